@@ -1,0 +1,120 @@
+"""What a stage is: a name, its settings, a way to fit it, and a pure function on a frame.
+
+A chain of stages is a pipeline. Recording, tables and report iterate over stages and layers and
+know none by name, so a new stage is one new file that defines a `Stage`, and its name in a
+configuration's ``chain``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import Layer, LayerSpec, Mask, Rgb
+
+S = TypeVar("S")
+"""Settings of a stage: a frozen, validated dataclass."""
+P = TypeVar("P")
+"""Parameters that a stage learns: a frozen dataclass of floats and arrays, or None."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """What a stage sees of a frame.
+
+    ``original`` is the image as logged, ``image`` the same after the filters that ran before
+    this stage, both ``(H, W, 3)`` uint8 RGB; ``mask`` is the previous stage's road mask.
+    """
+
+    original: Rgb
+    image: Rgb
+    mask: Mask | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Output:
+    """What a stage hands out.
+
+    ``image`` replaces the image for the stages after it; ``mask`` is its road mask (which is
+    also among its ``layers``, under the stage's name); ``regions`` are pixel sets to count
+    apart; ``facts`` are numbers about the frame.
+    """
+
+    layers: tuple[Layer, ...] = ()
+    image: Rgb | None = None
+    mask: Mask | None = None
+    regions: Mapping[str, Mask] = field(default_factory=dict)
+    facts: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrainingSet:
+    """Labelled pixels of some frames, as one variant's filters left them.
+
+    Parameters
+    ----------
+    images
+        The training frames, each ``(H, W, 3)`` uint8 RGB.
+    frame, row, column
+        ``(n,)`` integers: where each sampled pixel lies.
+    road
+        ``(n,)`` bool: its label.
+    seed
+        For whatever a fit draws at random.
+    """
+
+    images: tuple[Rgb, ...]
+    frame: npt.NDArray[np.intp]
+    row: npt.NDArray[np.intp]
+    column: npt.NDArray[np.intp]
+    road: npt.NDArray[np.bool_]
+    seed: int = 0
+
+    def colours(self) -> npt.NDArray[np.uint8]:
+        """``(n, 3)`` uint8 RGB of the sampled pixels."""
+        colours = np.empty((len(self.road), 3), np.uint8)
+        for index, image in enumerate(self.images):
+            here = self.frame == index
+            colours[here] = image[self.row[here], self.column[here]]
+        return colours
+
+
+@dataclass(frozen=True, slots=True)
+class Stage(Generic[S, P]):
+    """One step of a pipeline.
+
+    Parameters
+    ----------
+    name
+        Bears the mask's layer and the tables' ``stage`` column.
+    title
+        A few words for a person, as ``Phase 1: colour similarity``.
+    settings
+        The type of its settings; every field has a default.
+    bind
+        ``bind(settings, parameters)`` returns the pure function from `View` to `Output`. What
+        depends on settings and parameters alone (tables, structuring elements) is made here,
+        once.
+    layers
+        ``layers(settings)``: the layers it will hand out, in order.
+    fit
+        ``fit(training_set, settings)`` learns the parameters; None if there is nothing to learn.
+    parameters
+        The type of the parameters, for reading model files; None if there are none.
+    is_filter
+        Whether it only prepares the image. The ``unfiltered`` variant is the chain without its
+        filters.
+    """
+
+    name: str
+    title: str
+    settings: type[S]
+    bind: Callable[[S, Any], Callable[[View], Output]]
+    layers: Callable[[S], tuple[LayerSpec, ...]]
+    fit: Callable[[TrainingSet, S], P] | None = None
+    parameters: type[P] | None = None
+    is_filter: bool = False

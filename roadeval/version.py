@@ -1,0 +1,5 @@
+"""The version of the package, in a module of its own so that `--version` imports nothing else."""
+
+from typing import Final
+
+VERSION: Final = "0.1.0"
