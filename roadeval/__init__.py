@@ -1,5 +1,67 @@
-"""Logged-replay evaluation and visualisation of road recognition."""
+"""Logged-replay evaluation and visualisation of road recognition.
 
-from roadeval.version import VERSION as __version__
+For a notebook::
 
-__all__ = ["__version__"]
+    import roadeval
+
+    outcome = roadeval.replay("drive.mcap", save="out.rrd")
+    outcome.summary["totals"]["filtered"]["post"]["ERR"]
+
+    recording = roadeval.Recording("out.rrd")
+    recording.frames.groupby("variant").ERR.mean()
+    recording.layer("filtered", "ndi", frame=40)
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+from roadeval.version import VERSION
+
+if TYPE_CHECKING:
+    from roadeval.config import Config, load_config, preset
+    from roadeval.errors import RoadevalError
+    from roadeval.options import Outcome, Progress, ReplayOptions
+    from roadeval.recording import Recording
+    from roadeval.replay import replay, train
+    from roadeval.runner import run_frame
+    from roadeval.training import Model, load_model, save_model
+
+__version__ = VERSION
+
+__all__ = [
+    "Config",
+    "Model",
+    "Outcome",
+    "Progress",
+    "Recording",
+    "ReplayOptions",
+    "RoadevalError",
+    "load_config",
+    "load_model",
+    "preset",
+    "replay",
+    "run_frame",
+    "save_model",
+    "train",
+]
+
+_HOMES: Final = {
+    **dict.fromkeys(("Config", "load_config", "preset"), "config"),
+    **dict.fromkeys(("Outcome", "Progress", "ReplayOptions"), "options"),
+    **dict.fromkeys(("Model", "load_model", "save_model"), "training"),
+    **dict.fromkeys(("replay", "train"), "replay"),
+    "Recording": "recording",
+    "RoadevalError": "errors",
+    "run_frame": "runner",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used, so that importing the package costs nothing."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'roadeval' has no attribute {name!r}")
+    return getattr(import_module(f"roadeval.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

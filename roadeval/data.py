@@ -27,6 +27,9 @@ ROAD: Final = 1
 IGNORE: Final = 255
 
 CAMERA: Final = "camera"
+FILTERED: Final = "filtered"
+UNFILTERED: Final = "unfiltered"
+"""The names of the two variants that come by default: with the chain's filters, and without."""
 BASELINE: Final = "blind"
 """The variant name of the baseline that never looks at the image."""
 FINAL_STAGE: Final = "post"
@@ -251,12 +254,16 @@ class Counts:
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """The counts of one stage of one variant on one frame, whole and by region."""
+    """The counts of one stage of one variant on one frame, whole and by region.
+
+    ``rates`` are the fractions of Eq. 24-29 by name; an undefined one is NaN.
+    """
 
     variant: str
     stage: str
     counts: Counts
     regions: Mapping[str, Counts] = field(default_factory=dict)
+    rates: Mapping[str, float] = field(default_factory=dict)
 
 
 class Health(StrEnum):

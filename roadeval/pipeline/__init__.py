@@ -1,1 +1,1 @@
-"""."""
+"""The paper's pipeline: pure functions on arrays, one file a phase."""

@@ -1,1 +1,16 @@
-"""."""
+"""Rerun out and back in: nobody else knows Rerun."""
+
+from roadeval.recording.encoding import Encoded
+from roadeval.recording.layout import RESERVED, Layout, RecordingError
+from roadeval.recording.reading import Recording
+from roadeval.recording.recorder import NullRecorder, Recorder
+
+__all__ = [
+    "RESERVED",
+    "Encoded",
+    "Layout",
+    "NullRecorder",
+    "Recorder",
+    "Recording",
+    "RecordingError",
+]

@@ -1,1 +1,15 @@
-"""."""
+"""How the pipeline learns: which frames, which pixels, what is fitted, and the model file."""
+
+from roadeval.training.fitting import Plan, TrainingError, fit
+from roadeval.training.model import Model, load_model, save_model
+from roadeval.training.settings import TrainingSettings
+
+__all__ = [
+    "Model",
+    "Plan",
+    "TrainingError",
+    "TrainingSettings",
+    "fit",
+    "load_model",
+    "save_model",
+]

@@ -1,0 +1,111 @@
+"""The command line: which commands there are, and the one place where errors become words."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from roadeval.cli import demo, info, messages, replay, signals, train
+from roadeval.cli.exit_codes import ExitCode
+from roadeval.errors import RoadevalError
+
+app = typer.Typer(
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for _command in (replay.replay, info.info, train.train, demo.demo):
+    app.command()(_command)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from roadeval.cli import console
+        from roadeval.version import VERSION
+
+        console.emit(f"{messages.PROGRAM} {VERSION}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    context: typer.Context,
+    version: Annotated[
+        bool,
+        typer.Option("--version", is_eager=True, callback=_show_version, help="Show the version."),
+    ] = False,
+) -> None:
+    """Replay camera logs through a road-recognition pipeline; record and score every step."""
+    if context.invoked_subcommand is None:
+        context.get_help()
+        raise typer.Exit(ExitCode.USAGE)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Parameters
+    ----------
+    arguments
+        Words after the program's name; those of the process if None.
+    """
+    try:
+        with signals.raised():
+            code = app(args=arguments, prog_name=messages.PROGRAM, standalone_mode=False)
+            sys.stdout.flush()
+            return int(code or ExitCode.DONE)
+    except (Exception, SystemExit) as error:
+        return explain(error)
+
+
+def explain(error: Exception | SystemExit) -> int:
+    """Say in one line what ended the command and return the exit code for it.
+
+    With ``ROADEVAL_DEBUG=1`` in the environment the traceback stands above the line.
+    """
+    if os.environ.get("ROADEVAL_DEBUG") == "1":
+        traceback.print_exception(error)
+    match error:
+        case signals.Stopped():
+            messages.interrupted("; ".join(_notes(error)) or "nothing was written")
+            return error.exit_code
+        case typer.TyperException():
+            messages.error(f"{error.format_message()}{_where_help_is(error)}")
+            return error.exit_code
+        case RoadevalError():
+            messages.error("; ".join([str(error), *_notes(error)]))
+            return ExitCode.FAILED
+        case BrokenPipeError() | SystemExit(__context__=BrokenPipeError()):
+            _drop_stdout()
+            return ExitCode.BROKEN_PIPE
+        case OSError(strerror=str(reason)):
+            where = f": {error.filename}" if error.filename else ""
+            messages.error(f"{reason}{where}")
+            return ExitCode.FAILED
+        case _:
+            messages.error(
+                f"{type(error).__name__}: {error} (a defect of {messages.PROGRAM}, not of your "
+                "input: run again with ROADEVAL_DEBUG=1 to see where, and please report it)"
+            )
+            return ExitCode.DEFECT
+
+
+def _notes(error: BaseException) -> list[str]:
+    """Return what the rooms added to an error on its way out, as where a partial output lies."""
+    return getattr(error, "__notes__", [])
+
+
+def _where_help_is(error: typer.TyperException) -> str:
+    context = getattr(error, "ctx", None)
+    return f"; see '{context.command_path} --help'" if context else ""
+
+
+def _drop_stdout() -> None:
+    """Send what is still buffered nowhere: the interpreter flushes stdout as it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,28 @@
+"""The two streams: results on stdout, everything said to the person on stderr."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def diagnostics() -> Console:
+    """Return a console on stderr, for progress, warnings and errors."""
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False, markup=False, emoji=False)
+
+
+def results() -> Console:
+    """Return a console on stdout, for what the user asked for."""
+    from rich.console import Console
+
+    return Console(highlight=False, markup=False, emoji=False)
+
+
+def emit(text: str) -> None:
+    """Write a line to stdout as it is, however long: for machines, and for paths to copy."""
+    sys.stdout.write(f"{text}\n")

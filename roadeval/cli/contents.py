@@ -1,0 +1,101 @@
+"""What a log holds, as plain data and as a screen of text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from roadeval.errors import RoadevalError
+from roadeval.logs import Log, Selection, TopicInfo
+from roadeval.options import ReplayOptions
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+
+NS = 1_000_000_000
+
+
+def describe(log: Log, options: ReplayOptions) -> dict[str, Any]:
+    """Describe a log as plain data: times in nanoseconds, rates in hertz.
+
+    ``picks`` says what replay would pick and why, ``problem`` why it could not, or null.
+    """
+    picks: tuple[str, ...] = ()
+    problem = None
+    try:
+        picks = options.select(log).reasons
+    except RoadevalError as error:
+        problem = str(error)
+    return {
+        "path": str(log.path),
+        "start_ns": log.start_ns,
+        "end_ns": log.end_ns,
+        "topics": [asdict(topic) for topic in log.topics],
+        "damage": [str(damage) for damage in log.damage],
+        "picks": list(picks),
+        "problem": problem,
+    }
+
+
+def show(found: Mapping[str, Any], out: Console) -> None:
+    """Print what `describe` found."""
+    out.print(f"{found['path']}: {_extent(found)}", soft_wrap=True)
+    out.print()
+    out.print(_topics(found["topics"]))
+    for topic in found["topics"]:
+        if topic["problem"]:
+            out.print(f"{topic['name']} cannot be read: {topic['problem']}", soft_wrap=True)
+        for gap in topic["gaps"]:
+            out.print(f"{topic['name']}: {_gap(gap, found['start_ns'])}", soft_wrap=True)
+    out.print()
+    if found["problem"]:
+        out.print(f"replay would stop: {found['problem']}", soft_wrap=True)
+    else:
+        out.print("replay would pick")
+        for pick in found["picks"]:
+            out.print(f"  {pick}", soft_wrap=True)
+
+
+def _extent(found: Mapping[str, Any]) -> str:
+    start, end = found["start_ns"], found["end_ns"]
+    return f"{(end - start) / NS:.1f} s from {moment(start)}"
+
+
+def moment(ns: int) -> str:
+    """Write a log time for a person: the date where it is one, else seconds."""
+    if ns < 365 * 24 * 3600 * NS:
+        return f"{ns / NS:.3f} s"
+    at = datetime.fromtimestamp(ns // NS, UTC)
+    return f"{at:%Y-%m-%d %H:%M:%S}.{ns % NS // 1_000_000:03d} UTC"
+
+
+def _gap(gap: tuple[int, int], start: int) -> str:
+    before, after = gap
+    return f"gap of {(after - before) / NS:.2f} s, {(before - start) / NS:.2f} s after the start"
+
+
+def _topics(topics: list[dict[str, Any]]) -> RenderableType:
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    table.add_column("topic", overflow="fold")
+    table.add_column("carries", overflow="fold")
+    for name in ("size", "messages", "rate"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for topic in topics:
+        table.add_row(
+            topic["name"],
+            _carries(topic),
+            "x".join(str(side) for side in topic["size"] or ()),
+            str(topic["count"]),
+            f"{topic['rate_hz']:.4g} Hz" if topic["rate_hz"] else "",
+        )
+    return table
+
+
+def _carries(topic: Mapping[str, Any]) -> str:
+    what = topic["format"] or topic["schema"] or "no schema"
+    return f"{what} ({topic['encoding']})"

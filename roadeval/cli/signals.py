@@ -1,0 +1,41 @@
+"""SIGINT and SIGTERM become one exception that unwinds the work, so that it ends tidily."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Final, NoReturn
+
+from roadeval.cli.exit_codes import ExitCode
+
+EXIT_CODES: Final = {
+    signal.SIGINT: ExitCode.INTERRUPTED,
+    signal.SIGTERM: ExitCode.TERMINATED,
+}
+
+
+class Stopped(SystemExit):
+    """The user or the system asked us to stop; open outputs are closed on the way out."""
+
+    def __init__(self, exit_code: ExitCode) -> None:
+        super().__init__(int(exit_code))
+        self.exit_code = exit_code
+
+
+@contextmanager
+def raised() -> Iterator[None]:
+    """Turn the first SIGINT or SIGTERM into `Stopped`; a second one ends the process at once."""
+    before = {number: signal.signal(number, _stop) for number in EXIT_CODES}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _stop(number: int, _frame: FrameType | None) -> NoReturn:
+    for each in EXIT_CODES:
+        signal.signal(each, signal.SIG_DFL)
+    raise Stopped(EXIT_CODES[signal.Signals(number)])

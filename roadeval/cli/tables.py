@@ -1,0 +1,124 @@
+"""What a replay came to, on one screen of 80 columns: percent here, fractions in the files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, TypeGuard
+
+from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+RATES: Final = ("ERR", "pooled_ERR", "ACC", "FPR", "FNR")
+COMPARED: Final = ("ERR", "FPR", "FNR")
+
+Totals = Mapping[str, Mapping[str, Mapping[str, Any]]]
+"""Counts and rates by variant and stage, as ``totals`` in ``summary.json``."""
+
+
+def show_scores(summary: Mapping[str, Any], out: Console) -> None:
+    """Print how well each variant did after each stage, and what the filter changed."""
+    totals: Totals = summary["totals"]
+    if not totals:
+        out.print("Nothing to score: the log holds no truth for these frames.")
+        return
+    out.print(scores(totals))
+    out.print(best(totals))
+    final = summary["difference"].get(FINAL_STAGE, {})
+    for line in differences(final):
+        out.print(line)
+    out.print(f"Verdict: {summary['verdict']}")
+
+
+def scores(totals: Totals) -> Table:
+    """Tabulate the rates by variant and stage; the lowest ERR of a final mask is bold."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    table.add_column("variant")
+    table.add_column("stage")
+    for name in ("frames", "ERR", "pooled ERR", "ACC", "FPR", "FNR"):
+        table.add_column(name, justify="right")
+    winner = _lowest(totals)
+    for variant, stages in totals.items():
+        for place, (stage, total) in enumerate(stages.items()):
+            table.add_row(
+                "" if place else variant,
+                stage,
+                str(total["frames"]),
+                *(percent(total[name]) for name in RATES),
+                style="bold" if (variant, stage) == (winner, FINAL_STAGE) else None,
+                end_section=place == len(stages) - 1,
+            )
+    return table
+
+
+def best(totals: Totals) -> str:
+    """Name the variant whose final mask has the lowest mean ERR, the baseline not excepted."""
+    winner = _lowest(totals)
+    if winner is None:
+        return "ERR is defined on no frame."
+    aside = ", which never looks at the image" if winner == BASELINE else ""
+    return f"Lowest ERR: {winner}{aside}, {percent(totals[winner][FINAL_STAGE]['ERR'])}"
+
+
+def differences(final: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
+    """Say what the filter changed in the final mask: percentage points, and how sure."""
+    if not final:
+        return
+    yield f"{FILTERED} minus {UNFILTERED}, {FINAL_STAGE}:"
+    for rate in COMPARED:
+        if rate in final:
+            yield f"  {rate} {points(final[rate]['mean'])}  {_certainty(final[rate])}"
+
+
+def percent(fraction: float | None) -> str:
+    """Write a rate for a person; an undefined one as a dash."""
+    return f"{100 * fraction:.2f} %" if defined(fraction) else "-"
+
+
+def points(fraction: float | None) -> str:
+    """Write a difference of two rates in percentage points, with its sign."""
+    return f"{100 * fraction:+.2f} pp" if defined(fraction) else "-"
+
+
+def defined(fraction: float | None) -> TypeGuard[float]:
+    """Tell whether a rate or an end of an interval has a value."""
+    return fraction is not None and not math.isnan(fraction)
+
+
+def show_files(files: Sequence[Path], out: Console) -> None:
+    """List what was written, folder by folder; a folder's line may be longer than 80 columns."""
+    folders: dict[Path, list[str]] = {}
+    for file in files:
+        folders.setdefault(file.parent, []).append(f"{file.name} ({size(file)})")
+    for folder, names in folders.items():
+        out.print(f"{folder}/")
+        out.print(Padding(", ".join(names), (0, 0, 0, 2)))
+
+
+def size(file: Path) -> str:
+    """Write a file's size for a person."""
+    bytes_ = file.stat().st_size
+    return f"{bytes_ / 1e6:.1f} MB" if bytes_ >= 1e6 else f"{max(bytes_ / 1e3, 0.1):.1f} kB"
+
+
+def _certainty(difference: Mapping[str, Any]) -> str:
+    if not defined(difference["low"]):
+        return f"no interval: {difference['reason']}"
+    low, high = (points(difference[end]) for end in ("low", "high"))
+    return f"{100 * difference['confidence']:.0f} % interval {low} to {high}"
+
+
+def _lowest(totals: Totals) -> str | None:
+    errors = {
+        variant: stages[FINAL_STAGE]["ERR"]
+        for variant, stages in totals.items()
+        if defined(stages.get(FINAL_STAGE, {}).get("ERR"))
+    }
+    return min(errors, key=errors.__getitem__, default=None)

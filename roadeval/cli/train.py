@@ -1,0 +1,60 @@
+"""``roadeval train``: a model from drives with truth, for use on others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from roadeval.cli import console, messages, options, progress
+from roadeval.cli.exit_codes import ExitCode
+
+
+def train(
+    drives: Annotated[
+        list[Path], typer.Argument(metavar="DRIVE...", help="Camera logs (MCAP) with truth.")
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="MODEL", help="Where the model lands.")
+    ],
+    preset: options.Preset = None,
+    config: options.ConfigFile = None,
+    variant: options.Variants = None,
+    train_frames: options.TrainFrames = None,
+    image_topic: options.ImageTopic = None,
+    truth_topic: options.TruthTopic = None,
+    road_label: options.RoadLabels = None,
+    ignore_label: options.IgnoreLabels = None,
+    sync_tolerance: options.SyncTolerance = None,
+    start: options.Start = None,
+    end: options.End = None,
+    quiet: options.Quiet = False,
+) -> int:
+    """Train a model on labelled frames, spread evenly over each drive."""
+    from roadeval.cli import settings
+    from roadeval.replay import ReplayOptions
+    from roadeval.replay import train as run
+
+    chosen = ReplayOptions(
+        config=settings.configuration(preset, config),
+        variants=settings.variants(variant),
+        image_topic=image_topic,
+        truth_topic=truth_topic,
+        road_labels=tuple(road_label or ()),
+        ignore_labels=tuple(ignore_label or ()),
+        start=start,
+        end=end,
+        sync_tolerance_ms=sync_tolerance,
+        train_frames=train_frames,
+    )
+    with progress.watched(quiet) as watch:
+        model = run(drives, output, options=chosen, on_progress=watch)
+    for warning in model.warnings:
+        messages.warning(warning)
+    if not quiet:
+        console.emit(
+            f"{output}: {', '.join(model.parameters)}; trained on {len(model.digests)} frames, "
+            f"{model.pixels} pixels"
+        )
+    return ExitCode.DONE

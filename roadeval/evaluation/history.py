@@ -1,0 +1,80 @@
+"""Every evaluated frame's counts and rates, kept small: what sums and intervals are made of."""
+
+from __future__ import annotations
+
+from array import array
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import Counts, Tally
+from roadeval.evaluation import rates
+
+
+@dataclass(slots=True)
+class History:
+    """The results of one stage of one variant, frame by frame: 88 bytes a frame.
+
+    A mask that the log itself carries may be missing on some frames, so each row says which
+    evaluated frame it belongs to.
+    """
+
+    variant: str
+    stage: str
+    _positions: array[int] = field(default_factory=lambda: array("q"))
+    _counts: array[int] = field(default_factory=lambda: array("q"))
+    _rates: array[float] = field(default_factory=lambda: array("d"))
+
+    def append(self, position: int, tally: Tally) -> None:
+        """Add the tally of the evaluated frame number ``position``, counted from 0."""
+        counts = tally.counts
+        self._positions.append(position)
+        self._counts.extend((counts.tp, counts.tn, counts.fp, counts.fn))
+        self._rates.extend(tally.rates[name] for name in rates.RATES)
+
+    @property
+    def positions(self) -> npt.NDArray[np.int64]:
+        """``(n,)`` int64: places among the evaluated frames, rising."""
+        return np.array(self._positions, np.int64)
+
+    @property
+    def counts(self) -> npt.NDArray[np.int64]:
+        """``(n, 4)`` int64: TP, TN, FP, FN."""
+        return np.array(self._counts, np.int64).reshape(-1, 4)
+
+    @property
+    def rates(self) -> npt.NDArray[np.float64]:
+        """``(n, 6)`` float64: the rates in the order of `roadeval.evaluation.rates.RATES`."""
+        return np.array(self._rates, np.float64).reshape(-1, len(rates.RATES))
+
+    def totals(self) -> dict[str, Any]:
+        """Sum up the drive: counts, mean rates (the paper's), pooled rates, undefined ones.
+
+        A rate that is undefined on a frame is left out of its mean, and counted in ``undefined``.
+        """
+        pooled = Counts(*self.counts.sum(axis=0).tolist())
+        undefined = np.isnan(self.rates).sum(axis=0).tolist()
+        return {
+            "frames": len(self._positions),
+            **columns(pooled),
+            **means(self.rates),
+            **{f"pooled_{name}": value for name, value in rates.of(pooled).items()},
+            "undefined": dict(zip(rates.RATES, undefined, strict=True)),
+        }
+
+
+def columns(counts: Counts) -> dict[str, int]:
+    """Name the counts as the tables do: TP, TN, FP, FN, N."""
+    return {"TP": counts.tp, "TN": counts.tn, "FP": counts.fp, "FN": counts.fn, "N": counts.n}
+
+
+def means(table: npt.NDArray[np.float64]) -> dict[str, float]:
+    """Average the six rates over frames, ``(n, 6)``; NaN where a rate is defined on none."""
+    defined = ~np.isnan(table)
+    sums = np.where(defined, table, 0.0).sum(axis=0)
+    average = np.divide(
+        sums, defined.sum(axis=0), out=np.full(len(sums), np.nan), where=defined.any(axis=0)
+    )
+    return dict(zip(rates.RATES, average.tolist(), strict=True))

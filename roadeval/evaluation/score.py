@@ -1,0 +1,124 @@
+"""One frame against its truth: counts, rates, error maps, health, notes and table lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from roadeval.data import (
+    BASELINE,
+    FINAL_STAGE,
+    Counts,
+    Frame,
+    FrameResult,
+    Mask,
+    Role,
+    Tally,
+    Truth,
+    VariantResult,
+)
+from roadeval.evaluation import counts, health, rates, regions, tables
+from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.settings import EvaluationSettings
+
+Named = tuple[str, str, Mask]
+"""A road mask with its variant and stage."""
+
+
+class CountsNotConservedError(RuntimeError):
+    """The self-check failed: a defect of the program, not of the log."""
+
+
+def score_frame(
+    frame: Frame,
+    role: Role,
+    variants: tuple[VariantResult, ...],
+    settings: EvaluationSettings,
+    prior: BlindPrior | None,
+) -> FrameResult:
+    """Score one frame; one that is not `EVALUATED` is passed on without counts.
+
+    Parameters
+    ----------
+    frame
+        Must have a truth if its role is `EVALUATED`.
+    role
+        What the frame is used for.
+    variants
+        What each variant made of it. A variant's final mask is that of its last stage.
+    settings
+        What is counted, and how it is judged.
+    prior
+        The ``blind`` baseline, or None where no frame with truth was trained on.
+    """
+    if role is not Role.EVALUATED:
+        return FrameResult(frame, role, variants)
+    if frame.truth is None:
+        raise ValueError(f"frame {frame.number} is to be evaluated, but has no truth")
+    masks = _masks(variants, prior, frame.truth)
+    found = regions.of_frame(
+        frame, variants, boundary_width=settings.boundary_width, bands=settings.bands
+    )
+    tallies = tally(masks, frame.truth, found)
+    finals = {result.variant: result.rates for result in tallies}
+    blind = finals.pop(BASELINE, None)
+    final_masks = {variant: mask for variant, _, mask in masks if variant != BASELINE}
+    return FrameResult(
+        frame,
+        role,
+        variants,
+        errors={name: counts.error_map(own, frame.truth) for name, own in final_masks.items()},
+        tallies=tallies,
+        health={name: health.judge(own, blind, settings) for name, own in finals.items()},
+        notes=health.notes(finals, blind, settings),
+        tables={
+            "frames": tables.frame_lines(frame, tallies),
+            "regions": tables.region_lines(frame, tallies),
+        },
+    )
+
+
+def tally(masks: Sequence[Named], truth: Truth, found: Mapping[str, Mask]) -> tuple[Tally, ...]:
+    """Count named masks in the regions ``found``, and prove that no pixel was lost.
+
+    Raises
+    ------
+    CountsNotConservedError
+        If the counts of a mask do not add up to the labelled pixels, or its parts not to the
+        whole.
+    """
+    counted = counts.count([mask for _, _, mask in masks], truth, found)
+    labelled = counts.labelled_pixels(truth)
+    tallies = tuple(
+        Tally(variant, stage, result.whole, result.regions, rates.of(result.whole))
+        for (variant, stage, _), result in zip(masks, counted, strict=True)
+    )
+    for result in tallies:
+        prove(result, labelled)
+    return tallies
+
+
+def prove(result: Tally, labelled: int) -> None:
+    """Prove ``TP + TN + FP + FN = N = pixels - ignored``, and that the regions are parts of it.
+
+    The row bands together are the frame, and so are ``boundary`` and ``interior``; wherever a
+    tally has them, their counts must add up to the whole's.
+    """
+    whole, parts = result.counts, result.regions
+    bands = [part for name, part in parts.items() if name.startswith("band_")]
+    halves = [parts[name] for name in ("boundary", "interior") if name in parts]
+    sums = [sum(group, Counts()) for group in (bands, halves) if group]
+    negative = min(whole.tp, whole.tn, whole.fp, whole.fn) < 0
+    if whole.n != labelled or negative or any(total != whole for total in sums):
+        raise CountsNotConservedError(
+            f"{result.variant}/{result.stage}: {whole} in parts {sums} of {labelled} labelled "
+            "pixels: please report this as a defect of roadeval"
+        )
+
+
+def _masks(
+    variants: Sequence[VariantResult], prior: BlindPrior | None, truth: Truth
+) -> list[Named]:
+    named = [(v.variant, stage, mask) for v in variants for stage, mask in v.masks()]
+    if prior is not None:
+        named.append((BASELINE, FINAL_STAGE, prior.mask((truth.shape[0], truth.shape[1]))))
+    return named

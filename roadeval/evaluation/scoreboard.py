@@ -1,0 +1,161 @@
+"""The scoreboard of a drive: frames are scored one by one, added in order, and summed up."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import (
+    BASELINE,
+    FILTERED,
+    FINAL_STAGE,
+    UNFILTERED,
+    Frame,
+    FrameResult,
+    Role,
+    VariantResult,
+)
+from roadeval.evaluation import windows
+from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.history import History
+from roadeval.evaluation.rates import RATES
+from roadeval.evaluation.score import score_frame
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.uncertainty import Difference, mean_difference
+from roadeval.evaluation.verdict import NO_PAIR, NOTHING_SCORED, verdict
+
+COMPARED: Final = ("ACC", "ERR", "FNR", "FPR")
+"""The rates whose paired differences are given; TPR and TNR only mirror two of them."""
+
+
+class Scoreboard:
+    """Scores frames against their truth and sums up the drive.
+
+    Parameters
+    ----------
+    settings
+        What is counted, and how it is judged.
+    variants
+        The names of all variants, in the order of the tables.
+    prior
+        The ``blind`` baseline, or None where no frame with truth was trained on.
+    """
+
+    def __init__(
+        self, settings: EvaluationSettings, variants: Sequence[str], prior: BlindPrior | None
+    ) -> None:
+        if BASELINE in variants:
+            raise ValueError(f"no variant may be called {BASELINE!r}")
+        self._settings: Final = settings
+        self._order: Final = (*variants, BASELINE)
+        self._prior: Final = prior
+        self._frames: Final[list[int]] = []
+        self._roles: Final[Counter[str]] = Counter()
+        self._health: Final[defaultdict[str, Counter[str]]] = defaultdict(Counter)
+        self._histories: Final[dict[tuple[str, str], History]] = {}
+        self._seconds: Final[defaultdict[tuple[str, str], float]] = defaultdict(float)
+        self._runs: Final[Counter[tuple[str, str]]] = Counter()
+
+    def score(self, frame: Frame, role: Role, variants: tuple[VariantResult, ...]) -> FrameResult:
+        """Score one frame; changes nothing, so any thread may call it at any time."""
+        return score_frame(frame, role, variants, self._settings, self._prior)
+
+    def add(self, result: FrameResult) -> None:
+        """Add a scored frame: in the drive's order, from one thread."""
+        self._roles[result.role] += 1
+        for variant in result.variants:
+            for stage in variant.stages:
+                self._seconds[variant.variant, stage.stage] += stage.seconds
+                self._runs[variant.variant, stage.stage] += 1
+        if not result.tallies:
+            return
+        for name, health in result.health.items():
+            self._health[name][health] += 1
+        for tally in result.tallies:
+            history = self._histories.setdefault(
+                (tally.variant, tally.stage), History(tally.variant, tally.stage)
+            )
+            history.append(len(self._frames), tally)
+        self._frames.append(result.frame.number)
+
+    def roles(self) -> dict[str, int]:
+        """Count the frames added so far by role."""
+        return {str(role): count for role, count in self._roles.items()}
+
+    def totals(self) -> dict[str, dict[str, dict[str, Any]]]:
+        """Sum up by variant and stage: see `roadeval.evaluation.history.History.totals`."""
+        sums: dict[str, dict[str, dict[str, Any]]] = {}
+        for history in self._ordered():
+            sums.setdefault(history.variant, {})[history.stage] = history.totals()
+        return sums
+
+    def windows(self) -> list[windows.Window]:
+        """Cut the drive into windows: by window, then variant and stage."""
+        rows = [
+            row
+            for history in self._ordered()
+            for row in windows.rows(history, self._frames, self._settings.window)
+        ]
+        return sorted(rows, key=lambda row: row.number)
+
+    def differences(self) -> dict[str, dict[str, Difference]]:
+        """Give the paired difference, filtered minus unfiltered, by stage and rate.
+
+        Empty where one of the two variants is missing. Frames on which the rate is undefined for
+        either are left out.
+        """
+        return {
+            stage: {
+                rate: mean_difference(table[:, column], self._settings)
+                for column, rate in enumerate(RATES)
+                if rate in COMPARED
+            }
+            for stage, table in self._paired()
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """Give the parts of ``summary.json`` that the evaluation knows, fit for JSON."""
+        differences = self.differences()
+        return {
+            "verdict": self._verdict(differences),
+            "totals": self.totals(),
+            "difference": {
+                stage: {rate: asdict(difference) for rate, difference in by_rate.items()}
+                for stage, by_rate in differences.items()
+            },
+            "windows": -(-len(self._frames) // self._settings.window),
+            "health": {name: dict(counted) for name, counted in self._health.items()},
+            "seconds": self._mean_seconds(),
+        }
+
+    def _ordered(self) -> Iterator[History]:
+        """Yield the histories by variant in the tables' order, then by stage as they ran."""
+        return iter(sorted(self._histories.values(), key=lambda h: self._order.index(h.variant)))
+
+    def _paired(self) -> Iterator[tuple[str, npt.NDArray[np.float64]]]:
+        """Yield each stage of both default variants with ``(n, 6)`` differences of its rates."""
+        for (variant, stage), treated in self._histories.items():
+            control = self._histories.get((UNFILTERED, stage))
+            if variant == FILTERED and control is not None:
+                _, mine, theirs = np.intersect1d(
+                    treated.positions, control.positions, return_indices=True
+                )
+                yield stage, treated.rates[mine] - control.rates[theirs]
+
+    def _verdict(self, differences: Mapping[str, Mapping[str, Difference]]) -> str:
+        if not self._frames:
+            return NOTHING_SCORED
+        if FINAL_STAGE not in differences:
+            return NO_PAIR
+        return verdict(differences[FINAL_STAGE]["ERR"], "ERR", FINAL_STAGE)
+
+    def _mean_seconds(self) -> dict[str, dict[str, float]]:
+        mean: dict[str, dict[str, float]] = {}
+        for (variant, stage), total in self._seconds.items():
+            mean.setdefault(variant, {})[stage] = total / self._runs[variant, stage]
+        return mean

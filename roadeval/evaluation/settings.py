@@ -1,0 +1,58 @@
+"""Every choice of the evaluation that is not fixed by the paper, with its reason."""
+
+from typing import Annotated
+
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+
+@dataclass(frozen=True, config=ConfigDict(extra="forbid"))
+class EvaluationSettings:
+    """How results are counted, summed up and judged. Rates are fractions.
+
+    Parameters
+    ----------
+    window
+        Evaluated frames in a row of ``windows.csv``; the paper's is 10 (section 5).
+    boundary_width
+        Pixels on either side of the truth's edge that make up the region ``boundary``. Annotators
+        place an edge with a few pixels of freedom, so errors there mean less.
+    bands
+        Equal stripes of image rows, ``band_0`` at the top: how far away an error lies.
+    failed_err
+        A frame with at least this ERR has failed: a quarter of its pixels are wrong.
+    failed_fnr
+        A frame with at least this FNR has failed, however little road there is: next to nothing
+        of the road was found.
+    degraded_err
+        A frame with at least this ERR is degraded. The ``blind`` baseline makes about half of it
+        on an ordinary street.
+    degraded_margin
+        A frame whose ERR exceeds that of ``blind`` by more than this is degraded too: there, not
+        looking at the image would have been better.
+    noteworthy
+        The least change of ERR by the filter, or excess over ``blind``, that earns a note.
+    confidence
+        Of the interval around a difference.
+    effective_frames
+        No interval is given below this many effectively independent frames: there it would be
+        too short more often than its confidence admits (`roadeval.evaluation.uncertainty`).
+    resamples
+        Bootstrap repetitions; they shape the interval, while its width comes from the standard
+        error (`roadeval.evaluation.uncertainty`), so a thousand are plenty.
+    seed
+        Of the bootstrap, so that the same drive gives the same interval.
+    """
+
+    window: Annotated[int, Field(ge=1)] = 10
+    boundary_width: Annotated[int, Field(ge=1, le=100)] = 5
+    bands: Annotated[int, Field(ge=1, le=50)] = 5
+    failed_err: Annotated[float, Field(gt=0, le=1)] = 0.25
+    failed_fnr: Annotated[float, Field(gt=0, le=1)] = 0.9
+    degraded_err: Annotated[float, Field(gt=0, le=1)] = 0.15
+    degraded_margin: Annotated[float, Field(ge=0, le=1)] = 0.02
+    noteworthy: Annotated[float, Field(ge=0, le=1)] = 0.05
+    confidence: Annotated[float, Field(gt=0.5, lt=1)] = 0.95
+    effective_frames: Annotated[int, Field(ge=2)] = 10
+    resamples: Annotated[int, Field(ge=200, le=100_000)] = 2000
+    seed: Annotated[int, Field(ge=0)] = 0

@@ -1,0 +1,77 @@
+"""The tables' columns and lines. Numbers are written so that they read back the same.
+
+An undefined rate is an empty cell. No cell needs quoting: variant, stage and region names hold no
+comma.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Final
+
+from roadeval.data import Counts, Frame, Tally
+from roadeval.evaluation.rates import RATES
+from roadeval.evaluation.windows import Window
+
+COUNT_COLUMNS: Final = ("TP", "TN", "FP", "FN", "N")
+COLUMNS: Final[dict[str, tuple[str, ...]]] = {
+    "frames": ("frame", "stamp_ns", "log_time_ns", "variant", "stage", *COUNT_COLUMNS, *RATES),
+    "regions": ("frame", "variant", "stage", "region", *COUNT_COLUMNS),
+    "windows": (
+        *("window", "first_frame", "last_frame", "frames", "variant", "stage"),
+        *RATES,
+        *(f"pooled_{name}" for name in RATES),
+    ),
+}
+"""The columns of each table, by its name; the file is ``<name>.csv``."""
+
+
+def header(table: str) -> str:
+    """Give a table's first line."""
+    return _line(COLUMNS[table])
+
+
+def frame_lines(frame: Frame, tallies: Iterable[Tally]) -> str:
+    """Write a frame's lines of ``frames.csv``."""
+    times = (frame.number, frame.stamp_ns, frame.log_time_ns)
+    return "".join(
+        _line((*times, tally.variant, tally.stage, *_cells(tally.counts), *tally.rates.values()))
+        for tally in tallies
+    )
+
+
+def region_lines(frame: Frame, tallies: Iterable[Tally]) -> str:
+    """Write a frame's lines of ``regions.csv``."""
+    return "".join(
+        _line((frame.number, tally.variant, tally.stage, region, *_cells(counts)))
+        for tally in tallies
+        for region, counts in tally.regions.items()
+    )
+
+
+def window_lines(windows: Iterable[Window]) -> str:
+    """Write the lines of ``windows.csv``."""
+    return "".join(
+        _line(
+            (
+                *(row.number, row.first_frame, row.last_frame, row.frames, row.variant, row.stage),
+                *row.rates.values(),
+                *row.pooled.values(),
+            )
+        )
+        for row in windows
+    )
+
+
+def _cells(counts: Counts) -> tuple[int, ...]:
+    return counts.tp, counts.tn, counts.fp, counts.fn, counts.n
+
+
+def _line(cells: Iterable[str | int | float]) -> str:
+    return ",".join(map(_cell, cells)) + "\n"
+
+
+def _cell(value: str | int | float) -> str:
+    """Write a cell: the shortest decimal that reads back as the same number."""
+    return "" if isinstance(value, float) and math.isnan(value) else str(value)

@@ -1,0 +1,42 @@
+"""The answer in a sentence to whether the filter helps on this drive."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from roadeval.data import FILTERED, UNFILTERED
+from roadeval.evaluation.uncertainty import Difference
+
+NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
+NO_PAIR: Final = f"No verdict on a filter: {FILTERED} and {UNFILTERED} were not both run."
+
+
+def verdict(difference: Difference, rate: str, stage: str) -> str:
+    """Say what a difference, filtered minus unfiltered, of an error rate means.
+
+    Parameters
+    ----------
+    difference
+        Of a rate that is better when lower.
+    rate, stage
+        What it is the difference of, as ``ERR`` and ``post``.
+    """
+    what, mean = f"{rate} of {stage}", 100 * difference.mean
+    if difference.low is None or difference.high is None:
+        return (
+            f"Cannot tell whether the filter helps on this drive: {what} differs by {mean:+.1f} pp "
+            f"on average, but {difference.reason}."
+        )
+    if difference.low == difference.high == 0:
+        return f"On this drive the filter leaves {what} of every frame as it is."
+    low, high = 100 * difference.low, 100 * difference.high
+    if low > 0:
+        return f"On this drive the filter raises {what} by {mean:.1f} pp [{low:.1f}, {high:.1f}]."
+    if high < 0:
+        return (
+            f"On this drive the filter lowers {what} by {-mean:.1f} pp [{-high:.1f}, {-low:.1f}]."
+        )
+    return (
+        f"On this drive the filter has no clear effect on {what}: "
+        f"{mean:+.1f} pp [{low:+.1f}, {high:+.1f}]."
+    )

@@ -1,0 +1,42 @@
+"""Frames flow through worker threads, in order and bounded: never more than a few at once."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import Final, TypeVar
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+AHEAD: Final = 2
+"""Items begun beyond those being worked on, so that no worker waits for the consumer."""
+
+
+def ordered(work: Callable[[T], R], items: Iterable[T], jobs: int) -> Iterator[R]:
+    """Yield ``work(item)`` for every item, in the items' order, computed by ``jobs`` threads.
+
+    The items are drawn as results are taken, at most ``jobs + 2`` ahead (back-pressure: memory
+    does not grow with their number). The first exception, of ``work`` or of ``items``, is
+    raised in its place; what is in flight then is waited for, and nothing new is begun. So is
+    it when the caller stops early.
+    """
+    with _pool(jobs) as pool:
+        waiting: deque[Future[R]] = deque()
+        for item in items:
+            waiting.append(pool.submit(work, item))
+            if len(waiting) >= jobs + AHEAD:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+
+
+@contextmanager
+def _pool(jobs: int) -> Iterator[ThreadPoolExecutor]:
+    pool = ThreadPoolExecutor(jobs, thread_name_prefix="roadeval")
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)

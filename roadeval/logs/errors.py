@@ -1,0 +1,13 @@
+"""What can go wrong with a log, in one line each."""
+
+from __future__ import annotations
+
+from roadeval.errors import RoadevalError
+
+
+class LogError(RoadevalError):
+    """A log that cannot be used as asked: what, which file or topic, and what to do next."""
+
+
+class FrameError(RoadevalError):
+    """One frame that cannot be decoded. It costs that frame, never the run."""

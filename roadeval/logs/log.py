@@ -1,0 +1,178 @@
+"""A camera log: its topics, what to replay of it, and its frames."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+import numpy.typing as npt
+from mcap.records import Channel, Schema
+
+from roadeval.logs.container import Container, Damage
+from roadeval.logs.errors import LogError
+from roadeval.logs.files import files_of
+from roadeval.logs.frames import FrameStream
+from roadeval.logs.labels import LabelValues
+from roadeval.logs.messages import Kind, kind_of
+from roadeval.logs.selection import Asked, Selection, settle
+from roadeval.logs.span import NS, Span
+from roadeval.logs.topics import TopicInfo, describe, sources_by_topic
+from roadeval.logs.track import Track
+
+
+def open_log(path: str | Path, *, keep_corrupt: bool = False) -> Log:
+    """Open an MCAP file, or a rosbag2 folder of split files, as one log.
+
+    Parameters
+    ----------
+    path
+        File or folder.
+    keep_corrupt
+        Whether to use data whose checksum is wrong.
+
+    Raises
+    ------
+    LogError
+        If it is missing, unreadable, or no MCAP log.
+    """
+    path = Path(path)
+    return Log(path, files_of(path), keep_corrupt=keep_corrupt)
+
+
+class Log:
+    """An open log; close it, or use it in a ``with`` statement.
+
+    Attributes
+    ----------
+    path, name
+        Where it lies, and its name without folder and suffix.
+    topics
+        Every topic, by name.
+    damage
+        What could not be read.
+    start_ns, end_ns
+        Log times of the first and the last message of all topics; 0 in an empty log.
+    """
+
+    def __init__(self, path: Path, files: list[Path], *, keep_corrupt: bool = False) -> None:
+        self.path = path
+        self.name = path.stem if path.is_file() else path.resolve().name
+        self._files = files
+        self._containers = [Container(f, _is_image, keep_corrupt=keep_corrupt) for f in files]
+        sources = sources_by_topic(self._containers)
+        self._tracks = {name: Track(name, found) for name, found in sources.items()}
+        self.topics: tuple[TopicInfo, ...] = tuple(
+            describe(name, sources[name], self._tracks[name]) for name in sorted(sources)
+        )
+        starts = [topic.first_ns for topic in self.topics if topic.first_ns is not None]
+        ends = [topic.last_ns for topic in self.topics if topic.last_ns is not None]
+        self.start_ns = min(starts, default=0)
+        self.end_ns = max(ends, default=0)
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """What could not be read, in the order of the files."""
+        return tuple(damage for container in self._containers for damage in container.damage)
+
+    def sha256(self) -> str:
+        """SHA-256 of the file, or of the SHA-256 sums of a folder's files, in hexadecimal."""
+        digests = []
+        for path in self._files:
+            with path.open("rb") as file:
+                digests.append(hashlib.file_digest(file, "sha256").hexdigest())
+        if len(digests) == 1:
+            return digests[0]
+        return hashlib.sha256("".join(digests).encode()).hexdigest()
+
+    def select(
+        self,
+        *,
+        image: str | None = None,
+        truth: str | None = None,
+        shadow: str | None = None,
+        masks: Mapping[str, str] | None = None,
+        labels: LabelValues | None = None,
+        sync_tolerance_ns: int | None = None,
+        resize_truth: bool = False,
+    ) -> Selection:
+        """Settle what to replay.
+
+        Parameters
+        ----------
+        image, truth, shadow
+            Topics of the camera, the road truth and the true shadow. None picks what is plain;
+            an empty truth or shadow takes none.
+        masks
+            Topics of other systems' road masks, by a name for each.
+        labels
+            What the values of the truth mean.
+        sync_tolerance_ns
+            Largest difference of header stamps of an image and its label; half the frame
+            period by default.
+        resize_truth
+            Whether to scale label images of another size than the camera's.
+
+        Raises
+        ------
+        LogError
+            If a topic is missing or the choice is not plain, a label value does not occur or
+            cannot be understood, or a label image has another size.
+        """
+        asked = Asked(
+            image, truth, shadow, masks or {}, labels or LabelValues(), sync_tolerance_ns,
+            resize_truth,
+        )  # fmt: skip
+        try:
+            return settle(self.topics, self._tracks, asked)
+        except LogError as error:
+            raise LogError(f"{self.path.name}: {error}") from error
+
+    def frames(self, selection: Selection, span: Span | None = None) -> FrameStream:
+        """Read the selected frames, by log time; each call begins anew.
+
+        Raises
+        ------
+        LogError
+            If the span holds no frame.
+        """
+        span = span or Span()
+        times = self._tracks[selection.image.name].log_times
+        start = span.start.resolve(self.start_ns) if span.start else None
+        end = span.end.resolve(self.start_ns) if span.end else None
+        first = 0 if start is None else int(np.searchsorted(times, start))
+        last = len(times) if end is None else int(np.searchsorted(times, end))
+        if first >= last:
+            raise LogError(self._empty(times))
+        return FrameStream(self._tracks, selection, span, range(first, last))
+
+    def _empty(self, times: npt.NDArray[np.int64]) -> str:
+        if not len(times):
+            return f"{self.path.name}: the image topic holds no message"
+        begin, end = ((int(time) - self.start_ns) / NS for time in (times[0], times[-1]))
+        return (
+            f"{self.path.name}: no frame in this range; the images lie from {begin:.3f} to "
+            f"{end:.3f} seconds after the log's start ({times[0]} to {times[-1]} ns)"
+        )
+
+    def close(self) -> None:
+        """Close the log's files."""
+        for container in self._containers:
+            container.close()
+
+    def __enter__(self) -> Log:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _is_image(_: Channel, schema: Schema | None) -> bool:
+    return kind_of(schema) is not Kind.OTHER

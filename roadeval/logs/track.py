@@ -1,0 +1,121 @@
+"""One topic of a log as a row of messages in the order of their log times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.logs.container import Container
+from roadeval.logs.errors import FrameError
+from roadeval.logs.messages import BadMessage, Picture, Reader, reader_for
+from roadeval.logs.records import BadRecord, Message
+
+UNREAD = np.iinfo(np.int64).min
+"""A stamp not read yet."""
+UNREADABLE = UNREAD + 1
+"""A stamp that cannot be read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """The channel of one file that carries the topic there."""
+
+    container: Container
+    channel_id: int
+
+
+class Track:
+    """The messages of one topic, from all files and channels that carry it.
+
+    Reading is for one thread at a time.
+
+    Attributes
+    ----------
+    name
+        The topic.
+    log_times
+        ``(n,)`` int64 nanoseconds, ascending; equal ones in the order of the file.
+    """
+
+    def __init__(self, name: str, sources: Sequence[Source]) -> None:
+        self.name = name
+        self._sources = sources
+        self._readers: dict[int, Reader | BadMessage] = {}
+        rows = [np.empty((0, 4), np.int64)]
+        for number, source in enumerate(sources):
+            log = source.container.logs.get(source.channel_id)
+            for chunk, entries in log.blocks if log else ():
+                place = np.full((len(entries), 2), (number, chunk), np.int64)
+                rows.append(np.hstack([entries, place]))
+        table = np.concatenate(rows)
+        table = table[np.argsort(table[:, 0], kind="stable")]
+        self.log_times: npt.NDArray[np.int64] = np.ascontiguousarray(table[:, 0])
+        self._offsets = table[:, 1]
+        self._numbers = table[:, 2].astype(np.int16)
+        self._chunks = table[:, 3].astype(np.int32)
+        self._stamps = np.full(len(table), UNREAD, np.int64)
+
+    def __len__(self) -> int:
+        return len(self.log_times)
+
+    def message(self, position: int) -> Message:
+        """Read a message.
+
+        Raises
+        ------
+        FrameError
+            If it cannot be read, or is not the one that the index promised.
+        """
+        source = self._sources[self._numbers[position]]
+        chunk, offset = int(self._chunks[position]), int(self._offsets[position])
+        try:
+            message: Message = source.container.message(chunk, offset)
+        except BadRecord as error:
+            raise self._error(position, str(error)) from error
+        expected = (source.channel_id, int(self.log_times[position]))
+        if (message.channel_id, message.log_time) != expected:
+            raise self._error(position, "another message than the index says")
+        return message
+
+    def picture(self, position: int) -> Picture:
+        """Read the picture of a message.
+
+        Raises
+        ------
+        FrameError
+            If it cannot be read or decoded.
+        """
+        message = self.message(position)
+        try:
+            return self._reader(int(self._numbers[position]))(message.data)
+        except BadMessage as error:
+            raise self._error(position, str(error)) from error
+
+    def stamp(self, position: int) -> int:
+        """Header stamp of a message in nanoseconds, or `UNREADABLE`."""
+        if self._stamps[position] == UNREAD:
+            try:
+                self._stamps[position] = self.picture(position).stamp_ns
+            except FrameError:
+                self._stamps[position] = UNREADABLE
+        return int(self._stamps[position])
+
+    def _reader(self, number: int) -> Reader:
+        if number not in self._readers:
+            source = self._sources[number]
+            channel = source.container.channels[source.channel_id]
+            schema = source.container.schemas.get(channel.schema_id)
+            try:
+                self._readers[number] = reader_for(channel, schema)
+            except BadMessage as error:
+                self._readers[number] = error
+        reader = self._readers[number]
+        if isinstance(reader, BadMessage):
+            raise reader
+        return reader
+
+    def _error(self, position: int, reason: str) -> FrameError:
+        return FrameError(f"{self.name} message {position}: {reason}")

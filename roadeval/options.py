@@ -1,0 +1,129 @@
+"""What a run is asked for, what it tells meanwhile, and what it gives."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from roadeval import logs
+from roadeval.config import Config, Variant, override, variants_of
+from roadeval.errors import RoadevalError
+from roadeval.training import TrainingSettings
+
+
+class OptionError(RoadevalError):
+    """An option that cannot be followed."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayOptions:
+    """How a log is replayed; the defaults are those of ``roadeval replay``.
+
+    Parameters
+    ----------
+    config
+        The configuration of the variants ``filtered`` and ``unfiltered``.
+    variants
+        Further variants by name.
+    model
+        A model file; else the log itself trains one.
+    image_topic, truth_topic, shadow_topic
+        Topics, where the log leaves a choice.
+    road_labels, ignore_labels
+        Values of the truth that mean road, and that are counted nowhere.
+    start, end
+        Range by log time: seconds from the start, nanoseconds, or RFC 3339; the end is not in it.
+    every, max_frames
+        Read every so many frames, and at most so many.
+    sync_tolerance_ms
+        How far a truth's stamp may lie from its image's; half the frame period by default.
+    train_frames, train_gap
+        Override the configuration's ``training.frames`` and ``training.gap``.
+    jobs
+        Worker threads; as many as there are processors by default. Changes no number.
+    record
+        What is recorded: ``all``, or ``none``.
+    keep_corrupt
+        Keep messages whose checksum is wrong.
+    resize_truth
+        Bring a truth of another size to the image's, nearest pixel.
+    """
+
+    config: Config = field(default_factory=Config)
+    variants: Mapping[str, Config] = field(default_factory=dict)
+    model: Path | None = None
+    image_topic: str | None = None
+    truth_topic: str | None = None
+    shadow_topic: str | None = None
+    road_labels: tuple[int, ...] = ()
+    ignore_labels: tuple[int, ...] = ()
+    start: str | None = None
+    end: str | None = None
+    every: int = 1
+    max_frames: int | None = None
+    sync_tolerance_ms: float | None = None
+    train_frames: int | None = None
+    train_gap: int | None = None
+    jobs: int | None = None
+    record: str = "all"
+    keep_corrupt: bool = False
+    resize_truth: bool = False
+
+    def select(self, log: logs.Log) -> logs.Selection:
+        """Settle what of a log is replayed."""
+        tolerance = self.sync_tolerance_ms
+        return log.select(
+            image=self.image_topic,
+            truth=self.truth_topic,
+            shadow=self.shadow_topic,
+            labels=logs.LabelValues(self.road_labels, self.ignore_labels),
+            sync_tolerance_ns=None if tolerance is None else round(tolerance * 1e6),
+            resize_truth=self.resize_truth,
+        )
+
+    def span(self) -> logs.Span:
+        """Give the part of the log that is read."""
+        start = None if self.start is None else logs.parse_time(self.start)
+        end = None if self.end is None else logs.parse_time(self.end)
+        return logs.Span(start, end, self.every, self.max_frames)
+
+    def all_variants(self) -> tuple[Variant, ...]:
+        """Give every variant of the run: the two by default, then the extra ones."""
+        return variants_of(self.config, self.variants)
+
+    def training(self) -> TrainingSettings:
+        """Give the configuration's training settings with the options' own on top."""
+        given = {"frames": self.train_frames, "gap": self.train_gap}
+        wanted = {name: value for name, value in given.items() if value is not None}
+        settings: TrainingSettings = override(self.config.training, wanted, "--train-frames/-gap:")
+        return settings
+
+    def workers(self) -> int:
+        """Give the number of worker threads."""
+        if self.jobs is not None and self.jobs < 1:
+            raise OptionError(f"--jobs {self.jobs}: at least one worker is needed")
+        return self.jobs or os.cpu_count() or 1
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a run is: ``stage`` is ``training``, ``replaying`` or ``writing``."""
+
+    done: int
+    total: int | None
+    stage: str
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a run gave: where it stands, and the content of ``summary.json``."""
+
+    recording: Path | None
+    reports: Path | None
+    summary: dict[str, Any]
+    warnings: tuple[str, ...]
+    losses: tuple[str, ...]
+    files: tuple[Path, ...]

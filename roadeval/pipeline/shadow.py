@@ -1,0 +1,379 @@
+"""Phase 2, the shadow filter (section 3.2): NDI, Otsu, components, buffer rings, compensation.
+
+| equation | function |
+|---|---|
+| 6 | `ndi`, and `NDI_CODES`, the same as a table |
+| 7 | `otsu_threshold`, `printed_threshold` |
+| 8 | `shadow_mask` |
+| 9 | `connected_components` |
+| 10 | `buffer_ring`, counted per component in `plain.region_sums` |
+| 11 | `compensation`, `compensate` |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Final, Literal
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as validated
+
+from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb
+from roadeval.pipeline import colour
+from roadeval.pipeline.fast import KERNELS
+from roadeval.pipeline.stage import Output, Stage, View
+
+Floats = npt.NDArray[np.float64]
+Codes = npt.NDArray[np.uint8]
+Labels = npt.NDArray[np.int32]
+
+SHADOW_COLOUR: Final = (86, 180, 233, 160)
+RING_COLOUR: Final = (240, 228, 66, 220)
+
+NDI: Final = LayerSpec("ndi", LayerKind.SCALAR, "NDI (Eq. 6)", value_range=(-1.0, 1.0))
+SHADOW: Final = LayerSpec(
+    "shadow",
+    LayerKind.MASK,
+    "Shadow mask (Eq. 8)",
+    (LabelClass(0, "lit", (0, 0, 0, 0)), LabelClass(1, "shadow", SHADOW_COLOUR)),
+)
+RINGS: Final = LayerSpec(
+    "rings",
+    LayerKind.LABELS,
+    "Components and buffer rings (Eq. 9-10)",
+    (
+        LabelClass(0, "none", (0, 0, 0, 0)),
+        LabelClass(1, "shadow", SHADOW_COLOUR),
+        LabelClass(2, "ring", RING_COLOUR),
+    ),
+)
+COMPENSATED: Final = LayerSpec(
+    "compensated", LayerKind.RGB, "Compensated image (Eq. 11)", exact=False
+)
+
+
+@validated(frozen=True, config=ConfigDict(extra="forbid"))
+class ShadowSettings:
+    """Settings of the shadow filter.
+
+    Parameters
+    ----------
+    threshold
+        ``otsu``: the between-class variance of Otsu (1979); ``printed``: Eq. 7 with the
+        definitions printed beside it, which lands at the edge of the histogram.
+    inclusive
+        Whether the threshold's own code is shadow, as printed in Eq. 8. Otsu's upper class
+        begins above it.
+    connectivity
+        Neighbours that make one component (Eq. 9): 8 or 4.
+    ring_width
+        Number of 3x3 dilations that make a buffer ring (Eq. 10).
+    min_area
+        Components of fewer pixels are left as they are.
+    max_gain
+        Upper bound of the contrast gain of Eq. 11; none as printed. Gains above 3 are common.
+    statistic
+        ``deviation``: ``mu_ring + (I - mu) * sigma_ring / sigma``, which gives the component
+        its ring's mean and standard deviation; ``printed``: Eq. 11 literally, variances and
+        inverted.
+    colour_space
+        Where the compensation happens: ``rgb``, or ``hsi`` (S and V of Eq. 3-5, hue kept,
+        converted back as step 5 of section 4.2 says).
+    """
+
+    threshold: Literal["otsu", "printed"] = "otsu"
+    inclusive: bool = False
+    connectivity: Literal[4, 8] = 8
+    ring_width: Annotated[int, Field(ge=1, le=64)] = 1
+    min_area: Annotated[int, Field(ge=1)] = 1
+    max_gain: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+    statistic: Literal["deviation", "printed"] = "deviation"
+    colour_space: Literal["rgb", "hsi"] = "rgb"
+
+
+# --- Detection: Eq. 6-8 ---------------------------------------------------------------------------
+
+
+def ndi(saturation: Floats, value: Floats) -> Floats:
+    """Normalised difference index ``(S - V) / (S + V)`` in -1..1 (Eq. 6, section 3.2).
+
+    The printed ``S - V / S - V`` lacks its brackets and a sign. ``S + V`` is 0 for pure black
+    alone, which is -1 like every other grey, so that a rectified image's border is no shadow.
+    """
+    total = saturation + value
+    return np.where(total > 0, (saturation - value) / np.where(total > 0, total, 1.0), -1.0)
+
+
+def ndi_code(index: Floats) -> Codes:
+    """Quantise NDI in -1..1 to the codes 0..255, ``rint((NDI + 1) * 127.5)``, uint8."""
+    return np.rint((index + 1.0) * 127.5).astype(np.uint8)
+
+
+def _ndi_codes() -> Codes:
+    total = np.arange(3 * 255 + 1, dtype=np.float64)[:, None]
+    least = np.minimum(np.arange(256, dtype=np.float64)[None, :], np.floor(total / 3))
+    saturation = np.where(total > 0, 1.0 - 3.0 * least / np.maximum(total, 1), 0.0)
+    return ndi_code(ndi(saturation, np.broadcast_to(total / (3 * 255), saturation.shape)))
+
+
+NDI_CODES: Final = _ndi_codes()
+"""``(766, 256)`` uint8: the code of Eq. 6 by ``R + G + B`` and ``min(R, G, B)``, on which alone
+S, V and so NDI depend."""
+
+
+def otsu_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
+    """Otsu's threshold of a ``(256,)`` histogram (Eq. 7 as its source means it).
+
+    The lowest T that maximises ``(mu_T w(T) - mu(T))^2 / (w(T) (1 - w(T)))``, with the weight
+    ``w(T)`` and the first moment ``mu(T) = sum_{j<=T} j p_j`` of the lower class. The printed
+    text defines ``mu(T)`` as the upper class's weight. None with a single occupied code.
+    """
+    levels = np.arange(256)
+    lower, total = np.cumsum(histogram), histogram.sum()
+    moment = np.cumsum(histogram * levels)
+    # Numerators in integers: codes that no pixel has tie exactly, and the first maximum is meant.
+    difference = (moment[-1] * lower - moment * total).astype(np.float64)
+    weights = lower.astype(np.float64) * (total - lower)
+    if not weights.any():
+        return None
+    return int(np.argmax(np.where(weights > 0, difference**2 / np.maximum(weights, 1), -1.0)))
+
+
+def printed_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
+    """Eq. 7 with the definitions printed beside it, literally: ``mu(T) = sum_{j>T} p_j``.
+
+    ``(mu w(T) - mu(T))^2 / (w(T) mu(T))`` with ``mu`` the mean code; the first maximum over the
+    T where it is defined. None with a single occupied code.
+    """
+    p = histogram / histogram.sum()
+    weight = np.cumsum(histogram) / histogram.sum()
+    upper = 1.0 - weight
+    mean = (p * np.arange(256)).sum()
+    defined = (weight > 0) & (upper > 0)
+    if not defined.any():
+        return None
+    criterion = (mean * weight - upper) ** 2 / np.where(defined, weight * upper, 1.0)
+    return int(np.argmax(np.where(defined, criterion, -1.0)))
+
+
+def shadow_mask(codes: Codes, threshold: int | None, *, inclusive: bool) -> Mask:
+    """Eq. 8: ``(H, W)`` uint8, 1 where the code is above ``threshold`` (or equal to it)."""
+    if threshold is None:
+        return np.zeros(codes.shape, np.uint8)
+    return (codes >= threshold if inclusive else codes > threshold).astype(np.uint8)
+
+
+# --- Regions: Eq. 9-10 ----------------------------------------------------------------------------
+
+
+def connected_components(shadow: Mask, connectivity: int) -> tuple[Labels, int]:
+    """Eq. 9's fixed point for every seed: ``(H, W)`` int32 labels from 1, and their number."""
+    count, labels = cv2.connectedComponents(shadow, connectivity=connectivity, ltype=cv2.CV_32S)
+    return labels, count - 1
+
+
+def buffer_ring(shadow: Mask, width: int) -> Mask:
+    """Union of all buffer rings (Eq. 10): within ``width`` 3x3 dilations, and not shadow."""
+    square = np.ones((2 * width + 1, 2 * width + 1), np.uint8)
+    reached: Mask = cv2.dilate(shadow, square) & (1 - shadow)
+    return reached
+
+
+# --- Compensation: Eq. 11 -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moments:
+    """Pixels ``(count,)``, means and population standard deviations ``(count, C)`` by label."""
+
+    pixels: npt.NDArray[np.int64]
+    mean: Floats
+    deviation: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Compensation:
+    """The linear map of each component, ``target + (I - source) * gain``; ``(count, C)`` each.
+
+    ``applied`` is ``(count,)`` bool: the components that have a ring and the least area. The
+    others map to themselves.
+    """
+
+    source: Floats
+    target: Floats
+    gain: Floats
+    applied: npt.NDArray[np.bool_]
+
+
+def moments_of_sums(sums: npt.NDArray[np.int64]) -> Moments:
+    """Moments by label from `plain.region_sums`: the variance as ``(n Q - S^2) / n^2``.
+
+    The numerator is an exact integer for up to 11 million pixels a component, so a constant
+    component has a deviation of exactly 0.
+    """
+    n = np.maximum(sums[:, :1], 1)
+    variance = (n * sums[:, 4:] - sums[:, 1:4] ** 2) / n.astype(np.float64) ** 2
+    return Moments(sums[:, 0], sums[:, 1:4] / n, np.sqrt(variance))
+
+
+def moments_of_values(labels: npt.NDArray[np.integer], values: Floats, count: int) -> Moments:
+    """Moments by label of ``(n, C)`` values, in two passes; below 1e-9 a deviation is 0."""
+    pixels = np.bincount(labels, minlength=count)
+    n = np.maximum(pixels, 1)[:, None]
+
+    def mean(quantity: Floats) -> Floats:
+        columns = [np.bincount(labels, quantity[:, c], count) for c in range(quantity.shape[1])]
+        return np.stack(columns, axis=1) / n
+
+    centre = mean(values)
+    deviation = np.sqrt(mean((values - centre[labels]) ** 2))
+    return Moments(pixels, centre, np.where(deviation < 1e-9, 0.0, deviation))
+
+
+def compensation(inside: Moments, ring: Moments, settings: ShadowSettings) -> Compensation:
+    """Eq. 11 for every component, each channel apart.
+
+    ``deviation`` gives ``mu_ring + (I - mu) * sigma_ring / sigma`` (gain 1 where sigma is 0),
+    after which the component has its ring's mean and deviation. ``printed`` gives
+    ``mu_ring + (I - mu) / sigma_ring^2 * sigma^2`` (gain 1 where the ring's variance is 0),
+    which has the ratio upside down and flattens the region instead.
+    """
+    if settings.statistic == "deviation":
+        numerator, denominator = ring.deviation, inside.deviation
+    else:
+        numerator, denominator = inside.deviation**2, ring.deviation**2
+    gain = np.where(denominator > 0, numerator / np.where(denominator > 0, denominator, 1.0), 1.0)
+    if settings.max_gain is not None:
+        gain = np.minimum(gain, settings.max_gain)
+    applied = (ring.pixels > 0) & (inside.pixels >= settings.min_area)
+    applied[0] = False
+    here = applied[:, None]
+    return Compensation(
+        inside.mean,
+        np.where(here, ring.mean, inside.mean),
+        np.where(here, gain, 1.0),
+        applied,
+    )
+
+
+def compensate(
+    image: Rgb, labels: Labels, count: int, ring: Mask, settings: ShadowSettings
+) -> tuple[Rgb, Compensation]:
+    """Apply Eq. 11 to every component of an ``(H, W, 3)`` uint8 RGB image.
+
+    ``labels`` has ``count`` components from 1; ``ring`` is the union of their buffer rings.
+    """
+    labelled = count + 1
+    if settings.colour_space == "hsi":
+        return _compensate_hsi(image, labels, labelled, ring, settings)
+    sums = KERNELS.region_sums(image, labels, ring, labelled, settings.ring_width)
+    inside, around = (moments_of_sums(part) for part in sums)
+    change = compensation(inside, around, settings)
+    return KERNELS.transfer(image, labels, change.source, change.target, change.gain), change
+
+
+def _compensate_hsi(
+    image: Rgb, labels: Labels, count: int, ring: Mask, settings: ShadowSettings
+) -> tuple[Rgb, Compensation]:
+    """Compensate saturation and value, keep the hue, and convert back (section 4.2, step 5)."""
+    label, pixel = ring_pairs(labels, ring, settings.ring_width)
+    flat = image.reshape(-1, 3)
+    shadow = np.flatnonzero(labels)
+    k = labels.ravel()[shadow]
+    values = _saturation_value(flat[shadow])
+    inside = moments_of_values(k, values, count)
+    around = moments_of_values(label, _saturation_value(flat[pixel]), count)
+    change = compensation(inside, around, settings)
+    mapped = change.target[k] + (values - change.source[k]) * change.gain[k]
+    mapped = np.clip(mapped, 0.0, 1.0)
+    converted = colour.to_rgb(colour.hue(flat[shadow]), mapped[:, 0], mapped[:, 1])
+    result = flat.copy()
+    result[shadow] = np.where(change.applied[k][:, None], converted, flat[shadow])
+    return result.reshape(image.shape), change
+
+
+def _saturation_value(rgb: npt.NDArray[np.uint8]) -> Floats:
+    return np.stack([colour.saturation(rgb), colour.value(rgb)], axis=-1)
+
+
+def ring_pairs(
+    labels: Labels, ring: Mask, width: int
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Every ``(component, pixel)`` such that the pixel lies in the component's ring (Eq. 10).
+
+    Pixels are flat indices; a pixel near two components occurs with both.
+    """
+    y, x = np.nonzero(ring)
+    rows, columns = labels.shape
+    size = rows * columns
+    keys = []
+    for dy in range(-width, width + 1):
+        for dx in range(-width, width + 1):
+            v, u = y + dy, x + dx
+            valid = (v >= 0) & (v < rows) & (u >= 0) & (u < columns)
+            near = labels[v[valid], u[valid]].astype(np.int64)
+            keys.append((near * size + y[valid] * columns + x[valid])[near > 0])
+    unique = np.unique(np.concatenate(keys)) if keys else np.empty(0, np.int64)
+    return unique // size, unique % size
+
+
+# --- The stage ------------------------------------------------------------------------------------
+
+
+def bind(settings: ShadowSettings, _parameters: None) -> Callable[[View], Output]:
+    """Return the filter as a pure function of what it sees."""
+    threshold_of = otsu_threshold if settings.threshold == "otsu" else printed_threshold
+
+    def run(view: View) -> Output:
+        codes, histogram = KERNELS.look_up_sum_min(view.image, NDI_CODES)
+        threshold = threshold_of(histogram)
+        shadow = shadow_mask(codes, threshold, inclusive=settings.inclusive)
+        labels, count = connected_components(shadow, settings.connectivity)
+        ring = buffer_ring(shadow, settings.ring_width)
+        image, change = compensate(view.image, labels, count, ring, settings)
+        return Output(
+            layers=(
+                Layer(NDI, codes),
+                Layer(SHADOW, shadow),
+                Layer(RINGS, shadow + 2 * ring),
+                Layer(COMPENSATED, image),
+            ),
+            image=image,
+            regions={"shadow": shadow, "shadow_edge": ring, "lit": 1 - (shadow | ring)},
+            facts=_facts(threshold, shadow, count, change),
+        )
+
+    return run
+
+
+def _facts(
+    threshold: int | None, shadow: Mask, count: int, change: Compensation
+) -> dict[str, float]:
+    gains = change.gain[change.applied]
+    return {
+        "threshold": float("nan") if threshold is None else threshold / 127.5 - 1.0,
+        "shadow_share": float(shadow.mean()),
+        "components": float(count),
+        "compensated": float(change.applied.sum()),
+        "max_gain": float(gains.max()) if gains.size else 1.0,
+        "gains_above_3": float((gains.max(axis=1) > 3.0).sum()) if gains.size else 0.0,
+    }
+
+
+def layers(_settings: ShadowSettings) -> tuple[LayerSpec, ...]:
+    """Name the layers of the filter, in the order of the equations."""
+    return NDI, SHADOW, RINGS, COMPENSATED
+
+
+STAGE: Final[Stage[ShadowSettings, None]] = Stage(
+    name="shadow",
+    title="Phase 2: shadow filter",
+    settings=ShadowSettings,
+    bind=bind,
+    layers=layers,
+    is_filter=True,
+)

@@ -1,0 +1,99 @@
+"""Phase 1, colour similarity (section 3.1): Mahalanobis distance to the road's colour (Eq. 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Final
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as validated
+
+from roadeval.data import Layer, LayerKind, LayerSpec, mask_spec
+from roadeval.pipeline.fast import KERNELS
+from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
+
+SIMILARITY: Final = mask_spec("similarity", "Similar to road (Eq. 2)")
+
+
+@validated(frozen=True, config=ConfigDict(extra="forbid"))
+class SimilaritySettings:
+    """Settings of phase 1.
+
+    Parameters
+    ----------
+    quantile
+        A pixel is road where ``d^2`` is at most this quantile of the chi-squared distribution
+        with 3 degrees of freedom: the share of normally distributed road colours kept.
+    ridge
+        Added to the covariance's diagonal, in squared grey levels: a grey camera's covariance
+        is singular. 1 is about the variance that 8-bit JPEG coding alone adds.
+    """
+
+    quantile: Annotated[float, Field(gt=0, lt=1)] = 0.95
+    ridge: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoadColour:
+    """Mean ``(3,)`` and covariance ``(3, 3)`` of the road training set, RGB in 0..255."""
+
+    mean: npt.NDArray[np.float64]
+    covariance: npt.NDArray[np.float64]
+
+
+def fit(sample: TrainingSet, _settings: SimilaritySettings) -> RoadColour:
+    """Estimate m and S of Eq. 2 from the road pixels of the training set."""
+    road = sample.colours()[sample.road].astype(np.float64)
+    return RoadColour(road.mean(axis=0), np.cov(road, rowvar=False, ddof=0))
+
+
+def limit(quantile: float) -> float:
+    """Greatest ``d^2`` of a road pixel: ``chi2.ppf(quantile, 3)``."""
+    from scipy.stats import chi2
+
+    return float(chi2.ppf(quantile, 3))
+
+
+def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Output]:
+    """Return phase 1 as a pure function of what it sees.
+
+    ``d = sqrt((x - m)^T S^-1 (x - m))`` with S regularised. The printed Eq. 2 is no distance
+    (its brackets are misplaced).
+    """
+    precision = np.linalg.inv(road.covariance + settings.ridge * np.eye(3))
+    greatest = limit(settings.quantile)
+    spec = _distance(settings)
+
+    def run(view: View) -> Output:
+        squared = KERNELS.mahalanobis_squared(view.image, road.mean, precision)
+        mask = (squared <= greatest).astype(np.uint8)
+        distance = np.sqrt(squared, dtype=np.float32, casting="same_kind")
+        return Output((Layer(spec, distance), Layer(SIMILARITY, mask)), mask=mask)
+
+    return run
+
+
+def _distance(settings: SimilaritySettings) -> LayerSpec:
+    """Describe the distance map, shown from 0 to three times the limit."""
+    span = (0.0, 3.0 * limit(settings.quantile) ** 0.5)
+    title = "Mahalanobis distance to road (Eq. 2)"
+    return LayerSpec("distance", LayerKind.SCALAR, title, value_range=span, exact=False)
+
+
+def layers(settings: SimilaritySettings) -> tuple[LayerSpec, ...]:
+    """Name the layers of phase 1."""
+    return _distance(settings), SIMILARITY
+
+
+STAGE: Final = Stage(
+    name="similarity",
+    title="Phase 1: colour similarity",
+    settings=SimilaritySettings,
+    bind=bind,
+    layers=layers,
+    fit=fit,
+    parameters=RoadColour,
+)

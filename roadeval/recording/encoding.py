@@ -1,0 +1,93 @@
+"""A frame's result becomes payloads and plain numbers: pure, heavy, safe in any thread."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from roadeval.data import ERRORS, Frame, FrameResult, Health, Tally
+from roadeval.recording import layout as at
+from roadeval.recording.codecs import CAMERA_QUALITY, Codec, ImageCodec, codec
+from roadeval.recording.layout import Layout
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Encoded:
+    """A frame ready to be written; every mapping is by entity path, ``tables`` by name."""
+
+    number: int
+    stamp_ns: int
+    payloads: Mapping[str, bytes]
+    scalars: Mapping[str, float]
+    counts: Mapping[str, tuple[int, ...]]
+    states: Mapping[str, str]
+    notes: tuple[tuple[str, str], ...]
+    tables: Mapping[str, str]
+
+
+class Encoder:
+    """Encodes the frames of a recording with this layout."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.camera = ImageCodec(quality=CAMERA_QUALITY)
+        self.codecs: dict[str, Codec] = {
+            at.CAMERA: self.camera,
+            **{path: codec(spec, layout.width, layout.height) for path, spec in layout.images()},
+        }
+        self._rates = frozenset(layout.rates)
+
+    def __call__(self, result: FrameResult) -> Encoded:
+        """Encode one frame."""
+        level = "WARN" if set(result.health.values()) - {Health.OK} else "INFO"
+        return Encoded(
+            number=result.frame.number,
+            stamp_ns=result.frame.stamp_ns,
+            payloads={at.CAMERA: self._photo(result.frame), **dict(self._layers(result))},
+            scalars=dict(self._scalars(result)),
+            counts={at.scalar_path("counts", t.variant, t.stage): _row(t) for t in result.tallies},
+            states={
+                at.ROLE: result.role.value,
+                **{at.state_path(name): health.value for name, health in result.health.items()},
+            },
+            notes=tuple((note, level) for note in result.notes),
+            tables=result.tables,
+        )
+
+    def _photo(self, frame: Frame) -> bytes:
+        """The camera's own file where the log holds one, so that nothing is lost twice."""
+        if frame.media_type in ("image/jpeg", "image/png"):
+            return bytes(frame.payload)
+        return self.camera.encode(frame.image)
+
+    def _layers(self, result: FrameResult) -> Iterator[tuple[str, bytes]]:
+        for path, mask in (
+            (at.TRUTH_PATH, result.frame.truth),
+            (at.TRUE_SHADOW, result.frame.shadow_truth),
+        ):
+            if mask is not None:
+                yield path, self.codecs[path].encode(mask)
+        for variant in result.variants:
+            for layer in variant.layers():
+                path = at.layer_path(variant.variant, layer.spec.name)
+                yield path, self.codecs[path].encode(layer.array)
+        for name, layer in result.errors.items():
+            path = at.layer_path(name, ERRORS.name)
+            yield path, self.codecs[path].encode(layer.array)
+
+    def _scalars(self, result: FrameResult) -> Iterator[tuple[str, float]]:
+        for tally in result.tallies:
+            for rate, value in tally.rates.items():
+                if rate in self._rates and not math.isnan(value):
+                    yield at.scalar_path("metrics", tally.variant, tally.stage, rate), value
+        for variant in result.variants:
+            for stage in variant.stages:
+                where = variant.variant, stage.stage
+                yield at.scalar_path("timing", *where), stage.seconds * 1e3
+                for name, value in stage.facts.items():
+                    yield at.scalar_path("facts", *where, name), value
+
+
+def _row(tally: Tally) -> tuple[int, ...]:
+    counts = tally.counts
+    return counts.tp, counts.tn, counts.fp, counts.fn, counts.n

@@ -1,0 +1,3 @@
+"""."""
+def text(layout):
+    return f"# {layout.drive}"

@@ -1,0 +1,169 @@
+"""What a recording will hold, known before its first frame, and where each thing lies in it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Final
+
+from roadeval.data import (
+    ERRORS,
+    TRUTH,
+    LabelClass,
+    LayerKind,
+    LayerSpec,
+    VariantLayout,
+)
+from roadeval.errors import RoadevalError
+
+APPLICATION: Final = "roadeval"
+"""Name under which the files are known to the viewer, and by which our own are told."""
+FORMAT: Final = 1
+"""Version of the arrangement inside the file; raised when an older reader would go wrong."""
+
+FRAME: Final = "frame"
+STAMP: Final = "stamp"
+"""The two timelines: the frame's number, and its header stamp in nanoseconds."""
+
+CAMERA: Final = "/camera"
+TRUTH_PATH: Final = "/truth"
+TRUE_SHADOW: Final = "/true_shadow"
+NOTES: Final = "/notes"
+GUIDE: Final = "/results/guide"
+LAYOUT: Final = "/results/layout"
+OVERVIEW: Final = "overview"
+"""Name of the result that is a document for people."""
+PROPERTIES: Final = "/__properties/roadeval"
+"""Where the viewer and `rerun.RecordingStream.send_property` keep a recording's properties."""
+ROLE: Final = "/state/frame"
+RESERVED: Final = frozenset(
+    {
+        *("camera", "truth", "true_shadow", "metrics", "counts", "timing", "facts"),
+        *("state", "frame", "notes", "results"),
+    }
+)
+"""Names that no variant may bear, because the recording has another use for the path."""
+
+COUNTS: Final = ("TP", "TN", "FP", "FN", "N")
+"""The order of the five numbers under ``/counts``."""
+
+
+class RecordingError(RoadevalError):
+    """A recording cannot be written or read: one line that says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What is known about a recording before its first frame.
+
+    Parameters
+    ----------
+    drive
+        Name of the log, for titles.
+    width, height
+        Size of every image in pixels.
+    variants
+        The variants in the order in which they are shown, without the baseline.
+    rates
+        Names of the rates under ``/metrics``.
+    baseline
+        Whether tallies of the baseline come, too.
+    has_truth, has_shadow_truth
+        Whether any frame has a truth of the road, of shadow.
+    first_frame, last_frame
+        Where the viewer opens (the first evaluated frame) and the last frame, if known.
+    tables
+        Header line of each table whose lines come with the frames, by the table's name.
+    properties
+        Provenance: versions, settings, hashes.
+    """
+
+    drive: str
+    width: int
+    height: int
+    variants: tuple[VariantLayout, ...]
+    rates: tuple[str, ...] = ("ACC", "ERR", "TPR", "FNR", "TNR", "FPR")
+    baseline: bool = True
+    has_truth: bool = True
+    has_shadow_truth: bool = False
+    first_frame: int | None = None
+    last_frame: int | None = None
+    tables: Mapping[str, str] = field(default_factory=dict)
+    properties: Mapping[str, str | int | float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for variant in self.variants:
+            if variant.name in RESERVED:
+                raise RecordingError(
+                    f"a variant cannot be named {variant.name!r}: "
+                    "the recording uses that name itself; choose another"
+                )
+
+    def images(self) -> Iterator[tuple[str, LayerSpec]]:
+        """Yield the entity path and description of every layer, the truths and errors included."""
+        if self.has_truth:
+            yield TRUTH_PATH, TRUTH
+        if self.has_shadow_truth:
+            yield TRUE_SHADOW, SHADOW_TRUTH
+        for variant in self.variants:
+            for spec in variant.layers:
+                yield layer_path(variant.name, spec.name), spec
+            if self.has_truth:
+                yield layer_path(variant.name, ERRORS.name), ERRORS
+
+    def to_json(self) -> str:
+        """Write the layout as JSON, from which `from_json` makes an equal one."""
+        return json.dumps(asdict(self), sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> Layout:
+        """Read a layout that `to_json` wrote."""
+        raw = json.loads(text)
+        raw["variants"] = tuple(_variant(v) for v in raw["variants"])
+        raw["rates"] = tuple(raw["rates"])
+        return cls(**raw)
+
+
+SHADOW_TRUTH: Final = LayerSpec(
+    "true_shadow",
+    LayerKind.LABELS,
+    "True shadow",
+    (
+        LabelClass(0, "lit", (0, 0, 0, 0)),
+        LabelClass(1, "shadow", (86, 180, 233, 160)),
+        LabelClass(255, "ignored", (128, 128, 128, 160)),
+    ),
+)
+
+
+def layer_path(variant: str, layer: str) -> str:
+    """Entity path of a variant's layer."""
+    return f"/{variant}/{layer}"
+
+
+def scalar_path(kind: str, variant: str, stage: str, name: str = "") -> str:
+    """Entity path of numbers about a stage: ``kind`` is metrics, counts, timing or facts."""
+    return "/".join(("", kind, variant, stage, *([name] if name else [])))
+
+
+def state_path(variant: str) -> str:
+    """Entity path of a variant's lane of health."""
+    return f"/state/{variant}"
+
+
+def result_path(name: str) -> str:
+    """Entity path of a table or a document."""
+    return f"/results/{name}"
+
+
+def _variant(raw: dict[str, Any]) -> VariantLayout:
+    layers = tuple(_spec(layer) for layer in raw["layers"])
+    return VariantLayout(raw["name"], raw["title"], tuple(raw["stages"]), layers)
+
+
+def _spec(raw: dict[str, Any]) -> LayerSpec:
+    classes = tuple(LabelClass(c["value"], c["name"], tuple(c["rgba"])) for c in raw["classes"])
+    low, high = raw["value_range"]
+    kind = LayerKind(raw["kind"])
+    return LayerSpec(raw["name"], kind, raw["title"], classes, (low, high), raw["exact"])

@@ -1,0 +1,247 @@
+"""Rerun back in: tables, arrays and notes of a recording, whole or partial, without the log."""
+
+from __future__ import annotations
+
+import io
+import json
+import warnings
+from collections.abc import Iterator
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+from rerun.chunk import LazyChunkStream, LazyStore, RrdReader, StoreEntry
+
+from roadeval.data import VariantLayout
+from roadeval.recording import layout as at
+from roadeval.recording.codecs import Codec
+from roadeval.recording.encoding import Encoder
+from roadeval.recording.layout import Layout, RecordingError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_TEXT = "TextDocument:text"
+_CAMERA = "EncodedImage:blob"
+
+
+class Recording:
+    """A recording on disk.
+
+    A partial one, of a run that was interrupted or killed, is read as far as it goes: then
+    ``complete`` is False, and ``summary`` and ``windows`` may be empty.
+
+    Parameters
+    ----------
+    path
+        An ``.rrd`` file that `Recorder` wrote.
+
+    Raises
+    ------
+    RecordingError
+        If it is none.
+
+    Examples
+    --------
+    >>> recording = Recording("out.rrd")                                   # doctest: +SKIP
+    >>> recording.frames.query("stage == 'post'").ERR.mean()               # doctest: +SKIP
+    >>> mask = recording.layer("filtered", "post", frame=42)               # doctest: +SKIP
+    """
+
+    def __init__(self, path: str | PathLike[str]) -> None:
+        self.path = Path(path)
+        self._reader, self._entry = _open(self.path)
+        self._store = _store(self._reader, self._entry)
+        text = self._document(at.LAYOUT.rpartition("/")[2])
+        if text is None:
+            raise RecordingError(f"{self.path}: the recording ends before its first frame")
+        self.layout = Layout.from_json(text)
+        self._codecs: dict[str, Codec] = Encoder(self.layout).codecs
+        self._pages: dict[str, dict[int, Any]] = {}
+
+    # --- What it holds ---------------------------------------------------------------------------
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run reached its end."""
+        return self._store is not None and self.result("summary") is not None
+
+    @property
+    def variants(self) -> tuple[VariantLayout, ...]:
+        """The variants with their stages and layers; the baseline is none of them."""
+        return self.layout.variants
+
+    @cached_property
+    def frame_numbers(self) -> tuple[int, ...]:
+        """The frames whose images are there, in order."""
+        return tuple(frame for frame, _ in self._rows(at.CAMERA, _CAMERA))
+
+    @cached_property
+    def roles(self) -> dict[int, str]:
+        """What each frame was used for, see `roadeval.data.Role`."""
+        changes = dict(self._rows(at.ROLE, "StateChange:state"))
+        roles, role = {}, ""
+        for frame in self.frame_numbers:
+            role = roles[frame] = str(changes.get(frame, role))
+        return roles
+
+    # --- Results ---------------------------------------------------------------------------------
+
+    def result(self, name: str) -> str | None:
+        """Text of a result, as ``summary`` or ``windows``; None if the run did not get there."""
+        return self._document(name)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The content of ``summary.json``."""
+        return dict(json.loads(self.result("summary") or "{}"))
+
+    @cached_property
+    def frames(self) -> pd.DataFrame:
+        """The rows of ``frames.csv``."""
+        return self._table("frames")
+
+    @cached_property
+    def regions(self) -> pd.DataFrame:
+        """The rows of ``regions.csv``."""
+        return self._table("regions")
+
+    @cached_property
+    def windows(self) -> pd.DataFrame:
+        """The rows of ``windows.csv``."""
+        return _csv(self.result("windows") or "")
+
+    def scalars(self, path: str) -> pd.Series[float]:
+        """Numbers under an entity path, as ``/timing/filtered/svm``, by frame number."""
+        import pandas as pd
+
+        rows = dict(self._rows(path, "Scalars:scalars"))
+        return pd.Series(rows, name=path, dtype=float).rename_axis(at.FRAME)
+
+    def notes(self, frame: int) -> tuple[str, ...]:
+        """Say what there is to say about a frame."""
+        return self._notes.get(frame, ())
+
+    # --- Images ----------------------------------------------------------------------------------
+
+    def image(self, frame: int) -> npt.NDArray[np.uint8]:
+        """``(H, W, 3)`` uint8 RGB: the camera's image."""
+        return self._array(at.CAMERA, frame)
+
+    def truth(self, frame: int) -> npt.NDArray[np.uint8]:
+        """``(H, W)`` uint8: 0 non-road, 1 road, 255 ignored."""
+        return self._array(at.TRUTH_PATH, frame)
+
+    def layer(self, variant: str, name: str, frame: int) -> npt.NDArray[Any]:
+        """A layer of a variant on a frame.
+
+        Returns
+        -------
+        array
+            Masks and labels: ``(H, W)`` uint8, as the stage made them. Maps of numbers:
+            ``(H, W)`` float32 in their own unit. Images: ``(H, W, 3)`` uint8 RGB.
+
+        Raises
+        ------
+        RecordingError
+            If there is no such layer, or not on this frame.
+        """
+        return self._array(at.layer_path(variant, name), frame)
+
+    # --- How -------------------------------------------------------------------------------------
+
+    @cached_property
+    def _notes(self) -> dict[int, tuple[str, ...]]:
+        notes: dict[int, tuple[str, ...]] = {}
+        for frame, note in self._rows(at.NOTES, "TextLog:text"):
+            notes[frame] = (*notes.get(frame, ()), note)
+        return notes
+
+    def _array(self, path: str, frame: int) -> npt.NDArray[Any]:
+        if path not in self._codecs:
+            known = ", ".join(sorted(self._codecs))
+            raise RecordingError(f"{self.path}: there is no {path}; there are {known}")
+        codec = self._codecs[path]
+        page = self._pages.get(path, {})
+        if frame not in page:
+            page = self._pages[path] = self._page(path, codec.component, frame)
+        return codec.decode(page[frame])
+
+    def _page(self, path: str, component: str, frame: int) -> dict[int, bytes]:
+        """Rows of the chunk that holds this frame."""
+        for batch in self._batches(path, component, static=False):
+            frames = batch.column(at.FRAME).to_pylist()
+            if frame in frames:
+                blobs = batch.column(component).flatten()
+                return {f: blobs[i].values.to_numpy().tobytes() for i, f in enumerate(frames)}
+        raise RecordingError(f"{self.path}: {path} has nothing on frame {frame}")
+
+    def _table(self, name: str) -> pd.DataFrame:
+        lines = (lines for _, lines in self._rows(at.result_path(name), _TEXT))
+        header = self.layout.tables.get(name, "")
+        return _csv("".join((header, "\n", *lines)) if header else "")
+
+    def _rows(self, path: str, component: str) -> Iterator[tuple[int, Any]]:
+        for batch in self._batches(path, component, static=False):
+            values = batch.column(component).flatten()
+            yield from zip(batch.column(at.FRAME).to_pylist(), values.to_pylist(), strict=True)
+
+    def _document(self, name: str) -> str | None:
+        for batch in self._batches(at.result_path(name), _TEXT, static=True):
+            return str(batch.column(_TEXT).flatten()[0])
+        return None
+
+    def _batches(self, path: str, component: str, *, static: bool) -> Iterator[pa.RecordBatch]:
+        chunks = self._stream().filter(content=path, components=component, is_static=static)
+        for chunk in chunks:
+            yield chunk.to_record_batch()
+
+    def _stream(self) -> LazyChunkStream:
+        if self._store is not None:
+            return self._store.stream()
+        return self._reader.stream(store=self._entry)
+
+
+def _open(path: Path) -> tuple[RrdReader, StoreEntry]:
+    if not path.is_file():
+        raise RecordingError(f"{path}: no such recording")
+    try:
+        with warnings.catch_warnings():
+            # A partial recording has no index; that it is partial is told by `complete`.
+            warnings.simplefilter("ignore")
+            reader = RrdReader(path)
+            entries = reader.recordings()
+    except RuntimeError as error:
+        raise RecordingError(_reason(path)) from error
+    for entry in entries:
+        if entry.application_id == at.APPLICATION:
+            return reader, entry
+    made_by = entries[0].application_id if entries else "an unknown program"
+    raise RecordingError(f"{path}: a recording by {made_by}, not by {at.APPLICATION}")
+
+
+def _reason(path: Path) -> str:
+    with path.open("rb") as file:
+        if file.read(4) != b"RRF2":
+            return f"{path}: not a recording (.rrd)"
+    return (
+        f"{path}: the recording is torn; "
+        f"'rerun rrd optimize --continue-on-error {path} -o repaired.rrd' keeps what is whole"
+    )
+
+
+def _store(reader: RrdReader, entry: StoreEntry) -> LazyStore | None:
+    try:
+        return reader.store(store=entry)
+    except RuntimeError:
+        return None
+
+
+def _csv(text: str) -> pd.DataFrame:
+    import pandas as pd
+
+    return pd.read_csv(io.StringIO(text)) if text else pd.DataFrame()

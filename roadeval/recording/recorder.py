@@ -1,0 +1,196 @@
+"""Rerun out: frames become a recording that opens offline, in whatever state it was left."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+
+import rerun as rr
+from rerun.chunk import Chunk, RrdReader
+
+from roadeval.data import FrameResult
+from roadeval.recording import blueprint, style, tracks
+from roadeval.recording import layout as at
+from roadeval.recording.encoding import Encoded, Encoder
+from roadeval.recording.layout import Layout, RecordingError
+
+PAGE: Final = 8
+"""Frames whose images, notes and table lines share a chunk: what a killed run loses at most
+is the last page and the one still being written."""
+SERIES: Final = 64
+"""Frames whose numbers share a chunk."""
+
+
+class Recorder:
+    """Writes one recording, under the name ``partial`` until `finish`.
+
+    A context manager: left by an exception it closes the partial recording, which stays
+    readable.
+
+    Parameters
+    ----------
+    path
+        Where the complete recording will stand. A file there is replaced by `finish` only.
+    layout
+        What will come.
+    """
+
+    def __init__(self, path: Path, layout: Layout) -> None:
+        self.path = path
+        self.partial = path.with_name(f"{path.stem}.partial.rrd")
+        self._layout = layout
+        self._encoder = Encoder(layout)
+        self._pages, self._series = tracks.Tracks(), tracks.Tracks()
+        self._frames = self._chunks = 0
+        self._states: dict[str, str] = {}
+        self._shown: set[str] = set()
+        self._stream: rr.RecordingStream | None = None
+
+    def __enter__(self) -> Self:
+        """Open the partial file.
+
+        Raises
+        ------
+        RecordingError
+            If it cannot be written.
+        """
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self.partial.touch()
+        except OSError as error:
+            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
+        # The same input gives the same recording: its identity is its layout's, and the run's
+        # own clock does not appear in it.
+        identity = hashlib.blake2b(self._layout.to_json().encode(), digest_size=16).hexdigest()
+        stream = rr.RecordingStream(at.APPLICATION, recording_id=identity, send_properties=False)
+        stream.set_log_time_enabled(False)
+        stream.save(self.partial, default_blueprint=blueprint.arrange(self._layout))
+        stream.send_recording_name(self._layout.drive)
+        self._stream = stream
+        self._static(style.records(self._layout, self._encoder.codecs))
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._close()
+
+    def encode(self, result: FrameResult) -> Encoded:
+        """Encode a frame; the heavy part of the work, in any thread."""
+        return self._encoder(result)
+
+    def write(self, encoded: Encoded) -> None:
+        """Append a frame. Frames come in order, from one thread."""
+        self._add_images(encoded)
+        self._add_words(encoded)
+        when = encoded.number, encoded.stamp_ns
+        for path, number in encoded.scalars.items():
+            self._series.add(path, tracks.scalars, *when, number)
+        for path, numbers in encoded.counts.items():
+            self._series.add(path, tracks.counts, *when, numbers)
+        self._frames += 1
+        if self._frames % SERIES == 0:
+            self._send(self._series.take())
+        if self._frames % PAGE == 0:
+            # Wait for the last page, not for this one: the file is written meanwhile, and
+            # memory holds two pages at most.
+            self._open_stream().flush()
+            self._send(self._pages.take())
+
+    def finish(self, results: Mapping[str, str]) -> None:
+        """Add the results, close the file and give it its name.
+
+        Parameters
+        ----------
+        results
+            Texts to keep under ``/results``, by name: ``summary`` (JSON), ``windows`` (CSV
+            with its header), and for people ``overview`` (Markdown).
+
+        Raises
+        ------
+        RecordingError
+            If the file did not become what was written to it, as on a full disk.
+        """
+        self._static(style.results(results))
+        self._close()
+        self._check()
+        self.partial.replace(self.path)
+
+    def _add_images(self, encoded: Encoded) -> None:
+        when = encoded.number, encoded.stamp_ns
+        for path, payload in encoded.payloads.items():
+            columns = self._encoder.codecs[path].columns
+            self._pages.add(path, columns, *when, payload)
+        # The viewer goes on showing what it has; an image that this frame lacks must not stand.
+        for path in sorted(self._shown - encoded.payloads.keys()):
+            self._pages.add(path, tracks.clears, *when, None)
+        self._shown = set(encoded.payloads)
+
+    def _add_words(self, encoded: Encoded) -> None:
+        when = encoded.number, encoded.stamp_ns
+        for path, state in encoded.states.items():
+            if self._states.get(path) != state:
+                self._pages.add(path, tracks.states, *when, state)
+                self._states[path] = state
+        for note in encoded.notes:
+            self._pages.add(at.NOTES, tracks.notes, *when, note)
+        for name, lines in encoded.tables.items():
+            self._pages.add(at.result_path(name), tracks.texts, *when, lines)
+
+    def _static(self, records: Iterable[tuple[str, list[Any]]]) -> None:
+        stream = self._open_stream()
+        for path, archetypes in records:
+            stream.log(path, *archetypes, static=True, strict=True)
+
+    def _send(self, chunks: list[Chunk]) -> None:
+        self._open_stream().send_chunks(chunks)
+        self._chunks += len(chunks)
+
+    def _open_stream(self) -> rr.RecordingStream:
+        if self._stream is None:
+            raise RuntimeError("a recorder is used inside its 'with' block")
+        return self._stream
+
+    def _close(self) -> None:
+        if self._stream is None:
+            return
+        self._send(self._pages.take() + self._series.take())
+        self._stream.flush()
+        self._stream.disconnect()
+        self._stream = None
+
+    def _check(self) -> None:
+        """Compare the file's own index with what was sent: a full disk is told by nobody else."""
+        try:
+            complete = len(RrdReader(self.partial).store()) >= self._chunks
+        except (OSError, ValueError, RuntimeError):
+            complete = False
+        if not complete:
+            raise RecordingError(
+                f"{self.partial}: part of the recording is missing; is the disk full?"
+            )
+
+
+class NullRecorder:
+    """Does nothing, for a run without a recording."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Nothing is open."""
+
+    def encode(self, result: FrameResult) -> None:
+        """Encode nothing."""
+
+    def write(self, encoded: None) -> None:
+        """Write nothing."""
+
+    def finish(self, results: Mapping[str, str]) -> None:
+        """Keep nothing."""

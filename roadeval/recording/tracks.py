@@ -1,0 +1,98 @@
+"""Rows of one entity, gathered over frames and sent as one chunk.
+
+A chunk costs about 1.1 kB in the file, 0.5 kB of memory until the end (the file's index) and
+0.1 ms, so a chunk a frame and entity would cost more than most of what it holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import rerun as rr
+from rerun.chunk import Chunk
+
+from roadeval.recording.layout import COUNTS, FRAME, STAMP
+
+Columns = Callable[[list[Any]], Any]
+"""Makes the viewer's component columns of one value a row."""
+
+
+class Track:
+    """The pending rows of one entity."""
+
+    def __init__(self, path: str, columns: Columns) -> None:
+        self._path = path
+        self._columns = columns
+        self._frames: list[int] = []
+        self._stamps: list[int] = []
+        self._values: list[Any] = []
+
+    def add(self, frame: int, stamp_ns: int, value: Any) -> None:
+        """Append a row at this frame number and header stamp."""
+        self._frames.append(frame)
+        self._stamps.append(stamp_ns)
+        self._values.append(value)
+
+    def take(self) -> Chunk | None:
+        """Give away the pending rows as one chunk; None if there are none."""
+        if not self._frames:
+            return None
+        times = [
+            rr.TimeColumn(FRAME, sequence=self._frames),
+            rr.TimeColumn(STAMP, timestamp=np.array(self._stamps, "datetime64[ns]")),
+        ]
+        chunk = Chunk.from_columns(self._path, times, self._columns(self._values))
+        self._frames, self._stamps, self._values = [], [], []
+        return chunk
+
+
+class Tracks:
+    """Tracks that are sent together, made when their first row comes."""
+
+    def __init__(self) -> None:
+        self._tracks: dict[tuple[str, Columns], Track] = {}
+
+    def add(self, path: str, columns: Columns, frame: int, stamp_ns: int, value: Any) -> None:
+        """Append a row of this kind to the entity at ``path``."""
+        if (path, columns) not in self._tracks:
+            self._tracks[path, columns] = Track(path, columns)
+        self._tracks[path, columns].add(frame, stamp_ns, value)
+
+    def take(self) -> list[Chunk]:
+        """Give away all pending rows."""
+        chunks = (track.take() for track in self._tracks.values())
+        return [chunk for chunk in chunks if chunk is not None]
+
+
+def scalars(values: list[float]) -> Any:
+    """One number a row."""
+    return rr.Scalars.columns(scalars=values)
+
+
+def counts(values: list[tuple[int, ...]]) -> Any:
+    """The numbers of `layout.COUNTS` a row."""
+    flat = np.array(values, np.float64).ravel()
+    return rr.Scalars.columns(scalars=flat).partition([len(COUNTS)] * len(values))
+
+
+def states(values: list[str]) -> Any:
+    """A state that begins, a row."""
+    return rr.StateChange.columns(state=values)
+
+
+def texts(values: list[str]) -> Any:
+    """A document a row."""
+    return rr.TextDocument.columns(text=values)
+
+
+def notes(values: list[tuple[str, str]]) -> Any:
+    """A sentence and its level a row."""
+    sentences, levels = zip(*values, strict=True)
+    return rr.TextLog.columns(text=list(sentences), level=list(levels))
+
+
+def clears(values: list[None]) -> Any:
+    """An end of what was shown before, a row."""
+    return rr.Clear.columns(is_recursive=[False] * len(values))

@@ -1,0 +1,132 @@
+"""The main job: a log goes in; a recording, tables and figures come out."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from roadeval import learning, logs
+from roadeval.errors import RoadevalError
+from roadeval.evaluation.results import ResultsWriter, summary_text
+from roadeval.evaluation.tables import header, window_lines
+from roadeval.options import Outcome, Progress, ReplayOptions
+from roadeval.recording import NullRecorder, Recorder
+from roadeval.report.figures import write_figures
+from roadeval.run import Run
+from roadeval.training import Model, save_model
+
+__all__ = ["Outcome", "Progress", "ReplayOptions", "replay", "train"]
+
+
+def replay(
+    drive: str | Path,
+    *,
+    save: str | Path | None = None,
+    reports: str | Path | None = None,
+    options: ReplayOptions | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> Outcome:
+    """Replay a log through every variant; record, score and table every frame.
+
+    Parameters
+    ----------
+    drive
+        An MCAP file, or a rosbag2 folder of split files.
+    save
+        The recording; ``recordings/<drive>.rrd`` by default.
+    reports
+        The folder of tables and figures; ``reports/<drive>/`` by default.
+    options
+        Everything else.
+    on_progress
+        Called in the caller's thread after every frame.
+
+    Returns
+    -------
+    Outcome
+        What was written, and the summary.
+
+    Raises
+    ------
+    RoadevalError
+        For whatever a user can mend: one line that says what, where, and what to do.
+    """
+    options, tell = options or ReplayOptions(), on_progress or _silent
+    with logs.open_log(drive, keep_corrupt=options.keep_corrupt) as log:
+        run = Run(log, options, tell)
+        recorder = _recorder(Path(save or Path("recordings", f"{log.name}.rrd")), run, options)
+        folder = Path(reports or Path("reports", log.name))
+        with recorder, ResultsWriter(folder) as results:
+            for result, encoded in run.frames(recorder):
+                recorder.write(encoded)
+                results.append(result)
+            tell(Progress(run.done, run.total, "writing"))
+            windows, summary = run.board.windows(), run.summary()
+            recorder.finish(_texts(windows, summary))
+            files = results.finish(windows, summary)
+        files += write_figures(folder, log.name, windows, run.gallery.examples)
+        saved = None if isinstance(recorder, NullRecorder) else recorder.path
+        return Outcome(saved, folder, summary, run.warnings(), run.losses(), tuple(files))
+
+
+def train(
+    drives: Sequence[str | Path],
+    output: str | Path,
+    *,
+    options: ReplayOptions | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> Model:
+    """Train every variant on some drives, and write the model file.
+
+    From each drive ``training.frames`` labelled frames are taken, spread evenly over the
+    selected range.
+
+    Raises
+    ------
+    RoadevalError
+        If a drive has no truth, or there is nothing to learn.
+    """
+    options, tell = options or ReplayOptions(), on_progress or _silent
+    settings, frames = options.training(), []
+    total = settings.frames * len(drives)
+    for drive in drives:
+        with logs.open_log(drive, keep_corrupt=options.keep_corrupt) as log:
+            selection = options.select(log)
+            if selection.truth is None:
+                raise RoadevalError(f"{log.path}: no road truth to train on; see --truth-topic")
+            span = options.span()
+            for frame in learning.spread(partial(log.frames, selection, span), settings.frames):
+                frames.append(frame)
+                tell(Progress(len(frames), total, "training"))
+    plans = learning.plans_of(options.all_variants())
+    model = learning.train_on(frames, plans, settings)
+    save_model(model, Path(output))
+    return model
+
+
+def _recorder(path: Path, run: Run, options: ReplayOptions) -> Recorder | NullRecorder:
+    return NullRecorder() if options.record == "none" else Recorder(path, run.layout())
+
+
+def _texts(windows: Sequence[Any], summary: dict[str, Any]) -> dict[str, str]:
+    """Give the results as the recording keeps them: the files' own text."""
+    tables = {"windows": header("windows") + window_lines(windows)} if windows else {}
+    return {"summary": summary_text(summary), **tables}
+
+
+def _silent(_progress: Progress) -> None:
+    """Tell nobody."""
+
+
+class _Callable(ModuleType):
+    """Lets ``roadeval.replay(...)`` mean the function, although the module bears its name."""
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Outcome:
+        return replay(*args, **kwargs)
+
+
+sys.modules[__name__].__class__ = _Callable

@@ -1,0 +1,201 @@
+"""One run over one log: what was prepared for it, and the frames as they come out."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from typing import Any, Protocol
+
+from roadeval import learning, logs, provenance, runner
+from roadeval.config import Variant
+from roadeval.data import FrameResult, Role
+from roadeval.evaluation import tables
+from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.scoreboard import Scoreboard
+from roadeval.flow import ordered
+from roadeval.gallery import Gallery
+from roadeval.options import Progress, ReplayOptions
+from roadeval.recording import Layout
+from roadeval.training import Model
+
+Tell = Callable[[Progress], None]
+Processed = tuple[FrameResult, Any]
+"""A scored frame, and what the recorder made of it."""
+
+
+class Encoder(Protocol):
+    """Whatever turns a frame into what it will record, in any thread."""
+
+    def encode(self, result: FrameResult) -> Any:
+        """Encode a frame."""
+
+
+class Run:
+    """A log with its selection, its variants, what they have learnt, and the score so far.
+
+    Parameters
+    ----------
+    log
+        An open log.
+    options
+        What was asked for.
+    tell
+        Told how far the run is.
+
+    Raises
+    ------
+    RoadevalError
+        If the log, the options or the training leave nothing to run.
+    """
+
+    def __init__(self, log: logs.Log, options: ReplayOptions, tell: Tell) -> None:
+        self.log = log
+        self._options = options
+        self._tell = tell
+        self._jobs = options.workers()
+        self._variants: tuple[Variant, ...] = options.all_variants()
+        self._selection = options.select(log)
+        self._frames = log.frames(self._selection, options.span())
+        self.total = len(self._frames)
+        self.model, self._schedule = self._learn()
+        self._chains = runner.bind(self._variants, self.model)
+        prior = None if self.model.prior is None else BlindPrior(self.model.prior)
+        names = [variant.name for variant in self._variants]
+        self.board = Scoreboard(options.config.evaluation, names, prior)
+        self.gallery = Gallery(self.total)
+        self.done = 0
+
+    def _learn(self) -> tuple[Model, learning.Schedule]:
+        options, settings = self._options, self._options.training()
+        if options.model is not None:
+            return learning.from_file(options.model, self._variants)
+        labelled = self._selection.truth is not None and settings.source != "patch"
+        total = min(settings.frames, self.total)
+        return learning.from_log(
+            self.log.frames(self._selection, options.span()),
+            self._variants,
+            settings,
+            lambda done: self._tell(Progress(done, total, "training")),
+            labelled=labelled,
+        )
+
+    def layout(self) -> Layout:
+        """Describe the recording before its first frame."""
+        width, height = self._selection.image.size or (0, 0)
+        return Layout(
+            self.log.name,
+            width,
+            height,
+            tuple(variant.layout() for variant in self._variants),
+            baseline=self.model.prior is not None,
+            has_truth=self._selection.truth is not None,
+            has_shadow_truth=self._selection.shadow is not None,
+            first_frame=self._schedule.first,
+            tables={name: tables.header(name) for name in ("frames", "regions")},
+            properties=self._properties(),
+        )
+
+    def _properties(self) -> dict[str, str | int | float]:
+        return {
+            "version": provenance.versions()["roadeval"],
+            "drive": self.log.name,
+            "preset": self._options.config.preset,
+            "image_topic": self._selection.image.name,
+            "truth_topic": self._selection.truth.topic.name if self._selection.truth else "",
+            "trained_on": self.model.source,
+            "training_frames": len(self.model.digests),
+        }
+
+    def frames(self, recorder: Encoder) -> Iterator[Processed]:
+        """Yield every decodable frame in order, scored and encoded for the recorder.
+
+        Decoding, computing, scoring and encoding happen in the worker threads.
+        """
+
+        def work(frame: logs.LoggedFrame) -> Processed | None:
+            return self._process(frame, recorder)
+
+        for processed in ordered(work, self._frames, self._jobs):
+            self.done += 1
+            self._tell(Progress(self.done, self.total, "replaying"))
+            if processed is not None:
+                self.board.add(processed[0])
+                self.gallery.look(self.done, processed[0])
+                yield processed
+
+    def _process(self, logged: logs.LoggedFrame, recorder: Encoder) -> Processed | None:
+        try:
+            frame = logged.decode()
+        except logs.FrameError:
+            return None  # it stands in the log's accounting, with the reason
+        variants = tuple(
+            runner.run_variant(name, chain, frame.image) for name, chain in self._chains.items()
+        )
+        result = self.board.score(frame, self._schedule.role(frame), variants)
+        return result, recorder.encode(result)
+
+    def summary(self) -> dict[str, Any]:
+        """Give the content of ``summary.json``, but for its format."""
+        return self.board.summary() | {
+            "drive": self._drive(),
+            "frames": self._accounting(),
+            "training": self._training(),
+            "warnings": list(self.warnings()),
+            "losses": list(self.losses()),
+            "settings": provenance.settings(self._variants),
+            "versions": provenance.versions(),
+            "log": {"path": str(self.log.path), "sha256": self.log.sha256()},
+        }
+
+    def warnings(self) -> tuple[str, ...]:
+        """Say what a user should know before believing the results."""
+        unlabelled = (
+            ()
+            if self._selection.truth
+            else ("the log has no road truth: there is nothing to score, only masks to look at",)
+        )
+        return (*unlabelled, *self.model.warnings)
+
+    def losses(self) -> tuple[str, ...]:
+        """Say which parts of the log were lost."""
+        frames = self._frames.accounting.undecodable
+        return tuple(f"frame {number}: {reason}" for number, reason in sorted(frames.items()))
+
+    def _drive(self) -> dict[str, Any]:
+        width, height = self._selection.image.size or (0, 0)
+        return {
+            "name": self.log.name,
+            "width": width,
+            "height": height,
+            "rate_hz": self._selection.image.rate_hz,
+            "topics": list(self._selection.reasons),
+        }
+
+    def _accounting(self) -> dict[str, Any]:
+        """Account for every frame of the image topic: evaluated, or skipped and why."""
+        seen, roles = self._frames.accounting, Counter(self.board.roles())
+        skipped = {
+            "outside the range": seen.in_log - seen.in_range,
+            "not read (--every, --max-frames)": seen.in_range - seen.read,
+            "undecodable": len(seen.undecodable),
+            "trained on": roles[Role.TRAINING],
+            "gap after training": roles[Role.GAP],
+            "unlabelled": roles[Role.UNLABELLED],
+        }
+        return {
+            "in_log": seen.in_log,
+            "read": seen.read,
+            "decoded": seen.read - len(seen.undecodable),
+            "labelled": seen.labelled,
+            "trained_on": roles[Role.TRAINING],
+            "evaluated": roles[Role.EVALUATED],
+            "skipped": {reason: number for reason, number in skipped.items() if number},
+        }
+
+    def _training(self) -> dict[str, Any]:
+        return {
+            "source": self.model.source,
+            "frames": len(self.model.digests),
+            "pixels": self.model.pixels,
+            "model": None if self._options.model is None else str(self._options.model),
+        }

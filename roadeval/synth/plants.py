@@ -1,0 +1,196 @@
+"""Trees and bushes: clouds of leaves on branches, lit leaf by leaf and painted once each.
+
+The same leaves cast the shadow on the ground, so the sun's spots on the road are the gaps in
+the crown that one sees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+
+from roadeval.synth.camera import Matrix
+from roadeval.synth.light import Sun
+from roadeval.synth.noise import Field
+from roadeval.synth.panel import Picture
+from roadeval.synth.standing import Rod, Standing
+
+PIXELS_PER_METRE: Final = 44.0
+LEAF: Final = 0.075
+"""Radius of a painted cluster of leaves, metres."""
+SHADE_CELL: Final = 0.3
+"""Leaves within a column of this width stand in each other's light, metres."""
+BARK: Final = (0.115, 0.095, 0.075)
+
+
+@dataclass(frozen=True, slots=True)
+class Species:
+    """How a kind of plant grows: sizes in metres, colour as reflectance.
+
+    ``crown`` is the crown's height above its base (``stem``), ``spread`` its radius;
+    ``taper`` is 0 for a round crown and 1 for a cone.
+    """
+
+    stem: float
+    crown: float
+    spread: float
+    tufts: int
+    leaves: int
+    colour: tuple[float, float, float]
+    taper: float = 0.0
+
+
+OAK: Final = Species(2.6, 6.2, 3.5, 90, 13000, (0.075, 0.115, 0.028))
+PLANE: Final = Species(3.2, 7.0, 3.1, 80, 11000, (0.090, 0.125, 0.034))
+BIRCH: Final = Species(2.2, 6.5, 1.9, 55, 6500, (0.105, 0.135, 0.040), 0.45)
+SPRUCE: Final = Species(0.7, 8.5, 2.1, 85, 9000, (0.040, 0.068, 0.028), 0.95)
+BUSH: Final = Species(0.0, 1.5, 1.2, 40, 3000, (0.080, 0.112, 0.030))
+SHRUB: Final = Species(0.0, 1.0, 1.0, 30, 2200, (0.110, 0.120, 0.040))
+
+
+def grow(species: Species, sun: Sun, rng: np.random.Generator) -> Standing:
+    """Grow a plant and paint it in the light of ``sun``."""
+    tufts = _tufts(species, rng)
+    leaves = _leaves(species, tufts, rng)
+    branches = tuple(_branches(species, tufts, rng))
+    half_width = float(np.abs(leaves[:, 0]).max()) + 2 * LEAF
+    height = float(leaves[:, 1].max()) + 2 * LEAF
+    picture = _paint(species, leaves, branches, half_width, height, sun, rng)
+    return Standing(picture, half_width, height, leaves, branches)
+
+
+def _tufts(species: Species, rng: np.random.Generator) -> Matrix:
+    """``(n, 3)`` centres of the tufts that make up the crown, most of them near its surface."""
+    direction = rng.normal(size=(species.tufts, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    away = direction * rng.uniform(0.25, 1.0, (species.tufts, 1)) ** 0.5
+    level = away[:, 1] / 2 + 0.5
+    radius = species.spread * (1.0 - species.taper * level) * rng.uniform(0.8, 1.1, species.tufts)
+    height = species.stem + species.crown * (0.08 + 0.84 * level)
+    return np.stack([away[:, 0] * radius, height, away[:, 2] * radius], axis=1)
+
+
+def _leaves(species: Species, tufts: Matrix, rng: np.random.Generator) -> Matrix:
+    """``(n, 3)`` leaves: flattened clouds about the tufts, none below the ground."""
+    sizes = rng.gamma(3.0, 1.0, len(tufts))
+    tuft = rng.choice(len(tufts), species.leaves, p=sizes / sizes.sum())
+    radius = 0.17 * species.spread * (sizes[tuft] / 3.0) ** 0.4
+    leaves = tufts[tuft] + rng.normal(size=(species.leaves, 3)) * radius[:, None] * (1, 0.62, 1)
+    return np.asarray(leaves[leaves[:, 1] > 0.03])
+
+
+def _branches(
+    species: Species, tufts: Matrix, rng: np.random.Generator
+) -> Iterator[Rod]:
+    """Yield the trunk, then a branch from it to every third tuft."""
+    if species.stem == 0.0:
+        return
+    top = np.array([*rng.normal(0.0, 0.12, 2), species.stem + 0.75 * species.crown])[[0, 2, 1]]
+    knots = [np.zeros(3), 0.45 * top + (0.06, 0, 0), 0.75 * top, top]
+    for foot, tip, radius in zip(knots, knots[1:], (0.17, 0.12, 0.07), strict=False):
+        yield Rod(foot, tip, radius)
+    for tuft in tufts[::3]:
+        share = np.clip((0.75 * tuft[1] - 0.1) / top[1], 0.25, 0.95)
+        bend = share * top + 0.5 * (tuft - share * top) + (0.0, 0.25, 0.0)
+        yield Rod(share * top, bend, 0.05)
+        yield Rod(bend, tuft, 0.03)
+
+
+def light_left(points: Matrix, towards: Matrix, opacity: float) -> Field:
+    """Share of a distant light that leaves before a leaf let through to it.
+
+    Parameters
+    ----------
+    points
+        ``(n, 3)`` leaves.
+    towards
+        ``(3,)`` unit vector to the light.
+    opacity
+        Share of the light that a leaf takes from those behind it in the same column.
+
+    Returns
+    -------
+    ndarray
+        ``(n,)`` float32.
+    """
+    aside = np.cross(towards, (0.0, 0.0, 1.0) if abs(towards[2]) < 0.9 else (1.0, 0.0, 0.0))
+    aside /= np.linalg.norm(aside)
+    plane = np.stack([points @ aside, points @ np.cross(towards, aside)], axis=1)
+    cells = np.floor(plane / SHADE_CELL).astype(np.int64)
+    column = cells[:, 0] * 100_003 + cells[:, 1]
+    order = np.lexsort((-(points @ towards), column))
+    first = np.flatnonzero(np.diff(column[order], prepend=column[order[0]] - 1))
+    rank = np.arange(len(points)) - np.repeat(first, np.diff(first, append=len(points)))
+    left = np.empty(len(points), np.float32)
+    left[order] = (1.0 - opacity) ** rank
+    return left
+
+
+def _paint(
+    species: Species,
+    leaves: Matrix,
+    branches: Sequence[Rod],
+    half_width: float,
+    height: float,
+    sun: Sun,
+    rng: np.random.Generator,
+) -> Picture:
+    """Paint the far half of the leaves, then the wood, then the near half."""
+    size = (round(height * PIXELS_PER_METRE), round(2 * half_width * PIXELS_PER_METRE))
+    canvas = _Canvas(np.zeros((*size, 4), np.float32), np.zeros((*size, 4), np.float32), half_width)
+    middles = np.array([(b.foot + b.tip) / 2 for b in branches]).reshape(-1, 3)
+    everything = np.concatenate([leaves, middles])
+    visible = light_left(everything, sun.towards, 0.16)
+    sky = 0.25 + 0.75 * light_left(everything, np.array([0.0, 1.0, 0.0]), 0.10)
+    tint = np.array(species.colour) * np.exp(rng.normal(0.0, (0.20, 0.16, 0.2), (len(leaves), 3)))
+    turned = rng.uniform(0.35, 1.0, len(leaves))
+    shapes = rng.uniform((0.55, 0.3, 0), (1.2, 0.8, 180), (len(leaves), 3))
+    order = np.argsort(-leaves[:, 2])
+    far = int(np.count_nonzero(leaves[:, 2] > 0))
+    for i in order[:far]:
+        canvas.leaf(leaves[i], shapes[i], tint[i], visible[i], turned[i], sky[i])
+    for rod, seen, open_sky in zip(branches, visible[len(leaves):], sky[len(leaves):]):
+        canvas.wood(rod, float(seen), float(open_sky), sun)
+    for i in order[far:]:
+        canvas.leaf(leaves[i], shapes[i], tint[i], visible[i], turned[i], sky[i])
+    return Picture.of(canvas.sun, canvas.sky)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Canvas:
+    """The two images of a `Picture` while it is being painted."""
+
+    sun: Field
+    sky: Field
+    half_width: float
+
+    def pixel(self, point: Matrix) -> tuple[int, int]:
+        """Column and row of a ``(3,)`` point."""
+        column = (point[0] + self.half_width) * PIXELS_PER_METRE
+        return round(column), round(self.sun.shape[0] - point[1] * PIXELS_PER_METRE)
+
+    def leaf(
+        self, at: Matrix, shape: Matrix, tint: Matrix, visible: float, turned: float, sky: float
+    ) -> None:
+        """Paint one cluster: ``shape`` is two radii in units of `LEAF` and an angle, degrees."""
+        centre = self.pixel(at)
+        radii = (shape[:2] * LEAF * PIXELS_PER_METRE).round().astype(int).clip(1).tolist()
+        by_sun, by_sky = (tint * (visible * turned)).tolist(), (tint * sky).tolist()
+        cv2.ellipse(self.sun, centre, radii, shape[2], 0, 360, (*by_sun, 1.0), -1)
+        cv2.ellipse(self.sky, centre, radii, shape[2], 0, 360, (*by_sky, float(visible)), -1)
+
+    def wood(self, rod: Rod, visible: float, sky: float, sun: Sun) -> None:
+        """Paint a rod as strips, brighter on the side of the sun."""
+        across = np.array([1.0, 0.0, 0.0])
+        for side in (-0.6, 0.0, 0.6):
+            normal = np.array([side, 0.0, -np.sqrt(1 - side**2)])
+            direct = visible * sun.facing(normal)
+            ends = [self.pixel(p + side * rod.radius * across) for p in (rod.foot, rod.tip)]
+            width = max(1, round(0.9 * rod.radius * PIXELS_PER_METRE))
+            lit, shaded = (np.array(BARK) * direct).tolist(), (np.array(BARK) * sky * 0.7).tolist()
+            cv2.line(self.sun, *ends, (*lit, 1.0), width)
+            cv2.line(self.sky, *ends, (*shaded, visible * (direct > 0)), width)

@@ -1,0 +1,136 @@
+"""Fitting every variant on its own images of the same frames and pixels."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import Frame, Rgb, Truth
+from roadeval.errors import RoadevalError
+from roadeval.pipeline.chain import STAGES, Chain
+from roadeval.pipeline.stage import TrainingSet
+from roadeval.training.model import Model
+from roadeval.training.sampling import Pixels, sample
+from roadeval.training.selfsupervision import patch_truth
+from roadeval.training.settings import TrainingSettings
+
+COLLAPSED: Final = 0.001
+"""A classifier that calls less than this share of its training frames road, or more than the
+rest of it, has collapsed."""
+
+
+class TrainingError(RoadevalError):
+    """Frames that nothing can be learnt from, and why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What a variant's chain is, as training needs to know it: stages and their settings."""
+
+    chain: tuple[str, ...]
+    settings: Mapping[str, Any]
+
+    def relevant(self) -> dict[str, Any]:
+        """Give the settings that what is learnt depends on: of filters and learning stages."""
+        names = [n for n in self.chain if STAGES[n].is_filter or STAGES[n].fit is not None]
+        return {name: dataclasses.asdict(self.settings[name]) for name in names}
+
+
+def fit(
+    frames: Sequence[Frame],
+    plans: Mapping[str, Plan],
+    settings: TrainingSettings,
+    prior: npt.NDArray[np.float32] | None = None,
+) -> Model:
+    """Train every variant.
+
+    Parameters
+    ----------
+    frames
+        The training frames; with truth, unless ``settings.source`` allows the patch.
+    plans
+        The variants to train, by name.
+    settings
+        Sampling, and where the labels come from.
+    prior
+        Kept in the model for the baseline, see `Model`.
+
+    Raises
+    ------
+    TrainingError
+        If there is no frame, or if the frames show road alone or no road at all.
+    """
+    source, truths = _truths(frames, settings)
+    pixels = sample(truths, settings)
+    if not len(pixels.road):
+        numbers = f"{frames[0].number} to {frames[-1].number}"
+        raise TrainingError(
+            f"frames {numbers} show only one class, so nothing can be learnt from them; "
+            "choose other frames with --start or --train-frames, or give --model"
+        )
+    images = tuple(frame.image for frame in frames)
+    parameters, warnings = {}, []
+    for name, plan in plans.items():
+        parameters[name] = _fit_variant(images, pixels, plan, settings.seed)
+        warnings += _collapsed(name, images, plan, parameters[name])
+    return Model(
+        parameters,
+        {name: plan.relevant() for name, plan in plans.items()},
+        source,
+        frozenset(frame.digest() for frame in frames),
+        len(pixels.road),
+        prior,
+        tuple(warnings),
+    )
+
+
+def _truths(frames: Sequence[Frame], settings: TrainingSettings) -> tuple[str, list[Truth]]:
+    if not frames:
+        raise TrainingError("there is no frame to train on in the selected range")
+    labelled = [frame.truth for frame in frames if frame.truth is not None]
+    if settings.source != "patch" and len(labelled) == len(frames):
+        return "truth", labelled
+    if settings.source == "truth":
+        raise TrainingError(
+            "there is no truth to train on: name its topic with --truth-topic, give --model, "
+            'or allow training.source = "patch"'
+        )
+    return "patch", [patch_truth(frame.image, settings) for frame in frames]
+
+
+def _fit_variant(images: tuple[Rgb, ...], pixels: Pixels, plan: Plan, seed: int) -> dict[str, Any]:
+    """Fit the stages in order; what follows a filter learns from the images it leaves."""
+    parameters: dict[str, Any] = {}
+    for name in plan.chain:
+        stage = STAGES[name]
+        if stage.fit is not None:
+            training_set = TrainingSet(
+                images, pixels.frame, pixels.row, pixels.column, pixels.road, seed
+            )
+            parameters[name] = stage.fit(training_set, plan.settings[name])
+        if stage.is_filter:
+            filter_alone = Chain((name,), plan.settings, parameters)
+            images = tuple(filter_alone.filtered(image) for image in images)
+    return parameters
+
+
+def _collapsed(
+    variant: str, images: Sequence[Rgb], plan: Plan, parameters: Mapping[str, Any]
+) -> list[str]:
+    """Say which stages call everything, or nothing, road on the frames they learnt from."""
+    chain = Chain(plan.chain, plan.settings, parameters)
+    shares: dict[str, list[float]] = {}
+    for image in images:
+        for name, output in chain.run(image):
+            if output.mask is not None:
+                shares.setdefault(name, []).append(float(output.mask.mean()))
+    return [
+        f"{variant}: {name} has collapsed: it calls {share:.1%} of its own training frames road"
+        for name, share in ((name, float(np.mean(values))) for name, values in shares.items())
+        if not COLLAPSED <= share <= 1 - COLLAPSED
+    ]

@@ -1,0 +1,94 @@
+"""Small logs for the tests, written by the MCAP project's own writers."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from mcap_ros2.writer import Writer as Ros2Writer
+
+SECOND = 1_000_000_000
+
+HEADER = """std_msgs/Header header
+{fields}
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+IMAGE = HEADER.format(
+    fields="uint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\n"
+    "uint8[] data"
+)
+COMPRESSED = HEADER.format(fields="string format\nuint8[] data")
+
+
+def grey(level: int, width: int = 8, height: int = 6) -> npt.NDArray[np.uint8]:
+    """A plain image."""
+    return np.full((height, width), level, np.uint8)
+
+
+def jpeg(image: npt.NDArray[np.uint8]) -> bytes:
+    return cv2.imencode(".jpg", image)[1].tobytes()
+
+
+def png(image: npt.NDArray[np.uint8]) -> bytes:
+    return cv2.imencode(".png", image)[1].tobytes()
+
+
+def header(stamp_ns: int) -> dict[str, Any]:
+    stamp = {"sec": stamp_ns // SECOND, "nanosec": stamp_ns % SECOND}
+    return {"stamp": stamp, "frame_id": "camera"}
+
+
+def raw(stamp_ns: int, pixels: npt.NDArray[Any], encoding: str, **changed: Any) -> dict[str, Any]:
+    """A ``sensor_msgs/msg/Image``."""
+    return {
+        "header": header(stamp_ns),
+        "height": pixels.shape[0],
+        "width": pixels.shape[1],
+        "encoding": encoding,
+        "is_bigendian": 0,
+        "step": pixels.strides[0],
+        "data": pixels.tobytes(),
+    } | changed
+
+
+def compressed(stamp_ns: int, data: bytes, name: str = "jpeg") -> dict[str, Any]:
+    """A ``sensor_msgs/msg/CompressedImage``."""
+    return {"header": header(stamp_ns), "format": name, "data": data}
+
+
+def ros2_log(
+    path: Path, messages: Iterable[tuple[str, int, dict[str, Any]]], **options: Any
+) -> Path:
+    """Write (topic, log time, message) in the order given."""
+    with path.open("wb") as file:
+        writer = Ros2Writer(file, **options)
+        image = writer.register_msgdef("sensor_msgs/msg/Image", IMAGE)
+        packed = writer.register_msgdef("sensor_msgs/msg/CompressedImage", COMPRESSED)
+        for topic, log_time, message in messages:
+            schema = packed if "format" in message else image
+            writer.write_message(topic, schema, message, log_time)
+        writer.finish()
+    return path
+
+
+def drive(
+    path: Path, stamps: Iterable[int], labels: Iterable[int] = (), delay: int = 0, **options: Any
+) -> Path:
+    """A log of images whose level is their position, and of 0/255 masks, at these stamps."""
+    messages = [
+        ("/camera", stamp, compressed(stamp, jpeg(grey(20 * level))))
+        for level, stamp in enumerate(stamps)
+    ]
+    mask = grey(0)
+    mask[3:] = 255
+    messages += [("/labels", stamp + delay, raw(stamp, mask, "mono8")) for stamp in labels]
+    return ros2_log(path, sorted(messages, key=lambda message: message[1]), **options)

@@ -1,0 +1,170 @@
+"""Frames and truth out of a log."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from roadeval.logs import FrameError, Instant, LabelValues, LogError, Span, open_log, parse_time
+
+from .making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
+
+START = 1_700_000_000_123_456_789
+STAMPS = [START + i * SECOND // 10 for i in range(10)]
+
+
+def numbers(path: Path, span: Span | None = None) -> list[int]:
+    with open_log(path) as log:
+        return [frame.number for frame in log.frames(log.select(), span)]
+
+
+def test_frames_come_with_image_truth_and_times(tmp_path: Path) -> None:
+    path = drive(tmp_path / "drive.mcap", STAMPS, STAMPS)
+    with open_log(path) as log:
+        frames = [frame.decode() for frame in log.frames(log.select())]
+    assert [frame.stamp_ns for frame in frames] == STAMPS
+    assert [round(float(frame.image.mean())) for frame in frames] == [20 * i for i in range(10)]
+    assert frames[0].image.shape == (6, 8, 3)
+    assert frames[0].truth is not None
+    assert frames[0].truth[:, 0].tolist() == [0, 0, 0, 1, 1, 1]
+
+
+def test_the_cameras_own_file_is_kept(tmp_path: Path) -> None:
+    data = jpeg(grey(90))
+    path = ros2_log(tmp_path / "a.mcap", [("/camera", START, compressed(START, data))])
+    with open_log(path) as log:
+        frame = next(log.frames(log.select())).decode()
+    assert bytes(frame.payload) == data
+    assert frame.media_type == "image/jpeg"
+
+
+def test_labels_logged_after_all_images_are_found(tmp_path: Path) -> None:
+    path = drive(tmp_path / "late.mcap", STAMPS, STAMPS[::2], delay=3600 * SECOND)
+    with open_log(path) as log:
+        frames = log.frames(log.select())
+        assert [frame.labelled for frame in frames] == [True, False] * 5
+
+
+def test_an_unlabelled_log_works(tmp_path: Path) -> None:
+    path = drive(tmp_path / "drive.mcap", STAMPS)
+    with open_log(path) as log:
+        selection = log.select()
+        frame = next(log.frames(selection)).decode()
+    assert frame.truth is None
+    assert any("no truth" in reason for reason in selection.reasons)
+
+
+def test_frames_can_be_read_again(tmp_path: Path) -> None:
+    path = drive(tmp_path / "drive.mcap", STAMPS)
+    with open_log(path) as log:
+        selection = log.select()
+        assert len(list(log.frames(selection))) == len(list(log.frames(selection))) == 10
+
+
+def test_a_range_is_half_open_and_keeps_the_numbers(tmp_path: Path) -> None:
+    path = drive(tmp_path / "drive.mcap", STAMPS)
+    assert numbers(path, Span(parse_time("0.2"), parse_time("0.5"))) == [2, 3, 4]
+    assert numbers(path, Span(Instant(STAMPS[7]))) == [7, 8, 9]
+    assert numbers(path, Span(parse_time("0.1"), every=3, max_frames=2)) == [1, 4]
+
+
+def test_an_empty_range_says_where_the_images_lie(tmp_path: Path) -> None:
+    path = drive(tmp_path / "drive.mcap", STAMPS)
+    with pytest.raises(LogError, match=r"no frame in this range.*from 0.000 to 0.900"):
+        numbers(path, Span(parse_time("5")))
+
+
+def test_frames_are_ordered_by_log_time(tmp_path: Path) -> None:
+    messages = [("/cam", time, compressed(time, jpeg(grey(time)))) for time in (50, 10, 30)]
+    path = ros2_log(tmp_path / "a.mcap", messages)
+    with open_log(path) as log:
+        times = [(f.number, f.log_time_ns) for f in log.frames(log.select())]
+    assert times == [(0, 10), (1, 30), (2, 50)]
+
+
+def test_log_times_take_the_place_of_zero_stamps(tmp_path: Path) -> None:
+    mask = png(grey(255))
+    messages = []
+    for time in (10, 20, 30):
+        messages += [("/cam", time, compressed(0, jpeg(grey(9))))]
+        messages += [("/labels", time + 2, compressed(0, mask, "png"))]
+    path = ros2_log(tmp_path / "zero.mcap", messages)
+    with open_log(path) as log:
+        selection = log.select()
+        frames = list(log.frames(selection))
+    assert [(f.stamp_ns, f.labelled) for f in frames] == [(10, True), (20, True), (30, True)]
+    assert any("log times take their place" in reason for reason in selection.reasons)
+
+
+def test_a_bad_image_costs_its_frame_and_is_named(tmp_path: Path) -> None:
+    messages = [("/cam", i, compressed(i, jpeg(grey(9)))) for i in range(3)]
+    messages[1][2]["data"] = b"no image"
+    path = ros2_log(tmp_path / "bad.mcap", messages)
+    with open_log(path) as log:
+        stream = log.frames(log.select())
+        first, second, third = stream
+        first.decode()
+        with pytest.raises(FrameError, match="frame 1: 8 bytes that are no jpeg image"):
+            second.decode()
+        third.decode()
+    assert list(stream.accounting.undecodable) == [1]
+
+
+def test_truth_of_another_size_is_refused_and_the_remedy_named(tmp_path: Path) -> None:
+    messages = [
+        ("/cam", 1, compressed(1, jpeg(grey(9)))),
+        ("/labels", 1, raw(1, grey(255, width=4, height=3), "mono8")),
+    ]
+    path = ros2_log(tmp_path / "small.mcap", messages)
+    with open_log(path) as log:
+        with pytest.raises(LogError, match=r"/labels is 4x3, but /cam is 8x6: .*--resize-truth"):
+            log.select()
+        frame = next(log.frames(log.select(resize_truth=True))).decode()
+    assert frame.truth is not None
+    assert frame.truth.shape == (6, 8)
+
+
+def test_truth_that_no_image_claimed_is_counted(tmp_path: Path) -> None:
+    labels = sorted([*STAMPS, STAMPS[4] + 10_000_000])
+    path = drive(tmp_path / "drive.mcap", STAMPS, labels)
+    with open_log(path) as log:
+        stream = log.frames(log.select())
+        assert all(frame.labelled for frame in stream)
+    assert stream.accounting.truth_in_log == 11
+    assert stream.accounting.truth_unused == 1
+
+
+def test_another_systems_masks_and_true_shadow_come_along(tmp_path: Path) -> None:
+    mask = grey(0)
+    mask[:, 4:] = 255
+    messages = [
+        ("/cam", 1, compressed(1, jpeg(grey(9)))),
+        ("/net/road", 1, raw(1, mask, "mono8")),
+        ("/truth/shadow", 1, raw(1, 255 - mask, "mono8")),
+    ]
+    path = ros2_log(tmp_path / "net.mcap", messages)
+    with open_log(path) as log:
+        frame = next(log.frames(log.select(image="/cam", masks={"net": "/net/road"}))).decode()
+    assert np.array_equal(frame.external["net"], mask // 255)
+    assert frame.shadow_truth is not None
+    assert np.array_equal(frame.shadow_truth, 1 - mask // 255)
+
+
+@pytest.mark.parametrize(
+    ("drive_name", "labels", "road"),
+    [
+        ("camvid_0016E5_15hz", LabelValues((3,), (11,)), True),
+        ("camvid_0006R0_1hz", LabelValues(), True),
+        ("ford_shadows_unlabelled_raw", LabelValues(), False),
+    ],
+)
+def test_real_drives(data: Path, drive_name: str, labels: LabelValues, road: bool) -> None:
+    with open_log(data / "drives" / f"{drive_name}.mcap") as log:
+        stream = log.frames(log.select(labels=labels))
+        frame = next(stream).decode()
+        rest = list(stream)
+    assert len(rest) == (100 if road else 38)
+    assert all(f.labelled == road for f in rest)
+    if road:
+        assert frame.truth is not None
+        assert set(np.unique(frame.truth)) == {0, 1, 255}
