@@ -24,10 +24,9 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from roadeval.data import (
-    BASELINE,
-    CAMERA,
     FILTERED,
     FINAL_STAGE,
+    RESERVED,
     UNFILTERED,
     LayerSpec,
     VariantLayout,
@@ -36,14 +35,6 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.pipeline.chain import STAGES, Chain, layers_of, masks_of
 from roadeval.training import Plan, TrainingSettings
-
-RESERVED: Final = frozenset(
-    {
-        *(BASELINE, CAMERA, "counts", "metrics", "notes", "results", "roadeval"),
-        *("state", "timing", "true_shadow", "truth"),
-    }
-)
-"""Top-level names of the recording, which no variant may bear."""
 
 
 class ConfigError(RoadevalError):
@@ -123,6 +114,7 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
             "colour_space": "hsi",
         },
         "svm": {"kernel": "linear"},
+        "post": {"operations": ("close", "open")},
     },
 }
 """The presets, as overrides of the settings' own defaults."""

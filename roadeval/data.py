@@ -35,6 +35,14 @@ BASELINE: Final = "blind"
 FINAL_STAGE: Final = "post"
 """The stage whose mask is the pipeline's answer, and under which the baseline is filed."""
 
+RESERVED: Final = frozenset(
+    {
+        *("blind", "camera", "counts", "facts", "frame", "metrics", "notes", "results"),
+        *("roadeval", "state", "timing", "true_shadow", "truth"),
+    }
+)
+"""Names that no variant may bear: the tables or the recording use them for something else."""
+
 
 # --- Frames -------------------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from roadeval import logs
-from roadeval.config import Config, Variant, override, variants_of
+from roadeval.config import Config, Variant, check_variant_name, override, variants_of
 from roadeval.errors import RoadevalError
 from roadeval.training import TrainingSettings
 
@@ -32,6 +32,9 @@ class ReplayOptions:
         A model file; else the log itself trains one.
     image_topic, truth_topic, shadow_topic
         Topics, where the log leaves a choice.
+    mask_topics
+        Topics of road masks that the log already carries, by the name of their variant: a
+        network's output, say, which is then scored beside the pipeline.
     road_labels, ignore_labels
         Values of the truth that mean road, and that are counted nowhere.
     start, end
@@ -58,6 +61,7 @@ class ReplayOptions:
     image_topic: str | None = None
     truth_topic: str | None = None
     shadow_topic: str | None = None
+    mask_topics: Mapping[str, str] = field(default_factory=dict)
     road_labels: tuple[int, ...] = ()
     ignore_labels: tuple[int, ...] = ()
     start: str | None = None
@@ -79,6 +83,7 @@ class ReplayOptions:
             image=self.image_topic,
             truth=self.truth_topic,
             shadow=self.shadow_topic,
+            masks=self.mask_topics,
             labels=logs.LabelValues(self.road_labels, self.ignore_labels),
             sync_tolerance_ns=None if tolerance is None else round(tolerance * 1e6),
             resize_truth=self.resize_truth,
@@ -91,8 +96,11 @@ class ReplayOptions:
         return logs.Span(start, end, self.every, self.max_frames)
 
     def all_variants(self) -> tuple[Variant, ...]:
-        """Give every variant of the run: the two by default, then the extra ones."""
-        return variants_of(self.config, self.variants)
+        """Give every variant that is computed: the two by default, then the extra ones."""
+        variants = variants_of(self.config, self.variants)
+        for name in self.mask_topics:
+            check_variant_name(name, {variant.name for variant in variants})
+        return variants
 
     def training(self) -> TrainingSettings:
         """Give the configuration's training settings with the options' own on top."""

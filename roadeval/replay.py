@@ -11,7 +11,7 @@ from typing import Any
 
 from roadeval import learning, logs
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.results import ResultsWriter, summary_text
+from roadeval.evaluation.results import Results, ResultsWriter, summary_text
 from roadeval.evaluation.tables import header, window_lines
 from roadeval.options import Outcome, Progress, ReplayOptions
 from roadeval.recording import NullRecorder, Recorder
@@ -68,7 +68,8 @@ def replay(
             windows, summary = run.board.windows(), run.summary()
             recorder.finish(_texts(windows, summary))
             files = results.finish(windows, summary)
-        files += write_figures(folder, log.name, windows, run.gallery.examples)
+        tables = Results(folder).windows
+        files += write_figures(folder, log.name, tables, run.gallery.examples)
         saved = None if isinstance(recorder, NullRecorder) else recorder.path
         return Outcome(saved, folder, summary, run.warnings(), run.losses(), tuple(files))
 

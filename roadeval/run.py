@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from roadeval import learning, logs, provenance, runner
 from roadeval.config import Variant
-from roadeval.data import FrameResult, Role
+from roadeval.data import FrameResult, Role, VariantLayout
 from roadeval.evaluation import tables
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
@@ -60,7 +60,7 @@ class Run:
         self.model, self._schedule = self._learn()
         self._chains = runner.bind(self._variants, self.model)
         prior = None if self.model.prior is None else BlindPrior(self.model.prior)
-        names = [variant.name for variant in self._variants]
+        names = [layout.name for layout in self._layouts()]
         self.board = Scoreboard(options.config.evaluation, names, prior)
         self.gallery = Gallery(self.total)
         self.done = 0
@@ -86,7 +86,7 @@ class Run:
             self.log.name,
             width,
             height,
-            tuple(variant.layout() for variant in self._variants),
+            self._layouts(),
             baseline=self.model.prior is not None,
             has_truth=self._selection.truth is not None,
             has_shadow_truth=self._selection.shadow is not None,
@@ -94,6 +94,11 @@ class Run:
             tables={name: tables.header(name) for name in ("frames", "regions")},
             properties=self._properties(),
         )
+
+    def _layouts(self) -> tuple[VariantLayout, ...]:
+        masks = self._selection.masks.items()
+        external = (runner.external_layout(name, label.topic.name) for name, label in masks)
+        return (*(variant.layout() for variant in self._variants), *external)
 
     def _properties(self) -> dict[str, str | int | float]:
         return {
@@ -128,10 +133,9 @@ class Run:
             frame = logged.decode()
         except logs.FrameError:
             return None  # it stands in the log's accounting, with the reason
-        variants = tuple(
-            runner.run_variant(name, chain, frame.image) for name, chain in self._chains.items()
-        )
-        result = self.board.score(frame, self._schedule.role(frame), variants)
+        variants = [runner.run_variant(n, chain, frame.image) for n, chain in self._chains.items()]
+        variants += [runner.external_variant(name, mask) for name, mask in frame.external.items()]
+        result = self.board.score(frame, self._schedule.role(frame), tuple(variants))
         return result, recorder.encode(result)
 
     def summary(self) -> dict[str, Any]:

@@ -4,11 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from time import perf_counter
+from typing import Final
 
 from roadeval.config import Config, Variant
-from roadeval.data import FINAL_STAGE, Layer, Mask, Rgb, StageResult, VariantResult, mask_spec
+from roadeval.data import (
+    FILTERED,
+    FINAL_STAGE,
+    UNFILTERED,
+    Layer,
+    Mask,
+    Rgb,
+    StageResult,
+    VariantLayout,
+    VariantResult,
+    mask_spec,
+)
 from roadeval.pipeline.chain import Chain
 from roadeval.training import Model
+
+EXTERNAL: Final = mask_spec(FINAL_STAGE, "Road mask in the log")
 
 
 def run_variant(name: str, chain: Chain, image: Rgb) -> VariantResult:
@@ -24,10 +38,15 @@ def run_variant(name: str, chain: Chain, image: Rgb) -> VariantResult:
     return VariantResult(name, tuple(results))
 
 
+def external_layout(name: str, topic: str) -> VariantLayout:
+    """Describe a variant whose masks the log carries, under ``topic``."""
+    return VariantLayout(name, f"mask in {topic}", (FINAL_STAGE,), (EXTERNAL,))
+
+
 def external_variant(name: str, mask: Mask) -> VariantResult:
     """Present a mask that the log carries as a variant with the final stage alone."""
-    layer = Layer(mask_spec(FINAL_STAGE, f"Mask of {name}"), mask)
-    return VariantResult(name, (StageResult(FINAL_STAGE, (layer,), mask, {}, {}, 0.0),))
+    stage = StageResult(FINAL_STAGE, (Layer(EXTERNAL, mask),), mask, {}, {}, 0.0)
+    return VariantResult(name, (stage,))
 
 
 def bind(variants: tuple[Variant, ...], model: Model) -> Mapping[str, Chain]:
@@ -36,7 +55,7 @@ def bind(variants: tuple[Variant, ...], model: Model) -> Mapping[str, Chain]:
 
 
 def run_frame(
-    image: Rgb, model: Model, config: Config | None = None, *, variant: str = "filtered"
+    image: Rgb, model: Model, config: Config | None = None, *, variant: str = FILTERED
 ) -> VariantResult:
     """Run one variant on one image, with all layers: the notebook's way in.
 
@@ -63,6 +82,6 @@ def run_frame(
     >>> {layer.spec.name: layer.array.shape for layer in result.layers()}  # doctest: +SKIP
     """
     config = config or Config()
-    if variant == "unfiltered":
+    if variant == UNFILTERED:
         config = config.without_filter()
     return run_variant(variant, config.bind(model.parameters[variant]), image)

@@ -36,14 +36,18 @@ def _show_version(wanted: bool) -> None:
 @app.callback(invoke_without_command=True)
 def _root(
     context: typer.Context,
-    version: Annotated[
+    _version: Annotated[
         bool,
         typer.Option("--version", is_eager=True, callback=_show_version, help="Show the version."),
     ] = False,
 ) -> None:
-    """Replay camera logs through a road-recognition pipeline; record and score every step."""
+    """Flight recorder and scoreboard for road recognition.
+
+    Exit codes: 0 done; 1 a file cannot be used; 2 wrong usage; 3 done, but part of the log was
+    lost; 70 a defect of the program; 130, 143 interrupted.
+    """
     if context.invoked_subcommand is None:
-        context.get_help()
+        typer.echo(context.get_help(), err=True)
         raise typer.Exit(ExitCode.USAGE)
 
 
@@ -73,10 +77,10 @@ def explain(error: Exception | SystemExit) -> int:
         traceback.print_exception(error)
     match error:
         case signals.Stopped():
-            messages.interrupted("; ".join(_notes(error)) or "nothing was written")
+            messages.interrupted("; ".join(_notes(error)) or "stopped before the end")
             return error.exit_code
         case typer.TyperException():
-            messages.error(f"{error.format_message()}{_where_help_is(error)}")
+            messages.error(_usage(error))
             return error.exit_code
         case RoadevalError():
             messages.error("; ".join([str(error), *_notes(error)]))
@@ -101,9 +105,10 @@ def _notes(error: BaseException) -> list[str]:
     return getattr(error, "__notes__", [])
 
 
-def _where_help_is(error: typer.TyperException) -> str:
+def _usage(error: typer.TyperException) -> str:
+    sentence = error.format_message().replace("Value error, ", "").rstrip(".")
     context = getattr(error, "ctx", None)
-    return f"; see '{context.command_path} --help'" if context else ""
+    return f"{sentence}; see '{context.command_path} --help'" if context else sentence
 
 
 def _drop_stdout() -> None:

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from roadeval.errors import RoadevalError
-from roadeval.logs import Log, Selection, TopicInfo
+from roadeval.logs import Log
 from roadeval.options import ReplayOptions
 
 if TYPE_CHECKING:
@@ -41,6 +41,8 @@ def describe(log: Log, options: ReplayOptions) -> dict[str, Any]:
 
 def show(found: Mapping[str, Any], out: Console) -> None:
     """Print what `describe` found."""
+    from rich.padding import Padding
+
     out.print(f"{found['path']}: {_extent(found)}", soft_wrap=True)
     out.print()
     out.print(_topics(found["topics"]))
@@ -55,7 +57,7 @@ def show(found: Mapping[str, Any], out: Console) -> None:
     else:
         out.print("replay would pick")
         for pick in found["picks"]:
-            out.print(f"  {pick}", soft_wrap=True)
+            out.print(Padding(pick, (0, 0, 0, 2)))
 
 
 def _extent(found: Mapping[str, Any]) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 import typer
 
-from roadeval.cli import console, options, progress
+from roadeval.cli import console, options
 from roadeval.cli.exit_codes import ExitCode
 
 DEFAULT: Final = Path("recordings", "demo.mcap")
@@ -20,7 +20,11 @@ def demo(
     seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Another drive.")] = 0,
     quiet: options.Quiet = False,
 ) -> int:
-    """Render the synthetic drive: 100 frames, 640x480, 10 Hz, with true road and shadow."""
+    """Render the synthetic drive with known truth.
+
+    100 frames, 640x480, 10 Hz; truth of the road and of shadow. The same seed gives the same
+    drive.
+    """
     from roadeval.synth import DriveSettings, write_drive
 
     write_drive(output, DriveSettings(seed=seed))

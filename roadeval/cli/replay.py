@@ -11,17 +11,19 @@ from roadeval.cli.exit_codes import ExitCode
 
 def replay(
     drive: options.Drive,
+    *,
     save: Annotated[
         Path | None,
-        options.output(
-            "--save", metavar="OUT.rrd", help="Default: recordings/<drive>.rrd"
+        options.option(
+            "--save", metavar="OUT.rrd", help="Recording. Default: recordings/<drive>.rrd"
         ),
     ] = None,
     reports: Annotated[
         Path | None,
-        options.output("--reports", metavar="DIR", help="Default: reports/<drive>/"),
+        options.option(
+            "--reports", metavar="DIR", help="Tables and figures. Default: reports/<drive>/"
+        ),
     ] = None,
-    record: options.Record = "all",
     preset: options.Preset = None,
     config: options.ConfigFile = None,
     variant: options.Variants = None,
@@ -34,19 +36,28 @@ def replay(
     road_label: options.RoadLabels = None,
     ignore_label: options.IgnoreLabels = None,
     sync_tolerance: options.SyncTolerance = None,
+    resize_truth: options.ResizeTruth = False,
+    keep_corrupt: options.KeepCorrupt = False,
     start: options.Start = None,
     end: options.End = None,
     every: options.Every = 1,
     max_frames: options.MaxFrames = None,
+    record: options.Record = "all",
     jobs: options.Jobs = None,
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> int:
-    """Replay a log: record every step, score it against the truth, write tables and figures."""
-    from roadeval.cli import settings, tables
+    """Replay a log; record, score and plot every step.
+
+    Every intermediate goes into a recording for the Rerun viewer. Where the log has truth, each
+    stage is scored against it, with the shadow filter and without.
+    """
+    from roadeval.cli import outcome, settings
+    from roadeval.evaluation.results import summary_text
     from roadeval.replay import ReplayOptions
     from roadeval.replay import replay as run
 
+    labels = settings.labels(road_label, ignore_label)
     chosen = ReplayOptions(
         config=settings.configuration(preset, config),
         variants=settings.variants(variant),
@@ -54,8 +65,8 @@ def replay(
         image_topic=image_topic,
         truth_topic=truth_topic,
         shadow_topic=shadow_topic,
-        road_labels=tuple(road_label or ()),
-        ignore_labels=tuple(ignore_label or ()),
+        road_labels=labels.road,
+        ignore_labels=labels.ignore,
         start=start,
         end=end,
         every=every,
@@ -65,15 +76,17 @@ def replay(
         train_gap=train_gap,
         jobs=jobs,
         record=record,
+        keep_corrupt=keep_corrupt,
+        resize_truth=resize_truth,
     )
     with progress.watched(quiet) as watch:
-        outcome = run(drive, save=save, reports=reports, options=chosen, on_progress=watch)
-    for warning in outcome.warnings:
-        messages.warning(warning)
-    for loss in outcome.losses:
-        messages.lost(loss)
+        found = run(drive, save=save, reports=reports, options=chosen, on_progress=watch)
     if json:
-        console.emit_json(outcome.summary)
+        console.emit(summary_text(found.summary).rstrip())
     elif not quiet:
-        tables.print_outcome(outcome, console.results())
-    return ExitCode.LOSS if outcome.losses else ExitCode.DONE
+        outcome.show(found, console.results())
+    for warning in found.warnings:
+        messages.warning(warning)
+    for loss in found.losses:
+        messages.lost(loss)
+    return ExitCode.LOSS if found.losses else ExitCode.DONE

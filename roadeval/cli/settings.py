@@ -1,13 +1,14 @@
-"""From words on the command line to configurations."""
+"""From words on the command line to what the rooms take."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from roadeval.cli.options import PresetName, split_variant
+from roadeval.cli.options import PresetName, split_variant, usage
 from roadeval.config import Config, load_config
 from roadeval.config import preset as named
+from roadeval.logs import LabelValues
 
 
 def configuration(preset: PresetName | None, file: Path | None) -> Config:
@@ -18,3 +19,9 @@ def configuration(preset: PresetName | None, file: Path | None) -> Config:
 def variants(texts: Sequence[str] | None) -> dict[str, Config]:
     """Load the configurations of ``NAME=FILE.toml`` ..., by name."""
     return {name: load_config(file) for name, file in map(split_variant, texts or ())}
+
+
+def labels(road: Sequence[int] | None, ignore: Sequence[int] | None) -> LabelValues:
+    """Check what the truth's values are said to mean."""
+    with usage():
+        return LabelValues(tuple(road or ()), tuple(ignore or ()))

@@ -13,8 +13,9 @@ from roadeval.cli.exit_codes import ExitCode
 
 def train(
     drives: Annotated[
-        list[Path], typer.Argument(metavar="DRIVE...", help="Camera logs (MCAP) with truth.")
+        list[Path], typer.Argument(metavar="DRIVE", help="Camera logs (MCAP) with truth.")
     ],
+    *,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="MODEL", help="Where the model lands.")
     ],
@@ -27,26 +28,35 @@ def train(
     road_label: options.RoadLabels = None,
     ignore_label: options.IgnoreLabels = None,
     sync_tolerance: options.SyncTolerance = None,
+    resize_truth: options.ResizeTruth = False,
+    keep_corrupt: options.KeepCorrupt = False,
     start: options.Start = None,
     end: options.End = None,
     quiet: options.Quiet = False,
 ) -> int:
-    """Train a model on labelled frames, spread evenly over each drive."""
+    """Train a model on some drives, for use on others.
+
+    The training frames are labelled ones, spread evenly over each drive. Replay never evaluates
+    them, on whatever drive it meets them.
+    """
     from roadeval.cli import settings
     from roadeval.replay import ReplayOptions
     from roadeval.replay import train as run
 
+    labels = settings.labels(road_label, ignore_label)
     chosen = ReplayOptions(
         config=settings.configuration(preset, config),
         variants=settings.variants(variant),
         image_topic=image_topic,
         truth_topic=truth_topic,
-        road_labels=tuple(road_label or ()),
-        ignore_labels=tuple(ignore_label or ()),
+        road_labels=labels.road,
+        ignore_labels=labels.ignore,
         start=start,
         end=end,
         sync_tolerance_ms=sync_tolerance,
         train_frames=train_frames,
+        keep_corrupt=keep_corrupt,
+        resize_truth=resize_truth,
     )
     with progress.watched(quiet) as watch:
         model = run(drives, output, options=chosen, on_progress=watch)

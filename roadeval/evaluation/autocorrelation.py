@@ -44,7 +44,7 @@ class MeanError:
     frames
         Effectively independent frames, at most the series' length.
     frames_low
-        The same, cautiously.
+        The same, cautiously; at least 1.
     """
 
     standard_error: float
@@ -74,7 +74,7 @@ def error_of_mean(series: Series) -> MeanError:
         standard_error=math.sqrt(total / n),
         degrees=max(n / (2 * window + 1), 1.0),
         frames=n / (2 * time),
-        frames_low=min(by_window, _cautious_autoregression(covariance, n)),
+        frames_low=max(min(by_window, _cautious_autoregression(covariance, n)), 1.0),
     )
 
 
@@ -110,8 +110,7 @@ def _cautious_autoregression(covariance: Series, n: int) -> float:
 
     The coefficient is taken two standard errors above its estimate.
     """
-    coefficient = float(covariance[1] / covariance[0])
+    coefficient = max(float(covariance[1] / covariance[0]), 0.0)
     unbiased = min(coefficient + (1 + 3 * coefficient) / n, 1.0)
-    cautious = unbiased + _CAUTION * math.sqrt((1 - unbiased**2) / n)
-    cautious = min(max(cautious, 0.0), 1.0)
+    cautious = min(unbiased + _CAUTION * math.sqrt((1 - unbiased**2) / n), 1.0)
     return n * (1 - cautious) / (1 + cautious)

@@ -27,6 +27,24 @@ class History:
     _counts: array[int] = field(default_factory=lambda: array("q"))
     _rates: array[float] = field(default_factory=lambda: array("d"))
 
+    @classmethod
+    def of_table(
+        cls,
+        variant: str,
+        stage: str,
+        positions: npt.NDArray[np.int64],
+        counts: npt.NDArray[np.int64],
+        table: npt.NDArray[np.float64],
+    ) -> History:
+        """Make a history of what the properties `positions`, `counts` and `rates` gave."""
+        return cls(
+            variant,
+            stage,
+            array("q", positions.tolist()),
+            array("q", counts.ravel().tolist()),
+            array("d", table.ravel().tolist()),
+        )
+
     def append(self, position: int, tally: Tally) -> None:
         """Add the tally of the evaluated frame number ``position``, counted from 0."""
         counts = tally.counts

@@ -17,6 +17,7 @@ from typing import IO, TYPE_CHECKING, Any, Final, Self
 from roadeval.data import FrameResult
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import tables
+from roadeval.evaluation.rates import RATES
 from roadeval.evaluation.windows import Window
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ FORMAT: Final = {"name": "roadeval-summary", "version": 1}
 SUMMARY: Final = "summary.json"
 STREAMED: Final = ("frames", "regions")
 """The tables that grow frame by frame."""
-TEXT_COLUMNS: Final = {"variant": "str", "stage": "str", "region": "str"}
+TEXT_COLUMNS: Final = ("variant", "stage", "region")
 """Columns that are text even where a variant is called ``007``."""
 PARTS: Final = (
     *("format", "verdict", "drive", "frames", "totals", "difference", "windows", "health"),
@@ -191,13 +192,28 @@ class Results:
         return self._table("regions")
 
     def _table(self, name: str) -> pd.DataFrame:
-        """Read a table; one that was not written, because nothing was scored, is empty."""
-        import pandas as pd
+        """Read a table, bit by bit; one that was not written, nothing being scored, is empty."""
+        from pyarrow import csv
 
-        path = self._folder / f"{name}.csv"
-        if not path.exists():
-            return pd.DataFrame(columns=list(tables.COLUMNS[name]))
-        return pd.read_csv(path, float_precision="round_trip", dtype=TEXT_COLUMNS)
+        path, schema = self._folder / f"{name}.csv", _schema(name)
+        if path.exists():
+            types = csv.ConvertOptions(column_types=schema)
+            frame: pd.DataFrame = csv.read_csv(path, convert_options=types).to_pandas()
+        else:
+            frame = schema.empty_table().to_pandas()
+        return frame
+
+
+def _schema(table: str) -> Any:
+    """Give a table's columns with their types, as a PyArrow schema."""
+    import pyarrow as pa
+
+    def kind(column: str) -> Any:
+        if column in TEXT_COLUMNS:
+            return pa.string()
+        return pa.float64() if column.removeprefix("pooled_") in RATES else pa.int64()
+
+    return pa.schema([(column, kind(column)) for column in tables.COLUMNS[table]])
 
 
 def _read_summary(path: Path) -> dict[str, Any]:

@@ -54,5 +54,5 @@ class EvaluationSettings:
     noteworthy: Annotated[float, Field(ge=0, le=1)] = 0.05
     confidence: Annotated[float, Field(gt=0.5, lt=1)] = 0.95
     effective_frames: Annotated[int, Field(ge=2)] = 10
-    resamples: Annotated[int, Field(ge=200, le=100_000)] = 2000
+    resamples: Annotated[int, Field(ge=200, le=100_000)] = 1000
     seed: Annotated[int, Field(ge=0)] = 0

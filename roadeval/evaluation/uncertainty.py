@@ -101,15 +101,22 @@ def mean_difference(differences: Series, settings: EvaluationSettings) -> Differ
     return Difference(mean, low, high, settings.confidence, METHOD, *facts, None)
 
 
+def bootstrap_means(series: Series, settings: EvaluationSettings) -> Series:
+    """Give the means of ``settings.resamples`` stationary block bootstrap samples of a series."""
+    from arch.bootstrap import StationaryBootstrap
+
+    bootstrap = StationaryBootstrap(_block_length(series), series, seed=settings.seed)
+    means: Series = bootstrap.apply(np.mean, settings.resamples)[:, 0]
+    return means
+
+
 def _interval(
     series: Series, error: MeanError, settings: EvaluationSettings
 ) -> tuple[float, float]:
     """Spread the bootstrap's quantiles to the standard error, and to Student's t."""
-    from arch.bootstrap import StationaryBootstrap
     from scipy import stats
 
-    bootstrap = StationaryBootstrap(_block_length(series), series, seed=settings.seed)
-    means = bootstrap.apply(np.mean, settings.resamples)[:, 0]
+    means = bootstrap_means(series, settings)
     tail = (1 - settings.confidence) / 2
     widening = stats.t.isf(tail, error.degrees) / stats.norm.isf(tail)
     spread = max(error.standard_error / means.std(), 1.0) * widening

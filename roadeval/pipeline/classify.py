@@ -11,7 +11,8 @@ import numpy.typing as npt
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.data import Layer, LayerSpec, Mask, Rgb, mask_spec
+from roadeval.data import Layer, LayerSpec, Mask, mask_spec
+from roadeval.pipeline import cube
 from roadeval.pipeline.fast import KERNELS
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
 
@@ -19,8 +20,6 @@ Floats = npt.NDArray[np.float64]
 
 SVM: Final = mask_spec("svm", "SVM: road (Eq. 16)")
 
-UNKNOWN: Final = 255
-"""Entry of a `ColourClassifier`'s table whose colour has not been met yet."""
 _BLOCK: Final = 1 << 20
 """Kernel values computed at once: 8 MB of float64, which stays in the cache."""
 
@@ -107,61 +106,68 @@ def decision(
         # Eq. 15: the machine's plane, w = sum_i lambda_i y_i x_i.
         plane: Floats = features @ (machine.weights @ machine.vectors) + machine.offset
         return plane
+    from scipy.spatial.distance import cdist
+
     result = np.empty(len(features))
     rows = max(1, _BLOCK // max(1, len(machine.vectors)))
     for start in range(0, len(features), rows):
-        block = features[start : start + rows]
-        kernel = _squared_distances(block, machine.vectors)
-        kernel *= -settings.gamma
-        np.exp(kernel, out=kernel)
-        result[start : start + rows] = kernel @ machine.weights + machine.offset
+        block = slice(start, start + rows)
+        squared = cdist(features[block], machine.vectors, "sqeuclidean")
+        result[block] = np.exp(-settings.gamma * squared) @ machine.weights + machine.offset
     return result
 
 
-def _squared_distances(a: Floats, b: Floats) -> Floats:
-    """``(n, m)`` squared Euclidean distances between the rows of two ``(., 3)`` arrays."""
-    distances = a @ (-2.0 * b.T)
-    distances += (a * a).sum(axis=1)[:, None]
-    distances += (b * b).sum(axis=1)[None, :]
-    return distances
+def colour_table(machine: SupportVectors, settings: SvmSettings) -> npt.NDArray[np.uint8]:
+    """Eq. 16 for every colour there is: ``(2^24,)`` uint8 by ``R << 16 | G << 8 | B``, 1 for road.
 
-
-class ColourClassifier:
-    """Eq. 16 as a table over the 2^24 colours, filled as colours are met.
-
-    A pixel's features are its three colours alone, so a drive's few hundred thousand distinct
-    colours are all that is ever evaluated, each once and exactly. An entry depends on nothing
-    but its colour: threads may share the table, and at worst compute one twice.
+    A pixel's features are its three colours alone, so this is all the machine can say. A value
+    from the `cube` decides where its error bound keeps it off the threshold; the few colours
+    that are left are decided by `decision`.
     """
+    # Matrices this small gain nothing from threads, and lose all where other work needs a core.
+    from threadpoolctl import threadpool_limits
 
-    def __init__(self, machine: SupportVectors, settings: SvmSettings) -> None:
-        self._machine = machine
-        self._settings = settings
-        self._table = np.full(1 << 24, UNKNOWN, np.uint8)
+    table = np.empty((256, 256, 256), np.uint8)
+    slabs = _slabs(machine, settings)
+    with threadpool_limits(1, "blas"):
+        for red, values in enumerate(slabs):
+            values -= settings.threshold
+            table[red] = values > 0
+            green, blue = np.nonzero(np.abs(values) <= slabs.error)
+            if len(green):
+                colours = np.stack([np.full_like(green, red), green, blue], axis=1).astype(np.uint8)
+                exact = decision(colours, machine, settings)
+                table[red, green, blue] = exact > settings.threshold
+    return table.ravel()
 
-    def __call__(self, image: Rgb) -> Mask:
-        """Classify an ``(H, W, 3)`` uint8 RGB image: ``(H, W)`` uint8, 1 for road."""
-        mask: Mask = KERNELS.look_up_colours(image, self._table)
-        unknown = mask == UNKNOWN
-        if unknown.any():
-            self._learn(image[unknown])
-            mask[unknown] = KERNELS.look_up_colours(image[unknown][None], self._table)[0]
-        return mask
 
-    def _learn(self, colours: npt.NDArray[np.uint8]) -> None:
-        wide = colours.astype(np.int32)
-        index = np.unique((wide[:, 0] << 16) | (wide[:, 1] << 8) | wide[:, 2])
-        distinct = np.stack([index >> 16, (index >> 8) & 255, index & 255], axis=1)
-        values = decision(distinct.astype(np.uint8), self._machine, self._settings)
-        self._table[index] = values > self._settings.threshold
+def _slabs(machine: SupportVectors, settings: SvmSettings) -> cube.Slabs:
+    """Decision values on the colour cube."""
+
+    def features(channel: int, levels: Floats) -> Floats:
+        return (levels - machine.mean[channel]) / machine.scale[channel]
+
+    def factor(channel: int, levels: Floats) -> Floats:
+        away = features(channel, levels)[:, None] - machine.vectors[:, channel]
+        return np.exp(-settings.gamma * away**2)
+
+    every = np.stack([features(channel, cube.LEVELS) for channel in range(3)])
+    if settings.kernel == "linear":
+        plane = machine.weights @ machine.vectors
+        return cube.sums_of_terms(plane[:, None] * every, machine.offset)
+    # Features are known to a few roundings of the largest; exp(-gamma x^2) is no steeper than
+    # sqrt(gamma).
+    reach = max(np.abs(every).max(), np.abs(machine.vectors).max())
+    rounding = 8 * float(np.finfo(np.float64).eps) * (1 + settings.gamma**0.5 * reach)
+    return cube.sums_of_products(machine.weights, factor, machine.offset, rounding)
 
 
 def bind(settings: SvmSettings, machine: SupportVectors) -> Callable[[View], Output]:
     """Return phase 3 as a pure function of what it sees."""
-    classify = ColourClassifier(machine, settings)
+    table = colour_table(machine, settings)
 
     def run(view: View) -> Output:
-        mask = classify(view.image)
+        mask: Mask = KERNELS.look_up_colours(view.image, table)
         return Output((Layer(SVM, mask),), mask=mask)
 
     return run

@@ -36,8 +36,11 @@ class MorphologySettings:
         of the image's width, at least 3.
     shape
         ``square`` or ``ellipse``.
-    close, open
-        Whether closing (Eq. 21) and opening (Eq. 20) are applied, in this order.
+    operations
+        ``open`` (Eq. 20) and ``close`` (Eq. 21) in the order they are applied. Section 4.4
+        begins with dilation and erosion, a closing. On a noisy mask that joins the road to
+        whatever lies beside it, for good: on two real drives it costs 4 and 10 points of ERR.
+        So the opening comes first here, and the preset ``printed`` closes first.
     region
         What is kept: the ``largest`` component, the component with most pixels in the
         reference patch before the vehicle (``patch``; the largest where none has any), or
@@ -53,8 +56,7 @@ class MorphologySettings:
 
     element: Odd | None = None
     shape: Literal["square", "ellipse"] = "square"
-    close: bool = True
-    open: bool = True
+    operations: tuple[Literal["open", "close"], ...] = ("open", "close")
     region: Literal["largest", "patch", "all"] = "largest"
     fill: bool = True
     boundary_element: Odd = 3
@@ -70,7 +72,7 @@ class MorphologySettings:
 
 def element_side(width: int) -> int:
     """Odd number nearest to 1 % of an image's width, at least 3."""
-    return max(3, 2 * int(width / 200) + 1)
+    return max(3, 2 * (width // 200) + 1)
 
 
 def structuring_element(side: int, shape: str) -> Mask:
@@ -129,7 +131,10 @@ def keep_region(mask: Mask, patch: Mask | None = None) -> Mask:
     if patch is not None:
         inside = np.bincount(labels[patch > 0], minlength=count)[1:]
         votes = inside if inside.any() else votes
-    kept: Mask = (labels == 1 + int(np.argmax(votes))).astype(np.uint8)
+    best = np.flatnonzero(votes == votes.max()) + 1
+    # The library numbers components by blocks of rows: of equals, the first pixel decides.
+    first = best[0] if len(best) == 1 else labels[np.isin(labels, best)][0]
+    kept: Mask = (labels == first).astype(np.uint8)
     return kept
 
 
@@ -146,13 +151,11 @@ def fill_holes(mask: Mask) -> Mask:
 
 
 def post_process(mask: Mask, settings: MorphologySettings) -> Mask:
-    """Section 4.4 on an ``(H, W)`` road mask: close, open, keep one region, fill its holes."""
+    """Section 4.4 on an ``(H, W)`` road mask: open, close, keep one region, fill its holes."""
     height, width = mask.shape
     element = structuring_element(settings.element or element_side(width), settings.shape)
-    if settings.close:
-        mask = closing(mask, element)
-    if settings.open:
-        mask = opening(mask, element)
+    for operation in settings.operations:
+        mask = opening(mask, element) if operation == "open" else closing(mask, element)
     if settings.region != "all":
         patch = patch_mask(height, width, settings.patch) if settings.region == "patch" else None
         mask = keep_region(mask, patch)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Annotated
 
-import cv2
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass as validated
@@ -41,17 +40,14 @@ class ReferencePatch:
 
 @lru_cache(maxsize=16)
 def patch_mask(height: int, width: int, patch: ReferencePatch) -> Mask:
-    """Rasterise the patch as an ``(H, W)`` uint8 mask, read-only and shared between calls."""
-    middle = (width - 1) / 2
+    """Rasterise the patch as an ``(H, W)`` uint8 mask, read-only and shared between calls.
 
-    def edge(row: float, share: float) -> list[tuple[float, float]]:
-        y, half = row * (height - 1), share * width / 2
-        return [(middle - half, y), (middle + half, y)]
-
-    left_top, right_top = edge(patch.top, patch.top_width)
-    left_bottom, right_bottom = edge(patch.bottom, patch.bottom_width)
-    corners = np.rint([left_top, right_top, right_bottom, left_bottom]).astype(np.int32)
+    A pixel belongs to it when its centre does; each row holds at least the middle.
+    """
+    top, bottom = (round(share * (height - 1)) for share in (patch.top, patch.bottom))
+    share = np.linspace(patch.top_width, patch.bottom_width, bottom - top + 1)
+    half = np.maximum(share * width / 2, 0.5)
     mask = np.zeros((height, width), np.uint8)
-    cv2.fillConvexPoly(mask, corners, 1)
+    mask[top : bottom + 1] = np.abs(np.arange(width) - (width - 1) / 2) <= half[:, None]
     mask.flags.writeable = False
     return mask

@@ -116,8 +116,9 @@ def ndi_code(index: Floats) -> Codes:
 def _ndi_codes() -> Codes:
     total = np.arange(3 * 255 + 1, dtype=np.float64)[:, None]
     least = np.minimum(np.arange(256, dtype=np.float64)[None, :], np.floor(total / 3))
-    saturation = np.where(total > 0, 1.0 - 3.0 * least / np.maximum(total, 1), 0.0)
-    return ndi_code(ndi(saturation, np.broadcast_to(total / (3 * 255), saturation.shape)))
+    # NDI stays the same when S and V grow alike: times 765 (R + G + B) both are whole numbers,
+    # and a code that lies halfway, as (R + G + B, min) = (85, 0) does, is rounded as one.
+    return ndi_code(ndi(3 * 255 * (total - 3.0 * least), total**2))
 
 
 NDI_CODES: Final = _ndi_codes()
@@ -132,32 +133,33 @@ def otsu_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
     ``w(T)`` and the first moment ``mu(T) = sum_{j<=T} j p_j`` of the lower class. The printed
     text defines ``mu(T)`` as the upper class's weight. None with a single occupied code.
     """
-    levels = np.arange(256)
     lower, total = np.cumsum(histogram), histogram.sum()
-    moment = np.cumsum(histogram * levels)
-    # Numerators in integers: codes that no pixel has tie exactly, and the first maximum is meant.
-    difference = (moment[-1] * lower - moment * total).astype(np.float64)
-    weights = lower.astype(np.float64) * (total - lower)
-    if not weights.any():
-        return None
-    return int(np.argmax(np.where(weights > 0, difference**2 / np.maximum(weights, 1), -1.0)))
+    moment = np.cumsum(histogram * np.arange(256))
+    return _first_maximum(moment[-1] * lower - moment * total, lower * (total - lower))
 
 
 def printed_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
     """Eq. 7 with the definitions printed beside it, literally: ``mu(T) = sum_{j>T} p_j``.
 
-    ``(mu w(T) - mu(T))^2 / (w(T) mu(T))`` with ``mu`` the mean code; the first maximum over the
-    T where it is defined. None with a single occupied code.
+    The lowest T that maximises ``(mu_T w(T) - mu(T))^2 / (w(T) mu(T))``, where it is defined.
+    None with a single occupied code.
     """
-    p = histogram / histogram.sum()
-    weight = np.cumsum(histogram) / histogram.sum()
-    upper = 1.0 - weight
-    mean = (p * np.arange(256)).sum()
-    defined = (weight > 0) & (upper > 0)
-    if not defined.any():
+    lower, total = np.cumsum(histogram), histogram.sum()
+    upper = total - lower
+    mean = (histogram * np.arange(256)).sum()
+    return _first_maximum(mean * lower - upper * total, lower * upper)
+
+
+def _first_maximum(difference: npt.NDArray[np.int64], weights: npt.NDArray[np.int64]) -> int | None:
+    """Lowest T with the greatest ``difference^2 / weights``, of those with positive weights.
+
+    Both criteria of Eq. 7 times the squared number of pixels: whole numbers, so that codes
+    that no pixel has tie exactly with the code below them.
+    """
+    if not weights.any():
         return None
-    criterion = (mean * weight - upper) ** 2 / np.where(defined, weight * upper, 1.0)
-    return int(np.argmax(np.where(defined, criterion, -1.0)))
+    criterion = difference.astype(np.float64) ** 2 / np.maximum(weights, 1)
+    return int(np.argmax(np.where(weights > 0, criterion, -1.0)))
 
 
 def shadow_mask(codes: Codes, threshold: int | None, *, inclusive: bool) -> Mask:
@@ -210,14 +212,17 @@ class Compensation:
 
 
 def moments_of_sums(sums: npt.NDArray[np.int64]) -> Moments:
-    """Moments by label from `plain.region_sums`: the variance as ``(n Q - S^2) / n^2``.
+    """Moments by label from `plain.region_sums`.
 
-    The numerator is an exact integer for up to 11 million pixels a component, so a constant
-    component has a deviation of exactly 0.
+    The variance is taken about the grey level next to the mean, in integers: nothing cancels,
+    a constant component has a deviation of exactly 0, and no component is too large.
     """
     n = np.maximum(sums[:, :1], 1)
-    variance = (n * sums[:, 4:] - sums[:, 1:4] ** 2) / n.astype(np.float64) ** 2
-    return Moments(sums[:, 0], sums[:, 1:4] / n, np.sqrt(variance))
+    first, second = sums[:, 1:4], sums[:, 4:]
+    level = np.rint(first / n).astype(np.int64)
+    about = (first - n * level) / n
+    variance = (second - 2 * level * first + n * level**2) / n - about**2
+    return Moments(sums[:, 0], first / n, np.sqrt(variance))
 
 
 def moments_of_values(labels: npt.NDArray[np.integer], values: Floats, count: int) -> Moments:

@@ -83,19 +83,19 @@ class MaskCodec:
     component = "EncodedImage:blob"
 
     def style(self) -> Sequence[Any]:
-        """Above the camera's image."""
+        """Draw it above the camera's image."""
         return [rr.EncodedImage.from_fields(media_type="image/png", draw_order=10)]
 
     def encode(self, array: Array) -> bytes:
-        """``(H, W)`` uint8 of the classes' values to a PNG file."""
+        """Turn ``(H, W)`` uint8 of the classes' values into a PNG file."""
         return indexed_png.encode(array, [c.rgba for c in self.spec.classes])
 
     def columns(self, payloads: list[bytes]) -> Any:
-        """Encoded images."""
+        """Make encoded images."""
         return rr.EncodedImage.columns(blob=payloads)
 
     def decode(self, payload: bytes) -> Array:
-        """The same array."""
+        """Give back the same array."""
         return indexed_png.decode(payload)
 
 
@@ -109,7 +109,7 @@ class LabelCodec:
     component = "SegmentationImage:buffer"
 
     def style(self) -> Sequence[Any]:
-        """The classes' names and colours, and the format of every frame."""
+        """Name and colour the classes, and describe every frame's format."""
         classes = [rr.AnnotationInfo(c.value, c.name, c.rgba) for c in self.spec.classes]
         form = rr.components.ImageFormat(
             self.width,
@@ -123,15 +123,15 @@ class LabelCodec:
         ]
 
     def encode(self, array: Array) -> bytes:
-        """``(H, W)`` uint8 to its bytes."""
+        """Turn ``(H, W)`` uint8 into its bytes."""
         return array.tobytes()
 
     def columns(self, payloads: list[bytes]) -> Any:
-        """Segmentation images."""
+        """Make segmentation images."""
         return rr.SegmentationImage.columns(buffer=payloads)
 
     def decode(self, payload: bytes) -> Array:
-        """The same array."""
+        """Give back the same array."""
         return np.frombuffer(payload, np.uint8).reshape(self.height, self.width)
 
 
@@ -145,7 +145,7 @@ class ScalarCodec:
     component = "EncodedDepthImage:blob"
 
     def style(self) -> Sequence[Any]:
-        """The colour map. The viewer takes grey levels for fractions, whatever the unit."""
+        """Choose the colour map; the viewer takes grey levels for fractions, whatever the unit."""
         return [
             rr.EncodedDepthImage.from_fields(
                 media_type="image/png",
@@ -156,7 +156,7 @@ class ScalarCodec:
         ]
 
     def encode(self, array: Array) -> bytes:
-        """``(H, W)`` float32, or uint8 codes that span the range, to a PNG file."""
+        """Turn ``(H, W)`` float32, or uint8 codes that span the range, into a PNG file."""
         if not self.spec.exact:
             half = ((self.width + 1) // 2, (self.height + 1) // 2)
             array = cv2.resize(array, half, interpolation=cv2.INTER_AREA)
@@ -169,17 +169,18 @@ class ScalarCodec:
         return cv2.imencode(".png", array, _NOISY)[1].tobytes()
 
     def columns(self, payloads: list[bytes]) -> Any:
-        """Encoded depth images."""
+        """Make encoded depth images."""
         return rr.EncodedDepthImage.columns(blob=payloads)
 
     def decode(self, payload: bytes) -> Array:
-        """``(H, W)`` float32 in the layer's own unit, at full resolution."""
-        codes = cv2.imdecode(np.frombuffer(payload, np.uint8), cv2.IMREAD_UNCHANGED)
+        """Give ``(H, W)`` float32 in the layer's own unit, at full resolution."""
+        codes = _read(payload, cv2.IMREAD_UNCHANGED)
         low, high = self.spec.value_range
-        values = codes.astype(np.float32) * np.float32((high - low) / 255) + np.float32(low)
+        values: Array = codes * np.float32((high - low) / 255) + np.float32(low)
         if values.shape == (self.height, self.width):
             return values
-        return cv2.resize(values, (self.width, self.height), interpolation=cv2.INTER_LINEAR)
+        full: Array = cv2.resize(values, (self.width, self.height))
+        return full
 
 
 # 64 evenly spread levels that keep 0 and 255 where they are.
@@ -195,21 +196,27 @@ class ImageCodec:
     component = "EncodedImage:blob"
 
     def style(self) -> Sequence[Any]:
-        """Below every mask."""
+        """Draw it below every mask."""
         return [rr.EncodedImage.from_fields(draw_order=-10)]
 
     def encode(self, array: Array) -> bytes:
-        """``(H, W, 3)`` uint8 RGB to a JPEG file, or a PNG file if it must be exact."""
+        """Turn ``(H, W, 3)`` uint8 RGB into a JPEG file, or a PNG file if it must be exact."""
         bgr = cv2.cvtColor(array, cv2.COLOR_RGB2BGR)
         if self.exact:
             return cv2.imencode(".png", bgr, _NOISY)[1].tobytes()
         return cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, self.quality])[1].tobytes()
 
     def columns(self, payloads: list[bytes]) -> Any:
-        """Encoded images; the viewer tells JPEG from PNG by itself."""
+        """Make encoded images; the viewer tells JPEG from PNG by itself."""
         return rr.EncodedImage.columns(blob=payloads)
 
     def decode(self, payload: bytes) -> Array:
-        """``(H, W, 3)`` uint8 RGB."""
-        bgr = cv2.imdecode(np.frombuffer(payload, np.uint8), cv2.IMREAD_COLOR)
-        return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+        """Give ``(H, W, 3)`` uint8 RGB."""
+        return _read(payload, cv2.IMREAD_COLOR_RGB)
+
+
+def _read(payload: bytes, flags: int) -> Array:
+    image = cv2.imdecode(np.frombuffer(payload, np.uint8), flags)
+    if image is None:
+        raise ValueError("not an image")
+    return image

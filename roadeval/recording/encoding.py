@@ -14,7 +14,11 @@ from roadeval.recording.layout import Layout
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Encoded:
-    """A frame ready to be written; every mapping is by entity path, ``tables`` by name."""
+    """A frame ready to be written.
+
+    Every mapping is by entity path, but ``tables`` by name. ``states`` holds the state of every
+    lane, empty for none; ``notes`` pairs of a sentence and its level.
+    """
 
     number: int
     stamp_ns: int
@@ -36,6 +40,7 @@ class Encoder:
             **{path: codec(spec, layout.width, layout.height) for path, spec in layout.images()},
         }
         self._rates = frozenset(layout.rates)
+        self._lanes = {variant.name: at.state_path(variant.name) for variant in layout.variants}
 
     def __call__(self, result: FrameResult) -> Encoded:
         """Encode one frame."""
@@ -48,14 +53,14 @@ class Encoder:
             counts={at.scalar_path("counts", t.variant, t.stage): _row(t) for t in result.tallies},
             states={
                 at.ROLE: result.role.value,
-                **{at.state_path(name): health.value for name, health in result.health.items()},
+                **{path: result.health.get(name, "") for name, path in self._lanes.items()},
             },
             notes=tuple((note, level) for note in result.notes),
             tables=result.tables,
         )
 
     def _photo(self, frame: Frame) -> bytes:
-        """The camera's own file where the log holds one, so that nothing is lost twice."""
+        """Pass on the camera's own file where the log holds one, so that nothing is lost twice."""
         if frame.media_type in ("image/jpeg", "image/png"):
             return bytes(frame.payload)
         return self.camera.encode(frame.image)

@@ -1,3 +1,86 @@
-"""."""
-def text(layout):
-    return f"# {layout.drive}"
+"""The words in a recording: what the viewer shows, and what came out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from roadeval.data import VariantLayout
+from roadeval.recording.layout import Layout
+
+_ERRORS: Final = """\
+**Errors:** *green* road found, *orange* non-road called road (FP), *purple* road missed (FN),
+*grey* ignored.
+"""
+_ROWS: Final = """\
+**Rows:** a variant each, its phases from left to right; *green* is what a phase calls road.
+"""
+_CURVES: Final = """\
+**Curves:** rates of the final masks; *blind*, the training frames' mean truth, never looks at the
+image.
+"""
+_NO_TRUTH: Final = """\
+The log has no truth for the road: there is nothing to score, only what was computed.
+"""
+_HANDLING: Final = """\
+**Space** plays. The tabs above hold every layer, every number and the results.
+"""
+
+
+def text(layout: Layout, verdict: str = "") -> str:
+    """Explain the overview, after the verdict on the drive if there is one yet."""
+    parts = [_ERRORS, _ROWS, _CURVES] if layout.has_truth else [_NO_TRUTH, _ROWS]
+    return "\n".join([f"### {layout.drive}", "", verdict, "", *parts, _HANDLING])
+
+
+def variant(layout: VariantLayout) -> str:
+    """Introduce a variant."""
+    return f"### {layout.name}\n\n{layout.title}\n"
+
+
+def overview(layout: Layout, summary: Mapping[str, Any]) -> str:
+    """Tell a person what came out, from the content of ``summary.json``."""
+    return "\n".join(
+        [
+            f"# {layout.drive}",
+            *("", str(summary.get("verdict", ""))),
+            *_list("Warnings", summary.get("warnings", ())),
+            *_list("Lost", summary.get("losses", ())),
+            *_table(summary.get("totals", {})),
+            *_list("Frames", _accounts(summary.get("frames", {}))),
+            *_list("Provenance", (f"{k}: {v}" for k, v in layout.properties.items())),
+            "",
+        ]
+    )
+
+
+def _table(totals: Mapping[str, Any]) -> Iterator[str]:
+    rows = [
+        (variant, stage, total)
+        for variant, stages in totals.items()
+        for stage, total in stages.items()
+    ]
+    if rows:
+        yield from ("", "## Rates", "", "Means of the frames' rates; *pooled*: of all pixels.", "")
+        yield "| variant | stage | ERR | FPR | FNR | pooled ERR |"
+        yield "|---|---|---|---|---|---|"
+    for variant, stage, total in rows:
+        cells = (_percent(total.get(name)) for name in ("ERR", "FPR", "FNR", "pooled_ERR"))
+        yield f"| {variant} | {stage} | {' | '.join(cells)} |"
+
+
+def _percent(fraction: float | None) -> str:
+    return "-" if fraction is None else f"{100 * fraction:.2f} %"
+
+
+def _accounts(frames: Mapping[str, Any]) -> Iterator[str]:
+    for name, count in frames.items():
+        if isinstance(count, Mapping):
+            yield from (f"{name}, {reason}: {n}" for reason, n in count.items())
+        else:
+            yield f"{name}: {count}".replace("_", " ")
+
+
+def _list(title: str, items: Any) -> list[str]:
+    lines = [f"- {item}" for item in items]
+    return ["", f"## {title}", "", *lines] if lines else []

@@ -8,7 +8,9 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
 from roadeval.data import (
+    BASELINE,
     ERRORS,
+    FINAL_STAGE,
     TRUTH,
     LabelClass,
     LayerKind,
@@ -32,8 +34,11 @@ TRUE_SHADOW: Final = "/true_shadow"
 NOTES: Final = "/notes"
 GUIDE: Final = "/results/guide"
 LAYOUT: Final = "/results/layout"
+SUMMARY: Final = "summary"
 OVERVIEW: Final = "overview"
-"""Name of the result that is a document for people."""
+"""Names of two results: the content of ``summary.json``, and the same for people."""
+SECONDS: Final = "/timing/summary"
+"""The seconds of the summary: like all timing, they differ from run to run."""
 PROPERTIES: Final = "/__properties/roadeval"
 """Where the viewer and `rerun.RecordingStream.send_property` keep a recording's properties."""
 ROLE: Final = "/state/frame"
@@ -72,7 +77,9 @@ class Layout:
     has_truth, has_shadow_truth
         Whether any frame has a truth of the road, of shadow.
     first_frame, last_frame
-        Where the viewer opens (the first evaluated frame) and the last frame, if known.
+        The evaluated frames, if known: the viewer marks them on its time bar.
+    rate_hz
+        Frames a second, if known: the speed at which the viewer plays them.
     tables
         Header line of each table whose lines come with the frames, by the table's name.
     properties
@@ -89,6 +96,7 @@ class Layout:
     has_shadow_truth: bool = False
     first_frame: int | None = None
     last_frame: int | None = None
+    rate_hz: float | None = None
     tables: Mapping[str, str] = field(default_factory=dict)
     properties: Mapping[str, str | int | float] = field(default_factory=dict)
 
@@ -111,6 +119,13 @@ class Layout:
                 yield layer_path(variant.name, spec.name), spec
             if self.has_truth:
                 yield layer_path(variant.name, ERRORS.name), ERRORS
+
+    def scored(self) -> Iterator[tuple[str, str]]:
+        """Yield the variant and stage of everything that is counted, the baseline last."""
+        if self.has_truth:
+            yield from ((v.name, stage) for v in self.variants for stage in v.stages)
+        if self.has_truth and self.baseline:
+            yield BASELINE, FINAL_STAGE
 
     def to_json(self) -> str:
         """Write the layout as JSON, from which `from_json` makes an equal one."""
@@ -140,6 +155,11 @@ SHADOW_TRUTH: Final = LayerSpec(
 def layer_path(variant: str, layer: str) -> str:
     """Entity path of a variant's layer."""
     return f"/{variant}/{layer}"
+
+
+def guide_path(variant: str) -> str:
+    """Entity path of the words that introduce a variant."""
+    return f"{GUIDE}/{variant}"
 
 
 def scalar_path(kind: str, variant: str, stage: str, name: str = "") -> str:

@@ -56,7 +56,7 @@ class Recording:
         self.path = Path(path)
         self._reader, self._entry = _open(self.path)
         self._store = _store(self._reader, self._entry)
-        text = self._document(at.LAYOUT.rpartition("/")[2])
+        text = self._document(at.LAYOUT)
         if text is None:
             raise RecordingError(f"{self.path}: the recording ends before its first frame")
         self.layout = Layout.from_json(text)
@@ -68,7 +68,7 @@ class Recording:
     @property
     def complete(self) -> bool:
         """Whether the run reached its end."""
-        return self._store is not None and self.result("summary") is not None
+        return self._store is not None and self.result(at.SUMMARY) is not None
 
     @property
     def variants(self) -> tuple[VariantLayout, ...]:
@@ -92,13 +92,15 @@ class Recording:
     # --- Results ---------------------------------------------------------------------------------
 
     def result(self, name: str) -> str | None:
-        """Text of a result, as ``summary`` or ``windows``; None if the run did not get there."""
-        return self._document(name)
+        """Give the text of a result, as ``summary``; None if the run did not get there."""
+        return self._document(at.result_path(name))
 
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The content of ``summary.json``."""
-        return dict(json.loads(self.result("summary") or "{}"))
+        summary = dict(json.loads(self.result(at.SUMMARY) or "{}"))
+        seconds = json.loads(self._document(at.SECONDS) or "{}")
+        return summary | ({"seconds": seconds} if seconds else {})
 
     @cached_property
     def frames(self) -> pd.DataFrame:
@@ -116,7 +118,7 @@ class Recording:
         return _csv(self.result("windows") or "")
 
     def scalars(self, path: str) -> pd.Series[float]:
-        """Numbers under an entity path, as ``/timing/filtered/svm``, by frame number."""
+        """Give the numbers under an entity path, as ``/timing/filtered/svm``, by frame number."""
         import pandas as pd
 
         rows = dict(self._rows(path, "Scalars:scalars"))
@@ -129,15 +131,15 @@ class Recording:
     # --- Images ----------------------------------------------------------------------------------
 
     def image(self, frame: int) -> npt.NDArray[np.uint8]:
-        """``(H, W, 3)`` uint8 RGB: the camera's image."""
+        """Give the camera's image, ``(H, W, 3)`` uint8 RGB."""
         return self._array(at.CAMERA, frame)
 
     def truth(self, frame: int) -> npt.NDArray[np.uint8]:
-        """``(H, W)`` uint8: 0 non-road, 1 road, 255 ignored."""
+        """Give the truth, ``(H, W)`` uint8: 0 non-road, 1 road, 255 ignored."""
         return self._array(at.TRUTH_PATH, frame)
 
     def layer(self, variant: str, name: str, frame: int) -> npt.NDArray[Any]:
-        """A layer of a variant on a frame.
+        """Give a layer of a variant on a frame.
 
         Returns
         -------
@@ -172,17 +174,17 @@ class Recording:
         return codec.decode(page[frame])
 
     def _page(self, path: str, component: str, frame: int) -> dict[int, bytes]:
-        """Rows of the chunk that holds this frame."""
+        """Give the payloads of the chunk that holds this frame."""
         for batch in self._batches(path, component, static=False):
             frames = batch.column(at.FRAME).to_pylist()
             if frame in frames:
                 blobs = batch.column(component).flatten()
-                return {f: blobs[i].values.to_numpy().tobytes() for i, f in enumerate(frames)}
+                return {f: _bytes(blob) for f, blob in zip(frames, blobs, strict=True)}
         raise RecordingError(f"{self.path}: {path} has nothing on frame {frame}")
 
     def _table(self, name: str) -> pd.DataFrame:
         lines = (lines for _, lines in self._rows(at.result_path(name), _TEXT))
-        header = self.layout.tables.get(name, "")
+        header = self.layout.tables.get(name, "").rstrip()
         return _csv("".join((header, "\n", *lines)) if header else "")
 
     def _rows(self, path: str, component: str) -> Iterator[tuple[int, Any]]:
@@ -190,8 +192,8 @@ class Recording:
             values = batch.column(component).flatten()
             yield from zip(batch.column(at.FRAME).to_pylist(), values.to_pylist(), strict=True)
 
-    def _document(self, name: str) -> str | None:
-        for batch in self._batches(at.result_path(name), _TEXT, static=True):
+    def _document(self, path: str) -> str | None:
+        for batch in self._batches(path, _TEXT, static=True):
             return str(batch.column(_TEXT).flatten()[0])
         return None
 
@@ -232,6 +234,10 @@ def _reason(path: Path) -> str:
         f"{path}: the recording is torn; "
         f"'rerun rrd optimize --continue-on-error {path} -o repaired.rrd' keeps what is whole"
     )
+
+
+def _bytes(blob: pa.ListScalar) -> bytes:
+    return bytes(blob.values.to_numpy())  # noqa: PD011 - Arrow's values, not pandas'
 
 
 def _store(reader: RrdReader, entry: StoreEntry) -> LazyStore | None:

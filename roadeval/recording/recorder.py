@@ -87,6 +87,8 @@ class Recorder:
 
     def write(self, encoded: Encoded) -> None:
         """Append a frame. Frames come in order, from one thread."""
+        if not self._frames:
+            self._static(style.timing(encoded.scalars))
         self._add_images(encoded)
         self._add_words(encoded)
         when = encoded.number, encoded.stamp_ns
@@ -109,15 +111,15 @@ class Recorder:
         Parameters
         ----------
         results
-            Texts to keep under ``/results``, by name: ``summary`` (JSON), ``windows`` (CSV
-            with its header), and for people ``overview`` (Markdown).
+            Texts to keep under ``/results``, by name: ``summary`` (JSON) and ``windows`` (CSV
+            with its header).
 
         Raises
         ------
         RecordingError
             If the file did not become what was written to it, as on a full disk.
         """
-        self._static(style.results(results))
+        self._static(style.results(self._layout, results))
         self._close()
         self._check()
         self.partial.replace(self.path)
@@ -135,7 +137,7 @@ class Recorder:
     def _add_words(self, encoded: Encoded) -> None:
         when = encoded.number, encoded.stamp_ns
         for path, state in encoded.states.items():
-            if self._states.get(path) != state:
+            if self._states.get(path, "") != state:
                 self._pages.add(path, tracks.states, *when, state)
                 self._states[path] = state
         for note in encoded.notes:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import json
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final
 
 import rerun as rr
 
-from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED, Health, Role
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, Health, Role
 from roadeval.recording import guide
 from roadeval.recording import layout as at
 from roadeval.recording.codecs import Codec
@@ -30,13 +31,7 @@ _FURTHER: Final[tuple[Rgb, ...]] = (
     (240, 228, 66),
 )
 """Okabe and Ito's colours, safe for the colour-blind, in the order in which they are given out."""
-_STAGES: Final[tuple[Rgb, ...]] = (
-    (86, 180, 233),
-    (0, 158, 115),
-    (230, 159, 0),
-    (204, 121, 167),
-    (240, 228, 66),
-)
+_STAGES: Final = (_KNOWN[UNFILTERED], *_FURTHER)
 _LANES: Final[Mapping[str, Rgb]] = {
     Health.OK: (0, 158, 115),
     Health.DEGRADED: (230, 159, 0),
@@ -55,12 +50,11 @@ _OUTCOMES: Final[Mapping[str, Rgb]] = {
 }
 
 
-def colours(layout: Layout) -> dict[str, Rgb]:
+def _colours(layout: Layout) -> dict[str, Rgb]:
     """Give every variant, the baseline included, its colour."""
     further = (_FURTHER[i % len(_FURTHER)] for i in range(len(layout.variants)))
     names = [variant.name for variant in layout.variants]
-    return {**{n: _KNOWN[n] if n in _KNOWN else next(further) for n in names},
-            BASELINE: _KNOWN[BASELINE]}
+    return {name: _KNOWN.get(name) or next(further) for name in (*names, BASELINE)}
 
 
 def records(layout: Layout, codecs: Mapping[str, Codec]) -> Records:
@@ -68,37 +62,61 @@ def records(layout: Layout, codecs: Mapping[str, Codec]) -> Records:
     for path, codec in codecs.items():
         yield path, list(codec.style())
     yield at.LAYOUT, [rr.TextDocument(layout.to_json())]
-    yield at.GUIDE, [rr.TextDocument(guide.text(layout), media_type=rr.MediaType.MARKDOWN)]
+    yield at.GUIDE, [_markdown(guide.text(layout))]
+    for variant in layout.variants:
+        yield at.guide_path(variant.name), [_markdown(guide.variant(variant))]
     yield at.PROPERTIES, [rr.AnyValues(format=at.FORMAT, **layout.properties)]
     for name, header in layout.tables.items():
-        yield at.result_path(name), [rr.AnyValues(header=header)]
+        yield at.result_path(name), [rr.AnyValues(header=header.rstrip())]
     yield from _lanes(layout)
     yield from _lines(layout)
 
 
-def results(texts: Mapping[str, str]) -> Records:
-    """Yield what is known after the last frame."""
-    for name, text in texts.items():
-        kind = rr.MediaType.MARKDOWN if name == at.OVERVIEW else rr.MediaType.TEXT
-        yield at.result_path(name), [rr.TextDocument(text, media_type=kind)]
+def timing(paths: Iterable[str]) -> Records:
+    """Yield the colours of every stage that is timed, in the order in which they run."""
+    stages: dict[str, Rgb] = {}
+    for path in paths:
+        if path.startswith("/timing/"):
+            stage = path.rpartition("/")[2]
+            colour = stages.setdefault(stage, _STAGES[len(stages) % len(_STAGES)])
+            yield path, [_line(stage, colour)]
+
+
+def results(layout: Layout, texts: Mapping[str, str]) -> Records:
+    """Yield what is known after the last frame.
+
+    The seconds that a run took are kept apart from its summary, among the timing: everything
+    else is the same when the same log is replayed again.
+    """
+    summary = json.loads(texts.get(at.SUMMARY, "{}"))
+    verdict = str(summary.get("verdict", ""))
+    yield at.GUIDE, [_markdown(guide.text(layout, verdict))]
+    yield at.result_path(at.OVERVIEW), [_markdown(guide.overview(layout, summary))]
+    yield at.SECONDS, [rr.TextDocument(json.dumps(summary.pop("seconds", {})))]
+    kept = {at.SUMMARY: json.dumps(summary, indent=2)} if summary else {}
+    for name, text in {**texts, **kept}.items():
+        yield at.result_path(name), [rr.TextDocument(text)]
+
+
+def _markdown(text: str) -> rr.TextDocument:
+    return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
 
 
 def _lanes(layout: Layout) -> Records:
-    for path, values in (
-        (at.ROLE, list(Role)),
-        *((at.state_path(v.name), list(Health)) for v in layout.variants),
-    ):
-        yield path, [rr.StateConfiguration(values=values, colors=[_LANES[v] for v in values])]
+    lanes: dict[str, tuple[str, ...]] = {at.ROLE: tuple(Role)}
+    lanes |= {at.state_path(variant.name): tuple(Health) for variant in layout.variants}
+    for path, states in lanes.items():
+        colours = [_LANES[state] for state in states]
+        yield path, [rr.StateConfiguration(values=states, colors=colours)]
 
 
 def _lines(layout: Layout) -> Records:
-    colour = colours(layout)
-    stages = [(v.name, s) for v in layout.variants for s in v.stages]
-    scored = stages + [(BASELINE, FINAL_STAGE)] * layout.baseline
-    for variant, stage in scored if layout.has_truth else ():
+    colours = _colours(layout)
+    lines = rr.SeriesLines(names=list(_OUTCOMES), colors=list(_OUTCOMES.values()))
+    for variant, stage in layout.scored():
         for rate in layout.rates:
-            yield at.scalar_path("metrics", variant, stage, rate), [_line(variant, colour[variant])]
-        lines = rr.SeriesLines(names=list(_OUTCOMES), colors=list(_OUTCOMES.values()))
+            line = _line(variant, colours[variant])
+            yield at.scalar_path("metrics", variant, stage, rate), [line]
         yield at.scalar_path("counts", variant, stage), [lines]
 
 

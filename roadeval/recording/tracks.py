@@ -67,32 +67,32 @@ class Tracks:
 
 
 def scalars(values: list[float]) -> Any:
-    """One number a row."""
+    """Log one number a row."""
     return rr.Scalars.columns(scalars=values)
 
 
 def counts(values: list[tuple[int, ...]]) -> Any:
-    """The numbers of `layout.COUNTS` a row."""
+    """Log the numbers of `layout.COUNTS` a row."""
     flat = np.array(values, np.float64).ravel()
     return rr.Scalars.columns(scalars=flat).partition([len(COUNTS)] * len(values))
 
 
 def states(values: list[str]) -> Any:
-    """A state that begins, a row."""
+    """Begin a state, or end one with an empty text, a row."""
     return rr.StateChange.columns(state=values)
 
 
 def texts(values: list[str]) -> Any:
-    """A document a row."""
+    """Log a document a row."""
     return rr.TextDocument.columns(text=values)
 
 
 def notes(values: list[tuple[str, str]]) -> Any:
-    """A sentence and its level a row."""
+    """Log a sentence and its level a row."""
     sentences, levels = zip(*values, strict=True)
     return rr.TextLog.columns(text=list(sentences), level=list(levels))
 
 
 def clears(values: list[None]) -> Any:
-    """An end of what was shown before, a row."""
+    """Take away what was shown before, a row."""
     return rr.Clear.columns(is_recursive=[False] * len(values))

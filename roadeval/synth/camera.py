@@ -89,6 +89,19 @@ class Camera:
         """``(n,)`` distance of ``(n, 3)`` world points along the optical axis, metres."""
         return np.asarray((points - self.position) @ self.pose.axes()[2])
 
+    def catches(self, corners: Matrix) -> npt.NDArray[np.bool_]:
+        """Tell which of ``(n, 4, 3)`` rectangles may be seen: ``(n,)`` bool, a quick guess.
+
+        Left out is what lies behind, to either side, or is lower than a pixel in the image.
+        """
+        right, _, forward = self.pose.axes()
+        depth = (corners - self.position) @ forward
+        before = np.maximum(depth, NEAR)
+        column = (corners - self.position) @ right / before * self.focal
+        beside = (column.max(1) < -self.width / 2) | (column.min(1) > self.width / 2)
+        height = np.ptp(corners[..., 1], axis=1) / before.min(1) * self.focal
+        return np.asarray((depth.max(1) > NEAR) & ~beside & (height >= 1.0))
+
     def outline(self, corners: Matrix) -> Matrix:
         """Project the part of a polygon, ``(n, 3)``, that is not behind: ``(m, 2)``, m maybe 0."""
         depth = self.depth(corners)

@@ -24,6 +24,8 @@ DRY_GRASS: Final = np.array([0.150, 0.140, 0.060], np.float32)
 
 ASPHALT_CELL: Final = 0.02
 VERGE_CELL: Final = 0.04
+GRAIN_CELL: Final = 0.012
+GRAIN_CELLS: Final = 512
 ROWS: Final = 4096
 ASPHALT_COLUMNS: Final = 640
 VERGE_COLUMNS: Final = 1024
@@ -40,15 +42,17 @@ class Ground:
     road: Road
     asphalt: GroundTexture
     verge: GroundTexture
+    grain: GroundTexture
 
     @classmethod
     def laid(cls, road: Road, rng: np.random.Generator) -> Ground:
         """Lay a road and sow its verges."""
         half = ASPHALT_COLUMNS * ASPHALT_CELL / 2
-        asphalt = GroundTexture.averaged(_asphalt(rng), ASPHALT_CELL, -half, 0.0, cv2.BORDER_WRAP)
+        asphalt = GroundTexture.averaged(_asphalt(rng), ASPHALT_CELL, -half, 0.0)
         half = VERGE_COLUMNS * VERGE_CELL / 2
-        verge = GroundTexture.averaged(_verge(rng), VERGE_CELL, -half, 0.0, cv2.BORDER_WRAP)
-        return cls(road, asphalt, verge)
+        verge = GroundTexture.averaged(_verge(rng), VERGE_CELL, -half, 0.0)
+        grain = coloured_noise(rng, (GRAIN_CELLS, GRAIN_CELLS), 2, 20, 0.4)
+        return cls(road, asphalt, verge, GroundTexture.averaged(grain, GRAIN_CELL, 0.0, 0.0))
 
     def reflectance(self, offset: Field, z: Field, width: Field, length: Field) -> Field:
         """Return the reflectance of patches of ground.
@@ -66,13 +70,16 @@ class Ground:
             ``(h, w, 3)`` float32.
         """
         wear = self.asphalt.sample(offset, z, length)
+        grain = self.grain.sample(offset, z, length)
         left, right = self.road.edges(z)
         frayed = np.float32(0.05) * np.sin(5.1 * z + 2 * np.sin(1.7 * z))
         paved = covered(offset, width[:, None] + 0.03, left + frayed, right + frayed)
         painted = paint(offset, z, width[:, None], length[:, None])
         painted *= smoothstep(wear, 0.35, 0.85)
+        wear *= np.exp(np.float32(0.06) * grain)
         road = wear[..., None] * (ASPHALT + painted[..., None] * (PAINT - ASPHALT))
         verge = self.verge.sample(offset, z, length)
+        verge *= np.exp(np.float32(0.28) * grain)[..., None]
         return np.asarray(verge + paved[..., None] * (road - verge))
 
 
@@ -85,7 +92,7 @@ def _asphalt(rng: np.random.Generator) -> Field:
     offset = (np.arange(ASPHALT_COLUMNS) + 0.5) * ASPHALT_CELL - ASPHALT_COLUMNS * ASPHALT_CELL / 2
     worn = sum(np.exp(-(((offset - track) / 0.33) ** 2)) for track in WHEEL_TRACKS)
     oily = sum(np.exp(-(((offset - lane) / 0.3) ** 2)) for lane in (-1.7, 1.7))
-    surface = np.exp(0.075 * cloudy + 0.10 * grain + (0.07 * worn - 0.09 * oily)[None, :])
+    surface = np.exp(0.05 * cloudy + 0.07 * grain + (0.07 * worn - 0.09 * oily)[None, :])
     surface = np.asarray(surface, np.float32)
     _repair(surface, rng)
     _crack(surface, rng)

@@ -19,7 +19,7 @@ STOREY: Final = 2.8
 WALL_SKY: Final = 0.60
 ROOF_SKY: Final = 0.85
 """Shares of level ground's skylight that a wall and a roof get."""
-WALLS: Final = ((0.36, 0.20, 0.145), (0.55, 0.52, 0.45), (0.43, 0.37, 0.30), (0.30, 0.24, 0.20))
+WALLS: Final = ((0.20, 0.12, 0.092), (0.47, 0.44, 0.37), (0.33, 0.27, 0.20), (0.20, 0.15, 0.125))
 ROOFS: Final = ((0.20, 0.11, 0.085), (0.13, 0.125, 0.125), (0.17, 0.13, 0.11))
 GLASS: Final = (0.045, 0.055, 0.07)
 FRAME: Final = (0.62, 0.62, 0.60)
@@ -71,11 +71,26 @@ class House:
             _NOTHING, np.array([self.low[0], self.ridge, self.low[2]]), width,
             np.array([0.0, -self.ridge, 0.0]),
         )  # fmt: skip
-        outline = np.array([[0, 1], [0, 1 - eaves / self.ridge], [0.5, 0], [1, 1 - eaves / self.ridge], [1, 1]])
+        outline = np.array(
+            [[0, 1], [0, 1 - eaves / self.ridge], [0.5, 0], [1, 1 - eaves / self.ridge], [1, 1]]
+        )
         return (
             _painted(roof, _tiles(roof, self.roof, rng), slope, ROOF_SKY, shade),
-            _painted(side, _wall(side, self.wall, eaves, rng), np.array([outward, 0.0, 0.0]), WALL_SKY, shade),
-            _painted(gable, _wall(gable, self.wall, eaves, rng), np.array([0.0, 0.0, -1.0]), WALL_SKY, shade, outline),
+            _painted(
+                side,
+                _wall(side, self.wall, eaves, rng),
+                np.array([outward, 0.0, 0.0]),
+                WALL_SKY,
+                shade,
+            ),
+            _painted(
+                gable,
+                _wall(gable, self.wall, eaves, rng),
+                np.array([0.0, 0.0, -1.0]),
+                WALL_SKY,
+                shade,
+                outline,
+            ),
         )
 
 
@@ -101,7 +116,8 @@ def _wall(panel: Panel, colour: tuple[float, float, float], eaves: float,
         bottom = rows - (storey * STOREY + 0.85) * metre
         for bay in range(bays):
             middle = (bay + 0.5) * columns / bays
-            for margin, paint in ((0.09, FRAME), (0.0, GLASS)):
+            glass = tuple(rng.uniform(0.5, 2.6) * np.array(GLASS))
+            for margin, paint in ((0.09, FRAME), (0.0, glass)):
                 left, right = (round(middle + s * (0.6 + margin) * metre) for s in (-1, 1))
                 top = round(bottom - (1.35 + margin) * metre)
                 low = (right, round(bottom + margin * metre))
@@ -129,7 +145,7 @@ def _painted(
     down = (np.arange(rows) + 0.5)[:, None, None] / rows * panel.down
     points = panel.corner + right + down
     facing = shade.sun.facing(normal)
-    seen = shade.visible_from(points.reshape(-1, 3)).reshape(rows, columns)
+    seen = shade.visible_from(points)
     opacity = np.ones((rows, columns), np.float32)
     if outline is not None:
         opacity[:] = 0.0

@@ -21,7 +21,7 @@ SUN: Final = np.array([1.26, 1.15, 0.98], np.float32)
 """Irradiance of a surface that faces the clear sun: slightly warm."""
 SKY: Final = np.array([0.150, 0.182, 0.235], np.float32)
 """Irradiance of open level ground from the clear sky alone: bluish."""
-CLOUD: Final = np.array([0.205, 0.212, 0.220], np.float32)
+CLOUD: Final = np.array([0.215, 0.212, 0.205], np.float32)
 """What a cloud before the sun adds to the sky's light: nearly grey."""
 THICK: Final = 0.015
 """Share of the direct beam that the cloud lets through."""

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
-Field = npt.NDArray[np.float32]
-"""Any array of float32; each use states its shape."""
+Field = npt.NDArray[np.floating[Any]]
+"""Any array of floats; each use states its shape."""
 
 
 def coloured_noise(

@@ -7,7 +7,7 @@ its look without painting it anew.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import cv2
@@ -17,7 +17,7 @@ from roadeval.synth.camera import NEAR, Camera, Matrix
 from roadeval.synth.light import Light
 from roadeval.synth.noise import Field
 
-HAZE_LENGTH: Final = 900.0
+HAZE_LENGTH: Final = 2600.0
 """Distance at which the air has replaced all but 1/e of what lies behind it, metres."""
 
 
@@ -105,9 +105,10 @@ class Panel:
         offsets = [0 * self.right, self.right, self.right + self.down, self.down]
         return self.corner + np.stack(offsets)
 
-    def moved(self, by: Matrix, sunlit: float) -> Panel:
-        """Return the same panel elsewhere, in another share of the sun."""
-        return replace(self, corner=self.corner + by, sunlit=sunlit)
+    @property
+    def farthest(self) -> float:
+        """Z of the corner farthest down the road, metres: panels are painted in its order."""
+        return float(self.corner[2] + max(0.0, self.right[2]) + max(0.0, self.down[2]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -187,5 +188,3 @@ def _homography(
     first = panel.corner + (right + down) / 2 - camera.position
     window = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, 1.0]])
     return np.asarray(window @ camera.projection @ np.stack([right, down, first], axis=1))
-
-

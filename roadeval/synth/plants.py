@@ -20,7 +20,7 @@ from roadeval.synth.panel import Picture
 from roadeval.synth.standing import Rod, Standing
 
 PIXELS_PER_METRE: Final = 44.0
-LEAF: Final = 0.075
+LEAF: Final = 0.05
 """Radius of a painted cluster of leaves, metres."""
 SHADE_CELL: Final = 0.3
 """Leaves within a column of this width stand in each other's light, metres."""
@@ -44,12 +44,12 @@ class Species:
     taper: float = 0.0
 
 
-OAK: Final = Species(2.6, 6.2, 3.5, 90, 13000, (0.075, 0.115, 0.028))
-PLANE: Final = Species(3.2, 7.0, 3.1, 80, 11000, (0.090, 0.125, 0.034))
-BIRCH: Final = Species(2.2, 6.5, 1.9, 55, 6500, (0.105, 0.135, 0.040), 0.45)
-SPRUCE: Final = Species(0.7, 8.5, 2.1, 85, 9000, (0.040, 0.068, 0.028), 0.95)
-BUSH: Final = Species(0.0, 1.5, 1.2, 40, 3000, (0.080, 0.112, 0.030))
-SHRUB: Final = Species(0.0, 1.0, 1.0, 30, 2200, (0.110, 0.120, 0.040))
+OAK: Final = Species(2.6, 6.2, 3.5, 100, 20000, (0.075, 0.115, 0.028))
+PLANE: Final = Species(3.2, 7.0, 3.1, 85, 17000, (0.090, 0.125, 0.034))
+BIRCH: Final = Species(2.2, 6.5, 1.9, 60, 10000, (0.105, 0.135, 0.040), 0.45)
+SPRUCE: Final = Species(0.7, 8.5, 2.1, 90, 13000, (0.040, 0.068, 0.028), 0.95)
+BUSH: Final = Species(0.0, 1.5, 1.2, 45, 5000, (0.080, 0.112, 0.030))
+SHRUB: Final = Species(0.0, 1.0, 1.0, 35, 3500, (0.110, 0.120, 0.040))
 
 
 def grow(species: Species, sun: Sun, rng: np.random.Generator) -> Standing:
@@ -78,14 +78,12 @@ def _leaves(species: Species, tufts: Matrix, rng: np.random.Generator) -> Matrix
     """``(n, 3)`` leaves: flattened clouds about the tufts, none below the ground."""
     sizes = rng.gamma(3.0, 1.0, len(tufts))
     tuft = rng.choice(len(tufts), species.leaves, p=sizes / sizes.sum())
-    radius = 0.17 * species.spread * (sizes[tuft] / 3.0) ** 0.4
+    radius = 0.15 * species.spread * (sizes[tuft] / 3.0) ** 0.4
     leaves = tufts[tuft] + rng.normal(size=(species.leaves, 3)) * radius[:, None] * (1, 0.62, 1)
     return np.asarray(leaves[leaves[:, 1] > 0.03])
 
 
-def _branches(
-    species: Species, tufts: Matrix, rng: np.random.Generator
-) -> Iterator[Rod]:
+def _branches(species: Species, tufts: Matrix, rng: np.random.Generator) -> Iterator[Rod]:
     """Yield the trunk, then a branch from it to every third tuft."""
     if species.stem == 0.0:
         return
@@ -133,7 +131,7 @@ def light_left(points: Matrix, towards: Matrix, opacity: float) -> Field:
 def _paint(
     species: Species,
     leaves: Matrix,
-    branches: Sequence[Rod],
+    rods: Sequence[Rod],
     half_width: float,
     height: float,
     sun: Sun,
@@ -142,21 +140,19 @@ def _paint(
     """Paint the far half of the leaves, then the wood, then the near half."""
     size = (round(height * PIXELS_PER_METRE), round(2 * half_width * PIXELS_PER_METRE))
     canvas = _Canvas(np.zeros((*size, 4), np.float32), np.zeros((*size, 4), np.float32), half_width)
-    middles = np.array([(b.foot + b.tip) / 2 for b in branches]).reshape(-1, 3)
+    middles = np.array([(rod.foot + rod.tip) / 2 for rod in rods]).reshape(-1, 3)
     everything = np.concatenate([leaves, middles])
     visible = light_left(everything, sun.towards, 0.16)
     sky = 0.25 + 0.75 * light_left(everything, np.array([0.0, 1.0, 0.0]), 0.10)
-    tint = np.array(species.colour) * np.exp(rng.normal(0.0, (0.20, 0.16, 0.2), (len(leaves), 3)))
+    tint = np.array(species.colour) * np.exp(rng.normal(0.0, (0.15, 0.10, 0.15), leaves.shape))
     turned = rng.uniform(0.35, 1.0, len(leaves))
-    shapes = rng.uniform((0.55, 0.3, 0), (1.2, 0.8, 180), (len(leaves), 3))
     order = np.argsort(-leaves[:, 2])
-    far = int(np.count_nonzero(leaves[:, 2] > 0))
-    for i in order[:far]:
-        canvas.leaf(leaves[i], shapes[i], tint[i], visible[i], turned[i], sky[i])
-    for rod, seen, open_sky in zip(branches, visible[len(leaves):], sky[len(leaves):]):
-        canvas.wood(rod, float(seen), float(open_sky), sun)
-    for i in order[far:]:
-        canvas.leaf(leaves[i], shapes[i], tint[i], visible[i], turned[i], sky[i])
+    behind, before = np.split(order, [np.count_nonzero(leaves[:, 2] > 0)])
+    for half in (behind, before):
+        canvas.leaves(leaves[half], tint[half], turned[half], visible[half], sky[half], rng)
+        if half is behind:
+            for rod, *light in zip(rods, visible[len(leaves) :], sky[len(leaves) :], strict=True):
+                canvas.wood(rod, *light, sun)
     return Picture.of(canvas.sun, canvas.sky)
 
 
@@ -168,29 +164,45 @@ class _Canvas:
     sky: Field
     half_width: float
 
-    def pixel(self, point: Matrix) -> tuple[int, int]:
-        """Column and row of a ``(3,)`` point."""
-        column = (point[0] + self.half_width) * PIXELS_PER_METRE
-        return round(column), round(self.sun.shape[0] - point[1] * PIXELS_PER_METRE)
+    def pixels(self, points: Matrix) -> list[list[int]]:
+        """Column and row of each of ``(n, 3)`` points."""
+        column = (points[:, 0] + self.half_width) * PIXELS_PER_METRE
+        row = self.sun.shape[0] - points[:, 1] * PIXELS_PER_METRE
+        pixels: list[list[int]] = np.rint(np.stack([column, row], axis=1)).astype(int).tolist()
+        return pixels
 
-    def leaf(
-        self, at: Matrix, shape: Matrix, tint: Matrix, visible: float, turned: float, sky: float
+    def leaves(
+        self,
+        at: Matrix,
+        tint: Matrix,
+        turned: Matrix,
+        visible: Field,
+        sky: Field,
+        rng: np.random.Generator,
     ) -> None:
-        """Paint one cluster: ``shape`` is two radii in units of `LEAF` and an angle, degrees."""
-        centre = self.pixel(at)
-        radii = (shape[:2] * LEAF * PIXELS_PER_METRE).round().astype(int).clip(1).tolist()
-        by_sun, by_sky = (tint * (visible * turned)).tolist(), (tint * sky).tolist()
-        cv2.ellipse(self.sun, centre, radii, shape[2], 0, 360, (*by_sun, 1.0), -1)
-        cv2.ellipse(self.sky, centre, radii, shape[2], 0, 360, (*by_sky, float(visible)), -1)
+        """Paint clusters of leaves in order, ``(n, 3)`` each, as small turned ellipses."""
+        radii = rng.uniform((0.55, 0.3), (1.2, 0.8), (len(at), 2)) * LEAF * PIXELS_PER_METRE
+        by_sun = np.column_stack([tint * (visible * turned)[:, None], np.ones(len(at))])
+        by_sky = np.column_stack([tint * sky[:, None], visible])
+        for centre, axes, angle, lit, shaded in zip(
+            self.pixels(at),
+            np.rint(radii).astype(int).clip(1).tolist(),
+            rng.uniform(0, 180, len(at)).tolist(),
+            by_sun.tolist(),
+            by_sky.tolist(),
+            strict=True,
+        ):
+            cv2.ellipse(self.sun, centre, axes, angle, 0, 360, lit, -1)
+            cv2.ellipse(self.sky, centre, axes, angle, 0, 360, shaded, -1)
 
     def wood(self, rod: Rod, visible: float, sky: float, sun: Sun) -> None:
         """Paint a rod as strips, brighter on the side of the sun."""
-        across = np.array([1.0, 0.0, 0.0])
-        for side in (-0.6, 0.0, 0.6):
+        for side in np.linspace(-0.8, 0.8, 5):
             normal = np.array([side, 0.0, -np.sqrt(1 - side**2)])
             direct = visible * sun.facing(normal)
-            ends = [self.pixel(p + side * rod.radius * across) for p in (rod.foot, rod.tip)]
-            width = max(1, round(0.9 * rod.radius * PIXELS_PER_METRE))
-            lit, shaded = (np.array(BARK) * direct).tolist(), (np.array(BARK) * sky * 0.7).tolist()
-            cv2.line(self.sun, *ends, (*lit, 1.0), width)
-            cv2.line(self.sky, *ends, (*shaded, visible * (direct > 0)), width)
+            ends = self.pixels(np.stack([rod.foot, rod.tip]) + (side * rod.radius, 0.0, 0.0))
+            width = max(1, round(0.6 * rod.radius * PIXELS_PER_METRE))
+            lit, shaded = np.array(BARK) * direct, np.array(BARK) * sky * 0.7
+            seen = float(visible) if direct > 0 else 0.0
+            cv2.line(self.sun, *ends, (*lit.tolist(), 1.0), width)
+            cv2.line(self.sky, *ends, (*shaded.tolist(), seen), width)

@@ -14,7 +14,7 @@ from roadeval.synth.noise import Field
 
 WHITE_BALANCE: Final = (SUN + SKY)[1] / (SUN + SKY)
 """Gains that make a grey card grey in full daylight; shadows stay bluish."""
-MIDDLE: Final = 0.155
+MIDDLE: Final = 0.115
 """Where the automatic exposure wants the (geometric) mean, as a share of saturation."""
 REACTION: Final = 0.5
 """Time constant of the automatic exposure, seconds."""
@@ -26,7 +26,7 @@ BLUR: Final = 0.6
 """Standard deviation of the lens' blur at 640 columns, pixels."""
 VIGNETTING: Final = 0.22
 """Share of the light that is lost in the corners of the image."""
-CONTRAST: Final = 0.55
+CONTRAST: Final = 0.75
 """How much of an S curve the response has on top of the power law."""
 CODES: Final = 4096
 """Levels of the converter before the response."""
@@ -67,7 +67,9 @@ class Sensor:
         optical *= (self._vignette() * np.float32(self._metered(radiance)))[..., None]
         electrons = np.minimum(optical * WHITE_BALANCE.astype(np.float32), 1.0)
         noise = rng.standard_normal(electrons.shape, dtype=np.float32)
-        noise *= np.sqrt(electrons / np.float32(FULL_WELL) + np.float32((READ_NOISE / FULL_WELL) ** 2))
+        noise *= np.sqrt(
+            electrons / np.float32(FULL_WELL) + np.float32((READ_NOISE / FULL_WELL) ** 2)
+        )
         levels = np.clip((electrons + noise) * (CODES - 1) + 0.5, 0, CODES - 1).astype(np.uint16)
         return np.rint(response()).astype(np.uint8)[levels]
 

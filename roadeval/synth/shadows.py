@@ -145,7 +145,7 @@ class SunMap:
         share = np.ones(self.layers[0].shape, np.float32)
         for layer in self.layers:
             share *= layer * np.float32(1 / 255)
-        return GroundTexture.averaged(share, CELL, -REACH, self.start, cv2.BORDER_REPLICATE)
+        return GroundTexture.averaged(share, CELL, -REACH, self.start, outside=1.0)
 
     def hidden_sky(self, ground: GroundTexture) -> GroundTexture:
         """Return the share of the sky hidden from the ground: large where shade is dense.
@@ -155,20 +155,21 @@ class SunMap:
         coarse = 1.0 - cv2.resize(ground.levels[0], None, fx=1 / 8, fy=1 / 8,
                                   interpolation=cv2.INTER_AREA)  # fmt: skip
         hidden = SKY_HIDDEN * cv2.GaussianBlur(coarse, (0, 0), SKY_BLUR / (8 * CELL))
-        return GroundTexture.averaged(hidden, 8 * CELL, -REACH, self.start, cv2.BORDER_REPLICATE)
+        return GroundTexture.averaged(hidden, 8 * CELL, -REACH, self.start, outside=0.0)
 
     def visible_from(self, points: Matrix) -> Field:
-        """``(n,)`` share of the sun's disc seen from ``(n, 3)`` points.
+        """``(h, w)`` share of the sun's disc seen from ``(h, w, 3)`` points.
 
         Only the layers wholly above a point count, so that no wall stands in its own way.
         """
-        cells = to_cells(self.road, self.start, self.sun.shadow_of(points))
-        column, row = (cells - 0.5).astype(np.float32).T
-        share = np.ones(len(points), np.float32)
+        ground = self.sun.shadow_of(points.reshape(-1, 3))
+        cells = to_cells(self.road, self.start, ground) - 0.5
+        column, row = cells.astype(np.float32).T.reshape(2, *points.shape[:2])
+        share = np.ones(points.shape[:2], np.float32)
         for layer, bottom in zip(self.layers, HEIGHTS[:-1], strict=True):
             found = cv2.remap(
-                layer, column[None], row[None], cv2.INTER_LINEAR,
+                layer, column, row, cv2.INTER_LINEAR,
                 borderMode=cv2.BORDER_CONSTANT, borderValue=255,
             )  # fmt: skip
-            share *= np.where(points[:, 1] <= bottom, found[0] / np.float32(255), 1.0)
+            share *= np.where(points[..., 1] <= bottom, found / np.float32(255), 1.0)
         return share

@@ -21,7 +21,7 @@ TREES: Final = np.array([0.075, 0.095, 0.055], np.float32)
 CLOUD_PIXELS: Final = 512
 CLOUD_SCALE: Final = 26.0
 """Pixels of the cloud texture to one cloud height along the ground."""
-SKYLINE_COLUMNS: Final = 2048
+SKYLINE_COLUMNS: Final = 4096
 """Samples of the skylines over a full turn."""
 SKYLINE_SHARPNESS: Final = 0.0016
 """Over how many radians of elevation a skyline fades: about a pixel."""
@@ -32,7 +32,7 @@ class Sky:
     """The far view.
 
     ``clouds`` is ``(n, n)``, periodic; ``hills`` and ``trees`` are ``(m,)`` skylines, the
-    tangent of the elevation by azimuth.
+    tangent of the elevation by azimuth, straight ahead in the middle.
     """
 
     sun: Sun
@@ -76,7 +76,7 @@ class Sky:
         bright = np.float32(0.45 + 0.55 * beam)
         turn = np.arctan2(rays[..., 0], rays[..., 2]) / np.float32(2 * np.pi) * SKYLINE_COLUMNS
         for skyline, colour in ((self.hills, HILLS), (self.trees, TREES)):
-            top = np.interp(turn, np.arange(-64, 64), skyline[-64:64])
+            top = np.interp(turn + SKYLINE_COLUMNS / 2, np.arange(SKYLINE_COLUMNS), skyline)
             view += _below(climb, np.asarray(top, np.float32))[..., None] * (colour * bright - view)
         return view
 
@@ -93,9 +93,7 @@ class Sky:
         height = np.maximum(rays[..., 1], 0.03)
         across = rays[..., 0] / height * np.float32(CLOUD_SCALE)
         along = (rays[..., 2] / height + np.float32(drift)) * np.float32(CLOUD_SCALE)
-        found = cv2.remap(
-            self.clouds, across, along, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP
-        )
+        found = cv2.remap(self.clouds, across, along, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
         cover = smoothstep(found, 0.35, 1.5) * smoothstep(climb, 0.03, 0.14)
         return np.asarray(cover, np.float32), smoothstep(-found, -3.0, -0.6)
 

@@ -26,19 +26,19 @@ class GroundTexture:
         Side of a cell of the finest level, metres.
     left, start
         Offset and Z of the first cell's outer corner, metres.
-    border
-        OpenCV's border mode: what lies outside.
+    outside
+        The value beyond the texture; None if it wraps around.
     """
 
     levels: tuple[Field, ...]
     cell: float
     left: float
     start: float
-    border: int
+    outside: float | None
 
     @classmethod
     def averaged(
-        cls, finest: Field, cell: float, left: float, start: float, border: int
+        cls, finest: Field, cell: float, left: float, start: float, outside: float | None = None
     ) -> GroundTexture:
         """Average ``finest`` along Z by 2, 4, 8 ... as long as 16 rows remain."""
         levels = [finest]
@@ -46,7 +46,7 @@ class GroundTexture:
             rows, columns = levels[-1].shape[:2]
             size = (columns, rows // 2)
             levels.append(cv2.resize(levels[-1], size, interpolation=cv2.INTER_AREA))
-        return cls(tuple(levels), cell, left, start, border)
+        return cls(tuple(levels), cell, left, start, outside)
 
     def sample(self, offset: Field, z: Field, length: Field) -> Field:
         """Sample at ``(h, w)`` points; each row averages over about ``length`` metres of Z.
@@ -61,6 +61,7 @@ class GroundTexture:
         level = np.clip(np.log2(length / self.cell), 0, len(self.levels) - 1)
         column = (offset - self.left) / self.cell - 0.5
         row = (z - self.start) / self.cell
+        border = cv2.BORDER_WRAP if self.outside is None else cv2.BORDER_CONSTANT
         sampled = np.zeros((*z.shape, *self.levels[0].shape[2:]), np.float32)
         for k, texture in enumerate(self.levels):
             weight = np.clip(1.0 - np.abs(level - k), 0.0, None).astype(np.float32)
@@ -72,7 +73,8 @@ class GroundTexture:
                     column[band],
                     row[band] * np.float32(0.5**k) - np.float32(0.5),
                     cv2.INTER_LINEAR,
-                    borderMode=self.border,
+                    borderMode=border,
+                    borderValue=self.outside or 0.0,
                 )
                 sampled[band] += weight[band].reshape(-1, *[1] * (found.ndim - 1)) * found
         return sampled

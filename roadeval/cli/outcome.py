@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeGuard
 
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from roadeval.options import Outcome
+
 RATES: Final = ("ERR", "pooled_ERR", "ACC", "FPR", "FNR")
 COMPARED: Final = ("ERR", "FPR", "FNR")
 
@@ -20,18 +23,35 @@ Totals = Mapping[str, Mapping[str, Mapping[str, Any]]]
 """Counts and rates by variant and stage, as ``totals`` in ``summary.json``."""
 
 
-def show_scores(summary: Mapping[str, Any], out: Console) -> None:
-    """Print how well each variant did after each stage, and what the filter changed."""
-    totals: Totals = summary["totals"]
-    if not totals:
-        out.print("Nothing to score: the log holds no truth for these frames.")
-        return
-    out.print(scores(totals))
-    out.print(best(totals))
-    final = summary["difference"].get(FINAL_STAGE, {})
-    for line in differences(final):
-        out.print(line)
-    out.print(f"Verdict: {summary['verdict']}")
+def show(outcome: Outcome, out: Console) -> None:
+    """Print what a replay read, how well each variant did, and where everything was written."""
+    summary = outcome.summary
+    out.print(f"{summary['drive']['name']}: {accounting(summary)}")
+    out.print()
+    if summary["totals"]:
+        _show_scores(summary, out)
+    else:
+        out.print("Nothing to score: no frame that was read has road truth.")
+    out.print()
+    _show_files(outcome, out)
+
+
+def accounting(summary: Mapping[str, Any]) -> str:
+    """Say what became of the frames, in a line."""
+    frames = summary["frames"]
+    counted = f"{frames['evaluated']} evaluated in {summary['windows']} windows"
+    skipped = (f"{number} {why}" for why, number in frames["skipped"].items())
+    return ", ".join([f"{frames['read']} frames read", *skipped, counted])
+
+
+def _show_scores(summary: Mapping[str, Any], out: Console) -> None:
+    out.print(scores(summary["totals"]))
+    out.print()
+    out.print(best(summary["totals"]))
+    if final := summary["difference"].get(FINAL_STAGE):
+        out.print(f"{FILTERED} minus {UNFILTERED}, {FINAL_STAGE}:")
+        out.print(differences(final))
+    out.print(summary["verdict"])
 
 
 def scores(totals: Totals) -> Table:
@@ -39,9 +59,9 @@ def scores(totals: Totals) -> Table:
     from rich import box
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    table.add_column("variant")
-    table.add_column("stage")
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
+    table.add_column("variant", overflow="fold")
+    table.add_column("stage", overflow="fold")
     for name in ("frames", "ERR", "pooled ERR", "ACC", "FPR", "FNR"):
         table.add_column(name, justify="right")
     winner = _lowest(totals)
@@ -67,14 +87,15 @@ def best(totals: Totals) -> str:
     return f"Lowest ERR: {winner}{aside}, {percent(totals[winner][FINAL_STAGE]['ERR'])}"
 
 
-def differences(final: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
-    """Say what the filter changed in the final mask: percentage points, and how sure."""
-    if not final:
-        return
-    yield f"{FILTERED} minus {UNFILTERED}, {FINAL_STAGE}:"
+def differences(final: Mapping[str, Mapping[str, Any]]) -> Table:
+    """Tabulate what the filter changed in the final mask: percentage points, and how sure."""
+    from rich.table import Table
+
+    table = Table.grid(padding=(0, 2, 0, 0))
     for rate in COMPARED:
         if rate in final:
-            yield f"  {rate} {points(final[rate]['mean'])}  {_certainty(final[rate])}"
+            table.add_row(f"  {rate}", points(final[rate]["mean"]), _certainty(final[rate]))
+    return table
 
 
 def percent(fraction: float | None) -> str:
@@ -92,14 +113,14 @@ def defined(fraction: float | None) -> TypeGuard[float]:
     return fraction is not None and not math.isnan(fraction)
 
 
-def show_files(files: Sequence[Path], out: Console) -> None:
-    """List what was written, folder by folder; a folder's line may be longer than 80 columns."""
-    folders: dict[Path, list[str]] = {}
-    for file in files:
-        folders.setdefault(file.parent, []).append(f"{file.name} ({size(file)})")
-    for folder, names in folders.items():
-        out.print(f"{folder}/")
-        out.print(Padding(", ".join(names), (0, 0, 0, 2)))
+def _show_files(outcome: Outcome, out: Console) -> None:
+    """Say where the outputs lie; a path is never broken, so that it can be copied."""
+    if outcome.recording:
+        out.print(f"{outcome.recording} ({size(outcome.recording)})", soft_wrap=True)
+    if outcome.reports:
+        names = ", ".join(file.name for file in outcome.files if file.parent == outcome.reports)
+        out.print(f"{outcome.reports}{os.sep}", soft_wrap=True)
+        out.print(names)
 
 
 def size(file: Path) -> str:

@@ -1,0 +1,92 @@
+"""The single views of which the viewer's tabs are made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import rerun.blueprint as rrb
+
+from roadeval.data import ERRORS, LayerKind, LayerSpec, VariantLayout
+from roadeval.recording import layout as at
+from roadeval.recording.layout import Layout
+
+View = Any
+"""A view or a container of views."""
+
+PLOTTED: Final[Mapping[str, str]] = {
+    "ERR": "pixels that are wrong",
+    "FPR": "non-road called road",
+    "FNR": "road that was missed",
+}
+"""The rates that are plotted, and what they say."""
+
+
+def picture(title: str, paths: Sequence[str]) -> View:
+    """Draw images over each other."""
+    return rrb.Spatial2DView(origin="/", contents=list(paths), name=title)
+
+
+def camera() -> View:
+    """Show the image as logged."""
+    return picture("Camera", [at.CAMERA])
+
+
+def truth() -> View:
+    """Show which pixels are road."""
+    return picture("Truth: road", [at.CAMERA, at.TRUTH_PATH])
+
+
+def outcome(layout: Layout, variant: VariantLayout) -> View:
+    """Show where the variant is wrong, or without truth what it calls road."""
+    name = ERRORS.name if layout.has_truth else variant.stages[-1]
+    title = f"{variant.name}: {'errors' if layout.has_truth else 'road'}"
+    return picture(title, [at.CAMERA, at.layer_path(variant.name, name)])
+
+
+def is_overlay(spec: LayerSpec) -> bool:
+    """Tell a layer that is drawn over the camera's image from one that stands alone."""
+    return spec.kind in (LayerKind.MASK, LayerKind.LABELS)
+
+
+def layers(title: str, variant: str, specs: Sequence[LayerSpec]) -> View:
+    """Show layers of a variant in one picture."""
+    below = [at.CAMERA] if is_overlay(specs[0]) else []
+    return picture(title, [*below, *(at.layer_path(variant, spec.name) for spec in specs)])
+
+
+def plot(title: str, paths: Sequence[str]) -> View:
+    """Draw numbers over time."""
+    return rrb.TimeSeriesView(
+        origin="/",
+        contents=list(paths),
+        name=title,
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop),
+    )
+
+
+def stage_times(variant: VariantLayout) -> View:
+    """Draw how long each stage of a variant took."""
+    return plot(f"{variant.name}: milliseconds a stage", [f"/timing/{variant.name}/**"])
+
+
+def document(path: str, title: str | None = None) -> View:
+    """Show a text; without a title it has no title bar either."""
+    return rrb.TextDocumentView(
+        origin=path, contents=[path], name=title, titlebar=title is not None
+    )
+
+
+def events(*, wide: bool) -> View:
+    """Say how frames were used, how each variant fared, and what is worth a note."""
+    state = rrb.StateTimelineView(origin="/state", name="How it went")
+    notes = rrb.TextLogView(
+        origin=at.NOTES,
+        contents=[at.NOTES],
+        name="Notes",
+        columns=rrb.TextLogColumns(timeline_columns=[at.FRAME], text_log_columns=["body"]),
+        format_options=rrb.TextLogFormat(monospace_body=False),
+    )
+    if wide:
+        return rrb.Horizontal(state, notes, column_shares=[1, 2])
+    return rrb.Vertical(state, notes)

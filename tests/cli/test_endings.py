@@ -1,0 +1,102 @@
+"""However a command ends: one line on stderr, no traceback, and the exit code for it."""
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+import typer
+
+from roadeval.cli import app as cli
+from roadeval.cli.app import explain, main
+from roadeval.cli.exit_codes import ExitCode
+from roadeval.cli.signals import Stopped
+from roadeval.errors import RoadevalError
+
+
+def lines(capsys):
+    return capsys.readouterr().err.splitlines()
+
+
+def test_a_known_problem_is_one_line_and_exit_code_1(capsys):
+    assert explain(RoadevalError("drive.mcap:\n  no image topic")) == 1
+    assert lines(capsys) == ["roadeval: error: drive.mcap: no image topic"]
+
+
+def test_what_the_rooms_noted_on_an_error_is_told_with_it(capsys):
+    error = RoadevalError("disk full")
+    error.add_note("the partial recording is out.partial.rrd")
+    explain(error)
+    assert lines(capsys) == ["roadeval: error: disk full; the partial recording is out.partial.rrd"]
+
+
+@pytest.mark.parametrize(
+    ("code", "name"), [(ExitCode.INTERRUPTED, "SIGINT"), (ExitCode.TERMINATED, "SIGTERM")]
+)
+def test_a_signal_has_its_own_exit_code_and_tells_what_is_left(code, name, capsys):
+    error = Stopped(code)
+    error.add_note("the partial recording is out.partial.rrd")
+    assert explain(error) == 128 + getattr(signal, name)
+    assert lines(capsys) == ["roadeval: interrupted: the partial recording is out.partial.rrd"]
+
+
+def test_wrong_usage_points_to_the_help(capsys):
+    assert explain(typer.BadParameter("'x' is no number.")) == 2
+    assert lines(capsys) == ["roadeval: error: Invalid value: 'x' is no number"]
+    assert main(["replay", "--no-such-option"]) == 2
+    assert lines(capsys) == [
+        "roadeval: error: No such option: --no-such-option; see 'roadeval replay --help'"
+    ]
+
+
+def test_an_error_of_the_system_is_a_known_problem(capsys):
+    error = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "out.rrd")
+    assert explain(error) == 1
+    assert lines(capsys) == ["roadeval: error: No space left on device: out.rrd"]
+
+
+def test_a_defect_keeps_its_traceback_to_itself_but_says_how_to_see_it(capsys):
+    assert explain(KeyError("ndi")) == 70
+    (line,) = lines(capsys)
+    assert line.startswith("roadeval: error: KeyError: 'ndi' (a defect of roadeval")
+    assert "ROADEVAL_DEBUG=1" in line
+
+
+def test_the_traceback_is_there_for_who_asks(capsys, monkeypatch):
+    monkeypatch.setenv("ROADEVAL_DEBUG", "1")
+    try:
+        raise KeyError("ndi")
+    except KeyError as error:
+        explain(error)
+    assert lines(capsys)[0] == "Traceback (most recent call last):"
+
+
+def test_every_error_of_a_command_is_explained(capsys, monkeypatch):
+    def broken(**_):
+        raise RoadevalError("this log cannot be used")
+
+    monkeypatch.setattr(cli, "app", broken)
+    assert main([]) == 1
+    assert lines(capsys) == ["roadeval: error: this log cannot be used"]
+
+
+def test_the_line_is_coloured_at_a_terminal_only(capsys):
+    explain(RoadevalError("[bold]not markup[/bold]"))
+    assert lines(capsys) == ["roadeval: error: [bold]not markup[/bold]"]
+
+
+def test_a_reader_of_stdout_who_has_gone_is_no_error():
+    program = (
+        "import sys; from roadeval.cli import app, console\n"
+        "def talk(**_): console.emit('x' * 1_000_000)\n"
+        "app.app = talk\n"
+        "sys.exit(app.main([]))"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as run:
+        run.stdout.close()
+        assert run.stderr.read() == b""
+    assert run.returncode == ExitCode.BROKEN_PIPE

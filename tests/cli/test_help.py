@@ -1,0 +1,69 @@
+"""Help and version answer at once, because they import nothing heavy."""
+
+import subprocess
+import sys
+
+import pytest
+
+from roadeval.cli.app import app, main
+from roadeval.version import VERSION
+
+COMMANDS = [command.callback.__name__ for command in app.registered_commands if command.callback]
+HEAVY = ["cv2", "matplotlib", "mcap", "numba", "numpy", "pandas", "pyarrow", "rerun", "sklearn"]
+
+
+def test_the_commands_are_those_that_work():
+    assert COMMANDS == ["replay", "info", "train", "demo"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(command, capsys):
+    assert main([command, "--help"]) == 0
+    shown = capsys.readouterr()
+    assert f"Usage: roadeval {command}" in shown.out
+    assert shown.err == ""
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_fits_80_columns(command, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    main([command, "--help"])
+    assert max(len(line) for line in capsys.readouterr().out.splitlines()) <= 80
+
+
+def test_no_command_at_all_shows_the_help_as_wrong_usage(capsys):
+    assert main([]) == 2
+    shown = capsys.readouterr()
+    assert "Commands:" in shown.err
+    assert shown.out == ""
+
+
+def test_version_goes_to_stdout(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"roadeval {VERSION}\n"
+
+
+def test_help_imports_nothing_heavy():
+    words = [["--help"], ["--version"], *([command, "--help"] for command in COMMANDS)]
+    program = (
+        "import sys; from roadeval.cli.app import main\n"
+        f"for words in {words}: main(words)\n"
+        f"sys.exit(str([name for name in {HEAVY} if name in sys.modules]))"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert run.stderr.strip() == "[]"
+
+
+def test_help_takes_little_processor_time():
+    program = (
+        "import resource, sys; from roadeval.cli.app import main; main(['replay', '--help'])\n"
+        "used = resource.getrusage(resource.RUSAGE_SELF)\n"
+        "sys.exit(str(used.ru_utime + used.ru_stime))"
+    )
+    runs = [
+        subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+        for _ in range(3)
+    ]
+    assert min(float(run.stderr) for run in runs) < 0.3

@@ -1,0 +1,76 @@
+"""The command ``info``: what is in a log, and what replay would pick of it and why."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from roadeval.cli.app import main
+from roadeval.logs import LogWriter
+
+SECOND = 1_000_000_000
+START = 1_700_000_000 * SECOND
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Write a log of 1 Hz with these topics; masks where a topic's values are given."""
+
+    def write(topics, seconds=range(4)):
+        with LogWriter(tmp_path / "drive.mcap") as log:
+            for second in seconds:
+                for topic, values in topics.items():
+                    image = np.resize(np.array(values or [120], np.uint8), (6, 8))
+                    stamp = START + second * SECOND
+                    if values:
+                        log.mask(topic, stamp, image)
+                    else:
+                        jpeg = cv2.imencode(".jpg", image)[1].tobytes()
+                        log.image(topic, stamp, jpeg, "jpeg")
+        return str(tmp_path / "drive.mcap")
+
+    return write
+
+
+def test_it_tells_what_replay_would_pick_and_why(write, capsys):
+    assert main(["info", write({"/camera": None, "/road_mask": [0, 255]})]) == 0
+    shown = capsys.readouterr().out
+    assert "drive.mcap: 3.0 s from 2023-11-14 22:13:20.000 UTC" in shown
+    assert "/camera      jpeg (protobuf)    8x6          4   1 Hz" in shown
+    assert "image: /camera (the only camera image)" in shown
+    assert "truth: /road_mask (" in shown
+
+
+def test_it_tells_what_replay_would_ask_for(write, capsys):
+    drive = write({"/camera": None, "/labels": [0, 1, 2, 3]})
+    assert main(["info", drive]) == 0
+    assert "replay would stop: drive.mcap: /labels holds the values 0 1 2 3" in (
+        capsys.readouterr().out
+    )
+    main(["info", drive, "--road-label", "3"])
+    assert "truth: /labels (" in capsys.readouterr().out
+
+
+def test_it_tells_where_messages_are_missing(write, capsys):
+    main(["info", write({"/camera": None}, seconds=[0, 1, 2, 3, 9])])
+    assert "/camera: gap of 6.00 s, 3.00 s after the start" in capsys.readouterr().out
+
+
+def test_json_holds_the_same(write, capsys):
+    main(["info", write({"/left": None, "/right": None}), "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert [topic["name"] for topic in found["topics"]] == ["/left", "/right"]
+    assert found["start_ns"] == START
+    assert "--image-topic" in found["problem"]
+
+
+def test_damage_is_told_and_has_its_exit_code(data, capsys):
+    assert main(["info", str(data / "mcap" / "broken" / "trunc_midchunk.mcap")]) == 3
+    assert capsys.readouterr().err.startswith("roadeval: lost: trunc_midchunk.mcap: ")
+
+
+def test_what_is_no_log_is_a_known_problem(tmp_path, capsys):
+    (tmp_path / "notes.txt").write_text("no log")
+    assert main(["info", str(tmp_path / "notes.txt")]) == 1
+    assert "not an MCAP file" in capsys.readouterr().err

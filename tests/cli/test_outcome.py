@@ -1,0 +1,120 @@
+"""What a replay came to, on a screen of 80 columns."""
+
+import io
+import math
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from roadeval.cli import outcome
+from roadeval.options import Outcome
+
+RATES = ("ACC", "ERR", "TPR", "FNR", "TNR", "FPR")
+
+
+def total(err, pooled=None, frames=91):
+    """The sums of a stage, of which the tests look at ERR alone."""
+    rates = dict.fromkeys(RATES, 0.5) | {"ERR": err}
+    pooled_rates = {f"pooled_{rate}": 0.5 for rate in RATES} | {"pooled_ERR": pooled or err}
+    return {"frames": frames} | rates | pooled_rates
+
+
+TOTALS = {
+    "filtered": {"svm": total(0.2), "post": total(0.0912, pooled=0.0934)},
+    "unfiltered": {"svm": total(0.15), "post": total(0.0847)},
+    "blind": {"post": total(0.0721)},
+}
+
+
+def difference(mean, low, high, reason=None):
+    return {"mean": mean, "low": low, "high": high, "confidence": 0.95, "reason": reason}
+
+
+def summary(**changed):
+    return {
+        "drive": {"name": "drive"},
+        "frames": {"read": 101, "evaluated": 91, "skipped": {"trained on": 10}},
+        "windows": 10,
+        "totals": TOTALS,
+        "difference": {"post": {"ERR": difference(0.0065, 0.001, 0.012)}},
+        "verdict": "On this drive the filter harms.",
+    } | changed
+
+
+def screen(results, folder=Path("reports/drive")):
+    out = Console(file=io.StringIO(), width=80)
+    outcome.show(Outcome(None, folder, results, (), (), (folder / "frames.csv",)), out)
+    return out.file.getvalue()
+
+
+def lines(results):
+    """The lines of the screen, with single spaces."""
+    return [" ".join(line.split()) for line in screen(results).splitlines()]
+
+
+def test_every_stage_of_every_variant_is_a_row_in_percent():
+    shown = lines(summary())
+    assert "filtered svm 91 20.00 % 20.00 % 50.00 % 50.00 % 50.00 %" in shown
+    assert "post 91 9.12 % 9.34 % 50.00 % 50.00 % 50.00 %" in shown
+
+
+def test_the_baseline_stands_in_the_table():
+    assert "blind post 91 7.21 % 7.21 % 50.00 % 50.00 % 50.00 %" in lines(summary())
+
+
+def test_the_baseline_is_named_when_it_is_the_best():
+    assert outcome.best(TOTALS) == "Lowest ERR: blind, which never looks at the image, 7.21 %"
+
+
+def test_a_variant_is_named_when_it_is_the_best():
+    totals = TOTALS | {"blind": {"post": total(0.5)}}
+    assert outcome.best(totals) == "Lowest ERR: unfiltered, 8.47 %"
+
+
+def test_an_undefined_rate_wins_nothing_and_is_a_dash():
+    totals = {"filtered": {"post": total(math.nan)}, "unfiltered": {"post": total(0.3)}}
+    assert outcome.best(totals) == "Lowest ERR: unfiltered, 30.00 %"
+    assert "filtered post 91 - - 50.00 % 50.00 % 50.00 %" in lines(summary(totals=totals))
+
+
+def test_a_difference_is_told_in_points_with_its_interval():
+    assert "ERR +0.65 pp 95 % interval +0.10 pp to +1.20 pp" in lines(summary())
+
+
+def test_a_difference_without_an_interval_is_told_with_the_reason():
+    final = {"ERR": difference(-0.002, None, None, reason="5 frames, and an interval needs 10")}
+    shown = lines(summary(difference={"post": final}))
+    assert "ERR -0.20 pp no interval: 5 frames, and an interval needs 10" in shown
+
+
+def test_the_frames_are_accounted_for():
+    assert screen(summary()).startswith(
+        "drive: 101 frames read, 10 trained on, 91 evaluated in 10 windows\n"
+    )
+
+
+def test_without_truth_it_says_that_there_is_nothing_to_score():
+    shown = screen(summary(totals={}, difference={}))
+    assert "Nothing to score" in shown
+    assert "%" not in shown
+
+
+def test_it_fits_80_columns():
+    assert max(len(line) for line in screen(summary()).splitlines()) <= 80
+
+
+def test_a_long_path_is_never_broken():
+    folder = Path("/results", "a-long-name" * 10)
+    assert f"{folder}/\n" in screen(summary(), folder)
+
+
+@pytest.mark.parametrize(
+    ("length", "words"), [(0, "0.1 kB"), (2_340, "2.3 kB"), (34_200_000, "34.2 MB")]
+)
+def test_sizes_are_for_people(length, words, tmp_path):
+    file = tmp_path / "out.rrd"
+    file.touch()
+    with file.open("r+b") as opened:
+        opened.truncate(length)
+    assert outcome.size(file) == words

@@ -1,0 +1,49 @@
+"""A signal unwinds the work by an exception."""
+
+import os
+import signal
+
+import pytest
+
+from roadeval.cli import signals
+from roadeval.cli.exit_codes import ExitCode
+
+
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [(signal.SIGINT, ExitCode.INTERRUPTED), (signal.SIGTERM, ExitCode.TERMINATED)],
+)
+def test_a_signal_is_raised_as_an_exception_that_runs_clean_up(number, code):
+    tidied = []
+
+    def work():
+        try:
+            os.kill(os.getpid(), number)
+        finally:
+            tidied.append("closed")
+
+    with pytest.raises(signals.Stopped) as stopped, signals.raised():
+        work()
+    assert stopped.value.exit_code == code
+    assert tidied == ["closed"]
+
+
+def test_a_second_signal_would_end_the_process_at_once():
+    handlers = []
+
+    def work():
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+        finally:
+            handlers.extend(map(signal.getsignal, (signal.SIGINT, signal.SIGTERM)))
+
+    with pytest.raises(signals.Stopped), signals.raised():
+        work()
+    assert handlers == [signal.SIG_DFL, signal.SIG_DFL]
+
+
+def test_the_earlier_handlers_come_back():
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    with signals.raised():
+        assert signal.getsignal(signal.SIGTERM) != before[1]
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before

@@ -1,0 +1,38 @@
+"""What can be seen to be wrong without opening a file is wrong usage: exit code 2."""
+
+import pytest
+
+from roadeval.cli.app import main
+
+WRONG = {
+    "no drive": [],
+    "two drives": ["a.mcap", "b.mcap"],
+    "a stride of none": ["a.mcap", "--every", "0"],
+    "no frames": ["a.mcap", "--max-frames", "0"],
+    "a number that is none": ["a.mcap", "--jobs", "many"],
+    "an unknown preset": ["a.mcap", "--preset", "modern"],
+    "an unknown selection": ["a.mcap", "--record", "some"],
+    "a selection of none": ["a.mcap", "--record", "worst:0"],
+    "a variant without a file": ["a.mcap", "--variant", "mine"],
+    "a variant twice": ["a.mcap", "--variant", "mine=a.toml", "--variant", "mine=b.toml"],
+    "a variant of a default's name": ["a.mcap", "--variant", "filtered=a.toml"],
+    "a variant of a reserved name": ["a.mcap", "--variant", "camera=a.toml"],
+    "a time that is none": ["a.mcap", "--start", "noon"],
+    "a label that is two things": ["a.mcap", "--road-label", "3", "--ignore-label", "3"],
+    "a label to ignore alone": ["a.mcap", "--ignore-label", "11"],
+    "a negative label": ["a.mcap", "--road-label", "-1"],
+}
+
+
+@pytest.mark.parametrize("words", WRONG.values(), ids=WRONG)
+def test_wrong_usage_is_one_line_and_exit_code_2(words, capsys):
+    assert main(["replay", *words]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.startswith("roadeval: error: ")
+    assert shown.err.count("\n") == 1
+
+
+def test_a_mistyped_command_is_guessed(capsys):
+    assert main(["rplay"]) == 2
+    assert "Did you mean 'replay'?" in capsys.readouterr().err

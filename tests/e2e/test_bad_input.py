@@ -1,0 +1,111 @@
+"""Bad input is one line on stderr that says what, where and what to do, and exit code 1."""
+
+import cv2
+import numpy as np
+import pytest
+
+from roadeval.logs import LogWriter
+from tests.e2e.commands import roadeval
+
+SECOND = 1_000_000_000
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Write a log of 8x6 images under these topics and, with a size, masks under /road_mask."""
+
+    def write(*cameras, mask_size=None):
+        image = np.full((6, 8), 120, np.uint8)
+        jpeg = cv2.imencode(".jpg", image)[1].tobytes()
+        with LogWriter(tmp_path / "drive.mcap") as log:
+            for stamp in range(SECOND, 5 * SECOND, SECOND):
+                for topic in cameras:
+                    log.image(topic, stamp, jpeg, "jpeg")
+                if mask_size:
+                    log.mask("/road_mask", stamp, np.tile(np.uint8([0, 255]), mask_size))
+        return tmp_path / "drive.mcap"
+
+    return write
+
+
+@pytest.fixture
+def refused(tmp_path):
+    """Replay what cannot be replayed; returns the one line. Nothing may be left behind."""
+
+    def refused(*words):
+        outputs = ("--save", tmp_path / "out.rrd", "--reports", tmp_path / "reports")
+        run = roadeval("replay", "--quiet", *outputs, *words)
+        assert run.returncode == 1
+        assert run.stdout == ""
+        assert run.stderr.startswith("roadeval: error: ")
+        assert run.stderr.count("\n") == 1
+        assert not list(tmp_path.rglob("*.rrd"))
+        assert not list(tmp_path.rglob("*.csv*"))
+        return run.stderr
+
+    return refused
+
+
+def test_a_missing_file(refused, tmp_path):
+    assert "no-such.mcap: No such file" in refused(tmp_path / "no-such.mcap")
+
+
+def test_a_log_without_images(refused, data):
+    line = refused(data / "mcap" / "real" / "solvcon_vehicle_lz4.mcap")
+    assert "no image topic" in line
+    assert "/vehicle/imu" in line
+
+
+def test_two_cameras_to_choose_from(refused, write):
+    line = refused(write("/left", "/right"))
+    assert "/left, /right" in line
+    assert "--image-topic" in line
+
+
+def test_an_unknown_topic(refused, write):
+    line = refused(write("/left", "/right"), "--image-topic", "/middle")
+    assert "/middle" in line
+    assert "/left, /right" in line
+
+
+def test_truth_of_another_size(refused, write):
+    line = refused(write("/camera", mask_size=(12, 8)))
+    assert "/road_mask is 16x12, but /camera is 8x6" in line
+    assert "--resize-truth" in line
+
+
+def test_a_label_that_does_not_occur(refused, data):
+    drive = data / "drives" / "camvid_0016E5_15hz.mcap"
+    line = refused(drive, "--road-label", 77)
+    assert "77" in line
+    assert "/labels/semantic" in line
+
+
+def test_class_ids_that_nobody_explained(refused, data):
+    line = refused(data / "drives" / "camvid_0016E5_15hz.mcap")
+    assert "--road-label" in line
+
+
+def test_an_output_that_cannot_be_written(refused, write, tmp_path):
+    (tmp_path / "taken").write_text("a file, and no folder")
+    drive = write("/camera", mask_size=(6, 4))
+    line = refused(drive, "--train-frames", 2, "--save", tmp_path / "taken" / "out.rrd")
+    assert "taken" in line
+
+
+def test_an_impossible_setting(refused, write, tmp_path):
+    (tmp_path / "mine.toml").write_text("[shadow]\nring_width = -1\n")
+    line = refused(write("/camera", mask_size=(6, 4)), "--config", tmp_path / "mine.toml")
+    assert "mine.toml" in line
+    assert "ring_width" in line
+
+
+def test_an_empty_range(refused, data):
+    drive = data / "drives" / "camvid_0006R0_1hz.mcap"
+    line = refused(drive, "--start", 1000)
+    assert "no frame in this range" in line
+
+
+def test_nothing_left_to_evaluate(refused, write):
+    line = refused(write("/camera", mask_size=(6, 4)))
+    assert "--train-frames" in line

@@ -1,0 +1,93 @@
+"""Whole drives, from the log to the tables, with the numbers they must give."""
+
+import pytest
+
+from roadeval import Recording
+
+FIGURES = [
+    f"{figure}.{suffix}"
+    for figure in ("fig2_masks", "fig3a_error_rate", "fig3b_fp_fn_rate")
+    for suffix in ("pdf", "png")
+]
+TABLES = ["frames.csv", "regions.csv", "summary.json", "windows.csv"]
+
+
+@pytest.fixture(params=["demo", "street", "car_park"])
+def labelled(request):
+    """Each drive with truth: 100 frames of the demo, 101 of the others."""
+    return request.getfixturevalue(request.param)
+
+
+def pooled_error(replayed, variant, stage="post"):
+    return replayed.summary["totals"][variant][stage]["pooled_ERR"]
+
+
+def test_a_labelled_drive_gives_a_recording_tables_and_figures(labelled):
+    assert labelled.run.returncode == 0, labelled.run.stderr
+    assert labelled.recording.is_file()
+    assert sorted(file.name for file in labelled.reports.iterdir()) == sorted(FIGURES + TABLES)
+
+
+def test_frames_are_accounted_for(labelled):
+    frames = labelled.summary["frames"]
+    assert frames["in_log"] == frames["read"] == frames["decoded"] == frames["labelled"]
+    assert frames["skipped"] == {"trained on": 10}
+    assert frames["evaluated"] == frames["read"] - 10
+
+
+@pytest.mark.parametrize("drive", ["street", "car_park"])
+def test_a_camvid_drive_has_101_frames_and_10_windows(drive, request):
+    replayed = request.getfixturevalue(drive)
+    frames = replayed.summary["frames"]
+    assert (frames["read"], frames["trained_on"], frames["evaluated"]) == (101, 10, 91)
+    assert replayed.summary["windows"] == 10
+    assert len({row["window"] for row in replayed.table("windows")}) == 10
+    assert "101 frames read, 10 trained on, 91 evaluated in 10 windows" in replayed.run.stdout
+
+
+def test_every_variant_stage_and_the_baseline_are_in_every_table(labelled):
+    expected = {
+        *((v, s) for v in ("filtered", "unfiltered") for s in ("similarity", "svm", "post")),
+        ("blind", "post"),
+    }
+    for table in ("frames", "windows", "regions"):
+        rows = labelled.table(table)
+        assert {(row["variant"], row["stage"]) for row in rows} == expected
+    totals = labelled.summary["totals"]
+    assert {(v, s) for v, stages in totals.items() for s in stages} == expected
+
+
+def test_no_training_frame_is_in_a_table(labelled):
+    evaluated = {int(row["frame"]) for row in labelled.table("frames")}
+    assert evaluated == set(range(10, labelled.summary["frames"]["read"]))
+
+
+def test_the_counts_of_every_frame_add_up(labelled):
+    for row in labelled.table("frames"):
+        assert int(row["N"]) == sum(int(row[name]) for name in ("TP", "TN", "FP", "FN"))
+
+
+def test_the_unfiltered_pipeline_does_what_a_prototype_did(street, car_park):
+    assert pooled_error(street, "unfiltered") < 0.12
+    assert pooled_error(car_park, "unfiltered") < 0.09
+
+
+def test_the_filter_harms_on_the_street_and_the_tables_say_so(street):
+    assert pooled_error(street, "filtered") > pooled_error(street, "unfiltered")
+    assert street.summary["difference"]["post"]["ERR"]["mean"] > 0
+    assert "  ERR  +" in street.run.stdout
+
+
+def test_the_terminal_tells_where_everything_was_written(labelled):
+    assert str(labelled.recording) in labelled.run.stdout
+    assert f"{labelled.reports}/" in labelled.run.stdout
+    assert all(name in labelled.run.stdout for name in FIGURES + TABLES)
+
+
+def test_a_drive_without_truth_gives_masks_and_says_that_nothing_is_scored(unlabelled):
+    assert unlabelled.run.returncode == 0, unlabelled.run.stderr
+    assert "Nothing to score" in unlabelled.run.stdout
+    assert sorted(file.name for file in unlabelled.reports.glob("*.csv")) == []
+    assert unlabelled.summary["totals"] == {}
+    masks = Recording(unlabelled.recording).layer("unfiltered", "post", 38)
+    assert masks.shape == (215, 414)

@@ -1,0 +1,93 @@
+"""What the recording holds is what the tables say."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+from roadeval import Recording
+from tests.e2e.commands import replay
+
+RERUN = Path(sys.executable).with_name("rerun")
+
+
+def rerun(*words):
+    """Run Rerun's own tool."""
+    run = subprocess.run(
+        [RERUN, "rrd", *map(str, words)], capture_output=True, text=True, check=False, timeout=120
+    )
+    return run.returncode, run.stdout + run.stderr
+
+
+def truths_of(drive):
+    """The truth of each frame: true for road, false for none, masked where it is ignored."""
+    with drive.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        for _, _, _, message in reader.iter_decoded_messages(topics=["/front/road_mask"]):
+            labels = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_UNCHANGED)
+            yield np.ma.masked_array(labels == 255, labels == 128)
+
+
+def test_the_recorded_masks_scored_against_the_log_give_the_table(car_park, data):
+    truths = list(truths_of(data / "drives" / "camvid_0006R0_1hz.mcap"))
+    recording = Recording(car_park.recording)
+    rows = [row for row in car_park.table("frames") if row["variant"] != "blind"]
+    assert len(rows) == 91 * 6
+    for row in rows:
+        frame = int(row["frame"])
+        road, truth = recording.layer(row["variant"], row["stage"], frame) == 1, truths[frame]
+        found = [
+            np.ma.sum(outcome)
+            for outcome in (road & truth, ~road & ~truth, road & ~truth, ~road & truth)
+        ]
+        assert found == [int(row[name]) for name in ("TP", "TN", "FP", "FN")]
+        assert float(row["ERR"]) == (found[2] + found[3]) / truth.count()
+
+
+def test_the_recording_carries_the_same_records_as_the_files(car_park):
+    recording = Recording(car_park.recording)
+    assert len(recording.frames) == len(car_park.table("frames"))
+    assert len(recording.windows) == len(car_park.table("windows"))
+
+
+@pytest.mark.parametrize("drive", ["demo", "unlabelled"])
+def test_rerun_finds_no_fault_with_the_file(drive, request):
+    code, said = rerun("verify", request.getfixturevalue(drive).recording)
+    assert code == 0, said
+
+
+@pytest.fixture(scope="module")
+def twice(data, tmp_path_factory):
+    """The same 20 frames replayed by one worker, and by two."""
+    drive = data / "drives" / "camvid_0006R0_1hz.mcap"
+    return [
+        replay(tmp_path_factory.mktemp("twice"), drive, "--max-frames", 20, "--jobs", jobs)
+        for jobs in (1, 2)
+    ]
+
+
+@pytest.mark.parametrize("table", ["frames", "windows", "regions"])
+def test_two_runs_give_the_same_tables(twice, table):
+    one, two = ((each.reports / f"{table}.csv").read_bytes() for each in twice)
+    assert one == two
+
+
+def test_two_runs_give_the_same_recording_but_for_the_clock(twice, tmp_path):
+    clocked = [
+        *(f"/timing/{v}/{s}" for v in ("filtered", "unfiltered") for s in STAGES),
+        "/results/summary",
+    ]
+    dropped = [word for path in clocked for word in ("--drop-entity", path)]
+    for number, each in enumerate(twice):
+        code, said = rerun("filter", *dropped, each.recording, "-o", tmp_path / f"{number}.rrd")
+        assert code == 0, said
+    code, said = rerun("compare", "--unordered", tmp_path / "0.rrd", tmp_path / "1.rrd")
+    assert code == 0, said
+
+
+STAGES = ("shadow", "similarity", "svm", "post")

@@ -1,0 +1,94 @@
+"""What is counted, pixel by pixel."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from sklearn.metrics import confusion_matrix
+
+from roadeval.data import Counts
+from roadeval.evaluation.counts import count, error_map, labelled_pixels
+
+from .making import pixels
+
+TRUTH = pixels("##..", "##.?")
+MASK = pixels("#.#.", "####")
+
+
+def test_each_labelled_pixel_has_one_outcome() -> None:
+    (counted,) = count([MASK], TRUTH, {})
+    assert counted.whole == Counts(tp=3, tn=1, fp=2, fn=1)
+
+
+def test_an_ignored_pixel_is_in_no_count() -> None:
+    everywhere = np.full_like(TRUTH, 255)
+    (counted,) = count([MASK], everywhere, {"left": pixels("##..", "##..")})
+    assert counted.whole == counted.regions["left"] == Counts()
+
+
+def test_a_region_counts_its_own_pixels_only() -> None:
+    regions = {"left": pixels("##..", "##.."), "top": pixels("####", "....")}
+    (counted,) = count([MASK], TRUTH, regions)
+    assert counted.regions == {
+        "left": Counts(tp=3, tn=0, fp=0, fn=1),
+        "top": Counts(tp=1, tn=1, fp=1, fn=1),
+    }
+
+
+def test_masks_keep_their_order() -> None:
+    none, all_ = count([np.zeros_like(TRUTH), np.ones_like(TRUTH)], TRUTH, {})
+    assert (none.whole, all_.whole) == (Counts(tn=3, fn=4), Counts(tp=4, fp=3))
+
+
+def test_no_masks_give_no_counts() -> None:
+    assert count([], TRUTH, {}) == ()
+
+
+@pytest.mark.parametrize("odd", [pixels("##", "##", "##", "##"), pixels("####")])
+def test_another_shape_is_refused_even_with_as_many_pixels(odd: np.ndarray) -> None:
+    with pytest.raises(ValueError, match="shape"):
+        count([odd], TRUTH, {})
+    with pytest.raises(ValueError, match="shape"):
+        count([MASK], TRUTH, {"odd": odd})
+
+
+images = st.tuples(st.integers(1, 9), st.integers(1, 30)).flatmap(
+    lambda shape: st.tuples(
+        arrays(np.uint8, shape, elements=st.sampled_from([0, 1, 255])),
+        arrays(np.uint8, shape, elements=st.sampled_from([0, 1])),
+        arrays(np.uint8, shape, elements=st.sampled_from([0, 1])),
+    )
+)
+
+
+@given(images)
+def test_counts_equal_scikit_learns_confusion_matrix(
+    example: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> None:
+    truth, mask, region = example
+    (counted,) = count([mask], truth, {"region": region})
+    for found, inside in ((counted.whole, truth != 255), (counted.regions["region"], region == 1)):
+        known = inside & (truth != 255)
+        if known.any():
+            table = confusion_matrix(truth[known], mask[known], labels=[0, 1])
+            tn, fp, fn, tp = table.ravel().tolist()
+            assert found == Counts(tp, tn, fp, fn)
+        else:
+            assert found == Counts()
+
+
+@given(images)
+def test_no_labelled_pixel_is_lost(example: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+    truth, mask, _ = example
+    (counted,) = count([mask], truth, {})
+    assert counted.whole.n == labelled_pixels(truth) == (truth != 255).sum()
+
+
+def test_the_error_map_names_each_outcome() -> None:
+    layer = error_map(MASK, TRUTH)
+    names = {label.value: label.name for label in layer.spec.classes}
+    assert [[names[value] for value in row] for row in layer.array.tolist()] == [
+        ["TP", "FN", "FP", "TN"],
+        ["TP", "TP", "FP", "ignored"],
+    ]

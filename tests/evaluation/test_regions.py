@@ -1,0 +1,66 @@
+"""Which pixels belong to which region."""
+
+import numpy as np
+
+from roadeval.evaluation import regions
+
+from .making import a_frame, a_variant, pixels
+
+
+def test_the_boundary_lies_within_its_width_on_both_sides_of_the_edge() -> None:
+    truth = pixels("...####", "...####")
+    assert (regions.boundary(truth, 1) == pixels("..##...", "..##...")).all()
+    assert (regions.boundary(truth, 2) == pixels(".####..", ".####..")).all()
+
+
+def test_the_boundary_turns_corners() -> None:
+    truth = pixels("....", ".#..", "....", "....")
+    assert (regions.boundary(truth, 1) == pixels("###.", "###.", "###.", "....")).all()
+
+
+def test_road_that_meets_ignored_pixels_has_no_edge_there() -> None:
+    truth = pixels("##???..", "##???..")
+    assert not regions.boundary(truth, 1).any()
+
+
+def test_a_frame_of_one_class_has_no_boundary() -> None:
+    assert not regions.boundary(pixels("###", "###"), 2).any()
+
+
+def test_bands_go_from_top_to_bottom_and_share_the_rows() -> None:
+    bands = regions.row_bands((7, 2), 5)
+    assert list(bands) == ["band_0", "band_1", "band_2", "band_3", "band_4"]
+    assert sum(bands.values()).tolist() == [[1, 1]] * 7
+    rows = [int(np.count_nonzero(band[:, 0])) for band in bands.values()]
+    assert sum(rows) == 7
+    assert max(rows) - min(rows) <= 1
+    assert bands["band_0"][0, 0] == bands["band_4"][6, 0] == 1
+
+
+def test_more_bands_than_rows_leave_some_empty() -> None:
+    bands = regions.row_bands((2, 3), 5)
+    assert sum(bands.values()).tolist() == [[1, 1, 1]] * 2
+
+
+def test_a_region_is_the_same_for_all_variants() -> None:
+    mask, first, second = pixels("#."), pixels("##"), pixels("..")
+    with_filter = a_variant("filtered", {"post": mask}, {"shadow": first})
+    another = a_variant("gated", {"post": mask}, {"shadow": second, "lit": second})
+    found = regions.detected([a_variant("unfiltered", {"post": mask}), with_filter, another])
+    assert found == {"shadow": first, "lit": second}
+
+
+def test_a_frame_has_true_shadow_only_if_the_log_has_it() -> None:
+    truth = pixels("##..")
+    every = {"boundary", "interior", "band_0", "band_1"}
+    found = regions.of_frame(a_frame(truth), [], boundary_width=1, bands=2)
+    assert set(found) == every
+    shadowed = a_frame(truth, shadow=pixels("#.?#"))
+    found = regions.of_frame(shadowed, [], boundary_width=1, bands=2)
+    assert set(found) == every | {"true_shadow"}
+    assert (found["true_shadow"] == pixels("#..#")).all()
+
+
+def test_interior_is_what_the_boundary_leaves() -> None:
+    found = regions.of_frame(a_frame(pixels("...###")), [], boundary_width=1, bands=1)
+    assert (found["interior"] == pixels("##..##")).all()

@@ -1,0 +1,166 @@
+"""A drive's score, from its frames to its sums."""
+
+import math
+
+import numpy as np
+import pytest
+
+from roadeval.data import Counts, Health, Role, Tally
+from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.score import CountsNotConservedError, prove
+from roadeval.evaluation.scoreboard import Scoreboard
+from roadeval.evaluation.settings import EvaluationSettings
+
+from .making import a_frame, a_variant, pixels
+
+TRUTH = pixels("##..", "##.?")
+FILTERED = a_variant(
+    "filtered", {"svm": pixels("#...", "#..."), "post": pixels("##..", "#...")}, {"lit": TRUTH}
+)
+UNFILTERED = a_variant("unfiltered", {"svm": TRUTH, "post": pixels("##..", "##..")})
+
+
+def a_board(prior: BlindPrior | None = None, window: int = 10) -> Scoreboard:
+    settings = EvaluationSettings(window=window, boundary_width=1, bands=2)
+    return Scoreboard(settings, ["filtered", "unfiltered"], prior)
+
+
+def a_drive(frames: int, board: Scoreboard) -> Scoreboard:
+    for number in range(frames):
+        frame = a_frame(TRUTH, number)
+        board.add(board.score(frame, Role.EVALUATED, (FILTERED, UNFILTERED)))
+    return board
+
+
+def test_every_mask_of_every_variant_is_tallied_and_blind_comes_last() -> None:
+    board = a_board(BlindPrior.of_truths([pixels("#...", "#...")]))
+    result = board.score(a_frame(TRUTH), Role.EVALUATED, (FILTERED, UNFILTERED))
+    assert [(tally.variant, tally.stage) for tally in result.tallies] == [
+        ("filtered", "svm"),
+        ("filtered", "post"),
+        ("unfiltered", "svm"),
+        ("unfiltered", "post"),
+        ("blind", "post"),
+    ]
+    assert result.tallies[1].counts == Counts(tp=3, tn=3, fp=0, fn=1)
+    assert result.tallies[1].rates["FNR"] == 0.25
+    assert result.tallies[4].counts == Counts(tp=2, tn=3, fp=0, fn=2)
+
+
+def test_all_masks_are_counted_in_the_regions_that_the_filter_found() -> None:
+    result = a_board().score(a_frame(TRUTH), Role.EVALUATED, (FILTERED, UNFILTERED))
+    for tally in result.tallies:
+        assert list(tally.regions) == ["lit", "boundary", "interior", "band_0", "band_1"]
+
+
+def test_error_maps_are_of_the_final_masks() -> None:
+    result = a_board().score(a_frame(TRUTH), Role.EVALUATED, (FILTERED, UNFILTERED))
+    assert result.errors["filtered"].array.tolist() == [[1, 1, 0, 0], [1, 3, 0, 4]]
+    assert result.errors["unfiltered"].array.tolist() == [[1, 1, 0, 0], [1, 1, 0, 4]]
+
+
+def test_scoring_changes_nothing() -> None:
+    board = a_board()
+    board.score(a_frame(TRUTH), Role.EVALUATED, (FILTERED,))
+    assert board.totals() == {}
+    assert board.roles() == {}
+
+
+@pytest.mark.parametrize("role", [Role.TRAINING, Role.GAP, Role.UNLABELLED])
+def test_only_evaluated_frames_are_counted(role: Role) -> None:
+    board = a_board()
+    truth = None if role is Role.UNLABELLED else TRUTH
+    result = board.score(a_frame(truth), role, (FILTERED,))
+    board.add(result)
+    assert result.tallies == ()
+    assert result.tables == {}
+    assert board.roles() == {role: 1}
+    assert board.totals() == {}
+    assert board.summary()["verdict"] == "Nothing to score: no frame with truth was evaluated."
+
+
+def test_health_is_judged_and_counted_by_final_masks() -> None:
+    board = a_drive(3, a_board())
+    result = board.score(a_frame(TRUTH), Role.EVALUATED, (FILTERED, UNFILTERED))
+    assert result.health == {"filtered": Health.OK, "unfiltered": Health.OK}
+    assert board.summary()["health"] == {"filtered": {"ok": 3}, "unfiltered": {"ok": 3}}
+
+
+def test_totals_and_windows_follow_the_order_of_the_variants() -> None:
+    board = a_drive(3, a_board(BlindPrior.of_truths([TRUTH]), window=2))
+    assert list(board.totals()) == ["filtered", "unfiltered", "blind"]
+    assert list(board.totals()["filtered"]) == ["svm", "post"]
+    assert board.totals()["filtered"]["post"]["FN"] == 3
+    assert [(row.number, row.variant, row.stage) for row in board.windows()[:5]] == [
+        (0, "filtered", "svm"),
+        (0, "filtered", "post"),
+        (0, "unfiltered", "svm"),
+        (0, "unfiltered", "post"),
+        (0, "blind", "post"),
+    ]
+    assert board.summary()["windows"] == 2
+
+
+def test_the_difference_is_filtered_minus_unfiltered_by_stage() -> None:
+    differences = a_drive(12, a_board()).differences()
+    assert list(differences) == ["svm", "post"]
+    assert list(differences["post"]) == ["ACC", "ERR", "FNR", "FPR"]
+    assert differences["post"]["ERR"].mean == pytest.approx(1 / 7)
+    assert differences["post"]["FNR"].mean == pytest.approx(0.25)
+    assert differences["post"]["FPR"].mean == 0
+
+
+def test_only_frames_that_both_variants_have_are_compared() -> None:
+    board = a_board()
+    for number, variants in enumerate([(FILTERED, UNFILTERED), (FILTERED,), (UNFILTERED,)]):
+        board.add(board.score(a_frame(TRUTH, number), Role.EVALUATED, variants))
+    assert board.differences()["post"]["ERR"].frames == 1
+
+
+def test_without_the_pair_there_is_no_difference() -> None:
+    board = a_board()
+    board.add(board.score(a_frame(TRUTH), Role.EVALUATED, (FILTERED,)))
+    assert board.differences() == {}
+    assert board.summary()["verdict"].startswith("No verdict on a filter")
+
+
+def test_a_variant_may_not_be_called_blind() -> None:
+    with pytest.raises(ValueError, match="blind"):
+        Scoreboard(EvaluationSettings(), ["blind"], None)
+
+
+def test_seconds_are_averaged_over_all_frames() -> None:
+    board = a_drive(2, a_board())
+    board.add(board.score(a_frame(None), Role.UNLABELLED, (FILTERED,)))
+    assert board.summary()["seconds"]["filtered"] == pytest.approx({"svm": 0.002, "post": 0.002})
+
+
+def test_a_frame_that_ignores_every_pixel_has_undefined_rates_and_is_counted_so() -> None:
+    board = a_board()
+    frame = a_frame(np.full_like(TRUTH, 255))
+    board.add(board.score(frame, Role.EVALUATED, (FILTERED,)))
+    totals = board.totals()["filtered"]["post"]
+    assert totals["N"] == 0
+    assert math.isnan(totals["ERR"])
+    assert totals["undefined"]["ERR"] == 1
+
+
+class TestTheSelfCheck:
+    whole = Counts(tp=2, tn=2, fp=1, fn=1)
+
+    def test_accepts_counts_that_add_up(self) -> None:
+        halves = {"boundary": Counts(tp=1, fp=1), "interior": Counts(tp=1, tn=2, fn=1)}
+        prove(Tally("net", "post", self.whole, halves), 6)
+
+    def test_refuses_a_lost_pixel(self) -> None:
+        with pytest.raises(CountsNotConservedError, match="net/post"):
+            prove(Tally("net", "post", self.whole), 7)
+
+    def test_refuses_a_negative_count(self) -> None:
+        with pytest.raises(CountsNotConservedError):
+            prove(Tally("net", "post", Counts(tp=3, fp=-1)), 2)
+
+    def test_refuses_parts_that_do_not_make_the_whole(self) -> None:
+        bands = {"band_0": Counts(tp=2), "band_1": Counts(tn=2, fp=2)}
+        with pytest.raises(CountsNotConservedError):
+            prove(Tally("net", "post", self.whole, bands), 6)

@@ -1,0 +1,41 @@
+"""The sentence at the top of the results."""
+
+import pytest
+
+from roadeval.evaluation.uncertainty import Difference
+from roadeval.evaluation.verdict import verdict
+
+
+def difference(mean: float, low: float | None, high: float | None) -> Difference:
+    reason = "its 91 frames are worth about 5 independent ones" if low is None else None
+    return Difference(mean, low, high, 0.95, None, 91, 5.0, 3.0, reason)
+
+
+@pytest.mark.parametrize(
+    ("found", "sentence"),
+    [
+        (
+            difference(0.092, 0.071, 0.11),
+            "On this drive the filter raises ERR of post by 9.2 pp [7.1, 11.0].",
+        ),
+        (
+            difference(-0.014, -0.024, -0.008),
+            "On this drive the filter lowers ERR of post by 1.4 pp [0.8, 2.4].",
+        ),
+        (
+            difference(0.003, -0.004, 0.01),
+            "On this drive the filter has no clear effect on ERR of post: +0.3 pp [-0.4, +1.0].",
+        ),
+        (
+            difference(0.092, None, None),
+            "Cannot tell whether the filter helps on this drive: ERR of post differs by +9.2 pp "
+            "on average, but its 91 frames are worth about 5 independent ones.",
+        ),
+        (
+            difference(0.0, 0.0, 0.0),
+            "On this drive the filter leaves ERR of post of every frame as it is.",
+        ),
+    ],
+)
+def test_the_verdict_says_what_the_interval_allows(found: Difference, sentence: str) -> None:
+    assert verdict(found, "ERR", "post") == sentence

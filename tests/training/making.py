@@ -1,0 +1,24 @@
+"""Small frames that can be learnt from: grey road below, green verge above."""
+
+import numpy as np
+
+from roadeval.config import Config
+from roadeval.data import Frame
+
+GREY, GREEN = (120, 120, 125), (60, 140, 50)
+
+
+def frame(number: int = 0, *, labelled: bool = True) -> Frame:
+    """Make a 24x32 frame: verge in the upper half, road in the lower, a little noise."""
+    noise = np.random.default_rng(number).integers(-6, 7, (24, 32, 3))
+    image = np.empty((24, 32, 3))
+    image[:12], image[12:] = GREEN, GREY
+    image = (image + noise).clip(0, 255).astype(np.uint8)
+    truth = np.repeat([[0], [1]], 12, axis=0).repeat(32, axis=1).astype(np.uint8)
+    return Frame(number, number, number, image, image.tobytes(), truth=truth if labelled else None)
+
+
+def plans():
+    """Give the two default variants' plans."""
+    config = Config()
+    return {"filtered": config.plan(), "unfiltered": config.without_filter().plan()}

@@ -1,0 +1,107 @@
+"""Fitting the variants."""
+
+import numpy as np
+import pytest
+
+from roadeval.config import Config
+from roadeval.data import IGNORE
+from roadeval.pipeline.chain import Chain
+from roadeval.training import TrainingError, TrainingSettings, fit
+from roadeval.training.fitting import Plan
+from roadeval.training.selfsupervision import patch_truth
+from tests.training.making import frame, plans
+
+FRAMES = [frame(n) for n in range(3)]
+
+
+def test_a_fitted_variant_finds_the_road_in_a_new_frame():
+    plan = plans()["unfiltered"]
+    model = fit(FRAMES, {"unfiltered": plan}, TrainingSettings())
+    chain = Chain(plan.chain, plan.settings, model.parameters["unfiltered"])
+    fresh = frame(9)
+    masks = {name: output.mask for name, output in chain.run(fresh.image)}
+    for name in ("similarity", "svm", "post"):
+        wrong = (masks[name] != fresh.truth).mean()
+        assert wrong < 0.06, name
+
+
+def test_each_variant_learns_from_its_own_images():
+    model = fit(FRAMES, plans(), TrainingSettings())
+    filtered, unfiltered = model.parameters["filtered"], model.parameters["unfiltered"]
+    # The filter takes the verge for shadow: only the unfiltered machine ever saw green.
+    assert filtered["svm"].mean[1] != unfiltered["svm"].mean[1]
+
+
+def test_road_colour_is_the_mean_of_the_sampled_road_pixels():
+    model = fit(FRAMES, plans(), TrainingSettings(pixels_per_class=10_000))
+    road = np.concatenate([f.image[f.truth == 1] for f in FRAMES]).astype(float)
+    colour = model.parameters["unfiltered"]["similarity"]
+    # Every road pixel is drawn: there are as many as of the verge.
+    np.testing.assert_allclose(colour.mean, road.mean(axis=0))
+    np.testing.assert_allclose(colour.covariance, np.cov(road.T, ddof=0))
+
+
+def test_training_twice_gives_the_same_model():
+    first, second = (fit(FRAMES, plans(), TrainingSettings()) for _ in range(2))
+    machines = [m.parameters["filtered"]["svm"] for m in (first, second)]
+    np.testing.assert_array_equal(machines[0].vectors, machines[1].vectors)
+    np.testing.assert_array_equal(machines[0].weights, machines[1].weights)
+
+
+def test_the_model_remembers_its_frames():
+    model = fit(FRAMES, plans(), TrainingSettings())
+    assert model.digests == {f.digest() for f in FRAMES}
+    assert frame(9).digest() not in model.digests
+
+
+def test_no_frames_are_an_error():
+    with pytest.raises(TrainingError, match="no frame to train on"):
+        fit([], plans(), TrainingSettings())
+
+
+def test_one_class_alone_is_an_error_that_names_the_frames():
+    sky = frame(4)
+    sky.truth[:] = 0
+    with pytest.raises(TrainingError, match="frames 4 to 4 show only one class"):
+        fit([sky], plans(), TrainingSettings())
+
+
+def test_insisting_on_truth_where_there_is_none_is_an_error():
+    with pytest.raises(TrainingError, match="no truth to train on"):
+        fit([frame(labelled=False)], plans(), TrainingSettings(source="truth"))
+
+
+def test_without_truth_the_patch_teaches():
+    unlabelled = [frame(n, labelled=False) for n in range(3)]
+    model = fit(unlabelled, plans(), TrainingSettings())
+    assert model.source == "patch"
+    assert model.prior is None
+
+
+def test_a_collapsed_classifier_is_reported():
+    # A threshold that no decision value reaches: nothing is ever called road.
+    config = Config()
+    settings = dict(config.stages)
+    settings["svm"] = type(settings["svm"])(threshold=1000.0)
+    plan = Plan(("similarity", "svm", "post"), settings)
+    warnings = fit(FRAMES, {"x": plan}, TrainingSettings()).warnings
+    assert any("x: svm has collapsed: it calls 0.0% of its own" in w for w in warnings)
+
+
+def test_a_sound_classifier_is_not_reported():
+    only = {"unfiltered": plans()["unfiltered"]}
+    assert fit(FRAMES, only, TrainingSettings()).warnings == ()
+
+
+def test_the_patch_is_road_and_what_is_unlike_it_is_not():
+    shown = frame()
+    truth = patch_truth(shown.image, TrainingSettings())
+    assert (truth[18:22, 13:19] == 1).all()
+    assert (truth[:12] == 0).all()
+
+
+def test_the_patch_leaves_open_what_looks_like_it():
+    grey = np.full((40, 60, 3), 120, np.uint8)
+    truth = patch_truth(grey, TrainingSettings(horizon=0.4))
+    assert (truth[:16] == 0).all()
+    assert (truth[16:28] == IGNORE).all()

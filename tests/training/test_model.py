@@ -1,0 +1,124 @@
+"""The model file: plain data, complete or refused."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from roadeval.config import Config
+from roadeval.errors import RoadevalError
+from roadeval.training import Model, TrainingSettings, fit, load_model, save_model
+from tests.training.making import frame, plans
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    prior = np.linspace(0, 1, 24 * 32, dtype=np.float32).reshape(24, 32)
+    return fit([frame(n) for n in range(3)], plans(), TrainingSettings(), prior)
+
+
+@pytest.fixture
+def path(model: Model, tmp_path: Path) -> Path:
+    save_model(model, tmp_path / "city.model")
+    return tmp_path / "city.model"
+
+
+def test_a_model_reads_back_equal(model, path):
+    read = load_model(path)
+    assert read.digests == model.digests
+    assert read.source == model.source
+    np.testing.assert_array_equal(read.prior, model.prior)
+    for variant, stages in model.parameters.items():
+        for stage, parameters in stages.items():
+            for entry in dataclasses.fields(parameters):
+                np.testing.assert_array_equal(
+                    getattr(read.parameters[variant][stage], entry.name),
+                    getattr(parameters, entry.name),
+                )
+
+
+def test_the_same_model_gives_the_same_bytes(model, path, tmp_path):
+    save_model(model, tmp_path / "again.model")
+    assert (tmp_path / "again.model").read_bytes() == path.read_bytes()
+
+
+def test_nothing_is_left_beside_the_model(path):
+    assert [p.name for p in path.parent.iterdir()] == [path.name]
+
+
+def test_the_settings_it_was_made_for_are_accepted(path):
+    for name, plan in plans().items():
+        load_model(path).require(name, plan.relevant(), path)
+
+
+def test_other_settings_are_refused_by_name(path):
+    config = Config()
+    settings = dict(config.stages)
+    settings["svm"] = type(settings["svm"])(gamma=2.0)
+    plan = dataclasses.replace(config.plan(), settings=settings)
+    with pytest.raises(RoadevalError, match=r"settings of svm .*gamma 0.5 there, 2.0 here"):
+        load_model(path).require("filtered", plan.relevant(), path)
+
+
+def test_settings_of_stages_that_learn_nothing_do_not_matter(path):
+    config = Config()
+    settings = dict(config.stages)
+    settings["post"] = type(settings["post"])(element=9)
+    plan = dataclasses.replace(config.plan(), settings=settings)
+    load_model(path).require("filtered", plan.relevant(), path)
+
+
+def test_a_variant_it_was_not_trained_for_is_refused(path):
+    with pytest.raises(RoadevalError, match=r"no variant night .it has filtered, unfiltered"):
+        load_model(path).require("night", {}, path)
+
+
+def test_a_missing_file_is_one_line(tmp_path):
+    with pytest.raises(RoadevalError, match="there is no such model file"):
+        load_model(tmp_path / "none.model")
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"PK\x03\x04 no archive", b"\x80\x04}."])
+def test_another_file_is_refused(tmp_path, content):
+    path = tmp_path / "x.model"
+    path.write_bytes(content)
+    with pytest.raises(RoadevalError, match="not a model file"):
+        load_model(path)
+
+
+def test_every_cut_of_a_model_is_refused(path):
+    whole = path.read_bytes()
+    for length in range(0, len(whole), max(1, len(whole) // 50)):
+        path.write_bytes(whole[:length])
+        with pytest.raises(RoadevalError):
+            load_model(path)
+
+
+def test_an_array_that_hides_code_is_not_run(tmp_path):
+    class Trap:
+        def __reduce__(self):
+            return (exec, ("raise SystemExit('ran')",))
+
+    path = tmp_path / "trap.model"
+    with path.open("wb") as file:
+        np.savez(file, header=np.array([Trap()], object))
+    with pytest.raises(RoadevalError, match="not a model file"):
+        load_model(path)
+
+
+def test_a_later_version_is_refused(path):
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    header = json.loads(arrays["header"].tobytes()) | {"version": 99}
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
+    with pytest.raises(RoadevalError, match="model format 99, this version reads 1"):
+        load_model(path)
+
+
+def test_a_folder_that_is_missing_is_one_line(model, tmp_path):
+    with pytest.raises(RoadevalError, match="cannot write the model"):
+        save_model(model, tmp_path / "no" / "city.model")
