@@ -94,9 +94,15 @@ def test_the_frames_are_accounted_for():
     )
 
 
-def test_without_truth_it_says_that_there_is_nothing_to_score():
-    shown = screen(summary(totals={}, difference={}))
-    assert "Nothing to score" in shown
+@pytest.mark.parametrize(
+    ("labelled", "why"), [(0, "has road truth"), (10, "was trained on or left out")]
+)
+def test_where_nothing_is_scored_it_says_why(labelled, why):
+    frames = {"read": 39, "evaluated": 0, "labelled": labelled, "skipped": {"unlabelled": 39}}
+    shown = screen(summary(frames=frames, totals={}, difference={}, windows=0))
+    assert shown.startswith("drive: 39 frames read, 39 unlabelled, none evaluated\n")
+    assert "Nothing to score: " in shown
+    assert why in shown
     assert "%" not in shown
 
 

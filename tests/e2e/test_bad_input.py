@@ -15,7 +15,7 @@ def write(tmp_path):
     """Write a log of 8x6 images under these topics and, with a size, masks under /road_mask."""
 
     def write(*cameras, mask_size=None):
-        image = np.full((6, 8), 120, np.uint8)
+        image = np.tile(np.uint8([60, 120]), (6, 4))
         jpeg = cv2.imencode(".jpg", image)[1].tobytes()
         with LogWriter(tmp_path / "drive.mcap") as log:
             for stamp in range(SECOND, 5 * SECOND, SECOND):

@@ -51,14 +51,14 @@ def test_the_same_drive_gives_the_same_interval() -> None:
 def test_a_handful_of_frames_gives_no_interval() -> None:
     found = mean_difference(INDEPENDENT[:9], SETTINGS)
     assert found.low is found.high is None
-    assert found.reason == "9 frames, and an interval needs 10"
+    assert found.reason == "there are 9 frames, and an interval needs 10"
 
 
 def test_many_frames_that_are_worth_few_give_no_interval_either() -> None:
     found = mean_difference(autoregression(np.random.default_rng(4), 91, 0.95), SETTINGS)
     assert found.low is found.high is None
     assert found.effective_frames_low < 10
-    assert found.reason.startswith("its 91 frames are worth about")
+    assert found.reason.startswith("91 frames are worth about")
 
 
 def test_no_frame_at_all_has_no_mean() -> None:

@@ -7,7 +7,7 @@ from roadeval.evaluation.verdict import verdict
 
 
 def difference(mean: float, low: float | None, high: float | None) -> Difference:
-    reason = "its 91 frames are worth about 5 independent ones" if low is None else None
+    reason = "91 frames are worth about 5 independent ones" if low is None else None
     return Difference(mean, low, high, 0.95, None, 91, 5.0, 3.0, reason)
 
 
@@ -28,8 +28,13 @@ def difference(mean: float, low: float | None, high: float | None) -> Difference
         ),
         (
             difference(0.092, None, None),
-            "Cannot tell whether the filter helps on this drive: ERR of post differs by +9.2 pp "
-            "on average, but its 91 frames are worth about 5 independent ones.",
+            "Cannot tell whether the filter helps on this drive: ERR of post rose by 9.2 pp "
+            "on average, but 91 frames are worth about 5 independent ones.",
+        ),
+        (
+            difference(-0.092, None, None),
+            "Cannot tell whether the filter helps on this drive: ERR of post fell by 9.2 pp "
+            "on average, but 91 frames are worth about 5 independent ones.",
         ),
         (
             difference(0.0, 0.0, 0.0),
@@ -39,3 +44,9 @@ def difference(mean: float, low: float | None, high: float | None) -> Difference
 )
 def test_the_verdict_says_what_the_interval_allows(found: Difference, sentence: str) -> None:
     assert verdict(found, "ERR", "post") == sentence
+
+
+def test_where_no_frame_has_a_difference_there_is_no_verdict() -> None:
+    nothing = Difference(float("nan"), None, None, 0.95, None, 0, None, None, "there are 0 frames")
+    sentence = "Nothing to compare: ERR of post is undefined on every frame."
+    assert verdict(nothing, "ERR", "post") == sentence

@@ -1,0 +1,135 @@
+"""Stages in a row: what each sees, and that a chain is a pure function of the image."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from roadeval.pipeline.chain import STAGES, Chain, layers_of, masks_of
+from roadeval.pipeline.stage import TrainingSet
+from tests.pipeline.images import IMAGES, noise
+
+NAMES = ("shadow", "similarity", "svm", "post")
+SETTINGS = {
+    "paper": {name: STAGES[name].settings() for name in NAMES},
+    "printed": {
+        "shadow": STAGES["shadow"].settings(
+            threshold="printed", inclusive=True, statistic="printed", colour_space="hsi"
+        ),
+        "similarity": STAGES["similarity"].settings(),
+        "svm": STAGES["svm"].settings(kernel="linear"),
+        "post": STAGES["post"].settings(operations=("close", "open")),
+    },
+}
+
+
+def fitted(settings):
+    rng = np.random.default_rng(0)
+    grey = rng.normal(110, 20, (60, 1)) + rng.normal(0, 6, (60, 3))
+    colours = np.concatenate([np.clip(grey, 0, 255).astype(np.uint8), noise(1, 60)[0]])
+    where = np.zeros(120, np.intp)
+    sample = TrainingSet((colours[None],), where, where, np.arange(120), np.arange(120) < 60)
+    return {name: STAGES[name].fit(sample, settings[name]) for name in ("similarity", "svm")}
+
+
+@pytest.fixture(scope="module", params=SETTINGS.values(), ids=SETTINGS)
+def chains(request):
+    """The chain with the filter and without, as each preset has it."""
+    parameters = fitted(request.param)
+    return [Chain(names, request.param, parameters) for names in (NAMES, NAMES[1:])]
+
+
+def arrays(chain, image):
+    outputs = [output for _, output in chain.run(image)]
+    layers = [(layer.spec.name, layer.array) for o in outputs for layer in o.layers]
+    regions = [item for o in outputs for item in o.regions.items()]
+    return layers + regions
+
+
+def assert_same(a, b):
+    assert [name for name, _ in a] == [name for name, _ in b]
+    for (name, x), (_, y) in zip(a, b, strict=True):
+        np.testing.assert_array_equal(x, y, err_msg=name)
+
+
+def test_stages_after_the_filter_see_what_it_made(chains):
+    image = noise(30, 40)
+    filtered, unfiltered = chains
+    compensated = filtered.filtered(image)
+    assert (compensated != image).any()
+    after = [entry for entry in arrays(filtered, image) if entry[0] in NAMES[1:]]
+    alone = [entry for entry in arrays(unfiltered, compensated) if entry[0] in NAMES[1:]]
+    assert_same(after, alone)
+
+
+def test_a_chain_without_filters_leaves_the_image_alone(chains):
+    image = noise(5, 6)
+    assert chains[1].filtered(image) is image
+
+
+def test_a_stage_runs_when_it_is_asked_for(chains):
+    steps = chains[0].run(noise(20, 30))
+    assert [next(steps)[0], next(steps)[0]] == ["shadow", "similarity"]
+    assert [name for name, _ in steps] == ["svm", "post"]
+
+
+def test_layers_are_the_ones_announced_in_shape_and_type(chains):
+    image = noise(30, 40)
+    for names, chain in zip((NAMES, NAMES[1:]), chains, strict=True):
+        settings = {step.stage.name: step.settings for step in chain.steps}
+        layers = [layer for _, output in chain.run(image) for layer in output.layers]
+        assert tuple(layer.spec for layer in layers) == layers_of(names, settings)
+        for layer in layers:
+            assert layer.array.shape[:2] == image.shape[:2]
+            wanted = np.float32 if layer.spec.name == "distance" else np.uint8
+            assert layer.array.dtype == wanted, layer.spec.name
+            if layer.spec.classes:
+                assert set(np.unique(layer.array)) <= {c.value for c in layer.spec.classes}
+
+
+def test_a_stages_mask_is_the_layer_of_its_name(chains):
+    for name, output in chains[0].run(noise(30, 40)):
+        if output.mask is not None:
+            assert {layer.spec.name: layer.array for layer in output.layers}[name] is output.mask
+
+
+def test_stages_that_yield_masks_are_all_but_the_filters():
+    assert masks_of(NAMES) == ("similarity", "svm", "post")
+
+
+@pytest.mark.parametrize("image", IMAGES.values(), ids=IMAGES)
+def test_odd_images_pass_every_stage_and_stay_as_they_were(chains, image):
+    before = image.copy()
+    for chain in chains:
+        for _, array in arrays(chain, image):
+            assert np.isfinite(array).all()
+    np.testing.assert_array_equal(image, before)
+
+
+def test_read_only_and_strided_images_give_the_same(chains):
+    image = noise(31, 47)
+    frozen = np.frombuffer(image.tobytes(), np.uint8).reshape(image.shape)
+    backwards = np.ascontiguousarray(image[..., ::-1])[..., ::-1]
+    assert not backwards.flags.c_contiguous
+    for chain in chains:
+        expected = arrays(chain, image)
+        assert_same(arrays(chain, frozen), expected)
+        assert_same(arrays(chain, backwards), expected)
+
+
+def test_four_threads_give_the_same(chains):
+    image = noise(120, 160)
+    for chain in chains:
+        expected = arrays(chain, image)
+        with ThreadPoolExecutor(4) as pool:
+            for result in pool.map(lambda _, c=chain: arrays(c, image), range(8)):
+                assert_same(result, expected)
+
+
+def test_what_was_handed_out_is_not_changed_by_the_next_image(chains):
+    first, second = noise(30, 40, seed=1), noise(30, 40, seed=2)
+    for chain in chains:
+        handed_out = arrays(chain, first)
+        kept = [(name, array.copy()) for name, array in handed_out]
+        arrays(chain, second)
+        assert_same(handed_out, kept)

@@ -1,0 +1,166 @@
+"""Eq. 12-16 against scikit-learn, and the table of all colours against the definition."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.svm import SVC
+
+from roadeval.pipeline import classify
+from roadeval.pipeline.classify import SvmSettings
+from roadeval.pipeline.stage import TrainingSet, View
+from tests.pipeline.images import IMAGES, noise
+
+ROUNDING = 1e-9
+"""A decision value this near the threshold may fall to either side."""
+
+SETTINGS = {
+    "paper": SvmSettings(),
+    "printed": SvmSettings(kernel="linear"),
+    "narrow": SvmSettings(gamma=20.0, c=10.0),
+    "narrower than a level": SvmSettings(gamma=0.5, standardise=False),
+    "wide, in grey levels": SvmSettings(gamma=1e-4, standardise=False),
+    "another threshold": SvmSettings(threshold=0.3),
+}
+
+
+def sample(n=80, seed=0):
+    """Grey road between dark and bright, and other colours: not separable."""
+    rng = np.random.default_rng(seed)
+    road = rng.normal(110, 20, (n, 1)) + rng.normal(0, 6, (n, 3))
+    other = np.where(
+        rng.random((n, 1)) < 0.5, rng.normal(40, 25, (n, 3)), rng.normal(190, 40, (n, 3))
+    )
+    colours = np.clip(np.concatenate([road, other]), 0, 255).astype(np.uint8)
+    where = np.zeros(2 * n, np.intp)
+    return TrainingSet((colours[None],), where, where, np.arange(2 * n), np.arange(2 * n) < n)
+
+
+def scikit_learns(settings, training):
+    machine = SVC(C=settings.c, kernel=settings.kernel, gamma=settings.gamma)
+    steps = [StandardScaler()] if settings.standardise else []
+    return make_pipeline(*steps, machine).fit(training.colours(), training.road)
+
+
+@pytest.fixture(scope="module", params=SETTINGS.values(), ids=SETTINGS)
+def case(request):
+    """Settings, the machine that was fitted, its table, and scikit-learn's own."""
+    settings, training = request.param, sample()
+    machine = classify.fit(training, settings)
+    table = classify.colour_table(machine, settings)
+    return settings, machine, table, scikit_learns(settings, training)
+
+
+def index(colours):
+    wide = colours.astype(int)
+    return wide[..., 0] << 16 | wide[..., 1] << 8 | wide[..., 2]
+
+
+COLOURS = np.concatenate([noise(1, 8000)[0], sample().colours(), sample(seed=1).colours()])
+
+
+def test_decision_values_equal_scikit_learns(case):
+    settings, machine, _, theirs = case
+    ours = classify.decision(COLOURS, machine, settings)
+    np.testing.assert_allclose(ours, theirs.decision_function(COLOURS), rtol=0, atol=ROUNDING)
+
+
+def test_the_table_equals_predict_on_every_pixel_that_is_not_on_the_threshold(case):
+    settings, _, table, theirs = case
+    values = theirs.decision_function(COLOURS)
+    clear = np.abs(values - settings.threshold) > ROUNDING
+    assert clear.mean() > 0.99
+    expected = values > settings.threshold if settings.threshold else theirs.predict(COLOURS)
+    np.testing.assert_array_equal(table[index(COLOURS)][clear], expected[clear])
+
+
+@pytest.mark.parametrize("red", [0, 110, 255])
+def test_the_table_equals_the_definition_next_to_the_threshold(case, red):
+    settings, machine, table, _ = case
+    margins = classify._margins(machine, settings)
+    assert margins.error < 1e-5  # or the bound would decide nothing
+    quick = margins.of_red(red).ravel()
+    near = np.argsort(np.abs(quick))[:1000]
+    colours = np.stack([np.full(1000, red), near // 256, near % 256], axis=1).astype(np.uint8)
+    exact = classify.decision(colours, machine, settings) - settings.threshold
+    assert np.abs(quick[near] - exact).max() <= margins.error
+    clear = np.abs(exact) > ROUNDING
+    assert clear.mean() > 0.9
+    np.testing.assert_array_equal(table[index(colours)][clear], exact[clear] > 0)
+
+
+@pytest.mark.parametrize("kernel", ["rbf", "linear"])
+@pytest.mark.parametrize("colour", [(110, 108, 113), (30, 200, 4)])
+def test_a_colour_on_the_threshold_is_decided_by_the_definition(kernel, colour):
+    # The threshold is put so near that the quick value, whatever it is, cannot tell the side.
+    settings = SvmSettings(kernel=kernel)
+    machine = classify.fit(sample(40), settings)
+    pixel = np.array([colour], np.uint8)
+    value = classify.decision(pixel, machine, settings).item()
+    for offset, road in ((-1e-13, 1), (1e-13, 0)):
+        table = classify.colour_table(machine, replace(settings, threshold=value + offset))
+        assert table[index(pixel)].item() == road
+
+
+def test_the_machine_is_scikit_learns(case):
+    settings, machine, _, theirs = case
+    svc = theirs[-1]
+    np.testing.assert_array_equal(machine.vectors, svc.support_vectors_)
+    np.testing.assert_array_equal(machine.weights, svc.dual_coef_[0])
+    assert machine.offset == svc.intercept_[0]
+    # Eq. 14: 0 <= lambda <= C, and the sum of lambda y is 0.
+    assert np.abs(machine.weights).max() <= settings.c
+    assert machine.weights.sum() == pytest.approx(0, abs=1e-6)
+
+
+def test_features_are_standardised_over_the_training_set():
+    training = sample()
+    colours = training.colours()
+    machine = classify.fit(training, SvmSettings())
+    np.testing.assert_allclose(machine.mean, colours.mean(axis=0))
+    np.testing.assert_allclose(machine.scale, colours.std(axis=0))
+    machine = classify.fit(training, SvmSettings(standardise=False))
+    assert (machine.mean.tolist(), machine.scale.tolist()) == ([0, 0, 0], [1, 1, 1])
+
+
+def test_a_channel_that_never_varies_does_not_divide_by_zero():
+    training = sample()
+    training.images[0][..., 2] = 77
+    machine = classify.fit(training, SvmSettings())
+    assert machine.scale[2] == 1
+    assert np.isfinite(classify.decision(COLOURS, machine, SvmSettings())).all()
+
+
+def test_a_linear_machine_cannot_cut_a_mid_grey_out_and_an_rbf_machine_can():
+    training = sample()
+    accuracy = {}
+    for kernel in ("linear", "rbf"):
+        settings = SvmSettings(kernel=kernel)
+        values = classify.decision(training.colours(), classify.fit(training, settings), settings)
+        accuracy[kernel] = ((values > 0) == training.road).mean()
+    assert accuracy["linear"] < 0.8
+    assert accuracy["rbf"] > 0.9
+
+
+def test_decision_values_do_not_depend_on_the_block_size(monkeypatch):
+    settings = SvmSettings()
+    machine = classify.fit(sample(), settings)
+    whole = classify.decision(COLOURS[:100], machine, settings)
+    monkeypatch.setattr(classify, "_BLOCK", 1000)
+    np.testing.assert_allclose(
+        classify.decision(COLOURS[:100], machine, settings), whole, atol=1e-12
+    )
+
+
+def test_the_mask_is_the_table_at_every_pixel(case):
+    settings, machine, table, _ = case
+    run = classify.bind(settings, machine)
+    for image in IMAGES.values():
+        output = run(View(image, image))
+        assert output.mask.dtype == np.uint8
+        np.testing.assert_array_equal(output.mask, table[index(image)])
+        (layer,) = output.layers
+        assert layer.array is output.mask
+        assert layer.spec == classify.SVM

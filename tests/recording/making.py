@@ -1,0 +1,88 @@
+"""A drive of tiny frames, and a pipeline's results on them, made by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from roadeval.data import (
+    ERRORS,
+    Counts,
+    Frame,
+    FrameResult,
+    Health,
+    LabelClass,
+    Layer,
+    LayerKind,
+    LayerSpec,
+    Role,
+    StageResult,
+    Tally,
+    VariantLayout,
+    VariantResult,
+    mask_spec,
+)
+from roadeval.recording import Layout
+
+HEIGHT, WIDTH = 6, 8
+
+NDI = LayerSpec("ndi", LayerKind.SCALAR, "NDI (Eq. 6)", value_range=(-1.0, 1.0))
+RINGS = LayerSpec(
+    "rings",
+    LayerKind.LABELS,
+    "Rings",
+    (
+        LabelClass(0, "none", (0, 0, 0, 0)),
+        LabelClass(1, "shadow", (0, 0, 255, 128)),
+        LabelClass(2, "ring", (255, 255, 0, 255)),
+    ),
+)
+POST = mask_spec("post", "Road")
+VARIANT = VariantLayout("filtered", "with the filter", ("post",), (NDI, RINGS, POST))
+FRAMES_HEADER = "frame,variant,stage,ERR\n"
+
+
+def layout(**changes):
+    """The layout of the drive that `result` makes frames of."""
+    plain = Layout(
+        "street", WIDTH, HEIGHT, (VARIANT,), rates=("ERR", "FNR"), tables={"frames": FRAMES_HEADER}
+    )
+    return replace(plain, **changes)
+
+
+def frame(number, **changes):
+    """A frame whose image and truth depend on its number."""
+    draw = np.random.default_rng(number)
+    image = draw.integers(0, 256, (HEIGHT, WIDTH, 3), np.uint8)
+    truth = draw.choice(np.array([0, 1, 255], np.uint8), (HEIGHT, WIDTH))
+    plain = Frame(number, 10**9 * number + 7, 10**9 * number + 9, image, image.tobytes())
+    return replace(plain, truth=truth, **changes)
+
+
+def result(number, *, err=0.25, fnr=0.5, **changes):
+    """An evaluated frame's result: one filter that gives layers, one stage that gives a mask."""
+    shown = frame(number)
+    draw = np.random.default_rng(1000 + number)
+    ndi = draw.integers(0, 256, (HEIGHT, WIDTH), np.uint8)
+    rings = draw.integers(0, 3, (HEIGHT, WIDTH), np.uint8)
+    mask = draw.integers(0, 2, (HEIGHT, WIDTH), np.uint8)
+    errors = draw.integers(0, 5, (HEIGHT, WIDTH), np.uint8)
+    filtering = StageResult(
+        "shadow", (Layer(NDI, ndi), Layer(RINGS, rings)), None, {}, {"components": 3.0}, 0.004
+    )
+    final = StageResult("post", (Layer(POST, mask),), mask, {}, {}, 0.002)
+    tally = Tally("filtered", "post", Counts(1, 2, 3, 4), rates={"ERR": err, "FNR": fnr})
+    plain = FrameResult(
+        shown,
+        Role.EVALUATED,
+        (VariantResult("filtered", (filtering, final)),),
+        errors={"filtered": Layer(ERRORS, errors)},
+        tallies=(tally,),
+        health={"filtered": Health.OK},
+        tables={"frames": f"{number},filtered,post,{err}\n"},
+    )
+    return replace(plain, **changes)
+
+
+def unscored(number, role=Role.TRAINING):
+    """A frame that is recorded, but not counted."""
+    return result(number, role=role, errors={}, tallies=(), health={}, tables={})

@@ -1,0 +1,74 @@
+"""What comes back of a layer of each kind."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from roadeval.data import ERRORS, LayerKind, LayerSpec
+from roadeval.recording.codecs import codec
+from tests.recording.making import NDI, POST, RINGS
+
+HEIGHT, WIDTH = 9, 13
+DRAW = np.random.default_rng(0)
+RAMP = np.add.outer(np.arange(HEIGHT), np.arange(WIDTH)).astype(np.float32) / (HEIGHT + WIDTH)
+
+
+def there_and_back(spec, array):
+    chosen = codec(spec, array.shape[1], array.shape[0])
+    return chosen.decode(chosen.encode(array))
+
+
+@pytest.mark.parametrize(("spec", "values"), [(POST, 2), (RINGS, 3), (ERRORS, 5)])
+def test_masks_and_labels_come_back_equal(spec, values):
+    array = DRAW.integers(0, values, (HEIGHT, WIDTH)).astype(np.uint8)
+    np.testing.assert_array_equal(there_and_back(spec, array), array)
+
+
+def test_the_value_for_ignored_pixels_comes_back():
+    array = np.full((HEIGHT, WIDTH), 255, np.uint8)
+    np.testing.assert_array_equal(there_and_back(RINGS, array), array)
+
+
+def test_every_code_of_a_number_map_comes_back():
+    codes = np.arange(256, dtype=np.uint8).reshape(16, 16)
+    np.testing.assert_allclose(there_and_back(NDI, codes), codes / 127.5 - 1, atol=1e-6)
+
+
+def test_an_exact_number_map_comes_back_to_the_nearest_of_256_levels():
+    ndi = DRAW.uniform(-1, 1, (HEIGHT, WIDTH)).astype(np.float32)
+    back = there_and_back(NDI, ndi)
+    assert back.dtype == np.float32
+    assert np.abs(back - ndi).max() <= 1 / 255 + 1e-6
+
+
+def test_numbers_outside_their_range_are_clipped():
+    outside = np.array([[-7.0, 7.0], [-1.0, 1.0]], np.float32)
+    np.testing.assert_allclose(there_and_back(NDI, outside), [[-1, 1], [-1, 1]], atol=1e-6)
+
+
+def test_a_number_map_that_need_not_be_exact_comes_back_nearly_and_at_full_size():
+    spec = LayerSpec("distance", LayerKind.SCALAR, "", value_range=(0.0, 6.0), exact=False)
+    back = there_and_back(spec, 6 * RAMP)
+    assert back.shape == (HEIGHT, WIDTH)
+    assert np.abs(back - 6 * RAMP).max() < 0.5
+
+
+def test_an_image_that_need_not_be_exact_comes_back_nearly_and_at_full_size():
+    spec = LayerSpec("compensated", LayerKind.RGB, "", exact=False)
+    image = np.dstack([255 * RAMP, 255 - 255 * RAMP, 128 + 0 * RAMP]).astype(np.uint8)
+    back = there_and_back(spec, image)
+    assert back.shape == image.shape
+    assert np.abs(back.astype(int) - image).mean() < 10
+
+
+def test_an_exact_image_comes_back_equal():
+    image = DRAW.integers(0, 256, (HEIGHT, WIDTH, 3)).astype(np.uint8)
+    spec = LayerSpec("aligned", LayerKind.RGB, "")
+    np.testing.assert_array_equal(there_and_back(spec, image), image)
+
+
+def test_what_need_not_be_exact_takes_less_than_half():
+    noise = DRAW.integers(0, 256, (480, 640)).astype(np.uint8)
+    sizes = [len(codec(spec, 640, 480).encode(noise)) for spec in (NDI, replace(NDI, exact=False))]
+    assert sizes[1] < sizes[0] / 2

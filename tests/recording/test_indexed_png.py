@@ -1,0 +1,50 @@
+"""Small label images as PNG files."""
+
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from roadeval.recording import indexed_png
+
+ROAD = [(0, 0, 0, 0), (0, 158, 115, 160)]
+
+
+@pytest.mark.parametrize("classes", [2, 3, 4, 5, 16, 17, 256])
+@pytest.mark.parametrize("width", [1, 7, 8, 13])
+def test_labels_come_back_whatever_their_number_and_the_width(classes, width):
+    labels = np.random.default_rng(0).integers(0, classes, (5, width)).astype(np.uint8)
+    png = indexed_png.encode(labels, [(i, 0, 0, 255) for i in range(classes)])
+    np.testing.assert_array_equal(indexed_png.decode(png), labels)
+
+
+@pytest.mark.parametrize("classes", [2, 3, 5, 17])
+def test_another_library_reads_the_same_labels(classes):
+    labels = np.random.default_rng(0).integers(0, classes, (5, 13)).astype(np.uint8)
+    png = indexed_png.encode(labels, [(i, 0, 0, 255) for i in range(classes)])
+    np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(png))), labels)
+
+
+def test_another_library_sees_the_colours_and_how_opaque_they_are():
+    png = indexed_png.encode(np.array([[0, 1]], np.uint8), ROAD)
+    rgba = np.asarray(Image.open(io.BytesIO(png)).convert("RGBA"))
+    assert [tuple(pixel) for pixel in rgba[0]] == ROAD
+
+
+def test_a_mask_takes_a_bit_a_pixel_before_compression():
+    noise = np.random.default_rng(0).integers(0, 2, (480, 640)).astype(np.uint8)
+    assert len(indexed_png.encode(noise, ROAD)) < noise.size / 8 * 1.05
+
+
+@pytest.mark.parametrize("other", [b"", b"\xff\xd8\xff\xe0 a JPEG file"])
+def test_a_file_of_another_kind_is_refused(other):
+    with pytest.raises(ValueError, match="not a PNG"):
+        indexed_png.decode(other)
+
+
+def test_a_png_file_without_a_palette_is_refused():
+    grey = io.BytesIO()
+    Image.fromarray(np.zeros((2, 2), np.uint8)).save(grey, "PNG")
+    with pytest.raises(ValueError, match="palette"):
+        indexed_png.decode(grey.getvalue())

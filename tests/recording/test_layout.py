@@ -1,0 +1,42 @@
+"""What is known before the first frame."""
+
+import pytest
+
+from roadeval.recording import Layout, RecordingError
+from tests.recording.making import VARIANT, layout
+
+
+def paths(**changes):
+    return [path for path, _ in layout(**changes).images()]
+
+
+def test_every_layer_of_every_variant_has_a_path():
+    assert {"/filtered/ndi", "/filtered/rings", "/filtered/post"} < set(paths())
+
+
+def test_truth_and_error_maps_are_there_only_where_there_is_truth():
+    assert {"/truth", "/filtered/errors"} < set(paths())
+    assert not {"/truth", "/filtered/errors"} & set(paths(has_truth=False))
+
+
+def test_true_shadow_is_there_only_where_the_log_has_it():
+    assert "/true_shadow" in paths(has_shadow_truth=True)
+    assert "/true_shadow" not in paths()
+
+
+def test_the_baseline_is_scored_without_being_a_variant():
+    assert list(layout().scored()) == [("filtered", "post"), ("blind", "post")]
+    assert list(layout(baseline=False).scored()) == [("filtered", "post")]
+    assert not list(layout(has_truth=False).scored())
+
+
+def test_a_layout_survives_its_json():
+    whole = layout(first_frame=10, rate_hz=15.0, properties={"version": "1", "frames": 3})
+    assert Layout.from_json(whole.to_json()) == whole
+
+
+@pytest.mark.parametrize("name", ["camera", "truth", "metrics", "state", "frame", "results"])
+def test_a_variant_cannot_take_a_name_that_the_recording_uses(name):
+    variant = type(VARIANT)(name, "", ("post",), VARIANT.layers)
+    with pytest.raises(RecordingError, match=f"named '{name}'"):
+        layout(variants=(variant,))

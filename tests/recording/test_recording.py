@@ -1,0 +1,322 @@
+"""What was recorded is read back: from complete recordings and from partial ones."""
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import textwrap
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import rerun as rr
+
+from roadeval.data import Health, Role
+from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError
+from tests.recording.making import HEIGHT, WIDTH, frame, layout, result, unscored
+
+SUMMARY = {"verdict": "It helps.", "totals": {}, "seconds": {"filtered": {"post": 0.5}}}
+RESULTS = {"summary": json.dumps(SUMMARY), "windows": "window,ERR\n0,0.25\n"}
+RERUN = Path(sys.executable).with_name("rerun")
+
+
+def record(path, results, known=None, texts=None):
+    """Write a complete recording of these frames."""
+    with Recorder(path, known or layout()) as recorder:
+        for each in results:
+            recorder.write(recorder.encode(each))
+        recorder.finish(RESULTS if texts is None else texts)
+    return Recording(path)
+
+
+def rerun(*words):
+    """Run Rerun's own tool; its exit code."""
+    quiet = {**os.environ, "CI": "1"}
+    words = [RERUN, "rrd", *map(str, words)]
+    return subprocess.run(words, env=quiet, capture_output=True, check=False).returncode
+
+
+@pytest.fixture(scope="module")
+def drive():
+    """Two training frames, 17 evaluated ones with a note on one: more than two pages."""
+    frames = [*map(unscored, range(2)), *map(result, range(2, 19))]
+    frames[5] = replace(frames[5], notes=("It rains.", "It pours."))
+    return frames
+
+
+@pytest.fixture(scope="module")
+def recording(drive, tmp_path_factory):
+    return record(tmp_path_factory.mktemp("recording") / "out.rrd", drive)
+
+
+# --- Images -----------------------------------------------------------------------------------
+
+
+def test_masks_and_labels_of_every_frame_come_back_equal(drive, recording):
+    for each in drive:
+        for layer in each.variants[0].layers():
+            if layer.spec.name != "ndi":
+                back = recording.layer("filtered", layer.spec.name, each.frame.number)
+                np.testing.assert_array_equal(back, layer.array)
+
+
+def test_ndi_comes_back_to_its_code(drive, recording):
+    codes = next(drive[3].variants[0].layers()).array
+    np.testing.assert_allclose(recording.layer("filtered", "ndi", 3), codes / 127.5 - 1, atol=1e-6)
+
+
+def test_truth_and_error_map_come_back_equal(drive, recording):
+    np.testing.assert_array_equal(recording.truth(4), drive[4].frame.truth)
+    errors = recording.layer("filtered", "errors", 4)
+    np.testing.assert_array_equal(errors, drive[4].errors["filtered"].array)
+
+
+def test_the_cameras_own_file_is_passed_on(tmp_path):
+    shown = frame(0)
+    jpeg = cv2.imencode(".jpg", shown.image, [cv2.IMWRITE_JPEG_QUALITY, 30])[1].tobytes()
+    logged = replace(shown, payload=memoryview(jpeg), media_type="image/jpeg")
+    back = record(tmp_path / "out.rrd", [replace(unscored(0), frame=logged)]).image(0)
+    decoded = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR_RGB)
+    np.testing.assert_array_equal(back, decoded)
+
+
+def test_a_raw_image_is_recorded_in_its_own_size(recording):
+    assert recording.image(0).shape == (HEIGHT, WIDTH, 3)
+
+
+def test_a_layer_that_a_frame_lacks_is_not_shown_from_the_frame_before(drive, tmp_path):
+    bare = replace(drive[3], variants=(), errors={})
+    recording = record(tmp_path / "out.rrd", [drive[2], bare, drive[4]])
+    with pytest.raises(RecordingError, match="/filtered/post has nothing on frame 3"):
+        recording.layer("filtered", "post", 3)
+    ends = dict(recording._rows("/filtered/post", "Clear:is_recursive"))
+    assert ends == {3: False}
+
+
+# --- Numbers and words ------------------------------------------------------------------------
+
+
+def test_the_tables_lines_come_back_as_a_table(recording):
+    assert list(recording.frames.frame) == list(range(2, 19))
+    assert list(recording.frames.columns) == ["frame", "variant", "stage", "ERR"]
+
+
+def test_a_drive_without_rows_gives_an_empty_table_with_its_columns(tmp_path):
+    frames = record(tmp_path / "out.rrd", [unscored(0)]).frames
+    assert frames.empty
+    assert "ERR" in frames.columns
+
+
+def test_results_come_back(recording):
+    assert recording.complete
+    assert recording.summary == SUMMARY
+    assert recording.windows.ERR.tolist() == [0.25]
+
+
+def test_rates_facts_and_milliseconds_are_series(recording):
+    assert recording.scalars("/metrics/filtered/post/ERR").tolist() == [0.25] * 17
+    assert recording.scalars("/timing/filtered/shadow").tolist() == [4.0] * 19
+    assert recording.scalars("/facts/filtered/shadow/components")[18] == 3.0
+
+
+def test_counts_are_five_numbers_a_frame(recording):
+    (batch,) = recording._batches("/counts/filtered/post", "Scalars:scalars", static=False)
+    assert batch.column("Scalars:scalars").to_pylist() == [[1, 2, 3, 4, 10]] * 17
+
+
+def test_an_undefined_rate_leaves_a_gap(tmp_path):
+    frames = [result(0, fnr=0.5), result(1, fnr=float("nan")), result(2, fnr=0.75)]
+    series = record(tmp_path / "out.rrd", frames).scalars("/metrics/filtered/post/FNR")
+    assert series.to_dict() == {0: 0.5, 2: 0.75}
+
+
+def test_notes_belong_to_their_frame(recording):
+    assert recording.notes(5) == ("It rains.", "It pours.")
+    assert recording.notes(6) == ()
+
+
+def test_roles_are_known_for_every_frame(recording):
+    assert recording.frame_numbers == tuple(range(19))
+    assert recording.roles[1] == Role.TRAINING
+    assert recording.roles[18] == Role.EVALUATED
+
+
+def test_a_lane_holds_changes_only_and_ends_where_nothing_is_known(tmp_path):
+    states = [Health.OK, Health.OK, Health.FAILED, None, Health.OK]
+    frames = [
+        result(number, health={"filtered": state} if state else {})
+        for number, state in enumerate(states)
+    ]
+    recording = record(tmp_path / "out.rrd", frames)
+    lane = dict(recording._rows("/state/filtered", "StateChange:state"))
+    assert lane == {0: "ok", 2: "failed", 3: "", 4: "ok"}
+
+
+# --- Files ------------------------------------------------------------------------------------
+
+
+def test_nothing_stands_under_the_final_name_before_the_end(drive, tmp_path):
+    with Recorder(tmp_path / "new" / "out.rrd", layout()) as recorder:
+        recorder.write(recorder.encode(drive[0]))
+        assert not recorder.path.exists()
+        assert recorder.partial.parent == recorder.path.parent
+        recorder.finish(RESULTS)
+        assert recorder.path.exists()
+    assert not recorder.partial.exists()
+
+
+def test_reruns_own_tool_finds_no_fault(recording):
+    assert rerun("verify", recording.path) == 0
+
+
+def test_the_same_input_gives_the_same_recording_but_for_the_timing(drive, tmp_path):
+    slower = [
+        replace(each, variants=tuple(_slower(variant) for variant in each.variants))
+        for each in drive
+    ]
+    hours = {**RESULTS, "summary": json.dumps({**SUMMARY, "seconds": {"filtered": {"post": 9}}})}
+    record(tmp_path / "a.rrd", drive)
+    record(tmp_path / "b.rrd", slower, texts=hours)
+    assert rerun("compare", "--unordered", tmp_path / "a.rrd", tmp_path / "b.rrd") != 0
+    timing = ["/timing/filtered/shadow", "/timing/filtered/post", "/timing/summary"]
+    drops = [word for path in timing for word in ("--drop-entity", path)]
+    for name in ("a", "b"):
+        words = [*drops, tmp_path / f"{name}.rrd", "-o", tmp_path / f"{name}.same.rrd"]
+        assert rerun("filter", *words) == 0
+    same = [tmp_path / "a.same.rrd", tmp_path / "b.same.rrd"]
+    assert rerun("compare", "--unordered", *same) == 0
+
+
+def _slower(variant):
+    stages = tuple(replace(stage, seconds=stage.seconds * 3) for stage in variant.stages)
+    return replace(variant, stages=stages)
+
+
+@pytest.mark.parametrize("stop", [RuntimeError, KeyboardInterrupt, SystemExit])
+def test_an_exception_leaves_a_partial_recording_with_every_frame_so_far(stop, drive, tmp_path):
+    recorder = Recorder(tmp_path / "out.rrd", layout())
+    with pytest.raises(stop):
+        _record_and_stop(recorder, drive[:5], stop)
+    partial = Recording(recorder.partial)
+    assert not partial.complete
+    assert partial.frame_numbers == (0, 1, 2, 3, 4)
+    assert list(partial.frames.frame) == [2, 3, 4]
+    assert partial.summary == {}
+    assert not recorder.path.exists()
+    assert rerun("verify", recorder.partial) == 0
+
+
+def _record_and_stop(recorder, results, stop):
+    with recorder:
+        for each in results:
+            recorder.write(recorder.encode(each))
+        raise stop
+
+
+KILLED = """
+    import os, pathlib, signal, sys
+    from roadeval.recording import Recorder
+    from tests.recording.making import layout, result
+    with Recorder(pathlib.Path(sys.argv[1]), layout()) as recorder:
+        for number in range(20):
+            recorder.write(recorder.encode(result(number)))
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_killed_run_leaves_all_but_the_last_two_pages(tmp_path):
+    command = [sys.executable, "-c", textwrap.dedent(KILLED), str(tmp_path / "out.rrd")]
+    root = Path(__file__).resolve().parents[2]
+    assert subprocess.run(command, cwd=root, check=False).returncode == -signal.SIGKILL
+    partial = Recording(tmp_path / "out.partial.rrd")
+    assert not partial.complete
+    assert len(partial.frame_numbers) >= 8
+    assert len(partial.frames) == len(partial.frame_numbers)
+    back = partial.layer("filtered", "post", 7)
+    np.testing.assert_array_equal(back, next(result(7).variants[0].masks())[1])
+
+
+@contextmanager
+def files_no_larger_than(limit):
+    """Let writing fail beyond so many bytes, as on a full disk."""
+    unlimited = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, unlimited[1]))
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, unlimited)
+        signal.signal(signal.SIGXFSZ, handler)
+
+
+@pytest.mark.parametrize("missing", [30_000, 100], ids=["in the middle", "at the very end"])
+def test_a_full_disk_is_told_and_no_output_appears(missing, drive, recording, tmp_path):
+    limit = recording.path.stat().st_size - missing
+    with files_no_larger_than(limit), pytest.raises(RecordingError, match="is the disk full"):
+        record(tmp_path / "out.rrd", drive)
+    assert not (tmp_path / "out.rrd").exists()
+
+
+def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(RecordingError, match="cannot be written"), _recorder(tmp_path / "file/out"):
+        pass
+    with pytest.raises(RecordingError, match="is a folder"), _recorder(tmp_path):
+        pass
+
+
+def _recorder(path):
+    return Recorder(path, layout())
+
+
+def test_no_recording_is_made_by_the_recorder_that_does_nothing(drive):
+    with NullRecorder() as recorder:
+        recorder.write(recorder.encode(drive[0]))
+        recorder.finish(RESULTS)
+
+
+# --- What cannot be read ----------------------------------------------------------------------
+
+
+def test_an_unknown_layer_is_answered_with_those_that_exist(recording):
+    with pytest.raises(RecordingError, match=r"no /filtered/depth; there are .*/filtered/ndi"):
+        recording.layer("filtered", "depth", 3)
+
+
+def test_an_unknown_frame_is_told(recording):
+    with pytest.raises(RecordingError, match="nothing on frame 99"):
+        recording.image(99)
+
+
+@pytest.mark.parametrize("content", [b"", b"RR", b"\x89MCAP0\r\n", b"frame,stamp_ns\n"])
+def test_a_file_that_is_no_recording_is_told(content, tmp_path):
+    (tmp_path / "x.rrd").write_bytes(content)
+    with pytest.raises(RecordingError, match=r"x\.rrd: not a recording"):
+        Recording(tmp_path / "x.rrd")
+
+
+def test_a_missing_file_is_told(tmp_path):
+    with pytest.raises(RecordingError, match="no such recording"):
+        Recording(tmp_path / "x.rrd")
+
+
+def test_a_recording_by_another_program_is_told(tmp_path):
+    other = rr.RecordingStream("someone_else")
+    other.save(tmp_path / "x.rrd")
+    other.log("words", rr.TextDocument("hello"))
+    other.flush()
+    other.disconnect()
+    with pytest.raises(RecordingError, match="by someone_else, not by roadeval"):
+        Recording(tmp_path / "x.rrd")
+
+
+def test_a_torn_file_is_told_with_the_way_to_mend_it(recording, tmp_path):
+    whole = recording.path.read_bytes()
+    (tmp_path / "torn.rrd").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(RecordingError, match="rerun rrd optimize --continue-on-error"):
+        Recording(tmp_path / "torn.rrd")

@@ -1,0 +1,107 @@
+"""Which frames train, which are left out, and which are evaluated."""
+
+from dataclasses import dataclass, replace
+
+import pytest
+
+from roadeval.config import Config, variants_of
+from roadeval.data import Frame, Role
+from roadeval.errors import RoadevalError
+from roadeval.learning import Schedule, from_file, from_log, spread
+from roadeval.training import TrainingError, TrainingSettings, save_model
+from tests.training.making import frame
+
+VARIANTS = variants_of(Config(), {})
+
+
+@dataclass
+class Logged:
+    """A frame of a log, as `logs` would hand it out."""
+
+    frame: Frame
+    broken: bool = False
+
+    @property
+    def number(self) -> int:
+        return self.frame.number
+
+    @property
+    def labelled(self) -> bool:
+        return self.frame.truth is not None
+
+    def decode(self) -> Frame:
+        if self.broken:
+            raise RoadevalError("cannot be decoded")
+        return self.frame
+
+
+def log(count: int, unlabelled: tuple[int, ...] = (), broken: tuple[int, ...] = ()):
+    return [Logged(frame(n, labelled=n not in unlabelled), n in broken) for n in range(count)]
+
+
+def roles(frames, schedule: Schedule) -> str:
+    """Give the roles' first letters: t(raining), g(ap), u(nlabelled), e(valuated)."""
+    return "".join(schedule.role(f.frame)[0] for f in frames)
+
+
+def learn(logged, *, labelled: bool = True, **settings):
+    wanted = TrainingSettings(**settings)
+    return from_log(logged, VARIANTS, wanted, lambda done: None, labelled=labelled)
+
+
+def test_the_first_labelled_frames_train_and_the_rest_is_evaluated():
+    frames = log(8, unlabelled=(0, 2))
+    _, schedule = learn(frames, frames=2)
+    assert roles(frames, schedule) == "ututeeee"
+
+
+def test_frames_right_after_training_can_be_left_out():
+    frames = log(8)
+    _, schedule = learn(frames, frames=2, gap=3)
+    assert roles(frames, schedule) == "ttgggeee"
+    assert schedule.first == 5
+
+
+def test_a_frame_that_cannot_be_decoded_is_replaced_by_the_next():
+    frames = log(6, broken=(1,))
+    model, schedule = learn(frames, frames=2)
+    assert model.digests == {frames[0].frame.digest(), frames[2].frame.digest()}
+    assert schedule.first == 3
+
+
+def test_without_truth_the_first_frames_train():
+    frames = log(5, unlabelled=tuple(range(5)))
+    model, schedule = learn(frames, labelled=False, frames=2)
+    assert model.source == "patch"
+    assert roles(frames, schedule) == "ttuuu"
+
+
+@pytest.mark.parametrize(("frames", "gap"), [(4, 0), (2, 2), (9, 0)])
+def test_leaving_no_frame_to_evaluate_is_an_error(frames, gap):
+    with pytest.raises(TrainingError, match="none is left to evaluate; lower --train-frames"):
+        learn(log(4), frames=frames, gap=gap)
+
+
+def test_an_image_that_trained_is_recognised_wherever_it_lies():
+    frames = log(5)
+    _, schedule = learn(frames, frames=2)
+    elsewhere = replace(frames[1].frame, number=77, stamp_ns=5)
+    assert schedule.role(elsewhere) is Role.TRAINING
+
+
+def test_a_model_from_a_file_leaves_its_own_frames_out(tmp_path):
+    frames = log(6)
+    model, _ = learn(frames, frames=2)
+    save_model(model, tmp_path / "m.model")
+    _, schedule = from_file(tmp_path / "m.model", VARIANTS)
+    assert roles(frames, schedule) == "tteeee"
+
+
+def test_training_frames_are_spread_over_a_drive():
+    frames = log(20, unlabelled=(0,))
+    chosen = [f.number for f in spread(lambda: frames, 4)]
+    assert chosen == [1, 5, 9, 13]
+
+
+def test_a_short_drive_gives_what_it_has():
+    assert len(list(spread(lambda: log(3), 10))) == 3

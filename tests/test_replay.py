@@ -1,0 +1,231 @@
+"""The main job, on a small log of our own."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+
+import roadeval
+from roadeval import ReplayOptions, RoadevalError
+from roadeval.config import Config, load_config
+from roadeval.logs import LogWriter
+from tests.training.making import frame
+
+FRAMES = 26
+NS = 100_000_000
+
+
+def write_log(path: Path, *, truth: bool = True, net: bool = False, broken: int = -1) -> Path:
+    """Write a log of small frames; some have no truth, one may be broken."""
+    with LogWriter(path) as writer:
+        for number in range(FRAMES):
+            made, stamp = frame(number), (number + 1) * NS
+            # The verge creeps over the road, so that no fixed mask is right everywhere.
+            made.image[12 : 12 + number // 8] = made.image[0]
+            made.truth[12 : 12 + number // 8] = 0
+            _, png = cv2.imencode(".png", made.image[..., ::-1])
+            data = b"no image" if number == broken else png.tobytes()
+            writer.image("/camera/image", stamp, data, "png")
+            if truth and number != 20:
+                writer.mask("/truth/road", stamp, made.truth * 255)
+            if net:
+                writer.mask("/net/road_mask_prediction", stamp, made.truth * 255)
+    return path
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory) -> Path:
+    return write_log(tmp_path_factory.mktemp("log") / "small.mcap", net=True)
+
+
+def run(drive: Path, folder: Path, **options):
+    return roadeval.replay(
+        drive,
+        save=folder / "out.rrd",
+        reports=folder / "reports",
+        options=ReplayOptions(**options),
+    )
+
+
+def frames_of(folder: Path) -> pd.DataFrame:
+    return pd.read_csv(folder / "reports" / "frames.csv")
+
+
+@pytest.fixture(scope="module")
+def once(drive, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("once")
+    return folder, run(drive, folder, jobs=2)
+
+
+def test_every_frame_is_accounted_for(once):
+    _, outcome = once
+    assert outcome.summary["frames"] == {
+        "in_log": 26,
+        "read": 26,
+        "decoded": 26,
+        "labelled": 25,
+        "trained_on": 10,
+        "evaluated": 15,
+        "skipped": {"trained on": 10, "unlabelled": 1},
+    }
+    assert outcome.summary["windows"] == 2
+
+
+def test_training_and_unlabelled_frames_are_in_no_table(once):
+    folder, _ = once
+    assert sorted(set(frames_of(folder).frame)) == [*range(10, 20), *range(21, 26)]
+    regions = pd.read_csv(folder / "reports" / "regions.csv")
+    assert set(regions.frame) == set(frames_of(folder).frame)
+
+
+def test_every_variant_and_stage_is_in_the_tables(once):
+    folder, _ = once
+    rows = frames_of(folder)
+    assert set(zip(rows.variant, rows.stage, strict=True)) == {
+        *((v, s) for v in ("filtered", "unfiltered") for s in ("similarity", "svm", "post")),
+        ("blind", "post"),
+    }
+
+
+def test_counts_are_conserved_in_every_row(once):
+    rows = frames_of(once[0])
+    assert (rows.TP + rows.TN + rows.FP + rows.FN == rows.N).all()
+    assert (rows.N == 24 * 32).all()
+
+
+def test_the_last_window_says_how_short_it_is(once):
+    windows = pd.read_csv(once[0] / "reports" / "windows.csv")
+    assert windows[windows.window == windows.window.max()].frames.unique() == [5]
+
+
+def test_the_recording_holds_the_masks_that_were_scored(once):
+    folder, outcome = once
+    recording = roadeval.Recording(outcome.recording)
+    scored = frames_of(folder).set_index(["frame", "variant", "stage"])
+    for number in (10, 25):
+        truth = recording.truth(number)
+        for stage in ("similarity", "svm", "post"):
+            mask = recording.layer("unfiltered", stage, number)
+            assert ((mask == 1) & (truth == 1)).sum() == scored.TP[number, "unfiltered", stage]
+            assert ((mask == 1) & (truth == 0)).sum() == scored.FP[number, "unfiltered", stage]
+
+
+def test_the_summary_file_is_the_outcome_s_summary(once):
+    folder, outcome = once
+    written = json.loads((folder / "reports" / "summary.json").read_text())
+    assert written.pop("format") == {"name": "roadeval-summary", "version": 1}
+    assert written == json.loads(json.dumps(outcome.summary))
+
+
+def test_no_partial_file_is_left(once):
+    folder, _ = once
+    assert sorted(p.name for p in folder.iterdir()) == ["out.rrd", "reports"]
+    assert not [p for p in (folder / "reports").iterdir() if "partial" in p.name]
+
+
+def test_figures_are_written(once):
+    names = {p.name for p in (once[0] / "reports").iterdir()}
+    for figure in ("fig2_masks", "fig3a_error_rate", "fig3b_fp_fn_rate"):
+        assert {f"{figure}.png", f"{figure}.pdf"} <= names
+
+
+def test_the_number_of_workers_changes_no_number(drive, once, tmp_path):
+    run(drive, tmp_path, jobs=1)
+    for table in ("frames.csv", "windows.csv", "regions.csv"):
+        other = (tmp_path / "reports" / table).read_bytes()
+        assert other == (once[0] / "reports" / table).read_bytes()
+
+
+def test_frames_after_training_can_be_left_out(drive, tmp_path):
+    outcome = run(drive, tmp_path, train_frames=4, train_gap=5)
+    assert outcome.summary["frames"]["skipped"]["gap after training"] == 5
+    assert frames_of(tmp_path).frame.min() == 9
+
+
+def test_a_model_file_leaves_its_own_frames_out_and_evaluates_the_rest(drive, tmp_path):
+    model = roadeval.train([drive], tmp_path / "m.model", options=ReplayOptions(train_frames=5))
+    outcome = run(drive, tmp_path, model=tmp_path / "m.model")
+    assert outcome.summary["frames"]["trained_on"] == len(model.digests) == 5
+    assert outcome.summary["frames"]["evaluated"] == 20
+
+
+def test_a_model_made_for_other_settings_is_refused(drive, tmp_path):
+    roadeval.train([drive], tmp_path / "m.model")
+    (tmp_path / "c.toml").write_text("[svm]\ngamma = 3.0")
+    with pytest.raises(RoadevalError, match=r"gamma 0.5 there, 3.0 here"):
+        run(drive, tmp_path, model=tmp_path / "m.model", config=load_config(tmp_path / "c.toml"))
+
+
+def test_a_further_variant_is_run_like_the_two(drive, tmp_path):
+    config = Config()
+    wide = replace(
+        config, stages={**config.stages, "shadow": type(config.stages["shadow"])(ring_width=3)}
+    )
+    outcome = run(drive, tmp_path, variants={"wide": wide}, max_frames=16)
+    assert set(outcome.summary["totals"]["wide"]) == {"similarity", "svm", "post"}
+    assert roadeval.Recording(outcome.recording).layer("wide", "rings", 12).max() == 2
+
+
+def test_a_mask_in_the_log_is_scored_as_a_variant(drive, tmp_path):
+    outcome = run(drive, tmp_path, mask_topics={"net": "/net/road_mask_prediction"})
+    total = outcome.summary["totals"]["net"]["post"]
+    assert (total["ERR"], total["frames"]) == (0, 15)
+    assert roadeval.Recording(outcome.recording).layer("net", "post", 12).max() == 1
+
+
+def test_a_log_without_truth_is_recorded_and_not_scored(tmp_path):
+    log = write_log(tmp_path / "plain.mcap", truth=False)
+    outcome = run(log, tmp_path)
+    assert outcome.summary["totals"] == {}
+    assert "no road truth" in outcome.warnings[0]
+    assert not (tmp_path / "reports" / "frames.csv").exists()
+    assert roadeval.Recording(outcome.recording).layer("filtered", "post", 15).shape == (24, 32)
+
+
+def test_a_broken_frame_costs_itself_alone_and_is_named(tmp_path):
+    log = write_log(tmp_path / "hurt.mcap", broken=13)
+    outcome = run(log, tmp_path)
+    assert outcome.summary["frames"]["decoded"] == 25
+    assert outcome.summary["frames"]["evaluated"] == 14
+    assert "13" in outcome.losses[0]
+    assert 13 not in set(frames_of(tmp_path).frame)
+
+
+def test_without_a_recording_the_tables_are_the_same(drive, once, tmp_path):
+    outcome = run(drive, tmp_path, record="none")
+    assert outcome.recording is None
+    assert not (tmp_path / "out.rrd").exists()
+    frames = (tmp_path / "reports" / "frames.csv").read_bytes()
+    assert frames == (once[0] / "reports" / "frames.csv").read_bytes()
+
+
+def test_an_error_on_the_way_leaves_no_results_and_a_partial_recording(
+    drive, tmp_path, monkeypatch
+):
+    from roadeval.evaluation.scoreboard import Scoreboard
+
+    add = Scoreboard.add
+
+    def fail(self, result):
+        if result.frame.number == 12:
+            raise KeyboardInterrupt
+        add(self, result)
+
+    monkeypatch.setattr(Scoreboard, "add", fail)
+    with pytest.raises(KeyboardInterrupt):
+        run(drive, tmp_path)
+    assert list((tmp_path / "reports").iterdir()) == []
+    assert [p.name for p in tmp_path.glob("*.rrd")] == ["out.partial.rrd"]
+    partial = roadeval.Recording(tmp_path / "out.partial.rrd")
+    assert not partial.complete
+    assert partial.layer("unfiltered", "svm", 5).shape == (24, 32)
+
+
+@pytest.mark.parametrize("jobs", [0, -2])
+def test_no_workers_are_refused(drive, tmp_path, jobs):
+    with pytest.raises(RoadevalError, match="at least one worker"):
+        run(drive, tmp_path, jobs=jobs)
