@@ -116,6 +116,7 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "svm": {"kernel": "linear"},
         "post": {"operations": ("close", "open")},
     },
+    "gated": {"chain": ("gated", "similarity", "svm", "post")},
 }
 """The presets, as overrides of the settings' own defaults."""
 

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from roadeval.cli import demo, info, messages, replay, signals, train
+from roadeval.cli import compare, demo, info, messages, replay, report, signals, train
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.errors import RoadevalError
 
@@ -20,7 +20,14 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _command in (replay.replay, info.info, train.train, demo.demo):
+for _command in (
+    replay.replay,
+    report.report,
+    compare.compare,
+    info.info,
+    train.train,
+    demo.demo,
+):
     app.command()(_command)
 
 
@@ -44,7 +51,7 @@ def _root(
     """Flight recorder and scoreboard for road recognition.
 
     Exit codes: 0 done; 1 a file cannot be used; 2 wrong usage; 3 done, but part of the log was
-    lost; 70 a defect of the program; 130, 143 interrupted.
+    lost; 4 a --fail-if condition held; 70 a defect of the program; 130, 143 interrupted.
     """
     if context.invoked_subcommand is None:
         typer.echo(context.get_help(), err=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import textwrap
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -26,3 +27,18 @@ def results() -> Console:
 def emit(text: str) -> None:
     """Write a line to stdout as it is, however long: for machines, and for paths to copy."""
     sys.stdout.write(f"{text}\n")
+
+
+def wrapped(sentence: str, width: int, indent: int, hang: int = 0) -> str:
+    """Wrap a sentence between words only, so that names and paths stay whole.
+
+    ``indent`` is the left margin, ``hang`` what is added to it from the second line on.
+    """
+    return textwrap.fill(
+        sentence,
+        width,
+        initial_indent=" " * indent,
+        subsequent_indent=" " * (indent + hang),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
+from roadeval.cli import console
 from roadeval.errors import RoadevalError
 from roadeval.logs import Log
 from roadeval.options import ReplayOptions
@@ -41,8 +42,6 @@ def describe(log: Log, options: ReplayOptions) -> dict[str, Any]:
 
 def show(found: Mapping[str, Any], out: Console) -> None:
     """Print what `describe` found."""
-    from rich.padding import Padding
-
     out.print(f"{found['path']}: {_extent(found)}", soft_wrap=True)
     out.print()
     out.print(_topics(found["topics"]))
@@ -57,7 +56,7 @@ def show(found: Mapping[str, Any], out: Console) -> None:
     else:
         out.print("replay would pick")
         for pick in found["picks"]:
-            out.print(Padding(pick, (0, 0, 0, 2)))
+            out.print(console.wrapped(pick, out.width, indent=2, hang=2), soft_wrap=True)
 
 
 def _extent(found: Mapping[str, Any]) -> str:

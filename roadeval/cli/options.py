@@ -83,6 +83,13 @@ Drive = Annotated[
     Path, typer.Argument(metavar="DRIVE", show_default=False, help="A camera log (MCAP).")
 ]
 
+Result = Annotated[
+    Path,
+    typer.Argument(
+        metavar="RESULT", show_default=False, help="A recording (.rrd), or a results folder."
+    ),
+]
+
 Preset = Annotated[
     PresetName | None,
     option(

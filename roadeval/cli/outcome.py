@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeGuard
 
+from roadeval.cli import console
 from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def show(outcome: Outcome, out: Console) -> None:
     if summary["totals"]:
         _show_scores(summary, out)
     else:
-        out.print("Nothing to score: no frame that was read has road truth.")
+        out.print(f"Nothing to score: {_why_nothing(summary['frames'])}.")
     out.print()
     _show_files(outcome, out)
 
@@ -39,7 +40,9 @@ def show(outcome: Outcome, out: Console) -> None:
 def accounting(summary: Mapping[str, Any]) -> str:
     """Say what became of the frames, in a line."""
     frames = summary["frames"]
-    counted = f"{frames['evaluated']} evaluated in {summary['windows']} windows"
+    counted = f"{frames['evaluated'] or 'none'} evaluated"
+    if summary["windows"]:
+        counted += f" in {summary['windows']} windows"
     skipped = (f"{number} {why}" for why, number in frames["skipped"].items())
     return ", ".join([f"{frames['read']} frames read", *skipped, counted])
 
@@ -52,6 +55,12 @@ def _show_scores(summary: Mapping[str, Any], out: Console) -> None:
         out.print(f"{FILTERED} minus {UNFILTERED}, {FINAL_STAGE}:")
         out.print(differences(final))
     out.print(summary["verdict"])
+
+
+def _why_nothing(frames: Mapping[str, Any]) -> str:
+    if frames["labelled"]:
+        return "every frame with road truth was trained on or left out"
+    return "no frame that was read has road truth"
 
 
 def scores(totals: Totals) -> Table:
@@ -116,11 +125,11 @@ def defined(fraction: float | None) -> TypeGuard[float]:
 def _show_files(outcome: Outcome, out: Console) -> None:
     """Say where the outputs lie; a path is never broken, so that it can be copied."""
     if outcome.recording:
-        out.print(f"{outcome.recording} ({size(outcome.recording)})", soft_wrap=True)
+        out.print(f"recording  {outcome.recording} ({size(outcome.recording)})", soft_wrap=True)
     if outcome.reports:
-        names = ", ".join(file.name for file in outcome.files if file.parent == outcome.reports)
-        out.print(f"{outcome.reports}{os.sep}", soft_wrap=True)
-        out.print(names)
+        names = ", ".join(file.name for file in outcome.files)
+        out.print(f"results    {outcome.reports}{os.sep}", soft_wrap=True)
+        out.print(console.wrapped(names, out.width, indent=11), soft_wrap=True)
 
 
 def size(file: Path) -> str:

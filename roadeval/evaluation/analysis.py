@@ -77,10 +77,26 @@ def overlap(total: dict[str, Any]) -> dict[str, float]:
     return {name: rate(counts) for name, rate in rates.OVERLAP_RATES.items()}
 
 
-def rows(frames: pd.DataFrame, size: int) -> list[Window]:
-    """Cut the drive into rows of ``size`` evaluated frames, as in ``windows.csv``."""
+def rows(frames: pd.DataFrame, size: int) -> pd.DataFrame:
+    """Cut the drive into rows of ``size`` evaluated frames, with the columns of ``windows.csv``."""
+    import pandas as pd
+
     numbers = frames["frame"].unique().tolist()
-    return [row for history in histories(frames) for row in windows.rows(history, numbers, size)]
+    cut = [row for history in histories(frames) for row in windows.rows(history, numbers, size)]
+    return pd.DataFrame([_row(window) for window in cut])
+
+
+def _row(window: Window) -> dict[str, Any]:
+    return {
+        "window": window.number,
+        "first_frame": window.first_frame,
+        "last_frame": window.last_frame,
+        "frames": window.frames,
+        "variant": window.variant,
+        "stage": window.stage,
+        **window.rates,
+        **{f"pooled_{name}": value for name, value in window.pooled.items()},
+    }
 
 
 # --- One variant against another ------------------------------------------------------------------

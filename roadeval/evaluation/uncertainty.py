@@ -8,7 +8,30 @@ is too narrow, so its quantiles are spread to the standard error of
 a cautious count of effectively independent frames is below ten there is no interval: no method can
 know there how wide it should be.
 
-COVERAGE
+How often an interval that claims 95 % holds the true mean, in percent of 1,000 made-up drives
+(``tests/evaluation/coverage.py`` prints it); "plain" is the bootstrap before it is widened, "naive"
+takes the frames for independent:
+
+===============================  ======  ========  =====  =====  =====
+differences of like neighbours   frames  withheld  given  plain  naive
+===============================  ======  ========  =====  =====  =====
+autoregression, correlation 0.5      91       9.9   94.3   86.8   74.4
+autoregression, correlation 0.5     500       0.0   96.2   91.7   74.5
+autoregression, correlation 0.5    2000       0.0   94.5   92.9   74.3
+autoregression, correlation 0.9      91      99.9      *   67.6   33.1
+autoregression, correlation 0.9     500      13.6   94.3   85.2   33.3
+autoregression, correlation 0.9    2000       0.0   94.2   90.6   33.9
+slow (0.95), half of it noise        91      48.0   57.7   54.3   36.2
+slow (0.95), half of it noise       500       4.8   89.9   79.3   33.4
+slow (0.95), half of it noise      2000       0.0   93.2   89.5   36.2
+bursts (0.9), else nothing           91      79.9   18.4   62.8   34.3
+bursts (0.9), else nothing          500       2.8   90.4   83.5   40.2
+bursts (0.9), else nothing         2000       0.0   93.1   89.1   36.7
+===============================  ======  ========  =====  =====  =====
+
+(*) One drive of the thousand was given an interval, and it did not hold. The short drives at the
+bottom show what no estimate can mend: a drift that noise hides, or bursts that a drive happened not
+to meet, cannot be seen in 91 frames. An interval knows nothing of what its drive did not show.
 
 References
 ----------
@@ -87,14 +110,14 @@ def mean_difference(differences: Series, settings: EvaluationSettings) -> Differ
             mean, mean, mean, settings.confidence, None, n, n, n, "the same on every frame"
         )
     if n < least:
-        reason = f"{n} frames, and an interval needs {least}"
+        reason = f"there are {n} frames, and an interval needs {least}"
         return Difference(mean, None, None, settings.confidence, None, n, None, None, reason)
     error = error_of_mean(known)
     facts = (n, error.frames, error.frames_low)
     if error.frames_low < least:
         reason = (
-            f"its {n} frames are worth about {error.frames:.0f} independent ones, perhaps only "
-            f"{error.frames_low:.0f}, and an interval needs {least} for certain"
+            f"{n} frames are worth about {error.frames:.0f} independent ones, perhaps only "
+            f"{error.frames_low:.0f}, and an interval needs {least}"
         )
         return Difference(mean, None, None, settings.confidence, None, *facts, reason)
     low, high = _interval(known, error, settings)

@@ -22,10 +22,13 @@ def verdict(difference: Difference, rate: str, stage: str) -> str:
         What it is the difference of, as ``ERR`` and ``post``.
     """
     what, mean = f"{rate} of {stage}", 100 * difference.mean
+    if difference.frames == 0:
+        return f"Nothing to compare: {what} is undefined on every frame."
     if difference.low is None or difference.high is None:
+        moved = f"rose by {mean:.1f}" if mean > 0 else f"fell by {-mean:.1f}"
         return (
-            f"Cannot tell whether the filter helps on this drive: {what} differs by {mean:+.1f} pp "
-            f"on average, but {difference.reason}."
+            f"Cannot tell whether the filter helps on this drive: {what} {moved} pp on average, "
+            f"but {difference.reason}."
         )
     if difference.low == difference.high == 0:
         return f"On this drive the filter leaves {what} of every frame as it is."

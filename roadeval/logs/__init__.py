@@ -1,6 +1,6 @@
 """Camera logs (MCAP) in and out. No other room knows MCAP."""
 
-from roadeval.logs.container import Damage
+from roadeval.logs.damage import Damage
 from roadeval.logs.errors import FrameError, LogError
 from roadeval.logs.frames import Accounting, FrameStream, LoggedFrame
 from roadeval.logs.labels import LabelValues

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from roadeval.logs.errors import LogError
+from roadeval.logs.messages import Kind
 from roadeval.logs.topics import TopicInfo
 
 
@@ -62,9 +63,11 @@ def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicI
 
 
 def choose_truth(
-    topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None
+    topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None, *, colors: bool = False
 ) -> tuple[TopicInfo | None, str]:
     """Choose the topic of the road truth; returns it, or None, and why.
+
+    It is an image of single values, or, if ``colors`` are to be told apart, any without loss.
 
     Raises
     ------
@@ -75,13 +78,14 @@ def choose_truth(
         return None, "asked to use none"
     if asked is not None:
         return named(topics, asked, "--truth-topic"), "asked for"
-    labels = _label_topics(topics, image)
+    labels = _label_topics(topics, image, colors=colors)
     roads = [topic for topic in labels if not words(topic.name) & SHADOW_WORDS]
     strong = [topic for topic in roads if _is_plainly_truth(topic)]
     plain = strong or [topic for topic in roads if _is_plain_mask(topic, image)]
     plain = _most_alike(plain, image)
     if len(plain) == 1:
-        return plain[0], "the label image, by its name and its single channel"
+        by = "colours" if plain[0].channels == 3 else "single channel"
+        return plain[0], f"the label image, by its name and its {by}"
     if plain:
         listed = ", ".join(topic.name for topic in plain)
         raise LogError(f"{len(plain)} label topics: {listed}; choose one with --truth-topic")
@@ -133,7 +137,9 @@ def named(topics: Sequence[TopicInfo], name: str, option: str) -> TopicInfo:
     raise LogError(f"{option} {name}: {what}; its image topics are: {valid}")
 
 
-def _label_topics(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:
+def _label_topics(
+    topics: Sequence[TopicInfo], image: TopicInfo, *, colors: bool = False
+) -> list[TopicInfo]:
     """Topics that look like label images and are no network's output."""
     return [
         topic
@@ -141,13 +147,18 @@ def _label_topics(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicIn
         if topic.name != image.name
         and topic.count
         and _looks_like_label(topic)
-        and topic.channels == 1
+        and (topic.channels == 1 or (colors and not _is_lossy(topic)))
         and not words(topic.name) & OUTPUT_WORDS
     ]
 
 
 def _looks_like_label(topic: TopicInfo) -> bool:
     return topic.is_image and bool(words(topic.name) & (LABEL_WORDS | MASK_WORDS | SHADOW_WORDS))
+
+
+def _is_lossy(topic: TopicInfo) -> bool:
+    name = topic.format.lower()
+    return topic.kind is Kind.VIDEO or "jpeg" in name or "jpg" in name
 
 
 def _looks_like_depth(topic: TopicInfo) -> bool:

@@ -1,82 +1,53 @@
-"""One MCAP file as a table of contents: what is in it and where, in whatever state it is.
-
-The file is walked once from record to record, stepping over the data of chunks: that tells
-what is really there. The summary at the end is a second witness.
-"""
+"""One MCAP file as a table of contents: what is in it, where, and what of it is lost."""
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
+from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 from mcap.opcode import Opcode
-from mcap.records import Channel, Schema, Statistics
+from mcap.records import Channel, Schema
 
-from roadeval.logs.chunks import ChunkReader
+from roadeval.logs.chunks import ChunkReader, crc_of
+from roadeval.logs.damage import Damage
+from roadeval.logs.errors import BadRecord
 from roadeval.logs.records import (
-    CHUNK_HEAD,
-    HEAD,
-    LONGEST_NAME,
-    MAGIC,
     MESSAGE_HEAD,
-    BadRecord,
     Chunk,
+    Entries,
     Message,
-    Place,
     message_at,
     parse,
-    parse_chunk,
-    parse_message_index,
     walk,
 )
+from roadeval.logs.scan import Gap, Scan
 from roadeval.logs.source import Source
+from roadeval.logs.summary import read_summary
 
-Int64s = npt.NDArray[np.int64]
-OUTSIDE = -1
+OUTSIDE: Final = -1
 """The chunk number of a message that lies in no chunk."""
-SMALL = 64 << 20
-"""No record but a chunk, a message or an attachment is larger."""
-
-
-@dataclass(frozen=True, slots=True)
-class Damage:
-    """A part of a file that could not be read.
-
-    ``offset`` is the byte where it begins; ``start_ns`` and ``end_ns`` are the log times between
-    which messages are lost, None where nothing tells.
-    """
-
-    path: Path
-    offset: int
-    reason: str
-    start_ns: int | None = None
-    end_ns: int | None = None
-
-    def __str__(self) -> str:
-        return f"{self.path.name}: {self.reason} at byte {self.offset}"
 
 
 @dataclass(slots=True)
 class ChannelLog:
-    """Where the messages of one channel lie, as the walk finds them.
+    """Where the messages of one channel lie.
 
-    ``blocks`` holds (chunk number, ``(n, 2)`` log times and offsets) in file order; it stays
-    empty for a channel nobody asked for, of which only count and time range are kept.
+    ``blocks`` holds chunk numbers and entries in the order of the file; it stays empty for a
+    channel that nobody will read, of which only count and time range are kept.
     """
 
     wanted: bool
     count: int = 0
     first_ns: int = np.iinfo(np.int64).max
     last_ns: int = np.iinfo(np.int64).min
-    blocks: list[tuple[int, Int64s]] = field(default_factory=list)
+    blocks: list[tuple[int, Entries]] = field(default_factory=list)
 
-    def add(self, chunk: int, entries: Int64s) -> None:
-        """Add ``(n, 2)`` log times and offsets of messages in a chunk."""
+    def add(self, chunk: int, entries: Entries) -> None:
+        """Add the messages of a chunk."""
         if not len(entries):
             return
         self.count += len(entries)
@@ -87,7 +58,7 @@ class ChannelLog:
 
 
 class Container:
-    """One MCAP file.
+    """One MCAP file, in whatever state it is.
 
     Parameters
     ----------
@@ -95,32 +66,62 @@ class Container:
         The file.
     wanted
         Tells, by a channel and its schema, whether its messages will be read.
+    is_whole
+        Tells, by a channel, its schema and a message, whether the message is of the right
+        length; asked only beside damage.
     keep_corrupt
-        Whether to read chunks whose checksum is wrong.
+        Whether to read data whose checksum is wrong.
+
+    Attributes
+    ----------
+    schemas, channels
+        By their numbers.
+    logs
+        Where messages lie, by the number of their channel.
+    misled
+        Chunks whose message indexes were found to be wrong.
     """
 
     def __init__(
         self,
         path: Path,
         wanted: Callable[[Channel, Schema | None], bool],
+        is_whole: Callable[[Channel, Schema | None, Message], bool],
         *,
         keep_corrupt: bool = False,
     ) -> None:
         self.path = path
         self.source = Source(path)
-        self.schemas: dict[int, Schema] = {}
-        self.channels: dict[int, Channel] = {}
-        self.chunks: list[Chunk] = []
-        self.logs: dict[int, ChannelLog] = {}
-        self.statistics: Statistics | None = None
-        self.damage: list[Damage] = []
         self._wanted = wanted
         self._reader = ChunkReader(self.source, keep_corrupt=keep_corrupt)
-        self._loose: dict[int, array[int]] = {}
-        self._indexes: dict[int, Int64s] = {}
-        self._closed = -1
-        self._read_summary()
-        self._walk()
+        self._summary = read_summary(self.source)
+
+        def whole(scan: Scan, message: Message) -> bool:
+            channel = scan.channels.get(message.channel_id)
+            return channel is not None and is_whole(
+                channel, scan.schemas.get(channel.schema_id), message
+            )
+
+        self._scan = Scan(self.source, self._summary, whole)
+        self.schemas, self.channels = self._scan.schemas, self._scan.channels
+        statistics = self._summary.statistics
+        self._expected = statistics.channel_message_counts if statistics else None
+        self._data_is_wrong = False
+        self._saved_ns: int | None = None
+        self.misled: set[int] = set()
+        self.logs = self._collect()
+
+    @property
+    def chunks(self) -> list[Chunk]:
+        """The chunks, in the order of the file."""
+        return self._scan.chunks
+
+    def expected_of(self, topic: str) -> int | None:
+        """How many messages of a topic there should be, by the file's own statistics."""
+        if self._expected is None:
+            return None
+        channels = [number for number, channel in self.channels.items() if channel.topic == topic]
+        return sum(self._expected.get(number, 0) for number in channels)
 
     def message(self, chunk: int, offset: int) -> Message:
         """Read the message at ``offset`` in a chunk, or in the file if it is `OUTSIDE`.
@@ -130,134 +131,171 @@ class Container:
         BadRecord
             If it cannot be read, or its chunk cannot.
         """
-        if chunk != OUTSIDE:
-            return message_at(self._reader.read(self.chunks[chunk]), offset)
-        _, length = HEAD.unpack(self.source.read(offset, HEAD.size))
-        return message_at(self.source.read(offset, HEAD.size + length), 0)
+        if chunk == OUTSIDE:
+            return message_at(self.source, offset)
+        return message_at(self._reader.read(self.chunks[chunk]), offset)
+
+    def look(self, chunk: int, channel_id: int) -> Entries:
+        """Find the messages of a channel by looking into a chunk, whatever its indexes say.
+
+        Raises
+        ------
+        BadRecord
+            If the chunk cannot be read.
+        """
+        self.misled.add(chunk)
+        return self._look(chunk).get(channel_id, _entries(array("Q")))
+
+    def is_bad(self, chunk: int) -> bool:
+        """Whether a chunk was found to be unreadable."""
+        return chunk != OUTSIDE and self.chunks[chunk].offset in self._reader.bad
+
+    def verify(self) -> None:
+        """Read everything once, so that `damage` knows it all."""
+        for chunk in self.chunks:
+            try:
+                self._reader.read(chunk)
+            except BadRecord:
+                continue
+        self.verify_data()
+
+    def verify_data(self) -> None:
+        """Check the checksum of the whole data section, where the file has one."""
+        scan = self._scan
+        if scan.data_crc and scan.data_end is not None:
+            self._data_is_wrong = crc_of(self.source, scan.data_end) != scan.data_crc
 
     def close(self) -> None:
         """Close the file."""
         self.source.close()
 
-    def __enter__(self) -> Container:
-        return self
+    def _collect(self) -> dict[int, ChannelLog]:
+        """File all messages by channel; look into every chunk if the statistics differ."""
+        logs = self._file_all(look=self._expected is None)
+        counts = {channel_id: log.count for channel_id, log in logs.items()}
+        expected = {key: count for key, count in (self._expected or {}).items() if count}
+        if self._expected is not None and counts != expected:
+            logs = self._file_all(look=True)
+        return logs
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
+    def _file_all(self, *, look: bool) -> dict[int, ChannelLog]:
+        logs: dict[int, ChannelLog] = {}
+        for number in range(len(self.chunks)):
+            for channel_id, entries in self._index(number, look=look).items():
+                self._log(logs, channel_id).add(number, entries)
+        for channel_id, values in self._scan.loose.items():
+            self._log(logs, channel_id).add(OUTSIDE, _entries(values))
+        return logs
 
-    def _read_summary(self) -> None:
-        """Learn channels, schemas and statistics from the end of the file, if it has one."""
-        footer_size = HEAD.size + 20 + len(MAGIC)
-        tail = self.source.read(max(self.source.size - footer_size, 0), footer_size)
-        if len(tail) < footer_size or not tail.endswith(MAGIC) or tail[0] != Opcode.FOOTER:
-            return
-        start = parse(Opcode.FOOTER, tail[HEAD.size : -len(MAGIC)]).summary_start
-        if not 0 < start < self.source.size - footer_size:
-            return
-        summary = self.source.read(start, self.source.size - footer_size - start)
+    def _index(self, number: int, *, look: bool) -> Mapping[int, Entries]:
+        """Messages of a chunk by channel, by its message indexes or by looking into it."""
+        index = self._scan.indexes[number]
+        if index and not look and all(self._is_defined(channel_id) for channel_id in index):
+            return index
         try:
-            for place in walk(summary):
-                if place.opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS):
-                    self._define(place.opcode, summary[place.body : place.end])
-        except BadRecord as error:
-            self.damage.append(Damage(self.path, start, str(error)))
+            return self._look(number)
+        except BadRecord:
+            return index or {}
 
-    def _define(self, opcode: int, body: bytes | memoryview) -> None:
-        record = parse(opcode, body)
-        if isinstance(record, Schema):
-            self.schemas.setdefault(record.id, record)
-        elif isinstance(record, Channel):
-            self.channels.setdefault(record.id, record)
-        elif isinstance(record, Statistics):
-            self.statistics = record
+    def _is_defined(self, channel_id: int) -> bool:
+        channel = self.channels.get(channel_id)
+        return channel is not None and (channel.schema_id == 0 or channel.schema_id in self.schemas)
 
-    def _walk(self) -> None:
-        """Go from record to record through the data section."""
-        offset = len(MAGIC)
-        try:
-            while offset < self.source.size:
-                place = self._place(offset)
-                if place.opcode != Opcode.MESSAGE_INDEX:
-                    self._close_chunk()
-                if place.opcode in (Opcode.DATA_END, Opcode.FOOTER):
-                    break
-                self._visit(place)
-                offset = place.end
-        except BadRecord as error:
-            self.damage.append(Damage(self.path, offset, str(error)))
-        self._close_chunk()
-        for channel_id, entries in self._loose.items():
-            self._log(channel_id).add(OUTSIDE, _pairs(entries))
-
-    def _place(self, offset: int) -> Place:
-        head = self.source.peek(offset, HEAD.size)
-        if len(head) < HEAD.size:
-            raise BadRecord("the file is cut off")
-        opcode, length = HEAD.unpack(head)
-        end = offset + HEAD.size + length
-        if end > self.source.size:
-            raise BadRecord("the file is cut off")
-        return Place(opcode, offset, offset + HEAD.size, end)
-
-    def _visit(self, place: Place) -> None:
-        if place.opcode == Opcode.MESSAGE:
-            head = self.source.peek(place.body, MESSAGE_HEAD.size)
-            channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
-            self._loose.setdefault(channel_id, array("Q")).extend((log_time, place.offset))
-        elif place.opcode == Opcode.CHUNK:
-            length = min(place.end - place.body, CHUNK_HEAD.size + LONGEST_NAME + 8)
-            self.chunks.append(parse_chunk(place, self.source.peek(place.body, length)))
-        elif place.opcode == Opcode.MESSAGE_INDEX:
-            body = bytes(self.source.peek(place.body, place.end - place.body))
-            channel_id, entries = parse_message_index(body)
-            self._indexes[channel_id] = entries
-        elif place.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            self._define(place.opcode, self.source.peek(place.body, place.end - place.body))
-
-    def _close_chunk(self) -> None:
-        """File the message indexes that followed a chunk, or make them from its records."""
-        if not self.chunks or self.chunks[-1].offset == self._closed:
-            return
-        self._closed = self.chunks[-1].offset
-        number = len(self.chunks) - 1
-        known = all(channel_id in self.channels for channel_id in self._indexes)
-        if not self._indexes or not known:
-            self._indexes = self._index(number)
-        for channel_id, entries in self._indexes.items():
-            self._log(channel_id).add(number, entries)
-        self._indexes = {}
-
-    def _index(self, number: int) -> dict[int, Int64s]:
-        """Read a chunk to learn its channels and where its messages lie."""
+    def _look(self, number: int) -> Mapping[int, Entries]:
+        """Walk through the records of a chunk; learn its channels and where its messages lie."""
+        records = self._reader.read(self.chunks[number])
         found: dict[int, array[int]] = {}
-        chunk = self.chunks[number]
-        try:
-            records = self._reader.read(chunk)
-            for place in walk(records):
-                if place.opcode == Opcode.MESSAGE:
-                    message = message_at(records, place.offset)
-                    entries = found.setdefault(message.channel_id, array("Q"))
-                    entries.extend((message.log_time, place.offset))
-                elif place.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                    self._define(place.opcode, records[place.body : place.end])
-        except BadRecord as error:
-            damage = Damage(self.path, chunk.offset, str(error), chunk.start, chunk.end)
-            self.damage.append(damage)
-        return {key: _pairs(value) for key, value in found.items()}
+        for place in walk(records):
+            if place.opcode == Opcode.MESSAGE and place.end - place.body >= MESSAGE_HEAD.size:
+                head = records.peek(place.body, MESSAGE_HEAD.size)
+                channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
+                found.setdefault(channel_id, array("Q")).extend((log_time, place.offset))
+            elif place.opcode == Opcode.SCHEMA:
+                schema = parse(place.opcode, records.read(place.body, place.end - place.body))
+                self.schemas.setdefault(schema.id, schema)
+            elif place.opcode == Opcode.CHANNEL:
+                channel = parse(place.opcode, records.read(place.body, place.end - place.body))
+                self.channels.setdefault(channel.id, channel)
+        if self.chunks[number].cut:
+            self._saved_ns = max((max(values[::2]) for values in found.values()), default=None)
+        return {channel_id: _entries(values) for channel_id, values in found.items()}
 
-    def _log(self, channel_id: int) -> ChannelLog:
-        if channel_id not in self.logs:
+    def _log(self, logs: dict[int, ChannelLog], channel_id: int) -> ChannelLog:
+        if channel_id not in logs:
             channel = self.channels.get(channel_id)
             schema = self.schemas.get(channel.schema_id) if channel else None
-            self.logs[channel_id] = ChannelLog(bool(channel and self._wanted(channel, schema)))
-        return self.logs[channel_id]
+            logs[channel_id] = ChannelLog(bool(channel and self._wanted(channel, schema)))
+        return logs[channel_id]
+
+    @property
+    def damage(self) -> tuple[Damage, ...]:
+        """What is wrong with the file, as far as it is known by now, in its order."""
+        found = [
+            *self._gaps(),
+            *self._bad_chunks(),
+            *self._wrong_indexes(),
+            *self._missing(),
+            *self._unnamed(),
+            *self._wrong_sums(),
+        ]
+        return tuple(sorted(found, key=lambda damage: damage.offset))
+
+    def _gaps(self) -> Iterator[Damage]:
+        for gap in self._scan.gaps:
+            if gap.offset in self._reader.bad and not gap.lossy:
+                continue
+            before = self._saved_ns if self._is_cut(gap) and self._saved_ns else gap.before_ns
+            yield Damage(self.path, gap.offset, gap.reason, gap.lossy, before, gap.after_ns)
+
+    def _is_cut(self, gap: Gap) -> bool:
+        return bool(self.chunks) and self.chunks[-1].cut and gap.offset == self.chunks[-1].offset
+
+    def _bad_chunks(self) -> Iterator[Damage]:
+        for number, chunk in enumerate(self.chunks):
+            if chunk.offset in self._reader.bad:
+                index = self._scan.indexes[number] or {}
+                lost = tuple((self._topic(key), len(entries)) for key, entries in index.items())
+                reason = self._reader.bad[chunk.offset]
+                yield Damage(self.path, chunk.offset, reason, True, chunk.start, chunk.end, lost)
+
+    def _wrong_indexes(self) -> Iterator[Damage]:
+        for number in self.misled:
+            reason = "the message index of a chunk is wrong"
+            yield Damage(self.path, self.chunks[number].offset, reason, lossy=False)
+
+    def _missing(self) -> Iterator[Damage]:
+        """Messages that the file's own statistics count, if nothing else explains the loss."""
+        if any(gap.lossy for gap in self._scan.gaps) or self._reader.bad:
+            return
+        for channel_id, expected in (self._expected or {}).items():
+            found = self.logs[channel_id].count if channel_id in self.logs else 0
+            if found < expected:
+                lost = ((self._topic(channel_id), expected - found),)
+                reason = "messages that the file's own statistics count are missing"
+                yield Damage(self.path, self.source.size, reason, lost=lost)
+
+    def _unnamed(self) -> Iterator[Damage]:
+        for channel_id, log in self.logs.items():
+            if channel_id not in self.channels:
+                reason = f"{log.count} messages of a channel {channel_id} that is defined nowhere"
+                yield Damage(self.path, 0, reason, True, log.first_ns, log.last_ns)
+
+    def _wrong_sums(self) -> Iterator[Damage]:
+        scan = self._scan
+        if scan.data_end is not None and self._summary.problem:
+            yield Damage(self.path, scan.data_end, self._summary.problem, lossy=False)
+        if self._data_is_wrong:
+            unchecked = bool(scan.loose) or not all(chunk.crc for chunk in self.chunks)
+            reason = "the checksum of all data is wrong"
+            if unchecked:
+                reason += ", and nothing tells which message is; any may be"
+            yield Damage(self.path, scan.data_end or 0, reason, lossy=unchecked)
+
+    def _topic(self, channel_id: int) -> str:
+        channel = self.channels.get(channel_id)
+        return channel.topic if channel else f"channel {channel_id}"
 
 
-def _pairs(values: array[int]) -> Int64s:
+def _entries(values: array[int]) -> Entries:
     """``(n, 2)`` of a flat row of log times and offsets."""
     return np.frombuffer(values, np.int64).reshape(-1, 2)

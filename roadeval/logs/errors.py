@@ -11,3 +11,11 @@ class LogError(RoadevalError):
 
 class FrameError(RoadevalError):
     """One frame that cannot be decoded. It costs that frame, never the run."""
+
+
+class BadRecord(Exception):  # noqa: N818  (never leaves this room)
+    """A record whose parts contradict each other, or that is not there."""
+
+
+class BadMessage(Exception):  # noqa: N818  (never leaves this room)
+    """A message that cannot be decoded."""

@@ -4,9 +4,34 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Final
 
 from roadeval.logs.errors import LogError
 from roadeval.logs.records import MAGIC
+
+_HEAD: Final = 64
+"""Bytes that tell what a file is."""
+_DAMAGED: Final = 2
+"""Bytes of the first eight that may be wrong in what still counts as an MCAP file."""
+
+_OTHERS: Final = (
+    (0, b"#ROSBAG V", "a ROS 1 bag: mcap convert {path} {stem}.mcap"),
+    (0, b"SQLite format 3\0", "a rosbag2 SQLite file: mcap convert {path} {stem}.mcap"),
+    (0, b"version https://git-lfs", "a pointer to a file in Git LFS: git lfs pull"),
+    (0, b"\x28\xb5\x2f\xfd", "compressed as a whole by zstd: zstd -d {path} -o {stem}.mcap"),
+    (0, b"\x04\x22\x4d\x18", "compressed as a whole by lz4: lz4 -d {path} {stem}.mcap"),
+    (0, b"\x1f\x8b", "compressed as a whole by gzip: gunzip -c {path} > {stem}.mcap"),
+    (0, b"BZh", "compressed as a whole by bzip2: bunzip2 -c {path} > {stem}.mcap"),
+    (0, b"PK\x03\x04", "a ZIP archive: unzip {path}"),
+    (0, b"\xfd7zXZ\0", "compressed as a whole by xz: xz -dc {path} > {stem}.mcap"),
+    (0, b"RRF2", "a Rerun recording: roadeval report {path}"),
+    (0, b"\xff\xd8\xff", "a JPEG image: roadeval pack makes a log of a folder of images"),
+    (0, b"\x89PNG\r\n", "a PNG image: roadeval pack makes a log of a folder of images"),
+    (4, b"ftyp", "a video: roadeval pack {path} -o {stem}.mcap"),
+    (0, b"\x1a\x45\xdf\xa3", "a video: roadeval pack {path} -o {stem}.mcap"),
+    (0, b"RIFF", "a video or image: roadeval pack {path} -o {stem}.mcap"),
+)
+"""How many bytes to skip, the bytes that follow, what the file is and how it becomes a log."""
 
 
 def files_of(path: Path) -> list[Path]:
@@ -15,17 +40,17 @@ def files_of(path: Path) -> list[Path]:
     Raises
     ------
     LogError
-        If there is none, or one is no MCAP file.
+        If there is none, or one is no MCAP file; it says what that is and how to convert it.
     """
-    files = sorted(path.glob("*.mcap"), key=_natural) if path.is_dir() else [path]
+    files = sorted(path.glob("*.mcap"), key=natural) if path.is_dir() else [path]
     if not files:
-        raise LogError(f"{path}: a folder without *.mcap files")
+        raise LogError(_empty_folder(path))
     for file in files:
         _check(file)
     return files
 
 
-def _natural(path: Path) -> list[tuple[int, str]]:
+def natural(path: Path) -> list[tuple[int, str]]:
     """Order by which ``drive_2`` comes before ``drive_10``."""
     parts = re.findall(r"(\d+)|(\D+)", path.name)
     return [(int(number or 0), text) for number, text in parts]
@@ -34,8 +59,38 @@ def _natural(path: Path) -> list[tuple[int, str]]:
 def _check(path: Path) -> None:
     try:
         with path.open("rb") as file:
-            head = file.read(len(MAGIC))
+            head = file.read(_HEAD)
+            file.seek(max(path.stat().st_size - len(MAGIC), 0))
+            tail = file.read(len(MAGIC))
     except OSError as error:
         raise LogError(f"{path}: {error.strerror or error}") from error
-    if head != MAGIC:
-        raise LogError(f"{path}: not an MCAP file")
+    if not head:
+        raise LogError(f"{path}: the file is empty")
+    wrong = sum(ours != theirs for ours, theirs in zip(MAGIC, head, strict=False))
+    if head.startswith(MAGIC) or (wrong <= _DAMAGED and len(head) >= len(MAGIC)) or tail == MAGIC:
+        return
+    raise LogError(f"{path}: not an MCAP file but {_name(path, head)}")
+
+
+def _name(path: Path, head: bytes) -> str:
+    for skipped, magic, name in _OTHERS:
+        if head[skipped:].startswith(magic):
+            stem = path.name.split(".")[0]
+            clash = path.name == f"{stem}.mcap"
+            return name.format(path=path.name, stem=f"{stem}_converted" if clash else stem)
+    if not any(head):
+        return "zeros: the disk or the copy failed"
+    return f"something else (it begins with {head[:8].hex(' ')})"
+
+
+def _empty_folder(path: Path) -> str:
+    for pattern, advice in (
+        ("*.mcap.zst*", "its files are compressed as a whole by zstd: zstd -d them first"),
+        ("*.db3", "a rosbag2 folder of SQLite files: mcap convert FILE.db3 FILE.mcap"),
+        ("*.bag", "a folder of ROS 1 bags: mcap convert FILE.bag FILE.mcap"),
+        ("*.png", "a folder of images: roadeval pack makes a log of it"),
+        ("*.jpg", "a folder of images: roadeval pack makes a log of it"),
+    ):
+        if any(path.glob(pattern)):
+            return f"{path}: no *.mcap file in it; {advice}"
+    return f"{path}: a folder without *.mcap files"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,14 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import IGNORE, Frame, Mask, Rgb, Truth
-from roadeval.logs.errors import FrameError
+from roadeval.logs.errors import BadMessage, FrameError
 from roadeval.logs.labels import LabelMap
-from roadeval.logs.messages import BadMessage, CompressedPicture, Picture
-from roadeval.logs.pairing import Pairing
-from roadeval.logs.pixels import media_type, to_labels, to_rgb
-from roadeval.logs.selection import LabelTopic, Selection
+from roadeval.logs.messages import CompressedPicture, Kind, Picture
+from roadeval.logs.pairing import Pairing, Stamps
+from roadeval.logs.pixels import media_type, to_rgb
+from roadeval.logs.selection import Clock, LabelTopic, Selection
 from roadeval.logs.span import Span
 from roadeval.logs.track import UNREADABLE, Track
+from roadeval.logs.video import Pictures, Video
 
 
 @dataclass(slots=True)
@@ -132,7 +133,7 @@ class LoggedFrame:
 
     def _label(self, label: _Label, image: Rgb) -> Truth:
         try:
-            truth = label.labels.apply(to_labels(_readable(label.picture)))
+            truth = label.labels.read(_readable(label.picture))
         except BadMessage as error:
             raise FrameError(f"{label.topic}: {error}") from error
         return self._fitted(truth, image, label.topic)
@@ -168,6 +169,9 @@ class FrameStream:
         self, tracks: Mapping[str, Track], selection: Selection, span: Span, numbers: range
     ) -> None:
         self._images = tracks[selection.image.name]
+        self._pictures: Pictures = self._images
+        if selection.image.kind is Kind.VIDEO:
+            self._pictures = Video(self._images)
         self._selection = selection
         self._numbers = numbers
         self._labels = self._label_tracks(tracks)
@@ -202,19 +206,21 @@ class FrameStream:
         self.accounting.labelled += TRUTH in labels
         if TRUTH in self._labels:
             self.accounting.truth_unused = self._labels[TRUTH].unused
+        picture = _read(self._pictures, number)
         log_time = int(self._images.log_times[number])
         return LoggedFrame(
             number,
             self._stamp(number, log_time),
             log_time,
-            _read(self._images, number),
+            picture,
             labels,
             resize=self._selection.resize_truth,
             report=self.accounting.undecodable.__setitem__,
         )
 
     def _stamp(self, number: int, log_time: int) -> int:
-        stamp = self._images.stamp(number) if self._selection.stamped else UNREADABLE
+        stamped = self._selection.clock is Clock.STAMP
+        stamp = self._images.stamp(number) if stamped else UNREADABLE
         return log_time if stamp == UNREADABLE else stamp
 
     def _label_tracks(self, tracks: Mapping[str, Track]) -> dict[str, _LabelTrack]:
@@ -227,17 +233,28 @@ class FrameStream:
         }
 
 
-class _LogTimes:
-    """Log times in the place of stamps, for logs without any."""
+class _Times:
+    """Other numbers in the place of stamps, for logs whose stamps tell nothing."""
 
-    def __init__(self, track: Track) -> None:
-        self._times = track.log_times
+    def __init__(self, times: Sequence[int] | npt.NDArray[np.int64]) -> None:
+        self._times = times
 
     def __len__(self) -> int:
         return len(self._times)
 
     def stamp(self, position: int) -> int:
         return int(self._times[position])
+
+
+def _clocks(images: Track, labels: Track, clock: Clock) -> tuple[Stamps, Stamps]:
+    """Give what tells which label belongs to which image."""
+    if clock is Clock.STAMP:
+        return images, labels
+    if clock is Clock.LOG_TIME:
+        return _Times(images.log_times), _Times(labels.log_times)
+    # Without any time, order means something only if there is a label for each image.
+    count = len(labels) if len(images) == len(labels) else 0
+    return _Times(range(len(images))), _Times(range(count))
 
 
 class _LabelTrack:
@@ -250,11 +267,8 @@ class _LabelTrack:
         self.unused = 0
         self._label = label
         self._last: int | None = None
-        if selection.stamped:
-            self._pairing = Pairing(images, track, selection.tolerance_ns)
-        else:
-            times = (_LogTimes(images), _LogTimes(track))
-            self._pairing = Pairing(*times, selection.tolerance_ns)
+        clocks = _clocks(images, track, selection.clock)
+        self._pairing = Pairing(*clocks, selection.tolerance_ns)
 
     def of(self, image: int) -> _Label | None:
         position = self._pairing.partner(image)
@@ -266,7 +280,7 @@ class _LabelTrack:
         return _Label(_read(self.track, position), self._label.labels, self.track.name)
 
 
-def _read(track: Track, position: int) -> Picture | FrameError:
+def _read(track: Pictures, position: int) -> Picture | FrameError:
     try:
         return track.picture(position)
     except FrameError as error:

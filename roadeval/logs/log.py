@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 
@@ -11,7 +12,9 @@ import numpy as np
 import numpy.typing as npt
 from mcap.records import Channel, Schema
 
-from roadeval.logs.container import Container, Damage
+from roadeval.logs.container import Container
+from roadeval.logs.damage import Damage
+from roadeval.logs.decoders import message_is_whole
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import files_of
 from roadeval.logs.frames import FrameStream
@@ -61,7 +64,9 @@ class Log:
         self.path = path
         self.name = path.stem if path.is_file() else path.resolve().name
         self._files = files
-        self._containers = [Container(f, _is_image, keep_corrupt=keep_corrupt) for f in files]
+        self._containers = [
+            Container(f, _is_image, message_is_whole, keep_corrupt=keep_corrupt) for f in files
+        ]
         sources = sources_by_topic(self._containers)
         self._tracks = {name: Track(name, found) for name, found in sources.items()}
         self.topics: tuple[TopicInfo, ...] = tuple(
@@ -75,7 +80,34 @@ class Log:
     @property
     def damage(self) -> tuple[Damage, ...]:
         """What could not be read, in the order of the files."""
-        return tuple(damage for container in self._containers for damage in container.damage)
+        return tuple(
+            replace(damage, log_start_ns=self.start_ns)
+            for container in self._containers
+            for damage in container.damage
+        )
+
+    @property
+    def losses(self) -> tuple[str, ...]:
+        """What is lost of the log, a sentence each; empty if nothing is.
+
+        Damage in chunks is found when they are read, or by `verify`.
+        """
+        lost = [damage for damage in self.damage if damage.lossy]
+        kept = [self._kept(topic) for topic in self.topics if topic.is_image]
+        return (*(str(damage) for damage in lost), *kept) if lost else ()
+
+    def _kept(self, topic: TopicInfo) -> str:
+        track = self._tracks[topic.name]
+        expected = sum(container.expected_of(topic.name) or 0 for container in self._containers)
+        total = max(expected, len(track))
+        known = f" of {total}" if total > track.readable() else ""
+        until = (topic.last_ns or self.start_ns) - self.start_ns
+        return f"{topic.name}: {track.readable()}{known} images kept, up to {until / NS:.3f} s"
+
+    def verify(self) -> None:
+        """Read the whole log once, so that `damage` knows all of it."""
+        for container in self._containers:
+            container.verify()
 
     def sha256(self) -> str:
         """SHA-256 of the file, or of the SHA-256 sums of a folder's files, in hexadecimal."""
@@ -174,5 +206,5 @@ class Log:
         self.close()
 
 
-def _is_image(_: Channel, schema: Schema | None) -> bool:
-    return kind_of(schema) is not Kind.OTHER
+def _is_image(channel: Channel, schema: Schema | None) -> bool:
+    return kind_of(channel, schema) is not Kind.OTHER

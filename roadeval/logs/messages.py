@@ -1,16 +1,18 @@
-"""From a message's bytes to the picture it carries, whatever the encoding of the message."""
+"""What a camera's message carries, and what kinds of it there are."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Final
 
 from mcap.records import Channel, Schema
 
-Buffer = bytes | memoryview
+from roadeval.data import Rgb
+from roadeval.logs.errors import BadMessage, LogError
+from roadeval.logs.source import Buffer
+from roadeval.logs.span import parse_time
 
 
 class Kind(StrEnum):
@@ -44,8 +46,16 @@ class CompressedPicture:
     data: Buffer
 
 
-Picture = RawPicture | CompressedPicture
-Reader = Callable[[Buffer], Picture]
+@dataclass(frozen=True, slots=True, eq=False)
+class DecodedPicture:
+    """A video's frame: its packet, and what became of it together with those before it."""
+
+    stamp_ns: int
+    data: Buffer
+    pixels: Rgb
+
+
+Picture = RawPicture | CompressedPicture | DecodedPicture
 
 _KINDS: Final = {
     "Image": Kind.IMAGE,
@@ -56,85 +66,80 @@ _KINDS: Final = {
 }
 _SECONDS: Final = ("sec", "secs", "seconds")
 _NANOSECONDS: Final = ("nanosec", "nsec", "nsecs", "nanos", "nanoseconds")
+_CODECS: Final = {
+    "h264": "h264",
+    "avc": "h264",
+    "libx264": "h264",
+    "h265": "hevc",
+    "hevc": "hevc",
+    "libx265": "hevc",
+    "vp9": "vp9",
+    "av1": "av1",
+}
+_START_CODES: Final = (b"\x00\x00\x00\x01", b"\x00\x00\x01")
 
 
-class BadMessage(Exception):  # noqa: N818  (never leaves this room)
-    """A message that cannot be decoded."""
+def kind_of(channel: Channel, schema: Schema | None) -> Kind:
+    """Tell by its schema's name what a channel carries.
+
+    JSON without a schema may carry images (`Kind.COMPRESSED`); its first message tells.
+    """
+    if schema is None:
+        return Kind.COMPRESSED if channel.message_encoding == "json" else Kind.OTHER
+    return _KINDS.get(re.split(r"[/.:]", schema.name)[-1], Kind.OTHER)
 
 
-def kind_of(schema: Schema | None) -> Kind:
-    """Tell by its schema's name what a channel carries."""
-    name = re.split(r"[/.:]", schema.name)[-1] if schema else ""
-    return _KINDS.get(name, Kind.OTHER)
+def codec_of(picture: Picture) -> str | None:
+    """Name the video codec of a packet, None for a picture that stands alone."""
+    if not isinstance(picture, CompressedPicture):
+        return None
+    words = re.split(r"[^a-z0-9]+", picture.format.lower())
+    for word in words:
+        if word in _CODECS:
+            return _CODECS[word]
+    return "h264" if bytes(picture.data[:4]).startswith(_START_CODES) else None
 
 
-def reader_for(channel: Channel, schema: Schema | None) -> Reader:
-    """Return what decodes the messages of a channel.
-
-    The decoders are the `mcap` project's own. A new factory for each channel: they remember
-    schemas by number alone, and numbers repeat from file to file.
+def picture_in(message: Any) -> Picture:
+    """Take the picture out of a decoded message by the names of its fields.
 
     Raises
     ------
     BadMessage
-        If nothing decodes them, or the schema cannot be understood.
+        If it has not the fields of an image.
     """
-    for factory in _factories():
-        try:
-            decode = factory.decoder_for(channel.message_encoding, schema)
-        except Exception as error:
-            raise BadMessage(f"its schema cannot be understood: {_line(error)}") from error
-        if decode is not None:
-            return _reader(decode)
-    name = schema.encoding if schema else "no"
-    raise BadMessage(f"{channel.message_encoding!r} messages with {name!r} schema are not readable")
+    try:
+        return _picture_in(message)
+    except (AttributeError, StopIteration, TypeError, ValueError, LogError) as error:
+        raise BadMessage("it has not the fields of an image") from error
 
 
-def _factories() -> list[Any]:
-    from mcap_protobuf.decoder import DecoderFactory as Protobuf
-    from mcap_ros1.decoder import DecoderFactory as Ros1
-    from mcap_ros2.decoder import DecoderFactory as Ros2
-
-    return [Ros2(), Protobuf(), Ros1()]
-
-
-def _reader(decode: Callable[[bytes], Any]) -> Reader:
-    def read(data: Buffer) -> Picture:
-        try:
-            return picture(decode(bytes(data)))
-        except Exception as error:
-            raise BadMessage(f"the message cannot be decoded: {_line(error)}") from error
-
-    return read
+def _picture_in(message: Any) -> Picture:
+    stamp_ns = _stamp_ns(message)
+    if not hasattr(message, "height") or hasattr(message, "pts"):
+        name = message.format if hasattr(message, "format") else message.encoding
+        return CompressedPicture(stamp_ns, name, message.data)
+    return RawPicture(
+        stamp_ns,
+        int(message.width),
+        int(message.height),
+        message.encoding,
+        int(getattr(message, "step", 0)),
+        bool(getattr(message, "is_bigendian", False)),
+        message.data,
+    )
 
 
-def picture(message: Any) -> Picture:
-    """Take the picture out of a decoded message by the names of its fields."""
-    stamp_ns = _nanoseconds(_stamp(message))
-    if hasattr(message, "step"):
-        return RawPicture(
-            stamp_ns,
-            message.width,
-            message.height,
-            message.encoding,
-            message.step,
-            bool(getattr(message, "is_bigendian", False)),
-            message.data,
-        )
-    name = message.format if hasattr(message, "format") else message.encoding
-    return CompressedPicture(stamp_ns, name, message.data)
-
-
-def _stamp(message: Any) -> Any:
-    return message.header.stamp if hasattr(message, "header") else message.timestamp
-
-
-def _nanoseconds(stamp: Any) -> int:
-    """Integer nanoseconds of a stamp: a float would round them."""
+def _stamp_ns(message: Any) -> int:
+    """Integer nanoseconds of the header stamp, as a float would round them; 0 without one."""
+    if hasattr(message, "header"):
+        stamp = message.header.stamp
+    elif hasattr(message, "timestamp"):
+        stamp = message.timestamp
+    else:
+        return 0
+    if isinstance(stamp, str):
+        return parse_time(stamp).ns
     seconds = next(getattr(stamp, name) for name in _SECONDS if hasattr(stamp, name))
-    rest = next(getattr(stamp, name) for name in _NANOSECONDS if hasattr(stamp, name))
+    rest = next((getattr(stamp, name) for name in _NANOSECONDS if hasattr(stamp, name)), 0)
     return int(seconds) * 1_000_000_000 + int(rest)
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__

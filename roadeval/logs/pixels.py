@@ -2,69 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import io
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Rgb
-from roadeval.logs.messages import BadMessage, CompressedPicture, Picture, RawPicture
+from roadeval.logs.errors import BadMessage
+from roadeval.logs.messages import CompressedPicture, DecodedPicture, Picture, RawPicture
+from roadeval.logs.raw import eight_bits, layout_of, raw_to_rgb, rows_of
+from roadeval.logs.source import Buffer
 
 Array = npt.NDArray[Any]
 
 JPEG: Final = b"\xff\xd8\xff"
+JPEG_END: Final = b"\xff\xd9"
 PNG: Final = b"\x89PNG\r\n\x1a\n"
-LARGEST: Final = 1 << 28
-"""Pixels: more is a damaged head, not a camera."""
+PNG_END: Final = b"IEND"
+PALETTE: Final = b"\x03"
+"""A PNG's colour type, in its 26th byte, that means a palette."""
+TAIL: Final = 4096
+"""Bytes at a file's end in which its end mark must lie: some cameras pad their files."""
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """How an encoding lays out its pixels.
-
-    ``dtype`` and ``channels`` give a row's items; ``rows`` the rows stored per image row (3/2
-    for planar 4:2:0); ``code`` names OpenCV's conversion to RGB, None for RGB itself.
-    """
-
-    dtype: str
-    channels: int
-    code: str | None
-    rows: float = 1.0
-
-
-def _layouts() -> dict[str, Layout]:
-    layouts = {
-        "yuv422": Layout("u1", 2, "COLOR_YUV2RGB_UYVY"),
-        "uyvy": Layout("u1", 2, "COLOR_YUV2RGB_UYVY"),
-        "yuyv": Layout("u1", 2, "COLOR_YUV2RGB_YUY2"),
-        "yuv422_yuy2": Layout("u1", 2, "COLOR_YUV2RGB_YUY2"),
-        "nv12": Layout("u1", 1, "COLOR_YUV2RGB_NV12", 1.5),
-        "nv21": Layout("u1", 1, "COLOR_YUV2RGB_NV21", 1.5),
-        "32fc1": Layout("f4", 1, "COLOR_GRAY2RGB"),
-    }
-    for bits, dtype in (("8", "u1"), ("16", "u2")):
-        layouts |= {
-            f"mono{bits}": Layout(dtype, 1, "COLOR_GRAY2RGB"),
-            f"{bits}uc1": Layout(dtype, 1, "COLOR_GRAY2RGB"),
-            f"rgb{bits}": Layout(dtype, 3, None),
-            f"bgr{bits}": Layout(dtype, 3, "COLOR_BGR2RGB"),
-            f"{bits}uc3": Layout(dtype, 3, "COLOR_BGR2RGB"),
-            f"rgba{bits}": Layout(dtype, 4, "COLOR_RGBA2RGB"),
-            f"bgra{bits}": Layout(dtype, 4, "COLOR_BGRA2RGB"),
-            f"{bits}uc4": Layout(dtype, 4, "COLOR_BGRA2RGB"),
-        }
-        for order in ("rggb", "bggr", "grbg", "gbrg"):
-            code = f"COLOR_Bayer{order.upper()}2RGB"
-            layouts[f"bayer_{order}{bits}"] = Layout(dtype, 1, code)
-    return layouts
-
-
-LAYOUTS: Final = _layouts()
-"""Every raw encoding, by its name in lower case."""
-
-
-def media_type(data: bytes | memoryview) -> str | None:
+def media_type(data: Buffer) -> str | None:
     """Tell by its first bytes whether ``data`` is a JPEG or PNG file."""
     head = bytes(data[:8])
     if head.startswith(JPEG):
@@ -73,7 +35,7 @@ def media_type(data: bytes | memoryview) -> str | None:
 
 
 def to_rgb(picture: Picture) -> Rgb:
-    """Decode a camera's picture to ``(H, W, 3)`` uint8 RGB.
+    """Decode a picture to ``(H, W, 3)`` uint8 RGB.
 
     16-bit samples keep their upper eight bits, floats count as 0..1, grey fills all channels.
 
@@ -82,18 +44,20 @@ def to_rgb(picture: Picture) -> Rgb:
     BadMessage
         If it cannot be decoded.
     """
-    if isinstance(picture, RawPicture):
-        return _raw_to_rgb(picture)
     import cv2
 
-    flags = cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION
-    return _imdecode(picture, flags).astype(np.uint8, copy=False)
+    if isinstance(picture, DecodedPicture):
+        return picture.pixels
+    if isinstance(picture, RawPicture):
+        return raw_to_rgb(picture)
+    return _imdecode(picture, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
 
 
 def to_labels(picture: Picture) -> Array:
-    """Decode a label picture to ``(H, W)`` uint8 or uint16, or to ``(H, W, 3)`` uint8 RGB.
+    """Decode a label picture to ``(H, W)`` uint8 or uint16, or to ``(H, W, 3)`` if it has colours.
 
-    An image of three equal channels is a label image of one.
+    Of an image with a palette these are the palette's indices, or its greys if it has only
+    greys. An image of three equal channels is a label image of one.
 
     Raises
     ------
@@ -103,25 +67,43 @@ def to_labels(picture: Picture) -> Array:
     import cv2
 
     if isinstance(picture, RawPicture):
-        layout = _layout(picture)
-        if layout.code == "COLOR_GRAY2RGB" and layout.dtype != "f4":
-            return _rows(picture, layout)
-        colours: Array = _raw_to_rgb(picture)
-    else:
-        colours = _imdecode(picture, cv2.IMREAD_UNCHANGED)
-        if colours.ndim == 3:
-            code = cv2.COLOR_BGRA2RGB if colours.shape[2] == 4 else cv2.COLOR_BGR2RGB
-            colours = np.asarray(cv2.cvtColor(colours, code))
-    if colours.ndim == 2:
-        return colours
+        layout = layout_of(picture)
+        if layout.is_grey and layout.dtype != "f4":
+            return rows_of(picture, layout)
+    elif isinstance(picture, CompressedPicture):
+        if bytes(picture.data[25:26]) == PALETTE and media_type(picture.data) == "image/png":
+            return _indices(picture)
+        labels = _imdecode(picture, cv2.IMREAD_UNCHANGED)
+        if labels.ndim == 2:
+            return labels
+    return _grey(to_rgb(picture))
+
+
+def _grey(colours: Rgb) -> Array:
     grey = colours[..., 0]
     same = np.array_equal(grey, colours[..., 1]) and np.array_equal(grey, colours[..., 2])
     return np.ascontiguousarray(grey) if same else colours
 
 
+def _indices(picture: CompressedPicture) -> Array:
+    """Read a PNG's palette indices, which OpenCV does not hand out."""
+    from PIL import Image
+
+    try:
+        with Image.open(io.BytesIO(picture.data)) as image:
+            indices = np.asarray(image)
+            palette = np.array(image.getpalette("RGB"), np.uint8).reshape(-1, 3)
+    except (OSError, ValueError, SyntaxError) as error:
+        raise BadMessage(f"{len(picture.data)} bytes that are no png image") from error
+    used = palette[: int(indices.max()) + 1]
+    greys = (used == used[:, :1]).all() and len(used) > 1
+    return np.ascontiguousarray(used[indices, 0] if greys else indices)
+
+
 def _imdecode(picture: CompressedPicture, flags: int) -> Array:
     import cv2
 
+    _check_file(picture)
     try:
         image = cv2.imdecode(np.frombuffer(picture.data, np.uint8), flags)
     except cv2.error:
@@ -129,50 +111,15 @@ def _imdecode(picture: CompressedPicture, flags: int) -> Array:
     if image is None:
         name = picture.format or "compressed"
         raise BadMessage(f"{len(picture.data)} bytes that are no {name} image")
-    return np.asarray(image)
+    return eight_bits(image) if flags & cv2.IMREAD_COLOR_RGB else np.asarray(image)
 
 
-def _layout(picture: RawPicture) -> Layout:
-    layout = LAYOUTS.get(picture.encoding.lower())
-    if layout is None:
-        raise BadMessage(f"its encoding {picture.encoding!r} is unknown")
-    return layout
-
-
-def _rows(picture: RawPicture, layout: Layout) -> Array:
-    """View the data as rows of samples, without padding and in this machine's byte order."""
-    width, height = picture.width, picture.height
-    rows = int(height * layout.rows)
-    dtype = np.dtype(layout.dtype).newbyteorder(">" if picture.big_endian else "<")
-    row = width * layout.channels * dtype.itemsize
-    step = picture.step or row
-    if not 0 < width * height <= LARGEST or step < row:
-        raise BadMessage(f"an image of {width}x{height} with {step} bytes a row")
-    needed = step * (rows - 1) + row
-    if len(picture.data) < needed:
-        raise BadMessage(f"{len(picture.data)} bytes of pixels where {needed} are needed")
-    strides = (step, dtype.itemsize * layout.channels, dtype.itemsize)
-    shape = (rows, width, layout.channels)
-    array = np.ndarray(shape, dtype, picture.data, 0, strides)
-    if layout.channels == 1:
-        array = array[..., 0]
-    return np.ascontiguousarray(array, dtype.newbyteorder("="))
-
-
-def _raw_to_rgb(picture: RawPicture) -> Rgb:
-    import cv2
-
-    layout = _layout(picture)
-    samples = _eight_bits(_rows(picture, layout))
-    if layout.code is None:
-        return samples
-    rgb: Rgb = np.asarray(cv2.cvtColor(samples, getattr(cv2, layout.code)), np.uint8)
-    return rgb
-
-
-def _eight_bits(array: Array) -> npt.NDArray[np.uint8]:
-    if array.dtype == np.uint16:
-        return (array >> 8).astype(np.uint8)
-    if array.dtype == np.float32:
-        return np.rint(np.clip(np.nan_to_num(array), 0, 1) * 255).astype(np.uint8)
-    return np.asarray(array, np.uint8)
+def _check_file(picture: CompressedPicture) -> None:
+    """Refuse what OpenCV would take for an image: half a file, or a depth map."""
+    if "compresseddepth" in picture.format.lower():
+        raise BadMessage(f"it holds depth ({picture.format}), which is no camera image")
+    media, tail = media_type(picture.data), bytes(picture.data[-TAIL:])
+    if (media == "image/jpeg" and JPEG_END not in tail) or (
+        media == "image/png" and PNG_END not in tail
+    ):
+        raise BadMessage(f"a {media.removeprefix('image/')} file that is cut off")

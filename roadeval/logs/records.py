@@ -20,7 +20,8 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
-Buffer = bytes | memoryview
+from roadeval.logs.errors import BadRecord
+from roadeval.logs.source import Buffer, Bytes
 
 MAGIC: Final = b"\x89MCAP0\r\n"
 HEAD: Final = struct.Struct("<BQ")
@@ -31,12 +32,13 @@ CHUNK_HEAD: Final = struct.Struct("<QQQII")
 """Start time, end time, uncompressed size, CRC, length of the compression's name."""
 INDEX_HEAD: Final = struct.Struct("<HI")
 """Channel, bytes of entries."""
+LARGEST: Final = 1 << 28
+"""Bytes of a message or definition; one that claims more is damaged."""
 LONGEST_NAME: Final = 64
 """No compression has a longer name; a chunk that claims so is damaged."""
 
-
-class BadRecord(Exception):  # noqa: N818  (never leaves this room)
-    """A record whose parts contradict each other."""
+Entries = npt.NDArray[np.int64]
+"""``(n, 2)``: log times of messages, and offsets of their records in the chunk."""
 
 
 class Place(NamedTuple):
@@ -64,17 +66,21 @@ class Chunk:
 
     ``offset`` is the record's, ``data_offset`` and ``data_size`` the compressed data's, all in
     the file; ``size`` and ``crc`` are of the uncompressed records (CRC 0: not given); ``start``
-    and ``end`` are the log times of its messages, both closed.
+    and ``end`` are the log times of its messages, both closed. ``crc`` is None where it cannot
+    be told from damage. A chunk that is ``cut`` goes on beyond the end of the file; the head of
+    one that is ``repaired`` was damaged, and the file's summary told what it said.
     """
 
     offset: int
     start: int
     end: int
     size: int
-    crc: int
+    crc: int | None
     compression: str
     data_offset: int
     data_size: int
+    cut: bool = False
+    repaired: bool = False
 
 
 class _Strict(ReadDataStream):
@@ -112,6 +118,8 @@ def parse(opcode: int, body: Buffer) -> Any:
     BadRecord
         If the body is too short for what its own fields claim, or is not what they say.
     """
+    if opcode not in _READERS:
+        raise BadRecord(f"a record of unknown kind {opcode}")
     try:
         return _READERS[opcode](_Strict(io.BytesIO(body)))
     except (EndOfFile, struct.error, UnicodeDecodeError) as error:
@@ -121,29 +129,26 @@ def parse(opcode: int, body: Buffer) -> Any:
 def parse_chunk(place: Place, head: Buffer) -> Chunk:
     """Read a chunk's head from the first bytes of its body.
 
+    The length of its data is what the head says, which may contradict the record's own.
+
     Raises
     ------
     BadRecord
-        If the lengths inside contradict the record's own.
+        If it is no chunk's head.
     """
     if len(head) < CHUNK_HEAD.size:
         raise BadRecord("a chunk without a head")
     start, end, size, crc, name_length = CHUNK_HEAD.unpack_from(head)
     data_offset = CHUNK_HEAD.size + name_length + 8
     if name_length > LONGEST_NAME or len(head) < data_offset:
-        raise BadRecord("a chunk whose compression has no name")
-    name = bytes(head[CHUNK_HEAD.size : data_offset - 8])
+        raise BadRecord("a chunk whose head is damaged")
+    name = bytes(head[CHUNK_HEAD.size : data_offset - 8]).decode("utf-8", "replace")
     (data_size,) = struct.unpack_from("<Q", head, data_offset - 8)
-    if place.body + data_offset + data_size != place.end:
-        raise BadRecord("a chunk whose lengths contradict each other")
-    compression = name.decode("utf-8", "replace")
-    return Chunk(
-        place.offset, start, end, size, crc, compression, place.body + data_offset, data_size
-    )
+    return Chunk(place.offset, start, end, size, crc, name, place.body + data_offset, data_size)
 
 
-def parse_message_index(body: Buffer) -> tuple[int, npt.NDArray[np.int64]]:
-    """Read a message index: the channel, and ``(n, 2)`` log times and offsets in the chunk.
+def parse_message_index(body: Buffer) -> tuple[int, Entries]:
+    """Read a message index: the channel, and its messages.
 
     Raises
     ------
@@ -159,40 +164,48 @@ def parse_message_index(body: Buffer) -> tuple[int, npt.NDArray[np.int64]]:
     return channel_id, entries.reshape(-1, 2)
 
 
-def message_at(records: Buffer, offset: int) -> Message:
-    """Read the message whose record begins at ``offset``, without a copy.
+def message_at(records: Bytes, offset: int) -> Message:
+    """Read the message whose record begins at ``offset``.
 
     Raises
     ------
     BadRecord
         If there is no whole message.
     """
-    body = offset + HEAD.size
-    if offset < 0 or body + MESSAGE_HEAD.size > len(records):
-        raise BadRecord("a message beyond the end")
-    opcode, length = HEAD.unpack_from(records, offset)
-    if opcode != Opcode.MESSAGE or not MESSAGE_HEAD.size <= length <= len(records) - body:
+    head = records.read(offset, HEAD.size)
+    if len(head) < HEAD.size:
         raise BadRecord("no message where the index says")
-    data = memoryview(records)[body + MESSAGE_HEAD.size : body + length]
-    channel_id, sequence, log_time, publish_time = MESSAGE_HEAD.unpack_from(records, body)
-    return Message(channel_id, sequence, log_time, publish_time, data)
+    opcode, length = HEAD.unpack(head)
+    if opcode != Opcode.MESSAGE or not MESSAGE_HEAD.size <= length <= LARGEST:
+        raise BadRecord("no message where the index says")
+    body = memoryview(records.read(offset + HEAD.size, length))
+    if len(body) < length:
+        raise BadRecord("a message that is cut off")
+    channel_id, sequence, log_time, publish_time = MESSAGE_HEAD.unpack_from(body)
+    return Message(channel_id, sequence, log_time, publish_time, body[MESSAGE_HEAD.size :])
 
 
-def walk(records: Buffer) -> Iterator[Place]:
-    """Yield the places of the whole records in a chunk's uncompressed bytes.
+def place_at(records: Bytes, offset: int) -> Place:
+    """Read the head of the record at ``offset``; it may claim to go beyond the end.
 
     Raises
     ------
     BadRecord
-        At the first one that is cut off.
+        If not even a head fits in.
     """
-    offset, size = 0, len(records)
-    while offset < size:
-        if offset + HEAD.size > size:
-            raise BadRecord(f"a record cut off at byte {offset} of its chunk")
-        opcode, length = HEAD.unpack_from(records, offset)
-        end = offset + HEAD.size + length
-        if end > size:
-            raise BadRecord(f"a record cut off at byte {offset} of its chunk")
-        yield Place(opcode, offset, offset + HEAD.size, end)
-        offset = end
+    head = records.peek(offset, HEAD.size)
+    if len(head) < HEAD.size:
+        raise BadRecord("the file is cut off")
+    opcode, length = HEAD.unpack(head)
+    return Place(opcode, offset, offset + HEAD.size, offset + HEAD.size + length)
+
+
+def walk(records: Bytes) -> Iterator[Place]:
+    """Yield the places of the records in a chunk, as far as they are whole."""
+    offset = 0
+    while offset + HEAD.size <= records.size:
+        place = place_at(records, offset)
+        if place.end > records.size:
+            return
+        yield place
+        offset = place.end

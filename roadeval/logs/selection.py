@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from enum import StrEnum
 from itertools import islice
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.logs.choose import choose_image, choose_shadow, choose_truth, named
-from roadeval.logs.errors import FrameError, LogError
-from roadeval.logs.labels import LabelMap, LabelValues, understand
-from roadeval.logs.messages import BadMessage
-from roadeval.logs.pixels import to_labels
+from roadeval.logs.errors import BadMessage, FrameError, LogError
+from roadeval.logs.labels import LabelMap, LabelValues, seen_in, understand
+from roadeval.logs.messages import Picture
+from roadeval.logs.pixels import to_rgb
 from roadeval.logs.topics import TopicInfo, median_period
 from roadeval.logs.track import UNREADABLE, Track
 
 LOOKED_AT: Final = 10
 """Label images at the log's start, and as many spread over it, that settle what values mean."""
+
+
+class Clock(StrEnum):
+    """What tells which label belongs to which image."""
+
+    STAMP = "header stamps"
+    LOG_TIME = "log times"
+    ORDER = "their order"
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +52,9 @@ class Selection:
         Road truth, truth of shadow, and other systems' road masks by name.
     tolerance_ns
         Largest difference of the header stamps of an image and its label.
-    stamped
-        Whether the images have header stamps; else log times take their place.
+    clock
+        What pairs images and labels: header stamps if they tell the images apart, else log
+        times, else their order.
     resize_truth
         Whether label images of another size are scaled to the image's (nearest neighbour).
     notes
@@ -57,7 +67,7 @@ class Selection:
     shadow: LabelTopic | None
     masks: Mapping[str, LabelTopic]
     tolerance_ns: int
-    stamped: bool = True
+    clock: Clock = Clock.STAMP
     resize_truth: bool = False
     notes: tuple[str, ...] = field(default=())
 
@@ -97,6 +107,7 @@ def settle(topics: Sequence[TopicInfo], tracks: Mapping[str, Track], asked: Aske
         As `roadeval.logs.Log.select` says.
     """
     image, why = choose_image(topics, asked.image)
+    check_readable(tracks[image.name], image)
 
     def label(chosen: tuple[TopicInfo | None, str], labels: LabelValues) -> LabelTopic | None:
         topic, why = chosen
@@ -105,34 +116,51 @@ def settle(topics: Sequence[TopicInfo], tracks: Mapping[str, Track], asked: Aske
         meaning = look_at_labels(tracks[topic.name], topic, image, labels, resize=asked.resize)
         return LabelTopic(topic, meaning, why)
 
-    truth = choose_truth(topics, image, asked.truth)
+    truth = choose_truth(topics, image, asked.truth, colors=bool(asked.labels.road_colors))
     shadow = choose_shadow(topics, image, asked.shadow)
     masks = {
         name: (named(topics, topic, f"--mask-topic {name}"), "asked for")
         for name, topic in asked.masks.items()
     }
     track = tracks[image.name]
-    stamped = is_stamped(track)
+    clock = clock_of(track)
     return Selection(
         image,
         why,
         label(truth, asked.labels),
         label(shadow, LabelValues()),
         {name: found for name, mask in masks.items() if (found := label(mask, LabelValues()))},
-        tolerance(track.log_times, asked.tolerance_ns),
-        stamped,
+        tolerance(track, asked.tolerance_ns),
+        clock,
         asked.resize,
-        _notes(truth, stamped=stamped),
+        _notes(truth, clock),
     )
 
 
-def _notes(truth: tuple[TopicInfo | None, str], *, stamped: bool) -> tuple[str, ...]:
+def _notes(truth: tuple[TopicInfo | None, str], clock: Clock) -> tuple[str, ...]:
     notes = []
     if truth[0] is None:
         notes.append(f"no truth: {truth[1]}")
-    if not stamped:
-        notes.append("the header stamps are all zero: log times take their place")
+    if clock is not Clock.STAMP:
+        notes.append(f"the header stamps are all zero or equal: {clock} take their place")
     return tuple(notes)
+
+
+def check_readable(track: Track, topic: TopicInfo) -> None:
+    """Refuse a topic of which nothing can be decoded.
+
+    Raises
+    ------
+    LogError
+        If neither the first messages nor some spread over the log can be.
+    """
+    if not topic.problem:
+        return
+    for picture in _samples(track):
+        with suppress(BadMessage):
+            to_rgb(picture)
+            return
+    raise LogError(f"nothing of {topic.name} can be decoded: {topic.problem}")
 
 
 def look_at_labels(
@@ -145,67 +173,46 @@ def look_at_labels(
     LogError
         If the size differs and ``resize`` is off, or the values cannot be understood.
     """
+    if not resize and None not in (topic.size, image.size) and topic.size != image.size:
+        theirs, ours = ("x".join(map(str, size or ())) for size in (topic.size, image.size))
+        raise LogError(
+            f"{topic.name} is {theirs}, but {image.name} is {ours}: "
+            "scale the labels with --resize-truth"
+        )
     seen: set[int] = set()
-    for pixels in _samples(track):
-        if not resize:
-            check_size(pixels, image.size, topic.name, image.name)
-        seen |= values_of(pixels, topic.name)
+    for picture in _samples(track):
+        try:
+            seen |= seen_in(picture, labels)
+        except BadMessage:
+            continue
     return understand(labels, seen, topic.name)
 
 
-def values_of(pixels: npt.NDArray[Any], name: str) -> set[int]:
-    """Values that occur in a label image.
-
-    Raises
-    ------
-    LogError
-        If it holds colours.
-    """
-    if pixels.ndim != 2:
-        raise LogError(f"{name} holds colours, not label values")
-    return set(np.flatnonzero(np.bincount(pixels.ravel())).tolist())
-
-
-def check_size(
-    pixels: npt.NDArray[Any], size: tuple[int, int] | None, name: str, image: str
-) -> None:
-    """Refuse a label image of another size than the camera's.
-
-    Raises
-    ------
-    LogError
-        If it is.
-    """
-    height, width = pixels.shape[:2]
-    if size is not None and (width, height) != size:
-        raise LogError(
-            f"{name} is {width}x{height}, but {image} is {size[0]}x{size[1]}: "
-            "scale the labels with --resize-truth"
-        )
-
-
-def is_stamped(track: Track) -> bool:
-    """Whether any of a topic's first messages has a header stamp other than zero."""
+def clock_of(track: Track) -> Clock:
+    """Find what tells the first images of a topic apart."""
     stamps = (track.stamp(position) for position in range(len(track)))
     known = [stamp for stamp in islice(stamps, LOOKED_AT) if stamp != UNREADABLE]
-    return not known or any(known)
+    if len(set(known)) > 1 or (len(track) <= 1 and any(known)):
+        return Clock.STAMP
+    times = track.log_times[:LOOKED_AT]
+    return Clock.LOG_TIME if len(times) <= 1 or times[0] != times[-1] else Clock.ORDER
 
 
-def tolerance(log_times: npt.NDArray[np.int64], asked_ns: int | None) -> int:
+def tolerance(track: Track, asked_ns: int | None) -> int:
     """Nanoseconds asked for, or else half the frame period."""
-    return median_period(log_times) // 2 if asked_ns is None else asked_ns
+    if asked_ns is not None:
+        return asked_ns
+    period = median_period(track.log_times)
+    if period == 0:
+        stamps = sorted(track.stamp(position) for position in range(min(LOOKED_AT, len(track))))
+        known = [stamp for stamp in stamps if stamp != UNREADABLE]
+        period = median_period(np.array(known, np.int64))
+    return period // 2
 
 
-def _samples(track: Track) -> Iterator[npt.NDArray[Any]]:
-    """Decode the first label images and some spread over the rest."""
-    first = range(min(LOOKED_AT, len(track)))
+def _samples(track: Track) -> Iterator[Picture]:
+    """Read the first label images and some spread over the rest."""
     spread = np.linspace(0, max(len(track) - 1, 0), LOOKED_AT, dtype=int).tolist()
-    for position in _unique((*first, *spread)):
-        try:
-            yield to_labels(track.picture(position))
-        except (FrameError, BadMessage):
-            continue
-
-
-def _unique(positions: Iterable[int]) -> list[int]:
-    return sorted(set(positions))
+    for position in sorted({*range(min(LOOKED_AT, len(track))), *spread}):
+        with suppress(FrameError):
+            yield track.picture(position)

@@ -1,17 +1,51 @@
-"""The bytes of a file, by position."""
+"""Bytes by position, from a file or from memory."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from types import TracebackType
-from typing import Final
+from typing import Final, Protocol
+
+from roadeval.logs.errors import BadRecord
+
+Buffer = bytes | memoryview
 
 WINDOW: Final = 16 * 1024
 """Bytes read at once while walking from record to record."""
 
 
+class Bytes(Protocol):
+    """A row of bytes that need not lie in memory."""
+
+    @property
+    def size(self) -> int:
+        """How many."""
+        ...
+
+    def read(self, offset: int, length: int) -> Buffer:
+        """Read ``length`` bytes at ``offset``; fewer at the end."""
+        ...
+
+    def peek(self, offset: int, length: int) -> Buffer:
+        """Like `read`, for a few bytes at a time on a walk forward."""
+        ...
+
+
+class Memory:
+    """Bytes in memory, handed out without a copy."""
+
+    def __init__(self, data: bytes) -> None:
+        self._view = memoryview(data)
+        self.size = len(data)
+
+    def read(self, offset: int, length: int) -> Buffer:
+        """Read ``length`` bytes at ``offset``; fewer at the end."""
+        return self._view[offset : offset + length]
+
+    peek = read
+
+
 class Source:
-    """A file read by position.
+    """A file.
 
     Nothing is mapped: pages of a mapped file count as memory of the program, and a file that
     shrinks while it is read would end the program with a bus error.
@@ -25,14 +59,24 @@ class Source:
         self._window_at = 0
 
     def read(self, offset: int, length: int) -> bytes:
-        """Read ``length`` bytes at ``offset``; fewer at the end of the file."""
-        self._file.seek(offset)
-        data = self._file.read(min(length, max(self.size - offset, 0)))
-        while len(data) < length and (more := self._file.read(length - len(data))):
-            data += more
+        """Read ``length`` bytes at ``offset``; fewer at the end of the file.
+
+        Raises
+        ------
+        BadRecord
+            If the disk fails.
+        """
+        length = min(length, max(self.size - offset, 0))
+        try:
+            self._file.seek(offset)
+            data = self._file.read(length)
+            while len(data) < length and (more := self._file.read(length - len(data))):
+                data += more
+        except OSError as error:
+            raise BadRecord(f"unreadable on its disk ({error.strerror})") from error
         return data
 
-    def peek(self, offset: int, length: int) -> memoryview:
+    def peek(self, offset: int, length: int) -> Buffer:
         """Like `read`, through a small window that suits a walk forward."""
         begin = offset - self._window_at
         if begin < 0 or begin + length > len(self._window):
@@ -44,13 +88,19 @@ class Source:
         """Close the file."""
         self._file.close()
 
-    def __enter__(self) -> Source:
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
+class Part:
+    """A part of a file, as if it stood alone."""
+
+    def __init__(self, source: Source, offset: int, size: int) -> None:
+        self._source = source
+        self._offset = offset
+        self.size = size
+
+    def read(self, offset: int, length: int) -> Buffer:
+        """Read ``length`` bytes at ``offset``; fewer at the end."""
+        return self._source.read(self._offset + offset, min(length, self.size - offset))
+
+    def peek(self, offset: int, length: int) -> Buffer:
+        """Like `read`, through the file's window."""
+        return self._source.peek(self._offset + offset, min(length, self.size - offset))

@@ -10,11 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.logs.container import Container
-from roadeval.logs.errors import FrameError
-from roadeval.logs.messages import BadMessage, Kind, Picture, RawPicture, kind_of
-from roadeval.logs.pixels import LAYOUTS, to_labels
+from roadeval.logs.errors import BadMessage, FrameError, LogError
+from roadeval.logs.messages import CompressedPicture, Kind, RawPicture, codec_of, kind_of
+from roadeval.logs.pixels import to_labels
+from roadeval.logs.raw import layout_of
 from roadeval.logs.span import NS
 from roadeval.logs.track import Source, Track
+from roadeval.logs.video import Video
 
 PROBES: Final = 3
 """Messages to try before a topic counts as undecodable."""
@@ -80,13 +82,15 @@ def describe(name: str, sources: Sequence[Source], track: Track) -> TopicInfo:
     first = min((log.first_ns for log in logs), default=None)
     last = max((log.last_ns for log in logs), default=None)
     count = sum(log.count for log in logs)
-    kind = kind_of(schema)
-    look = _probe(track, kind) if kind is not Kind.OTHER else _Look()
+    kind = kind_of(channel, schema)
+    look = _Look(kind)
+    if kind is not Kind.OTHER:
+        look = _probe(track, kind, named=schema is not None)
     return TopicInfo(
         name,
         schema.name if schema else "",
         channel.message_encoding,
-        kind,
+        look.kind,
         count,
         first,
         last,
@@ -125,32 +129,46 @@ def _gaps(log_times: npt.NDArray[np.int64]) -> tuple[tuple[int, int], ...]:
 
 @dataclass(frozen=True, slots=True)
 class _Look:
+    kind: Kind
     format: str = ""
     size: tuple[int, int] | None = None
     channels: int | None = None
     problem: str = ""
 
 
-def _probe(track: Track, kind: Kind) -> _Look:
+def _probe(track: Track, kind: Kind, *, named: bool) -> _Look:
+    """Look at the first messages; without a schema's name they alone tell what they are."""
     problem = ""
     for position in range(min(PROBES, len(track))):
         try:
-            return _look(track.picture(position), kind)
+            return _look(track, position)
         except (FrameError, BadMessage) as error:
             problem = problem or str(error)
-    return _Look(problem=problem)
+    return _Look(kind, problem=problem) if named else _Look(Kind.OTHER)
 
 
-def _look(picture: Picture, kind: Kind) -> _Look:
-    if kind is Kind.VIDEO:
-        return _Look(picture.format if not isinstance(picture, RawPicture) else "", channels=3)
+def _look(track: Track, position: int) -> _Look:
+    picture = track.picture(position)
     if isinstance(picture, RawPicture):
-        layout = LAYOUTS.get(picture.encoding.lower())
-        grey = layout is not None and layout.code == "COLOR_GRAY2RGB"
-        return _Look(picture.encoding, (picture.width, picture.height), 1 if grey else 3)
+        size = (picture.width, picture.height)
+        channels = 1 if layout_of(picture).is_grey else 3
+        return _Look(Kind.IMAGE, picture.encoding, size, channels)
+    codec = codec_of(picture)
+    if codec is not None:
+        return _Look(Kind.VIDEO, codec, _video_size(track), 3)
     pixels = to_labels(picture)
+    name = picture.format if isinstance(picture, CompressedPicture) else ""
     size = (pixels.shape[1], pixels.shape[0])
-    return _Look(picture.format, size, 1 if pixels.ndim == 2 else 3)
+    return _Look(Kind.COMPRESSED, name, size, 1 if pixels.ndim == 2 else 3)
+
+
+def _video_size(track: Track) -> tuple[int, int] | None:
+    """Size of the first frame, if video can be decoded here."""
+    try:
+        pixels = Video(track).picture(0).pixels
+    except (FrameError, LogError):
+        return None
+    return pixels.shape[1], pixels.shape[0]
 
 
 def sources_by_topic(containers: Sequence[Container]) -> dict[str, list[Source]]:

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.logs.container import Container
-from roadeval.logs.errors import FrameError
-from roadeval.logs.messages import BadMessage, Picture, Reader, reader_for
-from roadeval.logs.records import BadRecord, Message
+from roadeval.logs.container import OUTSIDE, Container
+from roadeval.logs.decoders import Reader, reader_for
+from roadeval.logs.errors import BadMessage, BadRecord, FrameError
+from roadeval.logs.messages import Picture
+from roadeval.logs.records import Message
 
 UNREAD = np.iinfo(np.int64).min
 """A stamp not read yet."""
@@ -67,18 +68,41 @@ class Track:
         Raises
         ------
         FrameError
-            If it cannot be read, or is not the one that the index promised.
+            If it cannot be read.
         """
+        message = self._read(position)
+        if message is None and int(self._chunks[position]) != OUTSIDE:
+            self._correct(position)
+            message = self._read(position)
+        if message is None:
+            raise self._error(position, "no message where the index says")
+        return message
+
+    def _read(self, position: int) -> Message | None:
+        """Read a message, if it is the one that the index promises."""
         source = self._sources[self._numbers[position]]
         chunk, offset = int(self._chunks[position]), int(self._offsets[position])
         try:
             message: Message = source.container.message(chunk, offset)
         except BadRecord as error:
-            raise self._error(position, str(error)) from error
-        expected = (source.channel_id, int(self.log_times[position]))
-        if (message.channel_id, message.log_time) != expected:
-            raise self._error(position, "another message than the index says")
-        return message
+            if source.container.is_bad(chunk):
+                raise self._error(position, str(error)) from error
+            return None
+        same_time = message.log_time == int(self.log_times[position]) % 2**64
+        return message if same_time and message.channel_id == source.channel_id else None
+
+    def _correct(self, position: int) -> None:
+        """Put right what a chunk's message index says, by looking into the chunk."""
+        number, chunk = self._numbers[position], self._chunks[position]
+        source = self._sources[number]
+        here = np.flatnonzero((self._numbers == number) & (self._chunks == chunk))
+        promised = {(int(self.log_times[i]), int(self._offsets[i])): i for i in here}
+        found = source.container.look(int(chunk), source.channel_id).tolist()
+        missed = [entry for entry in found if tuple(entry) not in promised]
+        wrong = sorted(set(promised) - {tuple(entry) for entry in found})
+        for promise, (log_time, offset) in zip(wrong, missed, strict=False):
+            self.log_times[promised[promise]] = log_time
+            self._offsets[promised[promise]] = offset
 
     def picture(self, position: int) -> Picture:
         """Read the picture of a message.
@@ -102,6 +126,17 @@ class Track:
             except FrameError:
                 self._stamps[position] = UNREADABLE
         return int(self._stamps[position])
+
+    def readable(self) -> int:
+        """Messages that are in the log, less those in chunks found to be damaged."""
+        lost = sum(
+            source.container.is_bad(int(chunk)) * int(count)
+            for number, source in enumerate(self._sources)
+            for chunk, count in zip(
+                *np.unique(self._chunks[self._numbers == number], return_counts=True), strict=True
+            )
+        )
+        return len(self) - lost
 
     def _reader(self, number: int) -> Reader:
         if number not in self._readers:

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from roadeval.data import LayerSpec, Rgb
-from roadeval.pipeline import classify, morphology, shadow, similarity
+from roadeval.pipeline import classify, gated, morphology, shadow, similarity
 from roadeval.pipeline.stage import Output, Stage, View
 
 STAGES: Final[Mapping[str, Stage[Any, Any]]] = {
     stage.name: stage
-    for stage in (shadow.STAGE, similarity.STAGE, classify.STAGE, morphology.STAGE)
+    for stage in (shadow.STAGE, gated.STAGE, similarity.STAGE, classify.STAGE, morphology.STAGE)
 }
 """Every stage that a configuration's ``chain`` may name."""
 

@@ -121,19 +121,18 @@ def colour_table(machine: SupportVectors, settings: SvmSettings) -> npt.NDArray[
     """Eq. 16 for every colour there is: ``(2^24,)`` uint8 by ``R << 16 | G << 8 | B``, 1 for road.
 
     A pixel's features are its three colours alone, so this is all the machine can say. A value
-    from the `cube` decides where its error bound keeps it off the threshold; the few colours
-    that are left are decided by `decision`.
+    from the colour `cube` decides where its error bound keeps it off the threshold; the few
+    colours that are left are decided by `decision`.
     """
     # Matrices this small gain nothing from threads, and lose all where other work needs a core.
     from threadpoolctl import threadpool_limits
 
     table = np.empty((256, 256, 256), np.uint8)
-    slabs = _slabs(machine, settings)
+    margins = _margins(machine, settings)
     with threadpool_limits(1, "blas"):
-        for red, values in enumerate(slabs):
-            values -= settings.threshold
-            table[red] = values > 0
-            green, blue = np.nonzero(np.abs(values) <= slabs.error)
+        for red, margin in enumerate(margins):
+            table[red] = margin > 0
+            green, blue = np.nonzero(np.abs(margin) <= margins.error)
             if len(green):
                 colours = np.stack([np.full_like(green, red), green, blue], axis=1).astype(np.uint8)
                 exact = decision(colours, machine, settings)
@@ -141,25 +140,28 @@ def colour_table(machine: SupportVectors, settings: SvmSettings) -> npt.NDArray[
     return table.ravel()
 
 
-def _slabs(machine: SupportVectors, settings: SvmSettings) -> cube.Slabs:
-    """Decision values on the colour cube."""
+def _margins(machine: SupportVectors, settings: SvmSettings) -> cube.Slabs:
+    """Decision values on the colour cube, less the threshold."""
+    offset = machine.offset - settings.threshold
 
     def features(channel: int, levels: Floats) -> Floats:
-        return (levels - machine.mean[channel]) / machine.scale[channel]
+        result: Floats = (levels - machine.mean[channel]) / machine.scale[channel]
+        return result
 
     def factor(channel: int, levels: Floats) -> Floats:
         away = features(channel, levels)[:, None] - machine.vectors[:, channel]
-        return np.exp(-settings.gamma * away**2)
+        result: Floats = np.exp(-settings.gamma * away**2)
+        return result
 
     every = np.stack([features(channel, cube.LEVELS) for channel in range(3)])
     if settings.kernel == "linear":
         plane = machine.weights @ machine.vectors
-        return cube.sums_of_terms(plane[:, None] * every, machine.offset)
-    # Features are known to a few roundings of the largest; exp(-gamma x^2) is no steeper than
-    # sqrt(gamma).
-    reach = max(np.abs(every).max(), np.abs(machine.vectors).max())
-    rounding = 8 * float(np.finfo(np.float64).eps) * (1 + settings.gamma**0.5 * reach)
-    return cube.sums_of_products(machine.weights, factor, machine.offset, rounding)
+        return cube.sums_of_terms(plane[:, None] * every, offset)
+    # A feature is off by a few roundings of the largest, and exp(-gamma x^2) is nowhere steeper
+    # than sqrt(gamma).
+    reach = float(max(np.abs(every).max(), np.abs(machine.vectors).max()))
+    rounding = 8 * cube.EPS * (1 + settings.gamma**0.5 * reach)
+    return cube.sums_of_products(machine.weights, factor, offset, rounding=rounding)
 
 
 def bind(settings: SvmSettings, machine: SupportVectors) -> Callable[[View], Output]:

@@ -4,8 +4,7 @@ A kernel machine whose features are a pixel's three colours alone is a function 
 cube, 256 levels a channel. Its value is a sum over support vectors of products (RBF) or of sums
 (linear) of three factors, one a channel, so that all colours of one red level are a product of
 matrices. Along a channel a factor changes slowly: polynomials through a few nodes give it at
-every level, and since the factors themselves are few, the largest difference is looked up
-rather than estimated.
+every level, and since there are few factors, how far they are off is looked up, not estimated.
 """
 
 from __future__ import annotations
@@ -16,14 +15,16 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial.chebyshev import chebpts1, chebvander
 
 Floats = npt.NDArray[np.float64]
+Factor = Callable[[int, Floats], Floats]
 
 LEVELS: Final = np.arange(256.0)
-_NODES: Final = (16, 24, 32, 48, 64, 96, 128)
+EPS: Final = float(np.finfo(np.float64).eps)
+_NODES: Final = (16, 24, 32, 48, 64, 96, 128, 256)
 _ENOUGH: Final = 1e-6
-"""Interpolation this close, weights included, leaves some twenty of all colours undecided."""
-_EPS: Final = float(np.finfo(np.float64).eps)
+"""Values interpolated this well leave some twenty of all colours undecided."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,15 +50,10 @@ def sums_of_terms(terms: Floats, offset: float) -> Slabs:
     """Values ``terms[0, R] + terms[1, G] + terms[2, B] + offset`` for ``(3, 256)`` terms."""
     plane = terms[1][:, None] + terms[2][None, :] + offset
     largest = float(np.abs(terms).max(axis=1).sum()) + abs(offset)
-    return Slabs(lambda red: plane + terms[0, red], 4 * _EPS * largest)
+    return Slabs(lambda red: plane + terms[0, red], 4 * EPS * largest)
 
 
-def sums_of_products(
-    weights: Floats,
-    factor: Callable[[int, Floats], Floats],
-    offset: float,
-    rounding: float,
-) -> Slabs:
+def sums_of_products(weights: Floats, factor: Factor, offset: float, *, rounding: float) -> Slabs:
     """Values ``sum_i weights[i] f_i(0, R) f_i(1, G) f_i(2, B) + offset``.
 
     Parameters
@@ -72,42 +68,58 @@ def sums_of_products(
     rounding
         How far a factor may be off as it is computed.
     """
-    red = factor(0, LEVELS) * weights
     total = float(np.abs(weights).sum())
-    exact = [factor(channel, LEVELS) for channel in (1, 2)]
-    for count in (*_NODES, 256):
-        nodes, matrix = _interpolation(count)
-        green, blue = factor(1, nodes), factor(2, nodes)
-        # Rows of the matrix sum to at most this: by so much it can swell an error.
-        swell = float(np.abs(matrix).sum(axis=1).max())
-        gaps = [
-            float(np.abs(levels - matrix @ few).max()) + swell * (count * _EPS + 2 * rounding)
-            for levels, few in zip(exact, (green, blue), strict=True)
-        ]
-        if total * sum(gaps) <= _ENOUGH:
-            break
-    # Errors of the factors; then of a product of matrices, at most its length in roundings.
-    product = (1 + rounding) * (1 + gaps[0]) * (1 + gaps[1]) - 1
-    products = swell**2 * (len(weights) + 2 * count + 4) * _EPS
-    back = np.ascontiguousarray(matrix.T)
+    near = _interpolation(factor, _ENOUGH / total, rounding)
+    red = factor(0, LEVELS) * weights
+    back = np.ascontiguousarray(near.matrix.T)
 
     def of_red(level: int) -> Floats:
-        values: Floats = matrix @ ((green * red[level]) @ blue.T) @ back
+        values: Floats = near.matrix @ ((near.green * red[level]) @ near.blue.T) @ back
         values += offset
         return values
 
-    return Slabs(of_red, total * (product + products) + abs(offset) * _EPS)
+    # What the factors are off, and one rounding for each addition of the three matrix products.
+    factors = (1 + rounding) * (1 + near.gap) ** 2 - 1
+    additions = near.swell**2 * (len(weights) + 2 * len(near.green) + 4) * EPS
+    return Slabs(of_red, total * (factors + additions) + abs(offset) * EPS)
 
 
-def _interpolation(count: int) -> tuple[Floats, Floats]:
-    """``(count,)`` Chebyshev nodes in 0..255, and the matrix from values there to all levels.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Interpolation:
+    """Factors of green and blue at k nodes, and how to get from there to all levels.
 
-    With 256 nodes they are the levels, and nothing is interpolated.
+    ``green`` and ``blue`` are ``(k, m)``, ``matrix`` is ``(256, k)``; no row of it sums to more
+    than ``swell`` in absolute value, so that much it can enlarge an error. An interpolated
+    factor is within ``gap`` of the true one.
     """
-    if count == len(LEVELS):
-        return LEVELS, np.eye(count)
-    from numpy.polynomial.chebyshev import chebpts1, chebvander
 
+    green: Floats
+    blue: Floats
+    matrix: Floats
+    swell: float
+    gap: float
+
+
+def _interpolation(factor: Factor, tolerance: float, rounding: float) -> _Interpolation:
+    """Take the fewest Chebyshev nodes that keep the gap, twice, within the tolerance.
+
+    With 256 nodes, the levels themselves, nothing is interpolated.
+    """
+    exact = [factor(channel, LEVELS) for channel in (1, 2)]
+    for count in _NODES:
+        nodes, matrix = _chebyshev(count) if count < 256 else (LEVELS, np.eye(256))
+        few = [factor(channel, nodes) for channel in (1, 2)]
+        swell = float(np.abs(matrix).sum(axis=1).max())
+        seen = max(float(np.abs(f - matrix @ g).max()) for f, g in zip(exact, few, strict=True))
+        gap = seen + swell * (count * EPS + 2 * rounding)
+        if 2 * gap <= tolerance:
+            break
+    return _Interpolation(*few, matrix, swell, gap)
+
+
+def _chebyshev(count: int) -> tuple[Floats, Floats]:
+    """``(count,)`` Chebyshev nodes in 0..255; ``(256, count)`` from values there to all levels."""
     nodes = chebpts1(count)
     at_nodes, at_levels = (chebvander(x, count - 1) for x in (nodes, LEVELS / 127.5 - 1.0))
-    return (nodes + 1.0) * 127.5, np.linalg.solve(at_nodes.T, at_levels.T).T
+    matrix = np.linalg.solve(at_nodes.T, at_levels.T).T
+    return (nodes + 1.0) * 127.5, matrix.astype(np.float64)

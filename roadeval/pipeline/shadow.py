@@ -295,9 +295,9 @@ def _compensate_hsi(
     change = compensation(inside, around, settings)
     mapped = change.target[k] + (values - change.source[k]) * change.gain[k]
     mapped = np.clip(mapped, 0.0, 1.0)
-    converted = colour.to_rgb(colour.hue(flat[shadow]), mapped[:, 0], mapped[:, 1])
     result = flat.copy()
-    result[shadow] = np.where(change.applied[k][:, None], converted, flat[shadow])
+    # Components that are left as they are come back exactly: the conversion inverts every colour.
+    result[shadow] = colour.to_rgb(colour.hue(flat[shadow]), mapped[:, 0], mapped[:, 1])
     return result.reshape(image.shape), change
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from roadeval.data import ERRORS, Frame, FrameResult, Health, Tally
 from roadeval.recording import layout as at
-from roadeval.recording.codecs import CAMERA_QUALITY, Codec, ImageCodec, codec
+from roadeval.recording.codecs import CameraCodec, Codec, codec
 from roadeval.recording.layout import Layout
 
 
@@ -34,9 +34,9 @@ class Encoder:
     """Encodes the frames of a recording with this layout."""
 
     def __init__(self, layout: Layout) -> None:
-        self.camera = ImageCodec(quality=CAMERA_QUALITY)
+        self._camera = CameraCodec()
         self.codecs: dict[str, Codec] = {
-            at.CAMERA: self.camera,
+            at.CAMERA: self._camera,
             **{path: codec(spec, layout.width, layout.height) for path, spec in layout.images()},
         }
         self._rates = frozenset(layout.rates)
@@ -63,7 +63,7 @@ class Encoder:
         """Pass on the camera's own file where the log holds one, so that nothing is lost twice."""
         if frame.media_type in ("image/jpeg", "image/png"):
             return bytes(frame.payload)
-        return self.camera.encode(frame.image)
+        return self._camera.encode(frame.image)
 
     def _layers(self, result: FrameResult) -> Iterator[tuple[str, bytes]]:
         for path, mask in (

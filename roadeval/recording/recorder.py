@@ -18,8 +18,7 @@ from roadeval.recording.encoding import Encoded, Encoder
 from roadeval.recording.layout import Layout, RecordingError
 
 PAGE: Final = 8
-"""Frames whose images, notes and table lines share a chunk: what a killed run loses at most
-is the last page and the one still being written."""
+"""Frames whose images, notes and table lines share a chunk: what a killed run loses at most."""
 SERIES: Final = 64
 """Frames whose numbers share a chunk."""
 
@@ -57,16 +56,17 @@ class Recorder:
         RecordingError
             If it cannot be written.
         """
+        if self.path.is_dir():
+            raise RecordingError(f"{self.path}: is a folder; name a file in it, ending in .rrd")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self.partial.touch()
         except OSError as error:
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
-        # The same input gives the same recording: its identity is its layout's, and the run's
-        # own clock does not appear in it.
+        # The same input gives the same recording: its identity is its layout's, and properties
+        # of the run, which Rerun would add, stay out.
         identity = hashlib.blake2b(self._layout.to_json().encode(), digest_size=16).hexdigest()
         stream = rr.RecordingStream(at.APPLICATION, recording_id=identity, send_properties=False)
-        stream.set_log_time_enabled(False)
         stream.save(self.partial, default_blueprint=blueprint.arrange(self._layout))
         stream.send_recording_name(self._layout.drive)
         self._stream = stream
@@ -79,14 +79,25 @@ class Recorder:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._close()
+        try:
+            self._close()
+        except RecordingError:
+            # What went wrong first is what the user must hear.
+            if error is None:
+                raise
 
     def encode(self, result: FrameResult) -> Encoded:
         """Encode a frame; the heavy part of the work, in any thread."""
         return self._encoder(result)
 
     def write(self, encoded: Encoded) -> None:
-        """Append a frame. Frames come in order, from one thread."""
+        """Append a frame. Frames come in order, from one thread.
+
+        Raises
+        ------
+        RecordingError
+            If the file cannot be written any further.
+        """
         if not self._frames:
             self._static(style.timing(encoded.scalars))
         self._add_images(encoded)
@@ -100,10 +111,9 @@ class Recorder:
         if self._frames % SERIES == 0:
             self._send(self._series.take())
         if self._frames % PAGE == 0:
-            # Wait for the last page, not for this one: the file is written meanwhile, and
-            # memory holds two pages at most.
-            self._open_stream().flush()
+            # The file is whole after every page, and memory holds no more than one.
             self._send(self._pages.take())
+            self._flush()
 
     def finish(self, results: Mapping[str, str]) -> None:
         """Add the results, close the file and give it its name.
@@ -159,24 +169,33 @@ class Recorder:
             raise RuntimeError("a recorder is used inside its 'with' block")
         return self._stream
 
+    def _flush(self) -> None:
+        try:
+            self._open_stream().flush()
+        except RuntimeError as error:
+            raise self._incomplete() from error
+
     def _close(self) -> None:
         if self._stream is None:
             return
-        self._send(self._pages.take() + self._series.take())
-        self._stream.flush()
-        self._stream.disconnect()
-        self._stream = None
+        try:
+            self._send(self._pages.take() + self._series.take())
+            self._flush()
+        finally:
+            self._stream.disconnect()
+            self._stream = None
 
     def _check(self) -> None:
-        """Compare the file's own index with what was sent: a full disk is told by nobody else."""
+        """Compare the file's own index with what was sent to it."""
         try:
             complete = len(RrdReader(self.partial).store()) >= self._chunks
-        except (OSError, ValueError, RuntimeError):
+        except RuntimeError:
             complete = False
         if not complete:
-            raise RecordingError(
-                f"{self.partial}: part of the recording is missing; is the disk full?"
-            )
+            raise self._incomplete()
+
+    def _incomplete(self) -> RecordingError:
+        return RecordingError(f"{self.partial}: cannot be written any further; is the disk full?")
 
 
 class NullRecorder:

@@ -13,12 +13,12 @@ from typing import Any, Final
 Plain = dict[str, Any]
 """A block as JSON has it."""
 
-SUFFIXES: Final = {b"%PDF": "pdf", b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
+SUFFIXES: Final = {b"<?xml": "svg", b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
 
 
 @dataclass(frozen=True, slots=True)
 class Asset:
-    """A picture: the bytes of a PDF, PNG or JPEG file."""
+    """A picture: the bytes of an SVG, PNG or JPEG file."""
 
     content: bytes = field(repr=False)
 
@@ -47,7 +47,7 @@ class Heading:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A paragraph. ``style`` is ``body``, ``note`` (small and grey) or ``verdict`` (framed)."""
+    """A paragraph. ``style`` is ``body``, ``note`` (small and grey), ``title`` or ``verdict``."""
 
     text: str
     style: str = "body"
@@ -118,6 +118,8 @@ class Table:
         As many cells each as there are columns.
     breaks
         Rows above which a thin rule stands.
+    groups
+        Titles above several columns, each with its number of columns; together all columns.
     caption
         Stands above the table.
     small
@@ -127,6 +129,7 @@ class Table:
     columns: Sequence[str]
     rows: Sequence[Sequence[Cell | str]]
     breaks: Sequence[int] = ()
+    groups: Sequence[tuple[str, int]] = ()
     caption: str = ""
     small: bool = False
 
@@ -140,6 +143,7 @@ class Table:
             ],
             "rows": [[_cell(cell).plain() for cell in row] for row in self.rows],
             "breaks": [*self.breaks],
+            "groups": [{"title": title, "span": span} for title, span in self.groups],
             "caption": self.caption,
             "small": self.small,
         }
@@ -173,15 +177,24 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Strip:
-    """Pictures of equal size in rows of ``columns``, each with a few words below it."""
+    """Pictures of equal size in rows of ``columns``, each with a few words below it.
+
+    ``skip`` leaves as many places of the first row free.
+    """
 
     pictures: Sequence[tuple[str, Asset]]
     columns: int
+    skip: int = 0
 
     def plain(self) -> Plain:
         """Give the block as JSON has it."""
         pictures = [{"title": title, "picture": asset.name} for title, asset in self.pictures]
-        return {"kind": "strip", "pictures": pictures, "columns": self.columns}
+        return {
+            "kind": "strip",
+            "pictures": pictures,
+            "columns": self.columns,
+            "skip": self.skip,
+        }
 
     def assets(self) -> Iterator[Asset]:
         """Yield the pictures in it."""
@@ -205,15 +218,16 @@ class Together:
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """Two stacks of blocks side by side."""
+    """Two stacks of blocks side by side; the left one takes ``share`` of the width."""
 
     left: Sequence[Block]
     right: Sequence[Block]
+    share: float = 0.5
 
     def plain(self) -> Plain:
         """Give the block as JSON has it."""
         left, right = ([block.plain() for block in side] for side in (self.left, self.right))
-        return {"kind": "columns", "left": left, "right": right}
+        return {"kind": "columns", "left": left, "right": right, "share": self.share}
 
     def assets(self) -> Iterator[Asset]:
         """Yield the pictures in it."""
@@ -233,7 +247,32 @@ class Contents:
         return iter(())
 
 
-Block = Heading | Text | Command | Points | Table | Figure | Strip | Together | Columns | Contents
+@dataclass(frozen=True, slots=True)
+class Break:
+    """What follows begins on a new page."""
+
+    def plain(self) -> Plain:
+        """Give the block as JSON has it."""
+        return {"kind": "break"}
+
+    def assets(self) -> Iterator[Asset]:
+        """Yield the pictures in it."""
+        return iter(())
+
+
+Block = (
+    Heading
+    | Text
+    | Command
+    | Points
+    | Table
+    | Figure
+    | Strip
+    | Together
+    | Columns
+    | Contents
+    | Break
+)
 
 
 @dataclass(frozen=True, slots=True)

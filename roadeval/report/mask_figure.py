@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH: Final = 480
+WIDTH: Final = 400
 """Pixels across a picture, at most."""
 LEFT: Final = 0.28
 TOP: Final = 0.78

@@ -3,7 +3,7 @@
 Chosen over ReportLab (its own layout is left to the caller), WeasyPrint (needs Pango and other
 system libraries) and LaTeX (no package of Python's index brings it): one wheel, Apache-2.0, that
 compiles offline in a few tens of milliseconds, breaks pages and tables well, and brings its
-fonts. The document travels as JSON and its pictures as files in memory, so no text of a log can
+fonts. The document travels as JSON and its pictures as files beside it, so no text of a log can
 become markup, and nothing is fetched from anywhere.
 """
 
@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from contextlib import suppress
 from enum import StrEnum
 from importlib.resources import files
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Final
 
 from roadeval.errors import RoadevalError
@@ -25,10 +26,14 @@ _CONTROL: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 
 
 class Paper(StrEnum):
-    """Sizes of paper, by Typst's names."""
+    """Sizes of paper."""
 
     A4 = "a4"
-    LETTER = "us-letter"
+    LETTER = "letter"
+
+
+_NAMES: Final = {Paper.A4: "a4", Paper.LETTER: "us-letter"}
+"""Typst's names for them."""
 
 
 class ReportError(RoadevalError):
@@ -38,43 +43,57 @@ class ReportError(RoadevalError):
 def pdf(document: Document, paper: Paper = Paper.A4) -> bytes:
     """Typeset a document. The same document gives the same bytes.
 
-    Fonts are Typst's own, not the machine's, so that it looks the same everywhere.
+    Fonts are Typst's own and, for the figures, Matplotlib's; never the machine's, so that it
+    looks the same everywhere.
     """
     import typst
 
-    data = _printable(json.dumps(document.plain() | {"paper": paper}, ensure_ascii=False))
-    sources: Mapping[str, bytes] = {
-        "main.typ": files("roadeval.report").joinpath(_TEMPLATE).read_bytes(),
+    data = _printable(json.dumps(document.plain() | {"paper": _NAMES[paper]}, ensure_ascii=False))
+    sources = {
+        _TEMPLATE: files("roadeval.report").joinpath(_TEMPLATE).read_bytes(),
         "document.json": data.encode(),
         **document.assets(),
     }
-    compiled = typst.compile(
-        dict(sources), format="pdf", font_paths=typst.Fonts(include_system_fonts=False)
-    )
+    with TemporaryDirectory(prefix="roadeval-") as folder:
+        for name, content in sources.items():
+            Path(folder, name).write_bytes(content)
+        compiled = typst.compile(
+            Path(folder, _TEMPLATE),
+            root=folder,
+            format="pdf",
+            font_paths=typst.Fonts(include_system_fonts=False, font_paths=[_figures_fonts()]),
+        )
     assert isinstance(compiled, bytes)
     return compiled
 
 
-def write(document: Document, path: Path, paper: Paper = Paper.A4) -> Path:
-    """Typeset a document into a file, which bears its name only when it is complete.
+def put(path: Path, content: bytes) -> Path:
+    """Write a file, which bears its name only when it is complete.
 
     Raises
     ------
     ReportError
-        If the file cannot be written.
+        If it cannot be written.
     """
-    content = pdf(document, paper)
     temporary = path.with_name(f".{path.name}.partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary.write_bytes(content)
         temporary.replace(path)
     except OSError as error:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
         raise ReportError(
-            f"{path}: cannot write the document ({error.strerror}); choose another place with -o"
+            f"{path}: cannot be written ({error.strerror}); choose another place with -o"
         ) from error
     return path
+
+
+def _figures_fonts() -> str:
+    """Find the folder of the fonts that Matplotlib brings."""
+    from matplotlib import get_data_path
+
+    return str(Path(get_data_path(), "fonts", "ttf"))
 
 
 def _printable(text: str) -> str:

@@ -9,12 +9,14 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.synth.noise import Field
+from roadeval.synth.noise import Field, Flags
 
 FOCAL_OVER_WIDTH: Final = 0.875
 """Focal length in image widths: a horizontal field of view of 59 degrees."""
 NEAR: Final = 0.4
 """Nothing nearer than this is drawn, metres."""
+LEAST: Final = 1.5
+"""Nothing lower than this in the image is drawn, pixels."""
 
 Matrix = npt.NDArray[np.float64]
 
@@ -57,7 +59,12 @@ class Camera:
         """Focal length in pixels."""
         return FOCAL_OVER_WIDTH * self.width
 
-    @property
+    @cached_property
+    def axes(self) -> Matrix:
+        """``(3, 3)``: the image's right, down and forward directions in the world, as rows."""
+        return self.pose.axes()
+
+    @cached_property
     def position(self) -> Matrix:
         """``(3,)`` metres."""
         return np.array([self.pose.x, self.pose.y, self.pose.z])
@@ -69,13 +76,13 @@ class Camera:
         intrinsics = np.array(
             [[self.focal, 0.0, centre_x], [0.0, self.focal, centre_y], [0.0, 0.0, 1.0]]
         )
-        return np.asarray(intrinsics @ self.pose.axes())
+        return np.asarray(intrinsics @ self.axes)
 
     def rays(self) -> Field:
         """``(H, W, 3)`` float32 world directions; a point is position plus depth times ray."""
         columns = np.arange(self.width, dtype=np.float32) - np.float32((self.width - 1) / 2)
         rows = np.arange(self.height, dtype=np.float32) - np.float32((self.height - 1) / 2)
-        right, down, forward = self.pose.axes().astype(np.float32)
+        right, down, forward = self.axes.astype(np.float32)
         across = (columns / np.float32(self.focal))[:, None] * right + forward
         along = (rows / np.float32(self.focal))[:, None] * down
         return np.asarray(across[None, :, :] + along[:, None, :])
@@ -87,24 +94,26 @@ class Camera:
 
     def depth(self, points: Matrix) -> Matrix:
         """``(n,)`` distance of ``(n, 3)`` world points along the optical axis, metres."""
-        return np.asarray((points - self.position) @ self.pose.axes()[2])
+        return np.asarray((points - self.position) @ self.axes[2])
 
-    def catches(self, corners: Matrix) -> npt.NDArray[np.bool_]:
+    def catches(self, corners: Matrix) -> Flags:
         """Tell which of ``(n, 4, 3)`` rectangles may be seen: ``(n,)`` bool, a quick guess.
 
-        Left out is what lies behind, to either side, or is lower than a pixel in the image.
+        Left out is what lies behind, to either side, or is too low in the image.
         """
-        right, _, forward = self.pose.axes()
+        right, _, forward = self.axes
         depth = (corners - self.position) @ forward
         before = np.maximum(depth, NEAR)
         column = (corners - self.position) @ right / before * self.focal
         beside = (column.max(1) < -self.width / 2) | (column.min(1) > self.width / 2)
         height = np.ptp(corners[..., 1], axis=1) / before.min(1) * self.focal
-        return np.asarray((depth.max(1) > NEAR) & ~beside & (height >= 1.0))
+        return np.asarray((depth.max(1) > NEAR) & ~beside & (height >= LEAST))
 
     def outline(self, corners: Matrix) -> Matrix:
         """Project the part of a polygon, ``(n, 3)``, that is not behind: ``(m, 2)``, m maybe 0."""
         depth = self.depth(corners)
+        if depth.min() >= NEAR:
+            return self.project(corners)
         kept: list[Matrix] = []
         for here, there, d0, d1 in zip(
             corners, np.roll(corners, -1, 0), depth, np.roll(depth, -1), strict=True

@@ -23,8 +23,10 @@ CABIN: Final = (0.6, 3.1, HEIGHT)
 """Two boxes that cast the shadow: begin and end from the tail, height, metres."""
 BELT: Final = 0.96
 """Height of the lower edge of the windows, metres."""
-LEAN: Final = 0.22
-"""How far the sides lean inwards from ground to roof, metres."""
+LEAN: Final = 0.30
+"""How far the sides lean inwards from there to the roof, metres."""
+SEAM: Final = 1.03
+"""Panels are stretched by this over their upper neighbours, so that nothing shines through."""
 
 Colour = tuple[float, float, float]
 GLASS: Final[Colour] = (0.05, 0.06, 0.075)
@@ -40,23 +42,30 @@ SIDE: Final = (
 )  # fmt: skip
 SIDE_GLASS: Final = ((0.62, 1.0), (0.92, 1.34), (1.35, 1.38), (2.15, 1.38), (2.8, 0.99))
 END: Final = (
-    (0.04, 0.28), (0.0, 0.6), (0.05, 0.95), (0.24, 1.38), (0.4, HEIGHT), (WIDTH - 0.4, HEIGHT),
-    (WIDTH - 0.24, 1.38), (WIDTH - 0.05, 0.95), (WIDTH, 0.6), (WIDTH - 0.04, 0.28),
+    (0.04, 0.28), (0.0, 0.6), (0.0, 0.96), (0.26, 1.40), (0.4, HEIGHT), (WIDTH - 0.4, HEIGHT),
+    (WIDTH - 0.26, 1.40), (WIDTH, 0.96), (WIDTH, 0.6), (WIDTH - 0.04, 0.28),
 )  # fmt: skip
 END_GLASS: Final = ((0.22, 0.98), (0.36, 1.34), (WIDTH - 0.36, 1.34), (WIDTH - 0.22, 0.98))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """What a make of car looks like: window, deck and face of the end nearer to us, and side.
+    """What a make of car looks like.
 
-    The window begins ``bonnet`` metres behind that end and slopes back by ``rake``.
+    Parameters
+    ----------
+    window, deck, face
+        The end that is nearer to us: the window begins ``bonnet`` metres behind the face and
+        slopes back by ``rake``, the deck lies between.
+    doors, side_windows
+        The side, below and above `BELT`.
     """
 
     window: Picture
     deck: Picture
     face: Picture
-    side: Picture
+    doors: Picture
+    side_windows: Picture
     bonnet: float
     rake: float
 
@@ -68,12 +77,14 @@ def paint(body: Colour, oncoming: bool, sun: Sun) -> Look:
     above = sun.facing(np.array([0.0, 1.0, 0.0]))
     side, end = _side(body), _end(body, oncoming)
     belt = len(end) - round(BELT * PIXELS_PER_METRE)
-    deck = np.full((16, 32, 4), (*body, 1.0), np.float32)
+    side = side[:, ::-1] if oncoming else side
+    deck = np.full((64, 64, 4), (*body, 1.0), np.float32)
     return Look(
         window=_lit(end[:belt], near, 0.95),
         deck=_lit(deck, above, 1.0),
         face=_lit(end[belt:], near, 0.6),
-        side=_lit(side[:, ::-1] if oncoming else side, beside, 0.7),
+        doors=_lit(side[belt:], beside, 0.6),
+        side_windows=_lit(side[:belt], beside, 0.85),
         bonnet=1.05 if oncoming else 0.2,
         rake=0.8 if oncoming else 0.5,
     )
@@ -106,18 +117,18 @@ class Car:
         left = self.foot - across * WIDTH / 2
         inward = across if camera_x < self.foot[0] else -across
         flank = left if camera_x < self.foot[0] else left + across * WIDTH
-        lean = np.array([0.0, HEIGHT, 0.0]) + LEAN * inward
-        belt = left + np.array([0.0, BELT, 0.0])
-        roof = np.array([0.0, HEIGHT - BELT, 0.0]) + self.look.rake * along
+        up, above = np.array([0.0, BELT, 0.0]), np.array([0.0, HEIGHT - BELT, 0.0])
+        lean, rake = above + LEAN * inward, above + self.look.rake * along
         deck = self.look.bonnet * along
-        wide = across * WIDTH
+        long, wide = along * LENGTH, across * WIDTH
         return tuple(
             Panel(picture, corner, right, down, self.sunlit)
             for picture, corner, right, down in (
-                (self.look.side, flank + lean, along * LENGTH, -lean),
-                (self.look.window, belt + deck + roof, wide, -roof),
-                (self.look.deck, belt + deck, wide, -deck),
-                (self.look.face, belt, wide, left - belt),
+                (self.look.side_windows, flank + up + lean, long, -lean),
+                (self.look.doors, flank + SEAM * up, long, -SEAM * up),
+                (self.look.window, left + up + deck + rake, wide, -rake),
+                (self.look.deck, left + up + SEAM * deck, wide, -SEAM * deck),
+                (self.look.face, left + SEAM * up, wide, -SEAM * up),
             )
         )
 
@@ -149,7 +160,7 @@ def _lit(image: Field, facing: float, sky: float) -> Picture:
     """Light a painted panel, ``(h, w, 4)`` RGB and opacity: the sky shines more on its top."""
     gloss = np.linspace(1.3 * sky, 0.7 * sky, len(image), dtype=np.float32)[:, None]
     lit = float(facing > 0)
-    return Picture.painted(image[..., :3], image[..., 3], facing, gloss, lit)
+    return Picture.painted(image, facing, gloss, lit)
 
 
 def _canvas(width: float) -> Field:
@@ -164,8 +175,9 @@ def _fill(image: Field, outline: Sequence[tuple[float, float]], colour: Colour) 
     cv2.fillPoly(image, [np.round(points * PIXELS_PER_METRE).astype(np.int32)], (*colour, 1.0))
 
 
-def _box(image: Field, left: float, bottom: float, right: float, top: float,
-         colour: Colour) -> None:  # fmt: skip
+def _box(image: Field, corners: tuple[float, float, float, float], colour: Colour) -> None:
+    """Fill a rectangle: left, bottom, right and top in metres from the lower left corner."""
+    left, bottom, right, top = corners
     _fill(image, [(left, bottom), (right, bottom), (right, top), (left, top)], colour)
 
 
@@ -173,16 +185,16 @@ def _end(body: Colour, oncoming: bool) -> Field:
     """Paint the end of a car, ``(h, w, 4)`` RGB and opacity."""
     image = _canvas(WIDTH)
     for left in (0.1, WIDTH - 0.32):
-        _box(image, left, 0.0, left + 0.22, 0.4, RUBBER)
+        _box(image, (left, 0.0, left + 0.22, 0.4), RUBBER)
     _fill(image, END, body)
     _fill(image, END_GLASS, GLASS)
-    _box(image, 0.05, 0.28, WIDTH - 0.05, 0.40, RUBBER)
+    _box(image, (0.05, 0.28, WIDTH - 0.05, 0.40), RUBBER)
     lamp, height = (HEAD_LAMP, 0.62) if oncoming else (TAIL_LAMP, 0.74)
     for left in (0.06, WIDTH - 0.36):
-        _box(image, left, height, left + 0.30, height + 0.16, lamp)
+        _box(image, (left, height, left + 0.30, height + 0.16), lamp)
     if oncoming:
-        _box(image, 0.45, 0.56, WIDTH - 0.45, 0.70, RUBBER)
-    _box(image, WIDTH / 2 - 0.26, 0.44, WIDTH / 2 + 0.26, 0.55, PLATE)
+        _box(image, (0.45, 0.56, WIDTH - 0.45, 0.70), RUBBER)
+    _box(image, (WIDTH / 2 - 0.26, 0.44, WIDTH / 2 + 0.26, 0.55), PLATE)
     return image
 
 
@@ -193,8 +205,8 @@ def _side(body: Colour) -> Field:
     _fill(image, SIDE_GLASS, GLASS)
     dark = tuple(0.5 * c for c in body)
     for z in (0.95, 1.75, 2.65):
-        _box(image, z, 0.4, z + 0.02, 0.98, (dark[0], dark[1], dark[2]))
-    _box(image, 1.7, 0.98, 1.78, 1.40, body)
+        _box(image, (z, 0.4, z + 0.02, 0.98), (dark[0], dark[1], dark[2]))
+    _box(image, (1.7, 0.98, 1.78, 1.40), body)
     for z in (0.78, 3.42):
         centre = round(z * PIXELS_PER_METRE), round((HEIGHT - 0.31) * PIXELS_PER_METRE)
         for radius, colour in ((0.37, RUBBER), (0.22, HUB)):

@@ -18,7 +18,7 @@ from roadeval.synth.light import daylight, is_shadow
 from roadeval.synth.scene import build
 from roadeval.synth.sensor import Sensor
 from roadeval.synth.traffic import draw_traffic
-from roadeval.synth.view import see
+from roadeval.synth.view import Moment, see
 
 IMAGE_TOPIC: Final = "/camera/image"
 ROAD_TOPIC: Final = "/truth/road"
@@ -28,6 +28,8 @@ START_NS: Final = 1_718_445_600_000_000_000
 JPEG_QUALITY: Final = 84
 LONGEST: Final = 60.0
 """The maps of a longer drive's road would not fit into memory with ease, seconds."""
+FASTEST: Final = 1000.0
+"""Frames a second."""
 SMALLEST: Final = 32
 """Least width and height of an image, pixels."""
 
@@ -65,10 +67,10 @@ class DriveSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if self.frames < 1 or self.rate_hz <= 0 or self.seed < 0:
+        if self.frames < 1 or not 0 < self.rate_hz <= FASTEST or self.seed < 0:
             raise DriveError(
-                f"{self.frames} frames at {self.rate_hz} Hz, seed {self.seed}: "
-                "frames and rate_hz must be positive, the seed not negative"
+                f"{self.frames} frames at {self.rate_hz} Hz, seed {self.seed}: there must be a "
+                f"frame, rate_hz must lie between 0 and {FASTEST:g}, the seed must not be negative"
             )
         if min(self.width, self.height) < SMALLEST:
             raise DriveError(
@@ -122,10 +124,10 @@ def render_drive(settings: DriveSettings) -> Iterator[SynthFrame]:
         time = index / settings.rate_hz
         camera = Camera(settings.width, settings.height, journey.pose(time, scene.road))
         light = daylight(journey.beam(time))
-        cars = [mover.at(time, scene.road, scene.shade) for mover in movers]
-        film = see(scene, cars, camera, light, time)
+        cars = tuple(mover.at(time, scene.road, scene.shade) for mover in movers)
+        film = see(scene, Moment(time, camera, light, cars))
         image = sensor.expose(film.radiance, random(4, index))
-        road = (film.road >= 0.5).astype(np.uint8)
+        road = np.asarray(film.road >= 0.5, np.uint8)
         yield SynthFrame(index, image, road, is_shadow(film.visible, light))
 
 

@@ -10,8 +10,7 @@ import numpy as np
 from roadeval.synth.ground import DRY_GRASS, GRASS
 from roadeval.synth.light import Sun
 from roadeval.synth.panel import Picture
-from roadeval.synth.posts import NO_LEAVES
-from roadeval.synth.standing import Standing
+from roadeval.synth.standing import NO_LEAVES, Standing
 
 PIXELS_PER_METRE: Final = 90.0
 HALF_WIDTH: Final = 1.1
@@ -22,7 +21,7 @@ BLADES: Final = 700
 def grass_strip(sun: Sun, rng: np.random.Generator) -> Standing:
     """Grow a strip of grass across the view, sparse towards its ends and its top."""
     size = round(HEIGHT * PIXELS_PER_METRE), round(2 * HALF_WIDTH * PIXELS_PER_METRE)
-    colour, opacity = np.zeros((*size, 3), np.float32), np.zeros(size, np.float32)
+    image = np.zeros((*size, 4), np.float32)
     direct = np.zeros(size, np.float32)
     across = np.clip(rng.normal(0.0, 0.42, BLADES), -0.98, 0.98)
     root = rng.uniform(0.0, 0.10, BLADES)
@@ -33,12 +32,11 @@ def grass_strip(sun: Sun, rng: np.random.Generator) -> Standing:
     for i in np.argsort(-root):
         column = (across[i] + 1) * HALF_WIDTH * PIXELS_PER_METRE
         lean = column + rng.normal(0.0, 2.5)
-        ends = [
+        low, high = (
             (round(c), round((HEIGHT - y) * PIXELS_PER_METRE))
             for c, y in ((column, root[i]), (lean, tip[i]))
-        ]
-        cv2.line(colour, *ends, tint[i].tolist(), 1)
-        cv2.line(opacity, *ends, 1.0, 1)
-        cv2.line(direct, *ends, float(facing[i]), 1)
-    picture = Picture.painted(colour, opacity, direct, 0.8, 1.0)
+        )
+        cv2.line(image, low, high, (*tint[i].tolist(), 1.0), 1)
+        cv2.line(direct, low, high, float(facing[i]), 1)
+    picture = Picture.painted(image, direct, 0.8, 1.0)
     return Standing(picture, HALF_WIDTH, HEIGHT, NO_LEAVES, ())

@@ -9,18 +9,32 @@ import cv2
 import numpy as np
 
 from roadeval.synth.camera import Matrix
-from roadeval.synth.light import Sun
 from roadeval.synth.noise import Field, coloured_noise
 from roadeval.synth.panel import Panel, Picture
 from roadeval.synth.shadows import Silhouettes, SunMap
 
 PIXELS_PER_METRE: Final = 28.0
 STOREY: Final = 2.8
+BAY: Final = 2.6
+"""Distance between windows, metres."""
+WINDOW: Final = (1.2, 1.35)
+"""Width and height, metres."""
+SILL: Final = 0.85
+"""Height of a window's lower edge above its floor, metres."""
+COURSE: Final = 0.32
+"""Distance between rows of roof tiles, metres."""
+ROOF_STEPS: Final = 8
 WALL_SKY: Final = 0.60
 ROOF_SKY: Final = 0.85
 """Shares of level ground's skylight that a wall and a roof get."""
-WALLS: Final = ((0.20, 0.12, 0.092), (0.47, 0.44, 0.37), (0.33, 0.27, 0.20), (0.20, 0.15, 0.125))
-ROOFS: Final = ((0.20, 0.11, 0.085), (0.13, 0.125, 0.125), (0.17, 0.13, 0.11))
+
+Colour = tuple[float, float, float]
+WALLS: Final[tuple[Colour, ...]] = (
+    (0.20, 0.12, 0.092), (0.47, 0.44, 0.37), (0.33, 0.27, 0.20), (0.20, 0.15, 0.125),
+)  # fmt: skip
+ROOFS: Final[tuple[Colour, ...]] = (
+    (0.20, 0.11, 0.085), (0.13, 0.125, 0.125), (0.17, 0.13, 0.11),
+)  # fmt: skip
 GLASS: Final = (0.045, 0.055, 0.07)
 FRAME: Final = (0.62, 0.62, 0.60)
 
@@ -29,128 +43,133 @@ FRAME: Final = (0.62, 0.62, 0.60)
 class House:
     """A house between two opposite corners of its walls, ``(3,)`` metres each.
 
-    ``low[1]`` is 0 and ``high[1]`` the height of the eaves.
+    Parameters
+    ----------
+    low, high
+        The corners; ``low[1]`` is 0 and ``high[1]`` the height of the eaves.
+    ridge
+        Height of the ridge, metres.
+    side
+        On which side of the road it stands: -1 left, 1 right.
+    wall, roof
+        Reflectances.
     """
 
     low: Matrix
     high: Matrix
     ridge: float
-    wall: tuple[float, float, float]
-    roof: tuple[float, float, float]
+    side: float
+    wall: Colour
+    roof: Colour
 
     def occlude(self, silhouettes: Silhouettes) -> None:
         """Stand in the sun's way: the walls as a box, the roof as steps."""
         silhouettes.add_box(self.low, self.high)
-        eaves, middle = self.high[1], (self.low[0] + self.high[0]) / 2
-        for step in np.linspace(0.0, 1.0, 9)[:-1]:
-            narrow = (1 - step) * (self.high[0] - self.low[0]) / 2
-            bottom = eaves + step * (self.ridge - eaves)
-            top = bottom + (self.ridge - eaves) / 8
+        middle, half = (self.low[0] + self.high[0]) / 2, (self.high[0] - self.low[0]) / 2
+        heights = np.linspace(self.high[1], self.ridge, ROOF_STEPS + 1)
+        for k in range(ROOF_STEPS):
+            narrow = half * (1 - k / ROOF_STEPS)
             silhouettes.add_box(
-                np.array([middle - narrow, bottom, self.low[2]]),
-                np.array([middle + narrow, top, self.high[2]]),
+                np.array([middle - narrow, heights[k], self.low[2]]),
+                np.array([middle + narrow, heights[k + 1], self.high[2]]),
             )
 
-    def panels(self, shade: SunMap, rng: np.random.Generator) -> tuple[Panel, ...]:
+    def panels(self, shade: SunMap, rng: np.random.Generator) -> tuple[Panel, Panel, Panel]:
         """Paint what is seen from the road: roof, long wall and gable, in this order."""
-        right_of_road = bool(self.low[0] > shade.road.centre(self.low[2:])[0])
-        face, outward = (self.low[0], -1.0) if right_of_road else (self.high[0], 1.0)
+        face = self.low[0] if self.side > 0 else self.high[0]
         middle, eaves = (self.low[0] + self.high[0]) / 2, self.high[1]
-        long = np.array([0.0, 0.0, self.high[2] - self.low[2]])
-        rise = np.array([face - middle, eaves - self.ridge, 0.0])
-        slope = np.array([outward * abs(rise[1]), abs(rise[0]), 0.0]) / np.linalg.norm(rise)
-        width = np.array([self.high[0] - self.low[0], 0.0, 0.0])
-        roof = Panel(
-            _NOTHING, np.array([middle, self.ridge, self.low[2]]) - 0.02 * long, 1.04 * long,
-            1.12 * rise,
-        )  # fmt: skip
-        side = Panel(
-            _NOTHING, np.array([face, eaves, self.low[2]]), long, np.array([0.0, -eaves, 0.0])
+        along = np.array([0.0, 0.0, self.high[2] - self.low[2]])
+        across = np.array([self.high[0] - self.low[0], 0.0, 0.0])
+        pitch = np.array([face - middle, eaves - self.ridge, 0.0])
+        ridge = np.array([middle, self.ridge, self.low[2]])
+        roof = Panel(NOTHING, ridge - 0.02 * along, 1.04 * along, 1.12 * pitch)
+        wall = Panel(
+            NOTHING, np.array([face, eaves, self.low[2]]), along, np.array([0.0, -eaves, 0.0])
         )
         gable = Panel(
-            _NOTHING, np.array([self.low[0], self.ridge, self.low[2]]), width,
+            NOTHING,
+            np.array([self.low[0], self.ridge, self.low[2]]),
+            across,
             np.array([0.0, -self.ridge, 0.0]),
-        )  # fmt: skip
-        outline = np.array(
-            [[0, 1], [0, 1 - eaves / self.ridge], [0.5, 0], [1, 1 - eaves / self.ridge], [1, 1]]
         )
+        up = np.array([-self.side * -pitch[1], abs(pitch[0]), 0.0]) / np.linalg.norm(pitch)
+        out, towards_us = np.array([-self.side, 0.0, 0.0]), np.array([0.0, 0.0, -1.0])
+        gabled = _gabled(_wall(gable, self.wall, eaves, rng), eaves / self.ridge)
         return (
-            _painted(roof, _tiles(roof, self.roof, rng), slope, ROOF_SKY, shade),
-            _painted(
-                side,
-                _wall(side, self.wall, eaves, rng),
-                np.array([outward, 0.0, 0.0]),
-                WALL_SKY,
-                shade,
-            ),
-            _painted(
-                gable,
-                _wall(gable, self.wall, eaves, rng),
-                np.array([0.0, 0.0, -1.0]),
-                WALL_SKY,
-                shade,
-                outline,
-            ),
+            _lit(roof, _tiles(roof, self.roof, rng), up, ROOF_SKY, shade),
+            _lit(wall, _wall(wall, self.wall, eaves, rng), out, WALL_SKY, shade),
+            _lit(gable, gabled, towards_us, WALL_SKY, shade),
         )
 
 
-_NOTHING: Final = Picture((), ())
+NOTHING: Final = Picture((), ())
+"""What hangs on a wall before it is painted."""
+
+
+def _blank(panel: Panel, colour: Colour, texture: Field | float) -> Field:
+    """``(h, w, 4)`` RGB and opacity of a plain surface as large as the panel."""
+    image = np.ones((*_size(panel), 4), np.float32)
+    image[..., :3] = colour
+    image[..., :3] *= np.exp(np.asarray(texture, np.float32))[..., None]
+    return image
 
 
 def _size(panel: Panel) -> tuple[int, int]:
     """Rows and columns of a panel's picture."""
-    metres = np.linalg.norm(panel.down), np.linalg.norm(panel.right)
-    rows, columns = (max(8, round(float(m) * PIXELS_PER_METRE)) for m in metres)
+    rows, columns = (
+        max(8, round(float(np.linalg.norm(edge)) * PIXELS_PER_METRE))
+        for edge in (panel.down, panel.right)
+    )
     return rows, columns
 
 
-def _wall(panel: Panel, colour: tuple[float, float, float], eaves: float,
-          rng: np.random.Generator) -> Field:  # fmt: skip
-    """Paint bricks or plaster, ``(h, w, 3)`` reflectance, with a row of windows on each storey."""
+def _wall(panel: Panel, colour: Colour, eaves: float, rng: np.random.Generator) -> Field:
+    """Paint a wall, ``(h, w, 4)`` RGB and opacity, with a row of windows on each storey."""
     rows, columns = _size(panel)
-    stains = coloured_noise(rng, (rows, columns), 2, 200, 1.0)
-    image = np.float32(colour) * np.exp(0.07 * stains)[..., None]
-    metre = PIXELS_PER_METRE
-    bays = max(1, int(columns / metre / 2.6))
+    image = _blank(panel, colour, 0.07 * coloured_noise(rng, (rows, columns), 2, 200, 1.0))
+    bays = max(1, int(columns / PIXELS_PER_METRE / BAY))
     for storey in range(int(eaves / STOREY + 0.2)):
-        bottom = rows - (storey * STOREY + 0.85) * metre
+        sill = rows - (storey * STOREY + SILL) * PIXELS_PER_METRE
         for bay in range(bays):
-            middle = (bay + 0.5) * columns / bays
-            glass = tuple(rng.uniform(0.5, 2.6) * np.array(GLASS))
-            for margin, paint in ((0.09, FRAME), (0.0, glass)):
-                left, right = (round(middle + s * (0.6 + margin) * metre) for s in (-1, 1))
-                top = round(bottom - (1.35 + margin) * metre)
-                low = (right, round(bottom + margin * metre))
-                cv2.rectangle(image, (left, top), low, paint, -1)
-            bar = round(middle)
-            cv2.line(image, (bar, round(bottom)), (bar, round(bottom - 1.35 * metre)), FRAME, 1)
-    return np.asarray(image, np.float32)
+            glass = rng.uniform(0.5, 2.6) * np.array(GLASS)
+            _window(image, (bay + 0.5) * columns / bays, sill, glass)
+    return image
 
 
-def _tiles(panel: Panel, colour: tuple[float, float, float], rng: np.random.Generator) -> Field:
-    """Paint rows of roof tiles, ``(h, w, 3)`` reflectance."""
+def _window(image: Field, middle: float, sill: float, glass: Field) -> None:
+    """Paint a window about a column, its lower edge at a row."""
+    width, height = (PIXELS_PER_METRE * side for side in WINDOW)
+    for margin, colour in ((2.5, FRAME), (0.0, tuple(glass.tolist()))):
+        top_left = round(middle - width / 2 - margin), round(sill - height - margin)
+        low_right = round(middle + width / 2 + margin), round(sill + margin)
+        cv2.rectangle(image, top_left, low_right, (*colour, 1.0), -1)
+    bar = round(middle)
+    cv2.line(image, (bar, round(sill)), (bar, round(sill - height)), (*FRAME, 1.0), 1)
+
+
+def _gabled(wall: Field, eaves: float) -> Field:
+    """Cut the upper corners off a wall: ``eaves`` is their height as a share of the ridge's."""
+    rows, columns = wall.shape[:2]
+    outline = np.array([[0, 1], [0, 1 - eaves], [0.5, 0], [1, 1 - eaves], [1, 1]])
+    inside = np.zeros((rows, columns), np.float32)
+    cv2.fillConvexPoly(inside, np.round(outline * (columns, rows)).astype(np.int32), 1.0)
+    return np.dstack([wall[..., :3], inside])
+
+
+def _tiles(panel: Panel, colour: Colour, rng: np.random.Generator) -> Field:
+    """Paint rows of roof tiles, ``(h, w, 4)`` RGB and opacity."""
     rows, columns = _size(panel)
-    course = 0.12 * np.cos(2 * np.pi * np.arange(rows) / (0.32 * PIXELS_PER_METRE))
+    courses = 0.12 * np.cos(2 * np.pi * np.arange(rows) / (COURSE * PIXELS_PER_METRE))
     weather = 0.10 * coloured_noise(rng, (rows, columns), 2, 120, 0.8)
-    return np.asarray(np.float32(colour) * np.exp(course[:, None] + weather)[..., None], np.float32)
+    return _blank(panel, colour, courses[:, None] + weather)
 
 
-def _painted(
-    panel: Panel, colour: Field, normal: Matrix, sky: float, shade: SunMap,
-    outline: Matrix | None = None,
-) -> Panel:  # fmt: skip
-    """Hang ``colour`` on the panel, in the sun that reaches each of its points."""
-    rows, columns = colour.shape[:2]
+def _lit(panel: Panel, image: Field, normal: Matrix, sky: float, shade: SunMap) -> Panel:
+    """Hang an image on the panel, in the sun that reaches each of its points."""
+    rows, columns = image.shape[:2]
     right = (np.arange(columns) + 0.5)[None, :, None] / columns * panel.right
     down = (np.arange(rows) + 0.5)[:, None, None] / rows * panel.down
-    points = panel.corner + right + down
     facing = shade.sun.facing(normal)
-    seen = shade.visible_from(points)
-    opacity = np.ones((rows, columns), np.float32)
-    if outline is not None:
-        opacity[:] = 0.0
-        corners = np.round(outline * (columns, rows)).astype(np.int32)
-        cv2.fillConvexPoly(opacity, corners, 1.0)
-    visible = seen if facing > 0 else np.zeros_like(seen)
-    picture = Picture.painted(colour, opacity, facing * seen, sky, visible)
+    seen = shade.visible_from(panel.corner + right + down) * np.float32(facing > 0)
+    picture = Picture.painted(image, facing * seen, sky, seen)
     return Panel(picture, panel.corner, panel.right, panel.down)

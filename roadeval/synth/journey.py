@@ -20,7 +20,7 @@ LANE: Final = 1.7
 PITCH: Final = np.radians(-2.9)
 CLOUD_EDGE: Final = 0.7
 """Seconds that the edge of the cloud takes to pass."""
-CAST_RAMP: Final = 0.28
+CAST_RAMP: Final = 0.18
 """How far the beam has risen when the stretch without shadow ends: to about `CASTING_BEAM`."""
 
 
@@ -74,9 +74,9 @@ class Journey:
         return cls(
             duration,
             (Stretch.MODERATE, Stretch(last[0]), Stretch(last[1])),
-            lateral=sways((0.38, 7.0), (0.08, 2.2)),
-            yaw=sways((np.radians(1.1), 4.6), (np.radians(0.15), 0.9)),
-            pitch=sways((np.radians(0.75), 6.2), (np.radians(0.16), 0.7)),
+            lateral=sways((0.45, 7.0), (0.08, 2.2)),
+            yaw=sways((np.radians(1.3), 4.6), (np.radians(0.15), 0.9)),
+            pitch=sways((np.radians(0.9), 6.2), (np.radians(0.16), 0.7)),
             roll=sways(
                 (np.radians(0.5), 3.7),
             ),

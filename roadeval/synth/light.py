@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from roadeval.data import Mask
 from roadeval.synth.camera import Matrix
 from roadeval.synth.noise import Field
 
@@ -28,7 +29,7 @@ THICK: Final = 0.015
 
 SHADOW_VISIBILITY: Final = 0.5
 """True shadow: less than this share of the sun's disc is seen from the surface ..."""
-CASTING_BEAM: Final = 0.2
+CASTING_BEAM: Final = 0.1
 """... while at least this share of the beam gets past the clouds; a dimmer sun casts none."""
 
 
@@ -83,7 +84,7 @@ def daylight(beam: float) -> Light:
     return Light(np.float32(beam) * SUN, SKY + np.float32(1.0 - beam) * CLOUD, beam)
 
 
-def is_shadow(visible: Field, light: Light) -> Field:
+def is_shadow(visible: Field, light: Light) -> Mask:
     """Tell true shadow from the share of the sun's disc that each pixel's surface sees.
 
     Parameters

@@ -9,6 +9,8 @@ import numpy.typing as npt
 
 Field = npt.NDArray[np.floating[Any]]
 """Any array of floats; each use states its shape."""
+Flags = npt.NDArray[np.bool_]
+"""Any array of bool."""
 
 
 def coloured_noise(

@@ -20,6 +20,9 @@ from roadeval.synth.noise import Field
 HAZE_LENGTH: Final = 2600.0
 """Distance at which the air has replaced all but 1/e of what lies behind it, metres."""
 
+Window = tuple[int, int, int, int]
+"""Columns and rows of an image: left, top, right, bottom, the last two excluded."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
@@ -44,29 +47,23 @@ class Picture:
 
     @classmethod
     def painted(
-        cls, colour: Field, opacity: Field, direct: Field | float, sky: Field | float,
-        visible: Field | float,
-    ) -> Picture:  # fmt: skip
+        cls, image: Field, direct: Field | float, sky: Field | float, visible: Field | float
+    ) -> Picture:
         """Make the picture of a surface from its reflectance and the light on it.
 
         Parameters
         ----------
-        colour
-            ``(h, w, 3)`` reflectance.
-        opacity
-            ``(h, w)``, 0..1.
+        image
+            ``(h, w, 4)`` RGB reflectance and opacity, 0..1.
         direct, sky, visible
             ``(h, w)`` or one number: sun falling on the surface (cosine times visible share),
-            share of the sky's light that it gets, share of the sun's disc that it sees.
+            share of level ground's skylight that it gets, share of the sun's disc that it sees.
         """
-        shape = opacity.shape
-        seen = np.asarray(np.broadcast_to(visible, shape) * opacity, np.float32)
-        by_sun = colour * np.asarray(np.broadcast_to(direct, shape) * opacity)[..., None]
-        by_sky = colour * np.asarray(np.broadcast_to(sky, shape) * opacity)[..., None]
-        return cls.of(
-            np.dstack([by_sun, opacity]).astype(np.float32),
-            np.dstack([by_sky, seen]).astype(np.float32),
+        colour, opacity = image[..., :3], image[..., 3]
+        lit, shaded, seen = (
+            np.asarray(light * opacity, np.float32)[..., None] for light in (direct, sky, visible)
         )
+        return cls.of(np.dstack([colour * lit, opacity]), np.dstack([colour * shaded, seen]))
 
 
 def _halved(image: Field) -> tuple[Field, ...]:
@@ -102,8 +99,8 @@ class Panel:
 
     def corners(self) -> Matrix:
         """``(4, 3)`` metres, around the panel."""
-        offsets = [0 * self.right, self.right, self.right + self.down, self.down]
-        return self.corner + np.stack(offsets)
+        beside, below = self.corner + self.right, self.corner + self.down
+        return np.array([self.corner, beside, beside + self.down, below])
 
     @property
     def farthest(self) -> float:
@@ -135,36 +132,49 @@ def draw(film: Film, camera: Camera, panel: Panel, light: Light, haze: Field) ->
 
     ``haze`` is the ``(3,)`` radiance of the air in front of it, by depth of its nearest corner.
     """
-    outline = camera.outline(panel.corners())
+    corners = panel.corners()
+    outline = camera.outline(corners)
     window = _window(outline, camera)
     if window is None:
         return
-    left, top, right, bottom = window
-    nearest = max(NEAR, float(camera.depth(panel.corners()).min()))
-    level = _level(panel, camera, nearest)
-    place = _homography(panel, camera, panel.picture.sun[level].shape, left, top)
-    sun, sky = (
-        cv2.warpPerspective(image[level], place, (right - left, bottom - top))
-        for image in (panel.picture.sun, panel.picture.sky)
-    )
+    nearest = max(NEAR, float(camera.depth(corners).min()))
+    sun, sky = _warped(panel, camera, nearest, window)
     if nearest <= NEAR:
-        inside = np.zeros(sun.shape[:2], np.uint8)
-        cv2.fillConvexPoly(inside, np.round(outline - (left, top)).astype(np.int32), 1)
-        sun, sky = sun * inside[..., None], sky * inside[..., None]
+        inside = _inside(outline, window)
+        sun, sky = sun * inside, sky * inside
     clear = np.float32(np.exp(-nearest / HAZE_LENGTH))
     direct = clear * np.float32(panel.sunlit) * light.direct
     opacity = sun[..., 3]
     radiance = sun[..., :3] * direct + sky[..., :3] * (clear * light.sky)
     radiance += ((1 - clear) * opacity)[..., None] * haze
     through = 1.0 - opacity
+    left, top, right, bottom = window
     here = np.s_[top:bottom, left:right]
     film.radiance[here] = film.radiance[here] * through[..., None] + radiance
     film.visible[here] = film.visible[here] * through + sky[..., 3] * np.float32(panel.sunlit)
     film.road[here] *= through
 
 
-def _window(outline: Matrix, camera: Camera) -> tuple[int, int, int, int] | None:
-    """Columns and rows of the image that an outline touches, ends excluded; None if it misses."""
+def _warped(panel: Panel, camera: Camera, depth: float, window: Window) -> tuple[Field, Field]:
+    """Both images of the panel's picture as they appear in a window of the camera's image."""
+    left, top, right, bottom = window
+    level = _level(panel, camera, depth)
+    place = _homography(panel, camera, panel.picture.sun[level].shape, left, top)
+    size = (right - left, bottom - top)
+    sun = cv2.warpPerspective(panel.picture.sun[level], place, size)
+    return sun, cv2.warpPerspective(panel.picture.sky[level], place, size)
+
+
+def _inside(outline: Matrix, window: Window) -> Field:
+    """``(h, w, 1)``: 1 inside of an outline; what lies behind the camera would else appear too."""
+    left, top, right, bottom = window
+    inside = np.zeros((bottom - top, right - left, 1), np.float32)
+    cv2.fillConvexPoly(inside, np.round(outline - (left, top)).astype(np.int32), 1.0)
+    return inside
+
+
+def _window(outline: Matrix, camera: Camera) -> Window | None:
+    """Return the part of the image that an outline touches; None if it misses."""
     if not len(outline):
         return None
     left, top = np.maximum(np.floor(outline.min(0)) - 1, 0).astype(int).tolist()

@@ -50,17 +50,22 @@ BIRCH: Final = Species(2.2, 6.5, 1.9, 60, 10000, (0.105, 0.135, 0.040), 0.45)
 SPRUCE: Final = Species(0.7, 8.5, 2.1, 90, 13000, (0.040, 0.068, 0.028), 0.95)
 BUSH: Final = Species(0.0, 1.5, 1.2, 45, 5000, (0.080, 0.112, 0.030))
 SHRUB: Final = Species(0.0, 1.0, 1.0, 35, 3500, (0.110, 0.120, 0.040))
+SPECIES: Final = (OAK, PLANE, BIRCH, SPRUCE, BUSH, SHRUB)
 
 
 def grow(species: Species, sun: Sun, rng: np.random.Generator) -> Standing:
     """Grow a plant and paint it in the light of ``sun``."""
     tufts = _tufts(species, rng)
     leaves = _leaves(species, tufts, rng)
-    branches = tuple(_branches(species, tufts, rng))
-    half_width = float(np.abs(leaves[:, 0]).max()) + 2 * LEAF
-    height = float(leaves[:, 1].max()) + 2 * LEAF
-    picture = _paint(species, leaves, branches, half_width, height, sun, rng)
-    return Standing(picture, half_width, height, leaves, branches)
+    rods = tuple(_branches(species, tufts, rng))
+    half_width, height = _extent(leaves)
+    return Standing(_paint(species, leaves, rods, sun, rng), half_width, height, leaves, rods)
+
+
+def _extent(leaves: Matrix) -> tuple[float, float]:
+    """Half width and height of the picture that holds all leaves, metres."""
+    margin = 2 * LEAF
+    return float(np.abs(leaves[:, 0]).max()) + margin, float(leaves[:, 1].max()) + margin
 
 
 def _tufts(species: Species, rng: np.random.Generator) -> Matrix:
@@ -129,30 +134,25 @@ def light_left(points: Matrix, towards: Matrix, opacity: float) -> Field:
 
 
 def _paint(
-    species: Species,
-    leaves: Matrix,
-    rods: Sequence[Rod],
-    half_width: float,
-    height: float,
-    sun: Sun,
-    rng: np.random.Generator,
+    species: Species, leaves: Matrix, rods: Sequence[Rod], sun: Sun, rng: np.random.Generator
 ) -> Picture:
     """Paint the far half of the leaves, then the wood, then the near half."""
-    size = (round(height * PIXELS_PER_METRE), round(2 * half_width * PIXELS_PER_METRE))
-    canvas = _Canvas(np.zeros((*size, 4), np.float32), np.zeros((*size, 4), np.float32), half_width)
     middles = np.array([(rod.foot + rod.tip) / 2 for rod in rods]).reshape(-1, 3)
     everything = np.concatenate([leaves, middles])
     visible = light_left(everything, sun.towards, 0.16)
     sky = 0.25 + 0.75 * light_left(everything, np.array([0.0, 1.0, 0.0]), 0.10)
     tint = np.array(species.colour) * np.exp(rng.normal(0.0, (0.15, 0.10, 0.15), leaves.shape))
-    turned = rng.uniform(0.35, 1.0, len(leaves))
+    leaf = slice(len(leaves))
+    direct = tint * (visible[leaf] * rng.uniform(0.35, 1.0, len(leaves)))[:, None]
+    by_sun = np.column_stack([direct, np.ones(len(leaves))])
+    by_sky = np.column_stack([tint * sky[leaf, None], visible[leaf]])
+    canvas = _Canvas.stretched(*_extent(leaves))
     order = np.argsort(-leaves[:, 2])
     behind, before = np.split(order, [np.count_nonzero(leaves[:, 2] > 0)])
-    for half in (behind, before):
-        canvas.leaves(leaves[half], tint[half], turned[half], visible[half], sky[half], rng)
-        if half is behind:
-            for rod, *light in zip(rods, visible[len(leaves) :], sky[len(leaves) :], strict=True):
-                canvas.wood(rod, *light, sun)
+    canvas.leaves(leaves[behind], by_sun[behind], by_sky[behind], rng)
+    for rod, seen, lit in zip(rods, visible[len(leaves) :], sky[len(leaves) :], strict=True):
+        canvas.wood(rod, float(seen), float(lit), sun)
+    canvas.leaves(leaves[before], by_sun[before], by_sky[before], rng)
     return Picture.of(canvas.sun, canvas.sky)
 
 
@@ -164,6 +164,12 @@ class _Canvas:
     sky: Field
     half_width: float
 
+    @classmethod
+    def stretched(cls, half_width: float, height: float) -> _Canvas:
+        """Return an empty canvas of that size, metres."""
+        size = round(height * PIXELS_PER_METRE), round(2 * half_width * PIXELS_PER_METRE), 4
+        return cls(np.zeros(size, np.float32), np.zeros(size, np.float32), half_width)
+
     def pixels(self, points: Matrix) -> list[list[int]]:
         """Column and row of each of ``(n, 3)`` points."""
         column = (points[:, 0] + self.half_width) * PIXELS_PER_METRE
@@ -171,20 +177,10 @@ class _Canvas:
         pixels: list[list[int]] = np.rint(np.stack([column, row], axis=1)).astype(int).tolist()
         return pixels
 
-    def leaves(
-        self,
-        at: Matrix,
-        tint: Matrix,
-        turned: Matrix,
-        visible: Field,
-        sky: Field,
-        rng: np.random.Generator,
-    ) -> None:
-        """Paint clusters of leaves in order, ``(n, 3)`` each, as small turned ellipses."""
+    def leaves(self, at: Matrix, by_sun: Field, by_sky: Field, rng: np.random.Generator) -> None:
+        """Paint clusters of leaves in order, as small turned ellipses."""
         radii = rng.uniform((0.55, 0.3), (1.2, 0.8), (len(at), 2)) * LEAF * PIXELS_PER_METRE
-        by_sun = np.column_stack([tint * (visible * turned)[:, None], np.ones(len(at))])
-        by_sky = np.column_stack([tint * sky[:, None], visible])
-        for centre, axes, angle, lit, shaded in zip(
+        for centre, axes, angle, sun, sky in zip(
             self.pixels(at),
             np.rint(radii).astype(int).clip(1).tolist(),
             rng.uniform(0, 180, len(at)).tolist(),
@@ -192,17 +188,17 @@ class _Canvas:
             by_sky.tolist(),
             strict=True,
         ):
-            cv2.ellipse(self.sun, centre, axes, angle, 0, 360, lit, -1)
-            cv2.ellipse(self.sky, centre, axes, angle, 0, 360, shaded, -1)
+            cv2.ellipse(self.sun, centre, axes, angle, 0, 360, sun, -1)
+            cv2.ellipse(self.sky, centre, axes, angle, 0, 360, sky, -1)
 
     def wood(self, rod: Rod, visible: float, sky: float, sun: Sun) -> None:
         """Paint a rod as strips, brighter on the side of the sun."""
         for side in np.linspace(-0.8, 0.8, 5):
             normal = np.array([side, 0.0, -np.sqrt(1 - side**2)])
             direct = visible * sun.facing(normal)
-            ends = self.pixels(np.stack([rod.foot, rod.tip]) + (side * rod.radius, 0.0, 0.0))
+            aside = np.array([side * rod.radius, 0.0, 0.0])
+            foot, tip = self.pixels(np.stack([rod.foot, rod.tip]) + aside)
             width = max(1, round(0.6 * rod.radius * PIXELS_PER_METRE))
-            lit, shaded = np.array(BARK) * direct, np.array(BARK) * sky * 0.7
-            seen = float(visible) if direct > 0 else 0.0
-            cv2.line(self.sun, *ends, (*lit.tolist(), 1.0), width)
-            cv2.line(self.sky, *ends, (*shaded.tolist(), seen), width)
+            lit, shaded = (np.array(BARK) * direct).tolist(), (np.array(BARK) * sky * 0.7).tolist()
+            cv2.line(self.sun, foot, tip, (*lit, 1.0), width)
+            cv2.line(self.sky, foot, tip, (*shaded, visible if direct > 0 else 0.0), width)

@@ -10,7 +10,7 @@ import numpy as np
 from roadeval.synth.light import Sun
 from roadeval.synth.noise import Field
 from roadeval.synth.panel import Picture
-from roadeval.synth.standing import Rod, Standing
+from roadeval.synth.standing import NO_LEAVES, Rod, Standing
 
 PIXELS_PER_METRE: Final = 50.0
 SKY_ON_WALL: Final = 0.62
@@ -20,7 +20,7 @@ WOOD: Final = (0.17, 0.135, 0.105)
 LAMP: Final = (0.45, 0.45, 0.44)
 RED: Final = (0.52, 0.045, 0.04)
 WHITE: Final = (0.74, 0.74, 0.73)
-NO_LEAVES: Final = np.empty((0, 3))
+BLACK: Final = (0.05, 0.05, 0.05, 1.0)
 
 Colour = tuple[float, float, float]
 
@@ -31,8 +31,7 @@ class _Easel:
     def __init__(self, half_width: float, height: float, sun: Sun) -> None:
         size = round(height * PIXELS_PER_METRE), round(2 * half_width * PIXELS_PER_METRE)
         self.half_width, self.height, self.sun = half_width, height, sun
-        self.colour = np.zeros((*size, 3), np.float32)
-        self.opacity = np.zeros(size, np.float32)
+        self.image = np.zeros((*size, 4), np.float32)
         self.direct = np.full(size, sun.facing(np.array([0.0, 0.0, -1.0])), np.float32)
         self.rods: list[Rod] = []
 
@@ -41,18 +40,16 @@ class _Easel:
         """Add a cylinder from ``foot`` to ``tip`` (X and Y), shaded across."""
         for side in np.linspace(-0.8, 0.8, 5):
             normal = np.array([side, 0.0, -np.sqrt(1 - side**2)])
-            ends = [self.pixel(x + side * radius, y) for x, y in (foot, tip)]
+            low, high = (self.pixel(x + side * radius, y) for x, y in (foot, tip))
             width = max(1, round(0.6 * radius * PIXELS_PER_METRE))
-            cv2.line(self.colour, *ends, colour, width)
-            cv2.line(self.opacity, *ends, 1.0, width)
-            cv2.line(self.direct, *ends, self.sun.facing(normal), width)
+            cv2.line(self.image, low, high, (*colour, 1.0), width)
+            cv2.line(self.direct, low, high, self.sun.facing(normal), width)
         self.rods.append(Rod(np.array([*foot, 0.0]), np.array([*tip, 0.0]), radius))
 
     def disc(self, centre: tuple[float, float], radius: float, colour: Colour) -> None:
         """Add a round plate that faces the camera."""
         at, size = self.pixel(*centre), round(radius * PIXELS_PER_METRE)
-        cv2.circle(self.colour, at, size, colour, -1)
-        cv2.circle(self.opacity, at, size, 1.0, -1)
+        cv2.circle(self.image, at, size, (*colour, 1.0), -1)
         facing = self.sun.facing(np.array([0.0, 0.0, -1.0]))
         cv2.circle(self.direct, at, size, facing, -1)
 
@@ -64,7 +61,7 @@ class _Easel:
     def finished(self) -> Standing:
         """Return the thing, painted."""
         lit: Field = (self.direct > 0).astype(np.float32)
-        picture = Picture.painted(self.colour, self.opacity, self.direct, SKY_ON_WALL, lit)
+        picture = Picture.painted(self.image, self.direct, SKY_ON_WALL, lit)
         return Standing(picture, self.half_width, self.height, NO_LEAVES, tuple(self.rods))
 
 
@@ -93,7 +90,11 @@ def speed_sign(sun: Sun) -> Standing:
     easel.rod((0.0, 0.0), (0.0, 2.6), 0.04, STEEL)
     easel.disc((0.0, 2.3), 0.31, RED)
     easel.disc((0.0, 2.3), 0.24, WHITE)
-    for x in (-0.075, 0.075):
-        ends = easel.pixel(x, 2.2), easel.pixel(x, 2.4)
-        cv2.line(easel.colour, *ends, (0.05, 0.05, 0.05), 3)
+    for x, y, axes, opening in (
+        (-0.09, 2.35, (3, 2), 130),
+        (-0.09, 2.25, (3, 3), 130),
+        (0.08, 2.30, (3, 5), 180),
+    ):
+        centre = easel.pixel(x, y)
+        cv2.ellipse(easel.image, centre, axes, 0, -opening, opening, BLACK, 2)
     return easel.finished()

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from roadeval.synth.noise import Field
+from roadeval.synth.noise import Field, Flags
 
 HALF_WIDTH: Final = 3.4
 """From the centre line to the edge of the asphalt, metres: two narrow suburban lanes."""
@@ -66,7 +66,7 @@ class Road:
         bay = BAY_DEPTH * np.clip(inside, 0.0, 1.0)
         return -HALF_WIDTH * widening, (HALF_WIDTH + bay) * widening
 
-    def is_road(self, offset: Field, z: Field) -> Field:
+    def is_road(self, offset: Field, z: Field) -> Flags:
         """Tell which points of the ground are road: bool, shaped like ``offset``."""
         left, right = self.edges(z)
         return np.asarray((offset >= left) & (offset <= right))

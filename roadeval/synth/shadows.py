@@ -9,6 +9,7 @@ above it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import cv2
@@ -92,7 +93,7 @@ class Silhouettes:
 
     def add_box(self, low: Matrix, high: Matrix) -> None:
         """Add an upright box between two opposite corners, ``(3,)`` metres each."""
-        for k, (floor, ceiling) in enumerate(zip(HEIGHTS, HEIGHTS[1:], strict=False)):
+        for k, (floor, ceiling) in enumerate(pairwise(HEIGHTS)):
             bottom, top = max(low[1], floor), min(high[1], ceiling)
             if bottom < top:
                 corners = np.array(

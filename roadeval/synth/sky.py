@@ -27,6 +27,11 @@ SKYLINE_SHARPNESS: Final = 0.0016
 """Over how many radians of elevation a skyline fades: about a pixel."""
 
 
+def air(beam: float) -> Field:
+    """``(3,)`` radiance of the air between us and what is far, for a share of the sun's beam."""
+    return np.asarray(HORIZON * np.float32(0.4 + 0.6 * beam))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Sky:
     """The far view.

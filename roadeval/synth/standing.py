@@ -6,12 +6,15 @@ Trees and posts alike: leaves and rods block the sun, a picture shows them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from roadeval.synth.camera import Matrix
 from roadeval.synth.panel import Panel, Picture
 from roadeval.synth.shadows import Silhouettes
+
+NO_LEAVES: Final = np.empty((0, 3))
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ COLOURS: Final[tuple[Colour, ...]] = (
     (0.42, 0.43, 0.44), (0.62, 0.62, 0.60), (0.05, 0.05, 0.055), (0.05, 0.08, 0.17),
     (0.30, 0.04, 0.035), (0.16, 0.17, 0.18),
 )  # fmt: skip
-ONCOMING: Final = 4
+ONCOMING: Final = 3
 """Cars that come towards us in the whole drive."""
 
 

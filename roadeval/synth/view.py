@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import cv2
@@ -11,78 +11,89 @@ import numpy as np
 from roadeval.synth.camera import Camera, Matrix
 from roadeval.synth.cars import Car
 from roadeval.synth.light import Light
-from roadeval.synth.noise import Field
+from roadeval.synth.noise import Field, Flags
 from roadeval.synth.panel import HAZE_LENGTH, Film, draw
 from roadeval.synth.scene import Scene
-from roadeval.synth.sky import HORIZON
+from roadeval.synth.sky import air
 
 FARTHEST: Final = 420.0
 """The ground ends here and the far view begins, metres."""
-UNDER_CAR: Final = 0.85
-"""Share of the sky that a car hides from the ground below it."""
 CLOUD_DRIFT: Final = 0.004
 """How far the clouds move in a second, in their own heights."""
+UNDER_CAR: Final = 0.85
+"""Share of the sky that a car hides from the ground below it."""
 
 
-def see(scene: Scene, cars: Sequence[Car], camera: Camera, light: Light, time: float) -> Film:
-    """Render what a camera sees at ``time`` seconds: sky, ground, then panels, far to near."""
-    rays = camera.rays()
+@dataclass(frozen=True, slots=True, eq=False)
+class Moment:
+    """All that changes: ``time`` seconds, the camera, the light, the other cars."""
+
+    time: float
+    camera: Camera
+    light: Light
+    cars: tuple[Car, ...]
+
+
+def see(scene: Scene, now: Moment) -> Film:
+    """Render what the camera sees: sky, ground, then panels from far to near."""
+    rays = now.camera.rays()
     film = Film(
         np.zeros(rays.shape, np.float32),
         np.ones(rays.shape[:2], np.float32),
         np.zeros(rays.shape[:2], np.float32),
     )
-    air = HORIZON * np.float32(0.4 + 0.6 * light.beam)
-    horizon = -camera.pose.y / FARTHEST
-    above = np.flatnonzero((rays[..., 1] > horizon).any(1))
-    below = np.flatnonzero((rays[..., 1] <= horizon).any(1))
-    if above.size:
-        rows = slice(above[0], above[-1] + 1)
-        film.radiance[rows] = scene.sky.radiance(rays[rows], light.beam, CLOUD_DRIFT * time)
-    if below.size:
-        _ground(film, slice(below[0], below[-1] + 1), rays, scene, cars, camera, light, air)
-    caught = np.flatnonzero(camera.catches(scene.corners)).tolist()
+    down = rays[..., 1] <= -now.camera.pose.y / FARTHEST
+    if not down.all():
+        rows = _rows(~down)
+        drift = CLOUD_DRIFT * now.time
+        film.radiance[rows] = scene.sky.radiance(rays[rows], now.light.beam, drift)
+    if down.any():
+        _lay_ground(film, rays, down, scene, now)
+    caught = np.flatnonzero(now.camera.catches(scene.corners)).tolist()
     panels = [scene.panels[i] for i in caught]
-    panels += [panel for car in cars for panel in car.panels(camera.pose.x)]
+    panels += [panel for car in now.cars for panel in car.panels(now.camera.pose.x)]
+    haze = air(now.light.beam)
     for panel in sorted(panels, key=lambda panel: -panel.farthest):
-        draw(film, camera, panel, light, air)
+        draw(film, now.camera, panel, now.light, haze)
     return film
 
 
-def _ground(
-    film: Film,
-    rows: slice,
-    rays: Field,
-    scene: Scene,
-    cars: Sequence[Car],
-    camera: Camera,
-    light: Light,
-    air: Field,
-) -> None:
-    """Lay the ground under the rays that meet it."""
-    seen = rays[rows]
-    meets = seen[..., 1] <= -camera.pose.y / FARTHEST
-    depth = np.float32(-camera.pose.y) / np.minimum(seen[..., 1], -camera.pose.y / FARTHEST)
-    z = np.float32(camera.pose.z) + depth * seen[..., 2]
-    offset = np.float32(camera.pose.x) + depth * seen[..., 0] - scene.road.centre(z)
+def _rows(where: Flags) -> slice:
+    """Return the rows of ``(H, W)`` in which anything is true."""
+    found = np.flatnonzero(where.any(1))
+    return slice(int(found[0]), int(found[-1]) + 1)
+
+
+def _lay_ground(film: Film, rays: Field, down: Flags, scene: Scene, now: Moment) -> None:
+    """Lay the ground under the rays that meet it, ``down``."""
+    rows, pose = _rows(down), now.camera.pose
+    meets = down[rows]
+    depth = np.float32(pose.y) / np.maximum(-rays[rows, :, 1], np.float32(pose.y / FARTHEST))
+    z = np.float32(pose.z) + depth * rays[rows, :, 2]
+    offset = np.float32(pose.x) + depth * rays[rows, :, 0] - scene.road.centre(z)
     middle = depth[:, depth.shape[1] // 2]
-    width = middle / np.float32(camera.focal)
-    length = middle * width / np.float32(camera.pose.y)
+    width = middle / np.float32(now.camera.focal)
+    length = middle * width / np.float32(pose.y)
     sun = scene.sunlight.sample(offset, z, length)
     hidden = scene.hidden_sky.sample(offset, z, length)
-    for car in cars:
-        for outline in car.shadow(scene.sun):
-            sun *= 1 - _cover(outline, camera, rows)
-        below = cv2.GaussianBlur(_cover(car.footprint(), camera, rows), (0, 0), 2.0)
-        hidden = np.maximum(hidden, np.float32(UNDER_CAR) * below)
-    level = np.float32(scene.sun.towards[1])
-    light_on_it = (sun * level)[..., None] * light.direct + (1 - hidden)[..., None] * light.sky
-    radiance = scene.ground.reflectance(offset, z, width, length) * light_on_it
-    clear = np.exp(-depth / np.float32(HAZE_LENGTH))[..., None]
-    radiance = air + clear * (radiance - air)
+    _shade_by_cars(sun, hidden, rows, scene, now)
+    direct = now.light.direct * np.float32(scene.sun.towards[1])
+    light = sun[..., None] * direct + (1 - hidden)[..., None] * now.light.sky
+    radiance = scene.ground.reflectance(offset, z, width, length) * light
+    haze = air(now.light.beam)
+    radiance = haze + np.exp(-depth / np.float32(HAZE_LENGTH))[..., None] * (radiance - haze)
     film.radiance[rows][meets] = radiance[meets]
     film.visible[rows][meets] = sun[meets]
     film.road[rows][meets] = scene.road.is_road(offset, z)[meets]
+
+
+def _shade_by_cars(sun: Field, hidden: Field, rows: slice, scene: Scene, now: Moment) -> None:
+    """Take from the ground, in place, the sun and the sky that cars stand before."""
+    for car in now.cars:
+        for outline in car.shadow(scene.sun):
+            sun *= 1 - _cover(outline, now.camera, rows)
+        below = cv2.GaussianBlur(_cover(car.footprint(), now.camera, rows), (0, 0), 2.0)
+        np.maximum(hidden, np.float32(UNDER_CAR) * below, out=hidden)
 
 
 def _cover(outline: Matrix, camera: Camera, rows: slice) -> Field:
@@ -92,4 +103,4 @@ def _cover(outline: Matrix, camera: Camera, rows: slice) -> Field:
     if len(corners):
         fixed = np.round((corners - (0, rows.start)) * 16).astype(np.int32)
         cv2.fillConvexPoly(cover, fixed, 255, cv2.LINE_AA, 4)
-    return cover * np.float32(1 / 255)
+    return np.asarray(cover * np.float32(1 / 255))

@@ -3,6 +3,7 @@
 import re
 import signal
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
@@ -10,14 +11,17 @@ import pytest
 from roadeval import Recording
 from tests.e2e.commands import DEMO, ROADEVAL
 
+ENOUGH = 1_000_000
+"""Bytes of a recording that hold some frames, and far from all."""
+
 
 def stopped(folder, number):
-    """Replay the demo drive until it has begun to record, then send a signal."""
+    """Replay the demo drive until some frames are recorded, then send a signal."""
     words = ["replay", DEMO, "--save", folder / "out.rrd", "--reports", folder / "reports"]
     with subprocess.Popen([ROADEVAL, *words], stderr=subprocess.PIPE, text=True) as run:
-        for line in run.stderr:
-            if line.startswith("replaying"):
-                break
+        while sum(file.stat().st_size for file in folder.glob("*.rrd")) < ENOUGH:
+            assert run.poll() is None, run.stderr.read()
+            time.sleep(0.05)
         run.send_signal(number)
         said = run.stderr.read()
     return run.returncode, said

@@ -14,6 +14,12 @@ from roadeval import Recording
 from tests.e2e.commands import replay
 
 RERUN = Path(sys.executable).with_name("rerun")
+STAGES = ("shadow", "similarity", "svm", "post")
+CLOCKED = [
+    "/timing/summary",
+    *(f"/timing/{variant}/{stage}" for variant in ("filtered", "unfiltered") for stage in STAGES),
+]
+"""The entities that tell how long something took."""
 
 
 def rerun(*words):
@@ -78,16 +84,9 @@ def test_two_runs_give_the_same_tables(twice, table):
 
 
 def test_two_runs_give_the_same_recording_but_for_the_clock(twice, tmp_path):
-    clocked = [
-        *(f"/timing/{v}/{s}" for v in ("filtered", "unfiltered") for s in STAGES),
-        "/results/summary",
-    ]
-    dropped = [word for path in clocked for word in ("--drop-entity", path)]
+    dropped = [word for path in CLOCKED for word in ("--drop-entity", path)]
     for number, each in enumerate(twice):
         code, said = rerun("filter", *dropped, each.recording, "-o", tmp_path / f"{number}.rrd")
         assert code == 0, said
     code, said = rerun("compare", "--unordered", tmp_path / "0.rrd", tmp_path / "1.rrd")
     assert code == 0, said
-
-
-STAGES = ("shadow", "similarity", "svm", "post")

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.uncertainty import mean_difference
+from roadeval.evaluation.uncertainty import bootstrap_means, mean_difference
 
 from .coverage import autoregression, simulate
 
@@ -39,6 +39,11 @@ def test_neighbours_that_resemble_each_other_widen_the_interval() -> None:
     once, thrice = (mean_difference(np.repeat(INDEPENDENT, k), SETTINGS) for k in (1, 3))
     assert thrice.mean == pytest.approx(once.mean)
     assert thrice.high - thrice.low == pytest.approx(once.high - once.low, rel=0.2)
+
+
+def test_the_bootstrap_draws_blocks_as_long_as_the_frames_are_alike() -> None:
+    means = bootstrap_means(np.repeat(INDEPENDENT, 5), SETTINGS)
+    assert means.std() == pytest.approx(stats.sem(INDEPENDENT), rel=0.25)
 
 
 def test_the_same_drive_gives_the_same_interval() -> None:

@@ -140,6 +140,11 @@ def test_thresholds_do_not_depend_on_the_number_of_pixels(pixels):
     assert shadow.printed_threshold(counts) == 90
 
 
+def test_the_printed_threshold_takes_the_lower_of_two_equal_maxima():
+    # Mean 1: (w - mu)^2 / (w mu) is the same for w = 1/102 and for w = 101/102.
+    assert shadow.printed_threshold(as_array({0: 1, 1: 100, 2: 1})) == 0
+
+
 def test_the_printed_threshold_lands_at_the_edge_of_the_histogram():
     counts = as_array({level: 400 - abs(level - 100) for level in range(5, 200)})
     assert shadow.printed_threshold(counts) == 198
@@ -370,6 +375,14 @@ def test_moments_equal_numpy_on_the_pixels_themselves(image):
     assert ((moments.deviation[1] == 0) == (np.ptp(pixels, axis=0) == 0)).all()
 
 
+@pytest.mark.parametrize("pixels", [3, 7, 41])
+def test_a_constant_component_has_no_deviation_in_hsi_either(pixels):
+    values = np.repeat(noise(1, 99)[0] / 255, pixels, axis=0)
+    labels = np.repeat(np.arange(99), pixels)
+    moments = shadow.moments_of_values(labels, values, 99)
+    assert (moments.deviation == 0).all()
+
+
 @pytest.mark.parametrize("pixels", [10, 10**7, 10**9])
 def test_moments_of_huge_components_neither_overflow_nor_cancel(pixels):
     # All pixels 254 but one in ten, which is 255; then all of them 255.
@@ -417,11 +430,17 @@ def test_layers_are_the_ones_announced():
 
 def test_facts_state_threshold_components_and_gains():
     image = picture("#...#", "#....", ".....")
+    image[2, 0] = 255  # so that the left ring varies much, and the right one does not
     facts = run(image)[0].facts
     _, histogram = codes_of(image)
     assert facts["threshold"] == pytest.approx(shadow.otsu_threshold(histogram) / 127.5 - 1)
     assert facts["shadow_share"] == pytest.approx(3 / 15)
     assert facts["components"] == facts["compensated"] == 2
+    labels, count = shadow.connected_components(run(image)[1]["shadow"], 8)
+    ring = shadow.buffer_ring((labels > 0).astype(np.uint8), 1)
+    _, change = shadow.compensate(image, labels, count, ring, ShadowSettings())
+    assert facts["max_gain"] == change.gain.max() > 3
+    assert facts["gains_above_3"] == (change.gain > 3).any(axis=1).sum() == 1
     left = shadow.bind(ShadowSettings(min_area=2), None)(View(image, image)).facts
     assert (left["components"], left["compensated"]) == (2, 1)
 

@@ -1,0 +1,52 @@
+"""``roadeval report``: everything a result has to tell, as one PDF."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+from roadeval.cli import console, messages, options
+from roadeval.cli.exit_codes import ExitCode
+
+
+class PaperName(StrEnum):
+    """Sizes of paper."""
+
+    A4 = "a4"
+    LETTER = "letter"
+
+
+def report(
+    result: options.Result,
+    *,
+    output: Annotated[
+        Path | None,
+        options.option(
+            "-o",
+            "--output",
+            metavar="FILE.pdf",
+            help="Default: report.pdf in reports/<drive>/, or in the results folder given.",
+        ),
+    ] = None,
+    paper: Annotated[
+        PaperName, options.option("--paper", metavar="a4|letter", help="Default: a4.")
+    ] = PaperName.A4,
+    quiet: options.Quiet = False,
+) -> int:
+    """Write the report of a drive as a PDF.
+
+    Does the filter help, where are the errors, which stage broke it, and the frames to look at;
+    from the recording alone, or from a results folder, then without pictures.
+    """
+    from roadeval.opened import Opened
+    from roadeval.report.typeset import Paper
+    from roadeval.reporting import report as write
+
+    opened = Opened(result)
+    path = write(opened, output, paper=Paper(paper))
+    if not quiet:
+        console.emit(str(path))
+    if not opened.complete:
+        messages.warning(f"{result}: a partial recording; the report covers what can be read of it")
+    return ExitCode.DONE

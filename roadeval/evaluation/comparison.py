@@ -1,0 +1,302 @@
+"""Two or more results side by side: what changed, on the same frames, and how sure that is.
+
+Results of the same log are matched frame by frame, by their stamps; a frame that either trained
+on, or that either lacks, is left out of both. Results of different logs are only put side by side:
+a difference between them would mix the scene with the method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Final
+
+from roadeval.data import BASELINE
+from roadeval.errors import RoadevalError
+from roadeval.evaluation import analysis
+from roadeval.evaluation.conditions import Condition, ConditionError
+from roadeval.evaluation.rates import RATES
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.uncertainty import mean_difference
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FORMAT: Final = {"name": "roadeval-comparison", "version": 1}
+COMPARED: Final = ("ERR", "FPR", "FNR")
+"""The rates whose differences are given; ACC, TNR and TPR only mirror them."""
+MOVED: Final = 5
+"""Frames named of those that changed most, in each direction."""
+
+
+class ComparisonError(RoadevalError):
+    """Results that cannot be compared."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Side:
+    """One of the results that are compared.
+
+    Parameters
+    ----------
+    label
+        What it is called in tables; its own among all.
+    drive, digest
+        The log's name and SHA-256, None where the result does not know it.
+    frames
+        The rows of ``frames.csv``.
+    """
+
+    label: str
+    drive: str
+    digest: str | None
+    frames: pd.DataFrame
+
+
+def variants_as_sides(
+    frames: pd.DataFrame, drive: str, digest: str | None, chosen: Sequence[str] | None = None
+) -> list[Side]:
+    """Take the variants of one result for results of their own; the first is the base.
+
+    Parameters
+    ----------
+    frames
+        The result's table.
+    drive, digest
+        As in `Side`.
+    chosen
+        Variants in order; all but the baseline by default, ``unfiltered`` first.
+
+    Raises
+    ------
+    ComparisonError
+        If a variant is not there, or fewer than two are.
+    """
+    there = frames["variant"].unique().tolist() if len(frames) else []
+    names = list(chosen or sorted((n for n in there if n != BASELINE), key=_unfiltered_first))
+    for name in names:
+        if name not in there:
+            raise ComparisonError(f"{drive}: no variant {name}; there are {', '.join(there)}")
+    if len(names) < 2:
+        raise ComparisonError(
+            f"{drive}: {len(names)} variant to compare; two are needed, or a second result"
+        )
+    return [Side(name, drive, digest, frames[frames["variant"] == name]) for name in names]
+
+
+def _unfiltered_first(name: str) -> bool:
+    return name != "unfiltered"
+
+
+def compare(
+    sides: Sequence[Side], settings: EvaluationSettings, *, across_variants: bool = False
+) -> dict[str, Any]:
+    """Compare results with the first of them.
+
+    Parameters
+    ----------
+    sides
+        Two at least, the base first.
+    settings
+        Confidence and the rest of the intervals' making.
+    across_variants
+        Whether each side is one variant of the same result, to be matched with another one.
+
+    Returns
+    -------
+    dict
+        The content of the comparison's JSON file: ``format``, ``same_drive``, ``results``,
+        ``changes`` (a row per new result, variant and stage), ``moved`` (the frames that changed
+        most) and ``warnings``.
+
+    Raises
+    ------
+    ComparisonError
+        If a result has nothing to compare, or two have no frame in common.
+    """
+    for side in sides:
+        if not len(side.frames):
+            raise ComparisonError(f"{side.label}: nothing was scored, so nothing can be compared")
+    same = len({side.digest for side in sides}) == 1 and sides[0].digest is not None
+    found: dict[str, Any] = {
+        "format": FORMAT,
+        "same_drive": same,
+        "results": [
+            {
+                "label": side.label,
+                "drive": side.drive,
+                "sha256": side.digest,
+                "frames": side.frames["frame"].nunique(),
+            }
+            for side in sides
+        ],
+    }
+    if not same:
+        return found | {
+            "changes": [row for side in sides for row in _levels(side)],
+            "moved": [],
+            "warnings": [_apart(sides)],
+        }
+    base, changes, moved, warnings = sides[0], [], [], []
+    for new in sides[1:]:
+        pair = _Pair(base, new, settings, across_variants=across_variants)
+        changes += pair.changes()
+        moved += pair.moved()
+        warnings += pair.warnings()
+    return found | {"changes": changes, "moved": moved, "warnings": warnings}
+
+
+def judge(comparison: Mapping[str, Any], conditions: Sequence[Condition]) -> list[dict[str, Any]]:
+    """Judge conditions on every new result; a row for each: ``text``, ``holds``, ``sentence``.
+
+    Raises
+    ------
+    ConditionError
+        If a condition asks for what is not there, or for a change between different drives.
+    """
+    rows = []
+    for condition in conditions:
+        if condition.is_change and not comparison["same_drive"]:
+            raise ConditionError(
+                f"{condition.text}: not judged, because the results are of different drives, whose "
+                "difference mixes the scene with the method; limits in % can be judged"
+            )
+        matching = [
+            change
+            for change in comparison["changes"]
+            if (change["stage"], change["variant"]) == (condition.stage, condition.variant)
+        ]
+        if not matching:
+            there = {f"{each['stage']}.{each['variant']}" for each in comparison["changes"]}
+            raise ConditionError(
+                f"{condition.text}: nothing compared is called {condition.stage}."
+                f"{condition.variant}; there are {', '.join(sorted(there))}"
+            )
+        for change in matching:
+            holds, sentence = condition.judge(change)
+            rows.append({"text": condition.text, "holds": holds, "sentence": sentence})
+    return rows
+
+
+class _Pair:
+    """A base and a new result of the same drive, on the frames that both evaluated."""
+
+    def __init__(
+        self, base: Side, new: Side, settings: EvaluationSettings, *, across_variants: bool
+    ) -> None:
+        self._base, self._new, self._settings = base, new, settings
+        before = base.frames
+        if across_variants:
+            before = before.assign(variant=new.label)
+        keys = ["stamp", "variant", "stage"]
+        matched = _stamped(before).merge(_stamped(new.frames), on=keys, suffixes=("_base", ""))
+        if not len(matched):
+            raise ComparisonError(
+                f"{base.label} and {new.label} have no evaluated frame and stage in common"
+            )
+        self._matched = matched
+        self._last = analysis.final_stages(matched)
+
+    def changes(self) -> Iterator[dict[str, Any]]:
+        """Yield a row for each variant and stage that both have."""
+        for (variant, stage), rows in self._matched.groupby(["variant", "stage"], sort=False):
+            before = rows[["frame", *(f"{c}_base" for c in (*analysis.OUTCOMES, *RATES))]]
+            before = before.rename(columns=lambda name: name.removesuffix("_base"))
+            rates = COMPARED if stage == self._last[variant] else COMPARED[:1]
+            yield {
+                "result": self._new.label,
+                "variant": variant,
+                "stage": stage,
+                "final": stage == self._last[variant],
+                "frames": len(rows),
+                "base": _rates(before.assign(variant=variant, stage=stage)),
+                "new": _rates(rows),
+                "difference": {
+                    rate: asdict(
+                        mean_difference(
+                            (rows[rate] - rows[f"{rate}_base"]).to_numpy(float), self._settings
+                        )
+                    )
+                    for rate in rates
+                },
+            }
+
+    def moved(self) -> Iterator[dict[str, Any]]:
+        """Yield the frames whose final ERR changed most, the first variant's."""
+        variant = next(iter(self._last))
+        rows = analysis.finals(self._matched)
+        rows = rows[rows["variant"] == variant].assign(change=lambda r: r["ERR"] - r["ERR_base"])
+        paired = rows.drop(columns="ERR").rename(columns={"change": "ERR"}).set_index("frame")
+        for harmed in (True, False):
+            for row in analysis.most_changed(paired, MOVED, harmed=harmed).itertuples():
+                yield {
+                    "result": self._new.label,
+                    "variant": variant,
+                    "frame": int(row.frame),
+                    "stamp_ns": int(row.stamp_ns),
+                    "base": float(row.ERR_base),
+                    "new": float(row.ERR_base + row.ERR),
+                    "change": float(row.ERR),
+                }
+
+    def warnings(self) -> Iterator[str]:
+        """Say what was left out, and what makes the two less comparable than they look."""
+        base, new = self._base, self._new
+        both = self._matched["stamp"].nunique()
+        for side in (base, new):
+            rest = side.frames["frame"].nunique() - both
+            if rest:
+                yield (
+                    f"{rest} frames that {side.label} evaluated are left out against "
+                    f"{(new if side is base else base).label}, which lacks them or trained on them"
+                )
+        truths = self._matched[["TP", "FN", "N"]].sum(axis=1) != self._matched[
+            ["TP_base", "FN_base", "N_base"]
+        ].sum(axis=1)
+        if truths.any():
+            yield (
+                f"the truth differs on {self._matched[truths]['stamp'].nunique()} frames between "
+                f"{base.label} and {new.label} (other labels or topics?): part of the change may "
+                "be the truth's"
+            )
+
+
+def _stamped(frames: pd.DataFrame) -> pd.DataFrame:
+    """Add a key to match frames by: the stamp, and among equal ones the place."""
+    place = frames.groupby(["variant", "stage", "stamp_ns"], sort=False).cumcount()
+    return frames.assign(stamp=frames["stamp_ns"].astype(str) + "/" + place.astype(str))
+
+
+def _rates(rows: pd.DataFrame) -> dict[str, Any]:
+    """Sum up rows of one variant and stage: mean and pooled rates, IoU, F1 and precision."""
+    (history,) = analysis.histories(rows)
+    total = history.totals()
+    named = {name: total[name] for name in (*RATES, *(f"pooled_{rate}" for rate in RATES))}
+    return named | analysis.overlap(total)
+
+
+def _levels(side: Side) -> Iterator[dict[str, Any]]:
+    last = analysis.final_stages(side.frames)
+    for (variant, stage), rows in side.frames.groupby(["variant", "stage"], sort=False):
+        yield {
+            "result": side.label,
+            "variant": variant,
+            "stage": stage,
+            "final": stage == last[variant],
+            "frames": len(rows),
+            "base": {},
+            "new": _rates(rows),
+            "difference": {},
+        }
+
+
+def _apart(sides: Sequence[Side]) -> str:
+    for side in sides:
+        if side.digest is None:
+            return f"{side.label} does not say which log it is of: nothing is subtracted"
+    a, b = next((a, b) for a, b in pairwise(sides) if a.digest != b.digest)
+    return (
+        f"{a.label} and {b.label} are of different drives: side by side only, for a difference "
+        "would mix the scene with the method"
+    )

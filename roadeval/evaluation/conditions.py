@@ -1,0 +1,115 @@
+"""Limits that a comparison must keep: the small language of ``--fail-if``.
+
+A condition is a quantity, an operator and a limit::
+
+    condition := STAGE "." VARIANT "." RATE operator limit
+    operator  := ">" | ">=" | "<" | "<="
+    limit     := number "pp"        the change from the base to the new result, percentage points
+               | number "%"         the rate of the new result itself, percent
+    number    := ["+" | "-"] digits ["." digits]
+    RATE      := ACC ERR TPR FNR TNR FPR, each also as pooled_..., IoU F1 precision
+
+``post.filtered.ERR > +0.5pp`` holds where the error rate of the final mask has risen by more than
+half a percentage point; ``post.filtered.ERR > 20%`` where it is above a fifth. Rates are those of
+the frames that both results evaluated. Nothing is ever executed.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from roadeval.errors import RoadevalError
+from roadeval.evaluation.rates import OVERLAP_RATES, RATES
+
+OPERATORS: Final[Mapping[str, Callable[[float, float], bool]]] = {
+    ">": operator.gt,
+    ">=": operator.ge,
+    "<": operator.lt,
+    "<=": operator.le,
+}
+QUANTITIES: Final = (*RATES, *(f"pooled_{name}" for name in RATES), *OVERLAP_RATES)
+_GRAMMAR: Final = re.compile(
+    r"\s*(?P<stage>[\w-]+)\.(?P<variant>[\w-]+)\.(?P<rate>\w+)"
+    r"\s*(?P<operator>>=|<=|>|<)"
+    r"\s*(?P<number>[+-]?\d+(?:\.\d+)?)\s*(?P<unit>pp|%)\s*"
+)
+
+
+class ConditionError(RoadevalError):
+    """A condition that cannot be read, or not be judged."""
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A limit on a rate of a stage of a variant.
+
+    ``limit`` is in percentage points of change if ``is_change``, else in percent.
+    """
+
+    text: str
+    stage: str
+    variant: str
+    rate: str
+    operator: str
+    limit: float
+    is_change: bool
+
+    @classmethod
+    def parse(cls, text: str) -> Condition:
+        """Read a condition.
+
+        Raises
+        ------
+        ConditionError
+            If it does not follow the grammar.
+        """
+        match = _GRAMMAR.fullmatch(text)
+        if match is None:
+            raise ConditionError(
+                f"{text!r} is no condition; write STAGE.VARIANT.RATE, one of > >= < <=, and a "
+                "number with pp (change) or % (level), as 'post.filtered.ERR > +0.5pp'"
+            )
+        if match["rate"] not in QUANTITIES:
+            raise ConditionError(
+                f"{text!r}: there is no rate {match['rate']}; there are {', '.join(QUANTITIES)}"
+            )
+        return cls(
+            " ".join(text.split()),
+            match["stage"],
+            match["variant"],
+            match["rate"],
+            match["operator"],
+            float(match["number"]),
+            match["unit"] == "pp",
+        )
+
+    def judge(self, change: Mapping[str, Any]) -> tuple[bool, str]:
+        """Say whether it holds, and why in a sentence.
+
+        Parameters
+        ----------
+        change
+            A row of a comparison's ``changes``: ``result``, ``base`` and ``new`` rates.
+
+        Raises
+        ------
+        ConditionError
+            If the rate is undefined there.
+        """
+        before, after = change["base"].get(self.rate), change["new"][self.rate]
+        wanted = (before, after) if self.is_change else (after,)
+        if any(value is None or math.isnan(value) for value in wanted):
+            raise ConditionError(f"{self.text}: undefined in {change['result']}, so not judged")
+        what = f"{self.stage}.{self.variant}.{self.rate} of {change['result']}"
+        value = 100 * (after - before if self.is_change else after)
+        holds = OPERATORS[self.operator](value, self.limit)
+        if self.is_change:
+            told = f"changed by {value:+.2f} pp ({100 * before:.2f} % to {100 * after:.2f} %)"
+        else:
+            told = f"is {value:.2f} %"
+        return holds, f"{what} {told}: {self.text} {'holds' if holds else 'does not hold'}"

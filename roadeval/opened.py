@@ -1,0 +1,128 @@
+"""A result, whichever way it comes: a recording, whole or partial, or a folder of results."""
+
+from __future__ import annotations
+
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import asdict
+from functools import cached_property
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED, Role
+from roadeval.evaluation import analysis
+from roadeval.evaluation.results import Results
+from roadeval.evaluation.scoreboard import COMPARED
+from roadeval.evaluation.verdict import NO_PAIR, NOTHING_SCORED, verdict
+from roadeval.recording import Recording
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Opened:
+    """What ``roadeval replay`` left, from an ``.rrd`` or a results folder.
+
+    Parameters
+    ----------
+    path
+        Either.
+
+    Raises
+    ------
+    RoadevalError
+        If it is neither, or by another program or format.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self.recording = None if self.path.is_dir() else Recording(self.path)
+        self._tables: Results | Recording = self.recording or Results(self.path)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run reached its end."""
+        return self.recording is None or self.recording.complete
+
+    @property
+    def name(self) -> str:
+        """The drive's name."""
+        return self.recording.layout.drive if self.recording else self.summary["drive"]["name"]
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """As ``summary.json``; of an incomplete run, what its tables give."""
+        if self.complete:
+            return self._tables.summary
+        assert self.recording is not None
+        return _summary_of_part(self.recording)
+
+    @property
+    def frames(self) -> pd.DataFrame:
+        """The rows of ``frames.csv``."""
+        return self._tables.frames
+
+    @property
+    def regions(self) -> pd.DataFrame:
+        """The rows of ``regions.csv``."""
+        return self._tables.regions
+
+    @property
+    def windows(self) -> pd.DataFrame:
+        """The rows of ``windows.csv``; none of an incomplete run."""
+        return self._tables.windows
+
+    @property
+    def properties(self) -> Mapping[str, str | int | float]:
+        """What the recording says of its origin; nothing of a folder."""
+        return self.recording.layout.properties if self.recording else {}
+
+    def extra(self, name: str) -> pd.DataFrame:
+        """A further table that the run counted, as ``oracles``; empty if it did not."""
+        import pandas as pd
+
+        if self.recording is not None:
+            text = self.recording.result(name)
+        else:
+            path = self.path / f"{name}.csv"
+            text = path.read_text(encoding="utf-8") if path.exists() else None
+        return pd.read_csv(StringIO(text)) if text else pd.DataFrame()
+
+
+def _summary_of_part(recording: Recording) -> dict[str, Any]:
+    """Make the summary that a killed run did not get to write, of what it had scored."""
+    layout, roles = recording.layout, Counter(recording.roles.values())
+    frames = recording.frames
+    facts = _facts(frames) if len(frames) else {"verdict": NOTHING_SCORED, "totals": {}}
+    return {
+        "drive": {"name": layout.drive, "width": layout.width, "height": layout.height},
+        "frames": {
+            "decoded": len(recording.frame_numbers),
+            "trained_on": roles[Role.TRAINING],
+            "evaluated": frames["frame"].nunique() if len(frames) else 0,
+        },
+        "difference": {},
+        "warnings": [],
+        "losses": [],
+        "settings": {},
+        "versions": {},
+        "seconds": {},
+        "training": {"source": layout.properties.get("trained_on")},
+    } | facts
+
+
+def _facts(frames: pd.DataFrame) -> dict[str, Any]:
+    settings, totals = analysis.settings_of({}), analysis.totals(frames)
+    if not {FILTERED, UNFILTERED} <= totals.keys():
+        return {"verdict": NO_PAIR, "totals": totals}
+    paired = analysis.pairs(frames, FILTERED, UNFILTERED)
+    found = analysis.differences(paired, settings, COMPARED)
+    return {
+        "verdict": verdict(found["ERR"], "ERR", FINAL_STAGE),
+        "totals": totals,
+        "difference": {FINAL_STAGE: {name: asdict(each) for name, each in found.items()}},
+    }
+
+

@@ -1,0 +1,294 @@
+"""The report's own figures, as vectors."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from roadeval.data import BASELINE
+from roadeval.report.blocks import Asset
+from roadeval.report.findings import Heat, Totals
+from roadeval.report.style import FAINT, INK, RC, Look, looks
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH: Final = 7.4
+"""Inches; a page's text is 6.7 wide, so letters come out a little smaller than said here."""
+BARS: Final = 400
+"""More frames than this are drawn as means of neighbours."""
+FP: Final = "#D55E00"
+FN: Final = "#CC79A7"
+
+
+def vector(draw: Callable[[], Figure]) -> Asset:
+    """Draw a figure as SVG; equal figures give equal bytes.
+
+    Its letters stay letters, of the font that `roadeval.report.typeset` finds with Matplotlib, so
+    that the document embeds each font once and its figures can be searched.
+    """
+    import matplotlib as mpl
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    buffer = io.BytesIO()
+    with mpl.rc_context({**RC, "svg.fonttype": "none", "svg.hashsalt": "roadeval"}):  # type: ignore[arg-type]
+        figure = draw()
+        FigureCanvasSVG(figure)
+        figure.savefig(buffer, format="svg", dpi=200, metadata={"Date": None})
+    return Asset(buffer.getvalue())
+
+
+def difference(
+    frames: pd.DataFrame, treated: str, control: str, found: Mapping[str, Any]
+) -> Figure:
+    """Draw the paired difference of ERR over the drive, and its mean with the interval.
+
+    Parameters
+    ----------
+    frames
+        Indexed by ``frame``, with a column ``ERR``.
+    treated, control
+        The variants, for their colours.
+    found
+        The difference as in ``summary.json``.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, 2.6), layout="constrained")
+    ax = figure.subplots()
+    group = -(-len(frames) // BARS)
+    places = np.arange(0, len(frames), group)
+    values = 100 * _grouped(frames["ERR"].to_numpy(float), group)
+    look = looks([treated, control])
+    for name, wanted in ((control, values > 0), (treated, values <= 0)):
+        ax.bar(
+            places[wanted] + (group - 1) / 2, values[wanted], 0.86 * group, color=look[name].colour
+        )
+    if found["low"] is not None:
+        ax.axhspan(100 * found["low"], 100 * found["high"], color=INK, alpha=0.12, linewidth=0)
+    ax.axhline(100 * found["mean"], color=INK, linewidth=1.2, linestyle=(0, (4, 2)))
+    ax.axhline(0, color=FAINT, linewidth=0.8)
+    _frame_ticks(ax, frames.index.to_numpy())
+    ax.set_ylabel("difference of ERR, pp")
+    ax.text(0.005, 0.97, f"{treated} worse", transform=ax.transAxes, va="top", color=FAINT, size=8)
+    ax.text(0.005, 0.03, f"{treated} better", transform=ax.transAxes, color=FAINT, size=8)
+    return figure
+
+
+def regions(table: pd.DataFrame, variants: Sequence[str], names: Mapping[str, str]) -> Figure:
+    """Draw the error rate in each region, and its share of the pixels and of the errors.
+
+    Parameters
+    ----------
+    table
+        ``variant``, ``region``, ``ERR``, ``pixels`` and ``errors``.
+    variants
+        Those to draw, in order.
+    names
+        The regions to draw, from top to bottom, with their names for people.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, 0.75 + 0.24 * len(names)), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    rows = np.arange(len(names))
+    pixels = table.drop_duplicates("region").set_index("region")["pixels"].reindex([*names])
+    right.barh(rows, 100 * pixels, 0.7, color="#E3E3E3", label="share of the pixels")
+    for name, look in looks(variants).items():
+        own = table[table["variant"] == name].set_index("region").reindex([*names])
+        for ax, column in ((left, "ERR"), (right, "errors")):
+            _marks(ax, 100 * own[column].to_numpy(float), rows, look)
+    left.set_yticks(rows, list(names.values()))
+    left.invert_yaxis()
+    left.set_xlabel("ERR within the region, %")
+    right.set_xlabel("share of the wrong pixels, %")
+    for ax in (left, right):
+        ax.set_xlim(left=0)
+        ax.grid(axis="x")
+    handles, labels = left.get_legend_handles_labels()
+    more, also = right.get_legend_handles_labels()
+    figure.legend(
+        [*handles, more[also.index("share of the pixels")]],
+        [*(label.partition(":")[0] for label in labels), "share of the pixels"],
+        loc="outside upper left",
+        ncols=len(labels) + 1,
+        handlelength=1.5,
+    )
+    return figure
+
+
+def stages(totals: Totals) -> Figure:
+    """Draw ERR, FPR and FNR of each stage's mask, a line a variant."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, 2.5), layout="constrained")
+    names = list(dict.fromkeys(s for v, own in totals.items() for s in own if v != BASELINE))
+    for ax, rate in zip(figure.subplots(1, 3), ("ERR", "FPR", "FNR"), strict=True):
+        for variant, look in looks(list(totals)).items():
+            own = totals[variant]
+            if variant == BASELINE:
+                value = next(iter(own.values()))[rate]
+                ax.axhline(_percent(value), color=look.colour, linestyle=look.dash, linewidth=1.3)
+                continue
+            places = [names.index(stage) for stage in own]
+            values = [_percent(total[rate]) for total in own.values()]
+            ax.plot(places, values, color=look.colour, linestyle=look.dash, linewidth=look.width)
+            _marks(ax, np.array(places), np.array(values), look)
+        ax.set_xticks(range(len(names)), names)
+        ax.set_xlim(-0.3, len(names) - 0.7)
+        ax.set_ylim(bottom=0)
+        ax.set_title(f"{rate}, %", loc="left")
+    _legend(figure, list(totals))
+    return figure
+
+
+def heat(maps: Sequence[Heat]) -> Figure:
+    """Draw where false positives and false negatives lie, a row a variant."""
+    from matplotlib.colors import LinearSegmentedColormap
+    from matplotlib.figure import Figure
+
+    height, width = maps[0].fp.shape
+    row = (WIDTH - 0.9) / 2 * height / width
+    figure = Figure(figsize=(WIDTH, (row + 0.1) * len(maps) + 0.5), layout="constrained")
+    grid = figure.subplots(len(maps), 2, squeeze=False)
+    for column, (title, colour) in enumerate(
+        (("false positives: non-road called road", FP), ("false negatives: road missed", FN))
+    ):
+        shares = [(each.fp, each.fn)[column] for each in maps]
+        top = max(np.nanmax([np.nanmax(np.nan_to_num(share)) for share in shares]), 0.01)
+        palette = LinearSegmentedColormap.from_list("", ["white", colour, "#1A0A00"])
+        palette.set_bad("#BBBBBB")
+        for ax, each, share in zip(grid[:, column], maps, shares, strict=True):
+            drawn = ax.imshow(100 * share, cmap=palette, vmin=0, vmax=100 * top, aspect="auto")
+            ax.set_xticks([])
+            ax.set_yticks([])
+            ax.spines[:].set_visible(True)
+            if column == 0:
+                ax.set_ylabel(each.variant)
+        grid[0, column].set_title(title, loc="left")
+        bar = figure.colorbar(drawn, ax=grid[:, column], location="bottom", aspect=40, pad=0.02)
+        bar.set_label("% of the frames that label the pixel", size=8)
+        bar.outline.set_visible(False)  # type: ignore[operator]
+    return figure
+
+
+def coverage(table: pd.DataFrame) -> Figure:
+    """Draw the share of the image that each variant calls road, over the frames."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, 2.6), layout="constrained")
+    ax = figure.subplots()
+    frames = table.index.to_numpy()
+    for name, look in looks(list(table.columns)).items():
+        ax.plot(
+            frames,
+            100 * table[name],
+            color=look.colour,
+            linestyle=look.dash,
+            linewidth=look.width,
+        )
+    ax.set_xlabel("frame")
+    ax.set_ylabel("image called road, %")
+    ax.set_ylim(bottom=0)
+    _legend(figure, list(table.columns))
+    return figure
+
+
+def _marks(ax: Axes, x: Any, y: Any, look: Look) -> None:
+    face = "white" if look.hollow else look.colour
+    ax.plot(
+        x,
+        y,
+        label=look.label,
+        color=look.colour,
+        marker=look.marker,
+        markersize=5.5,
+        markerfacecolor=face,
+        linestyle="none",
+        zorder=look.order + 1,
+        clip_on=False,
+    )
+
+
+def _legend(figure: Figure, variants: Sequence[str]) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=look.colour,
+            linestyle=look.dash,
+            linewidth=look.width,
+            marker=None if name == BASELINE else look.marker,
+            markersize=5,
+            markerfacecolor="white" if look.hollow else look.colour,
+            label=name,
+        )
+        for name, look in looks(variants).items()
+    ]
+    figure.legend(handles=handles, loc="outside upper left", ncols=6, handlelength=3.2)
+
+
+def _frame_ticks(ax: Axes, frames: Any) -> None:
+    """Label places along the evaluated frames with the frames' numbers."""
+    step = max(len(frames) // 10, 1)
+    step = next(s for s in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 10**9) if s >= step)
+    places = np.flatnonzero(frames % step == 0)
+    ax.set_xticks(places, [str(frame) for frame in frames[places]])
+    ax.set_xlim(-0.5, len(frames) - 0.5)
+    ax.set_xlabel("frame")
+
+
+def _grouped(values: Any, group: int) -> Any:
+    """Average neighbours, an undefined value left out."""
+    starts = np.arange(0, len(values), group)
+    known = ~np.isnan(values)
+    sums = np.add.reduceat(np.where(known, values, 0.0), starts)
+    counts = np.add.reduceat(known.astype(float), starts)
+    return np.divide(sums, counts, out=np.zeros(len(starts)), where=counts > 0)
+
+
+def _percent(fraction: float | None) -> float:
+    return np.nan if fraction is None else 100 * fraction
+
+
+def forest(changes: Sequence[Mapping[str, Any]]) -> Figure:
+    """Draw each result's change of ERR, FPR and FNR against the base, with its interval.
+
+    Parameters
+    ----------
+    changes
+        Rows of a comparison with ``result``, ``variant`` and ``difference``.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, 0.8 + 0.26 * len(changes)), layout="constrained")
+    names = [
+        each["result"]
+        if each["result"] == each["variant"]
+        else f"{each['result']}: {each['variant']}"
+        for each in changes
+    ]
+    places = np.arange(len(changes))
+    grid = figure.subplots(1, 3, sharey=True)
+    for ax, rate in zip(grid, ("ERR", "FPR", "FNR"), strict=True):
+        for place, each in zip(places, changes, strict=True):
+            told = each["difference"][rate]
+            ax.plot(_percent(told["mean"]), place, "o", color=INK, markersize=5)
+            if told["low"] is not None:
+                ends = [100 * told["low"], 100 * told["high"]]
+                ax.plot(ends, [place, place], color=INK, linewidth=1.6)
+        ax.axvline(0, color=FAINT, linewidth=0.8)
+        ax.margins(x=0.15)
+        ax.set_title(f"{rate}, pp", loc="left")
+        ax.grid(axis="x")
+        ax.grid(visible=False, axis="y")
+    grid[0].set_yticks(places, names)
+    grid[0].set_ylim(len(changes) - 0.5, -0.5)
+    return figure

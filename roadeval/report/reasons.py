@@ -1,0 +1,224 @@
+"""Where the errors are, and which stage broke it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from roadeval.data import BASELINE, FILTERED, UNFILTERED
+from roadeval.report import plots
+from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
+from roadeval.report.findings import Findings
+from roadeval.report.front import variant_cell
+from roadeval.report.words import percent, points
+
+REGIONS: Final = {
+    "shadow": "inside detected shadow",
+    "shadow_edge": "at the edge of detected shadow",
+    "lit": "in light",
+    "true_shadow": "inside true shadow",
+    "boundary": "near the road's edge",
+    "interior": "away from the road's edge",
+}
+"""The regions' names for people, in the report's order; row bands follow."""
+FILTER: Final = "filter"
+"""Names the filter's part among the stages' in `Findings.parts`."""
+
+
+def where(found: Findings) -> Iterator[Block]:
+    """Say in which parts of the image the errors lie."""
+    yield Heading("Where the errors are")
+    names, table = region_names(found), found.regions
+    variants = [*found.finals]
+    yield Figure(
+        plots.vector(lambda: plots.regions(table, variants, names)),
+        "Error rate within each region, and the region's share of all wrong pixels beside its "
+        "share of all pixels: a mark to the right of the grey bar is more than its share.",
+    )
+    yield _regions(found, names)
+    yield Text(_said(found), "note")
+    if found.heat:
+        maps = found.heat
+        yield Figure(
+            plots.vector(lambda: plots.heat(maps)),
+            f"Where in the image the final masks go wrong, {_counted(found)}. Grey: never labelled.",
+            width=0.8,
+        )
+
+
+def region_names(found: Findings) -> dict[str, str]:
+    """Name the regions that were counted, the row bands by what they show."""
+    present = found.regions["region"].unique().tolist()
+    bands = [name for name in present if name.startswith("band_")]
+    height = found.summary["drive"].get("height") or 0
+    named = {name: text for name, text in REGIONS.items() if name in present}
+    for place, name in enumerate(bands):
+        rows = f"{height * place // len(bands)}–{height * (place + 1) // len(bands) - 1}"
+        end = {0: ", the top", len(bands) - 1: ", the bottom"}.get(place, "")
+        named[name] = (f"image rows {rows}" if height else f"image rows, band {place}") + end
+    return named
+
+
+def _regions(found: Findings, names: Mapping[str, str]) -> Table:
+    variants = [*found.finals]
+    table = found.regions.set_index(["region", "variant"])
+    pixels = found.regions.drop_duplicates("region").set_index("region")["pixels"]
+    rows: list[list[Cell | str]] = [
+        [
+            text,
+            percent(pixels[region], 1),
+            *(
+                percent(table.loc[(region, name), column], 1)
+                for column in ("ERR", "errors")
+                for name in variants
+            ),
+        ]
+        for region, text in names.items()
+    ]
+    kinds = [region.split("_")[0] == "band" for region in names]
+    first_band = kinds.index(True) if any(kinds) else len(rows)
+    halves = [place for place, region in enumerate(names) if region == "boundary"]
+    return Table(
+        ["<region", "of all", *variants, *variants],
+        rows,
+        breaks=sorted({*halves, first_band} - {0, len(rows)}),
+        groups=[
+            ("", 1),
+            ("pixels, %", 1),
+            ("ERR within, %", len(variants)),
+            ("share of its wrong pixels, %", len(variants)),
+        ],
+        small=True,
+    )
+
+
+def _said(found: Findings) -> str:
+    width = next(
+        (s["evaluation"]["boundary_width"] for s in found.summary["settings"].values()), None
+    )
+    near = f"within {width} pixels of" if width else "near"
+    return (
+        "Shadow is what the filter took for shadow, right or wrong; where it is not true shadow, "
+        f"that is a finding of its own. Near the road's edge means {near} the border between road "
+        "and non-road in the truth. Counts of all evaluated frames together; regions overlap."
+    )
+
+
+def _counted(found: Findings) -> str:
+    evaluated = found.summary["frames"]["evaluated"]
+    if found.sampled == evaluated:
+        return f"over all {evaluated} evaluated frames"
+    return f"over {found.sampled} frames spread evenly over the {evaluated} evaluated"
+
+
+# --- Stages ---------------------------------------------------------------------------------------
+
+
+def stages(found: Findings) -> Iterator[Block]:
+    """Say what each stage did to the mask, and which part of the error is whose."""
+    yield Heading("Which stage broke it")
+    totals = found.totals
+    yield Figure(
+        plots.vector(lambda: plots.stages(totals)),
+        f"Rates of each stage's mask, means over the frames. Dotted: {BASELINE}, for scale.",
+    )
+    yield _stages(found)
+    if len(found.changes):
+        yield Text(
+            "Repaired and spoiled: labelled pixels that the stage has right and the mask before it "
+            f"wrong, and the reverse, {_counted(found)}.",
+            "note",
+        )
+    yield Heading("How the error of the final mask comes about", 2)
+    yield _parts(found)
+    yield Text(_sum(found), "note")
+    yield from _oracles(found)
+
+
+def _stages(found: Findings) -> Table:
+    changes = {
+        (row.variant, row.after): (row.repaired, row.spoiled) for row in found.changes.itertuples()
+    }
+    rows: list[list[Cell | str]] = []
+    breaks = []
+    for variant, own in found.totals.items():
+        breaks.append(len(rows))
+        for place, (stage, total) in enumerate(own.items()):
+            repaired, spoiled = changes.get((variant, stage), (None, None))
+            rows.append(
+                [
+                    variant_cell(variant, [*found.totals]) if place == 0 else "",
+                    stage,
+                    Cell(percent(total["ERR"]), bold=stage == found.finals[variant]),
+                    percent(total["FPR"]),
+                    percent(total["FNR"]),
+                    percent(found.overlap[variant][stage]["IoU"]),
+                    percent(repaired),
+                    percent(spoiled),
+                ]
+            )
+    return Table(
+        ["<variant", "<stage", "ERR", "FPR", "FNR", "IoU", "repaired", "spoiled"],
+        rows,
+        breaks=breaks[1:],
+        caption="Percent: of the frames' pixels (ERR), non-road (FPR) and road (FNR).",
+    )
+
+
+def _parts(found: Findings) -> Table:
+    """Tabulate the mean ERR of each final mask as a sum over its stages."""
+    columns = list(dict.fromkeys(part for parts in found.parts.values() for part in parts))
+    return Table(
+        ["<final mask", *columns, "ERR"],
+        [
+            [
+                variant_cell(variant, [*found.totals]),
+                *(_part(parts, part) for part in columns),
+                Cell(percent(found.total(variant)["ERR"]), bold=True),
+            ]
+            for variant, parts in found.parts.items()
+        ],
+    )
+
+
+def _part(parts: Mapping[str, float], part: str) -> str:
+    if part not in parts:
+        return "–"
+    first = part == next(iter(parts))
+    return percent(parts[part]) if first else points(parts[part])
+
+
+def _sum(found: Findings) -> str:
+    parts = max(found.parts.values(), key=len)
+    first, *rest = parts
+    meaning = {
+        FILTER: f"what {FILTERED} has more or less than {UNFILTERED} in that mask",
+        **{name: f"what {name} made of it" for name in rest if name != FILTER},
+    }
+    told = "; ".join(f"{name}: {meaning[name]}" for name in rest)
+    return (
+        f"A sum, in percent of the pixels. {first}: the error of the mask that the last stage is "
+        f"given, without the filter{'; ' if told else ''}{told}. Percentage points add up to ERR."
+    )
+
+
+def _oracles(found: Findings) -> Iterator[Block]:
+    """Show what remains when a stage is replaced by the truth, where the run counted that."""
+    if not len(found.oracles):
+        return
+    yield Heading("If a stage were perfect", 2)
+    table = found.oracles
+    yield Table(
+        [f"<{name}" if table[name].dtype == object else name for name in table.columns],
+        [[_oracle_cell(name, value) for name, value in row.items()] for row in table.to_dict("records")],
+        small=True,
+    )
+    yield Text(
+        "Oracles: a stage's output replaced by the truth while replaying. Not a result, but a "
+        "bound on what mending that stage could bring.",
+        "note",
+    )
+
+
+def _oracle_cell(name: str, value: Any) -> str:
+    return percent(value) if isinstance(value, float) and not name.endswith("frame") else str(value)
