@@ -42,6 +42,13 @@ def drive(tmp_path_factory) -> Path:
     return write_log(tmp_path_factory.mktemp("log") / "small.mcap", net=True)
 
 
+@pytest.fixture(autouse=True)
+def _no_figures(request, monkeypatch):
+    """Draw figures only for the run that looks at them: they take most of a small run's time."""
+    if "once" not in request.fixturenames:
+        monkeypatch.setattr("roadeval.replay.write_figures", lambda *given: [])
+
+
 def run(drive: Path, folder: Path, **options):
     return roadeval.replay(
         drive,

@@ -12,8 +12,12 @@ COMMANDS = [command.callback.__name__ for command in app.registered_commands if 
 HEAVY = ["cv2", "matplotlib", "mcap", "numba", "numpy", "pandas", "pyarrow", "rerun", "sklearn"]
 
 
-def test_the_commands_are_those_that_work():
-    assert COMMANDS == ["replay", "info", "train", "demo"]
+def test_the_list_of_commands_tells_each_in_a_line(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    main(["--help"])
+    listed = capsys.readouterr().out.split("Commands:\n")[1].splitlines()
+    assert [line.split()[0] for line in listed] == COMMANDS
+    assert all(line.endswith(".") and not line.endswith("...") for line in listed)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -34,7 +34,7 @@ def difference(mean, low, high, reason=None):
 def summary(**changed):
     return {
         "drive": {"name": "drive"},
-        "frames": {"read": 101, "evaluated": 91, "skipped": {"trained on": 10}},
+        "frames": {"in_log": 101, "read": 101, "evaluated": 91, "skipped": {"trained on": 10}},
         "windows": 10,
         "totals": TOTALS,
         "difference": {"post": {"ERR": difference(0.0065, 0.001, 0.012)}},
@@ -94,11 +94,25 @@ def test_the_frames_are_accounted_for():
     )
 
 
+def test_frames_that_were_not_read_are_accounted_for_too():
+    skipped = {"outside the range": 61, "trained on": 10}
+    frames = {"in_log": 101, "read": 40, "evaluated": 30, "skipped": skipped}
+    assert outcome.accounting(summary(frames=frames, windows=3)) == (
+        "40 of 101 frames read, 61 outside the range, 10 trained on, 30 evaluated in 3 windows"
+    )
+
+
 @pytest.mark.parametrize(
     ("labelled", "why"), [(0, "has road truth"), (10, "was trained on or left out")]
 )
 def test_where_nothing_is_scored_it_says_why(labelled, why):
-    frames = {"read": 39, "evaluated": 0, "labelled": labelled, "skipped": {"unlabelled": 39}}
+    frames = {
+        "in_log": 39,
+        "read": 39,
+        "evaluated": 0,
+        "labelled": labelled,
+        "skipped": {"unlabelled": 39},
+    }
     shown = screen(summary(frames=frames, totals={}, difference={}, windows=0))
     assert shown.startswith("drive: 39 frames read, 39 unlabelled, none evaluated\n")
     assert "Nothing to score: " in shown

@@ -13,7 +13,7 @@ from roadeval.options import Outcome, Progress, ReplayOptions
 SUMMARY = {
     "verdict": "",
     "drive": {"name": "drive"},
-    "frames": {"read": 3, "evaluated": 0, "labelled": 0, "skipped": {"unlabelled": 3}},
+    "frames": {"in_log": 3, "read": 3, "evaluated": 0, "labelled": 0, "skipped": {"unlabelled": 3}},
     "totals": {},
     "difference": {},
     "windows": 0,

@@ -14,10 +14,11 @@ DEMO = Path(__file__).resolve().parents[2] / "recordings" / "demo.mcap"
 Run = subprocess.CompletedProcess[str]
 
 
-def roadeval(*words: Any) -> Run:
+def roadeval(*words: Any, cwd: Path | None = None) -> Run:
     """Run the installed command to its end."""
+    command = [ROADEVAL, *map(str, words)]
     return subprocess.run(
-        [ROADEVAL, *map(str, words)], capture_output=True, text=True, check=False, timeout=300
+        command, cwd=cwd, capture_output=True, text=True, check=False, timeout=300
     )
 
 

@@ -10,6 +10,7 @@ from mcap.opcode import Opcode
 
 from roadeval.logs.chunks import ChunkReader
 from roadeval.logs.container import Container
+from roadeval.logs.damage import damage_of
 from roadeval.logs.records import MAGIC, Message, Place, message_at, parse, parse_chunk, walk
 from roadeval.logs.source import Bytes, Part, Source
 
@@ -77,7 +78,7 @@ def test_every_message_is_found_and_nothing_is_called_damaged(data: Path, folder
             for _, offset in entries.tolist()
         ]
         topics = {channel.topic for channel in container.channels.values()}
-        assert container.damage == (), path.name
+        assert damage_of(container) == (), path.name
         container.close()
         assert found == messages, path.name
         assert topics == {dict(r["fields"])["topic"] for r in expected if r["type"] == "Channel"}

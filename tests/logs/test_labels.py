@@ -10,7 +10,7 @@ from roadeval.logs.messages import BadMessage
 
 def truth(values: list[int], labels: LabelValues | None = None) -> list[int]:
     table = understand(labels or LabelValues(), values, "/labels")
-    return table.apply(np.array([values], np.uint8))[0].tolist()
+    return table.of_values(np.array([values], np.uint8))[0].tolist()
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,7 @@ def test_given_values_become_road_and_ignore_and_all_others_non_road() -> None:
 
 def test_a_sixteen_bit_value_is_understood() -> None:
     table = understand(LabelValues(road=(300,)), [0, 300], "/labels")
-    assert table.apply(np.array([[0, 300, 44]], np.uint16)).tolist() == [[0, 1, 0]]
+    assert table.of_values(np.array([[0, 300, 44]], np.uint16)).tolist() == [[0, 1, 0]]
 
 
 @pytest.mark.parametrize(
@@ -62,4 +62,4 @@ def test_a_value_cannot_mean_both() -> None:
 def test_a_mask_that_later_holds_another_value_is_not_guessed_at() -> None:
     table = understand(LabelValues(), [0, 255], "/mask")
     with pytest.raises(BadMessage, match="holds the value 7"):
-        table.apply(np.array([[0, 7]], np.uint8))
+        table.of_values(np.array([[0, 7]], np.uint8))

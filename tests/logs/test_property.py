@@ -1,153 +1,187 @@
 """Random damage: never a crash, never a wrong frame unsaid, never a good frame lost."""
 
 import random
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from mcap.writer import CompressionType, Writer
 from mcap_ros2._dynamic import serialize_dynamic
 
 from roadeval.logs import FrameError, LogError, open_log
-from roadeval.logs.container import Container
+from roadeval.logs.container import OUTSIDE, Container
 
 from .making import COMPRESSED, IMAGE, compressed, grey, jpeg, raw
 
-FRAMES = 12
-PERIOD = 100_000_000
-START = 1_700_000_000 * 10**9
-CAMERA = "/camera"
+CASES = 500
+"""Random cases for each container of a finished log, and half as many for an unfinished one."""
 
-CONTAINERS = {
+FRAMES = 12
+START = 1_700_000_000 * 10**9
+PERIOD = 10**8
+CAMERA = "/camera"
+CHANNELS = (
+    (CAMERA, "sensor_msgs/msg/CompressedImage", COMPRESSED),
+    ("/labels", "sensor_msgs/msg/Image", IMAGE),
+)
+CONTAINERS: dict[str, dict[str, Any]] = {
     "zstd": {"compression": CompressionType.ZSTD},
     "lz4": {"compression": CompressionType.LZ4},
     "uncompressed": {"compression": CompressionType.NONE},
     "unchunked": {"use_chunking": False},
 }
+RECORD_HEADS = 31
+"""Bytes before a message's data: its record's head and its own."""
 
 
 @dataclass(frozen=True)
-class Original:
-    """An undamaged log, and for each frame its bytes in the file, first and last, and content."""
+class Good:
+    """A good log: its bytes; by log time, where each image lies and its file; two borders."""
 
     data: bytes
     spans: dict[int, tuple[int, int]]
-    payloads: dict[int, bytes]
-
-
-def make(path: Path, container: str) -> Original:
-    images = "sensor_msgs/msg/CompressedImage"
-    masks = "sensor_msgs/msg/Image"
-    with path.open("wb") as file:
-        writer = Writer(file, chunk_size=1500, enable_data_crcs=True, **CONTAINERS[container])
-        writer.start("ros2", "test")
-        for topic, name, text in ((CAMERA, images, IMAGE_TEXTS[0]), ("/labels", masks, IMAGE_TEXTS[1])):
-            schema = writer.register_schema(name, "ros2msg", text.encode())
-            writer.register_channel(topic, "cdr", schema)
-        encode = [serialize_dynamic(images, COMPRESSED)[images], serialize_dynamic(masks, IMAGE)[masks]]
-        payloads = {}
-        for i in range(FRAMES):
-            stamp = START + i * PERIOD
-            payloads[stamp] = jpeg(grey(20 * i))
-            writer.add_message(1, stamp, encode[0](compressed(stamp, payloads[stamp])), stamp, i)
-            writer.add_message(2, stamp + 5, encode[1](raw(stamp, grey(255), "mono8")), stamp, i)
-        writer.finish()
-    return Original(path.read_bytes(), dict(spans(path)), payloads)
-
-
-IMAGE_TEXTS = (COMPRESSED, IMAGE)
-
-
-def spans(path: Path) -> Iterator[tuple[int, tuple[int, int]]]:
-    """Where each image lies in the file: its chunk, or its own record."""
-    container = Container(path, lambda *_: True, lambda *_: True)
-    for number, entries in container.logs[1].blocks:
-        for log_time, offset in entries.tolist():
-            if number >= 0:
-                chunk = container.chunks[number]
-                yield log_time, (chunk.offset, chunk.data_offset + chunk.data_size)
-            else:
-                length = len(container.message(number, offset).data)
-                yield log_time, (offset, offset + 31 + length)
-    container.close()
+    images: dict[int, bytes]
+    definitions_end: int
+    data_end: int
 
 
 @dataclass(frozen=True)
-class Damaged:
+class Bad:
+    """The bytes of a damaged log, and the first and last of them that are damaged."""
+
     data: bytes
     first: int
     last: int
 
 
-def flip(data: bytes, rng: random.Random) -> Damaged:
+def write(path: Path, container: str) -> dict[int, bytes]:
+    """Write a camera and its labels in small chunks; give each image by its log time."""
+    images = {START + i * PERIOD: jpeg(grey(20 * i)) for i in range(FRAMES)}
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=1500, enable_data_crcs=True, **CONTAINERS[container])
+        writer.start("ros2", "test")
+        encoders = []
+        for topic, name, text in CHANNELS:
+            schema = writer.register_schema(name, "ros2msg", text.encode())
+            writer.register_channel(topic, "cdr", schema)
+            encoders.append(serialize_dynamic(name, text)[name])
+        for stamp, data in images.items():
+            image, label = compressed(stamp, data), raw(stamp, grey(255), "mono8")
+            writer.add_message(1, stamp, encoders[0](image), stamp)
+            writer.add_message(2, stamp + 5, encoders[1](label), stamp)
+        writer.finish()
+    return images
+
+
+def places(container: Container) -> Iterator[tuple[int, tuple[int, int]]]:
+    """By log time, the bytes of the file that an image hangs on: its chunk's, or its own."""
+    for number, entries in container.logs[1].blocks:
+        for log_time, offset in entries.tolist():
+            if number == OUTSIDE:
+                length = len(container.message(number, offset).data)
+                yield log_time, (offset, offset + RECORD_HEADS + length)
+            else:
+                chunk = container.chunks[number]
+                yield log_time, (chunk.offset, chunk.data_offset + chunk.data_size)
+
+
+def make(path: Path, name: str) -> Good:
+    images = write(path, name)
+    data = path.read_bytes()
+    container = Container(path, lambda *_: True, lambda *_: True)
+    spans = dict(places(container))
+    container.close()
+    data_end = data.index(b"\x0f\x04" + bytes(7))
+    definitions_end = min(spans.values())[0 if name == "unchunked" else 1]
+    return Good(data, spans, images, definitions_end, data_end)
+
+
+def flip(data: bytes, rng: random.Random) -> Bad:
     at = rng.randrange(len(data))
     changed = bytearray(data)
     changed[at] ^= 1 << rng.randrange(8)
-    return Damaged(bytes(changed), at, at)
+    return Bad(bytes(changed), at, at)
 
 
-def overwrite(data: bytes, rng: random.Random) -> Damaged:
-    length = rng.choice((1, 2, 8, 40, 300, 2000))
+def overwrite(data: bytes, rng: random.Random) -> Bad:
     at = rng.randrange(len(data))
-    length = min(length, len(data) - at)
+    length = min(rng.choice((1, 2, 8, 40, 300, 2000)), len(data) - at)
     filling = rng.choice((bytes(length), b"\xff" * length, rng.randbytes(length)))
-    return Damaged(data[:at] + filling + data[at + length :], at, at + length - 1)
+    return Bad(data[:at] + filling + data[at + length :], at, at + length - 1)
 
 
-def cut(data: bytes, rng: random.Random) -> Damaged:
+def cut(data: bytes, rng: random.Random) -> Bad:
     at = rng.randrange(len(data))
-    return Damaged(data[:at], at, len(data))
+    return Bad(data[:at], at, len(data))
 
 
-def remove(data: bytes, rng: random.Random) -> Damaged:
-    """Drop some bytes; what follows moves, so only what lies before is expected back."""
-    length = rng.choice((1, 3, 50, 700))
+def remove(data: bytes, rng: random.Random) -> Bad:
+    """Drop some bytes: what follows moves away from where any index says it is."""
     at = rng.randrange(len(data))
-    return Damaged(data[:at] + data[at + length :], at, len(data))
+    return Bad(data[:at] + data[at + rng.choice((1, 3, 50, 700)) :], at, len(data))
 
 
-KINDS = (flip, overwrite, cut, remove)
+KINDS: tuple[Callable[[bytes, random.Random], Bad], ...] = (flip, overwrite, cut, remove)
 
 
 def read(path: Path) -> tuple[dict[int, tuple[int, bytes]], tuple[str, ...]]:
-    """Stamp and bytes of the frames that decode, by log time, and what is said to be lost."""
+    """Stamp and file of every image that decodes, by log time; and what is said to be lost."""
     found = {}
     with open_log(path) as log:
         log.verify()
-        for frame in log.frames(log.select(image=CAMERA, truth="")):
+        for logged in log.frames(log.select(image=CAMERA, truth="")):
             try:
-                decoded = frame.decode()
+                frame = logged.decode()
             except FrameError:
                 continue
-            found[decoded.log_time_ns] = (decoded.stamp_ns, bytes(decoded.payload))
+            found[frame.log_time_ns] = (frame.stamp_ns, bytes(frame.payload))
         return found, log.losses
 
 
-def check(original: Original, damaged: Damaged, path: Path) -> None:
-    path.write_bytes(damaged.data)
-    expected = {
-        time
-        for time, (begin, end) in original.spans.items()
-        if end <= damaged.first or begin > damaged.last
-    }
+def check(good: Good, bad: Bad, expected: set[int], path: Path) -> None:
+    path.write_bytes(bad.data)
     try:
         found, losses = read(path)
     except LogError:
-        assert not expected
+        assert not expected, "no frame was kept"
         return
-    wrong = {t for t, (stamp, data) in found.items() if original.payloads.get(t) != data or stamp != t}
-    assert not wrong or losses
-    assert expected <= set(found)
-    assert losses or set(found) == set(original.payloads)
+    right = {time for time, frame in found.items() if frame == (time, good.images.get(time))}
+    assert losses or right == set(found), "a wrong frame was not reported"
+    assert losses or right == set(good.images), "a lost frame was not reported"
+    assert expected <= right, "a good frame was lost"
+
+
+def untouched(good: Good, bad: Bad) -> set[int]:
+    return {
+        time for time, (begin, end) in good.spans.items() if end <= bad.first or begin > bad.last
+    }
 
 
 @pytest.mark.parametrize("container", CONTAINERS)
-def test_damage_in_one_place(tmp_path: Path, container: str) -> None:
-    original = make(tmp_path / "good.mcap", container)
+def test_damage_to_a_finished_log(tmp_path: Path, container: str) -> None:
+    good = make(tmp_path / "good.mcap", container)
     rng = random.Random(container)
-    for _ in range(800):
-        kind = rng.choice(KINDS)
-        damaged = kind(original.data, rng)
-        check(original, damaged, tmp_path / "bad.mcap")
+    for case in range(CASES):
+        bad = rng.choice(KINDS)(good.data, rng)
+        try:
+            check(good, bad, untouched(good, bad), tmp_path / "bad.mcap")
+        except Exception as error:
+            error.add_note(f"case {case}, bytes {bad.first} to {bad.last}")
+            raise
+
+
+@pytest.mark.parametrize("container", CONTAINERS)
+def test_damage_to_a_log_that_was_never_finished(tmp_path: Path, container: str) -> None:
+    """Without a summary, what channels there are stands only where the first message is."""
+    good = make(tmp_path / "good.mcap", container)
+    rng = random.Random(container)
+    for case in range(CASES // 2):
+        bad = rng.choice(KINDS)(good.data[: good.data_end], rng)
+        expected = untouched(good, bad) if bad.first >= good.definitions_end else set()
+        try:
+            check(good, bad, expected, tmp_path / "bad.mcap")
+        except Exception as error:
+            error.add_note(f"case {case}, bytes {bad.first} to {bad.last}")
+            raise

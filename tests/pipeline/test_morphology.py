@@ -124,8 +124,11 @@ def test_the_component_with_most_pixels_in_the_patch_is_preferred():
     road = mask("######", "......", "##..#.")
     patch = mask("......", "......", ".###.#")
     assert (morphology.keep_region(road, patch) == mask("......", "......", "##....")).all()
-    nowhere = np.zeros_like(road)
-    assert (morphology.keep_region(road, nowhere) == mask("######", "......", "......")).all()
+
+
+def test_without_any_pixel_in_the_patch_the_largest_component_is_kept():
+    road, patch = mask("##....", "......", "######"), mask("......", "######", "......")
+    assert (morphology.keep_region(road, patch) == mask("......", "......", "######")).all()
 
 
 def test_the_region_rule_is_a_setting():

@@ -140,7 +140,9 @@ def test_thresholds_do_not_depend_on_the_number_of_pixels(pixels):
     assert shadow.printed_threshold(counts) == 90
 
 
-def test_the_printed_threshold_takes_the_lower_of_two_equal_maxima():
+def test_the_printed_threshold_is_at_the_lower_edge_where_most_codes_are_near_0():
+    # Mean 60/56. T = 0: w = 1/56, criterion 53.0; T = 1: w = 51/56, criterion 9.7.
+    assert shadow.printed_threshold(as_array({0: 1, 1: 50, 2: 5})) == 0
     # Mean 1: (w - mu)^2 / (w mu) is the same for w = 1/102 and for w = 101/102.
     assert shadow.printed_threshold(as_array({0: 1, 1: 100, 2: 1})) == 0
 

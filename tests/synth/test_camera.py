@@ -43,5 +43,5 @@ def test_an_outline_is_cut_where_it_passes_behind_the_camera() -> None:
 def test_what_lies_behind_or_beside_or_is_tiny_is_not_caught() -> None:
     camera = Camera(160, 120, Pose(0.0, 0.0, 0.0))
     ahead = np.array([[-1.0, 1.0, 9.0], [1.0, 1.0, 9.0], [1.0, -1.0, 9.0], [-1.0, -1.0, 9.0]])
-    corners = np.stack([ahead, ahead - (0, 0, 20), ahead + (50, 0, 0), ahead * (1, 0.001, 1)])
+    corners = np.stack([ahead, ahead - (0, 0, 20), ahead - (50, 0, 0), ahead * (1, 0.001, 1)])
     assert camera.catches(corners).tolist() == [True, False, False, False]

