@@ -117,6 +117,10 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "post": {"operations": ("close", "open")},
     },
     "gated": {"chain": ("gated", "similarity", "svm", "post")},
+    "robust": {
+        "chain": ("exposure", "similarity", "context", "post"),
+        "training": {"pixels_per_class": 800, "max_pixels": 20_000},
+    },
 }
 """The presets, as overrides of the settings' own defaults."""
 
@@ -191,6 +195,11 @@ def _chain(names: Any, where: str) -> tuple[str, ...]:
             )
     if len(set(names)) < len(names):
         raise ConfigError(f"{where}: chain: a stage can occur only once")
+    masks = masks_of(names)
+    if len(set(masks)) < len(masks):
+        twice = next(mask for mask in masks if masks.count(mask) > 1)
+        both = [name for name in names if STAGES[name].reported == twice]
+        raise ConfigError(f"{where}: chain: {' and '.join(both)} both make the mask {twice}")
     if names[-1] != FINAL_STAGE:
         raise ConfigError(f"{where}: chain must end with {FINAL_STAGE}, whose mask is the answer")
     return tuple(names)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -79,8 +78,16 @@ class Opened:
         """What the recording says of its origin; nothing of a folder."""
         return self.recording.layout.properties if self.recording else {}
 
+    def notes(self, frame: int, variant: str) -> tuple[str, ...]:
+        """Give the recording's sentences about a frame, but those about other variants."""
+        if self.recording is None:
+            return ()
+        others = {each.name for each in self.recording.variants} - {variant}
+        notes = self.recording.notes(frame)
+        return tuple(note for note in notes if note.partition(" ")[0] not in others)
+
     def extra(self, name: str) -> pd.DataFrame:
-        """A further table that the run counted, as ``oracles``; empty if it did not."""
+        """Read a further table that the run counted, as ``oracles``; empty if it did not."""
         import pandas as pd
 
         if self.recording is not None:
@@ -124,5 +131,3 @@ def _facts(frames: pd.DataFrame) -> dict[str, Any]:
         "totals": totals,
         "difference": {FINAL_STAGE: {name: asdict(each) for name, each in found.items()}},
     }
-
-

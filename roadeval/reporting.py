@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -34,6 +34,9 @@ MOVED: Final = 3
 EXAMPLES: Final = 4
 THUMBNAILS: Final = 8
 """Frames in figure 2 and on the first page."""
+OUTCOMES: Final = 6
+STEPS: Final = 2
+"""Variants whose errors a frame of the gallery shows, and whose steps."""
 
 
 def report(
@@ -91,10 +94,12 @@ def find(opened: Opened) -> Findings:
             for variant, stages in summary["totals"].items()
         },
         changes=_changes(maps),
-        parts={v: analysis.causes(frames, v).mean().to_dict() for v in _variants(frames)},
+        parts={
+            name: _named(analysis.causes(frames, name).mean().to_dict())
+            for name in _variants(frames)
+        },
         heat=[
-            Heat(name, each.share(each.fp), each.share(each.fn))
-            for name, each in maps.heat.items()
+            Heat(name, each.share(each.fp), each.share(each.fn)) for name, each in maps.heat.items()
         ],
         oracles=opened.extra("oracles"),
         sampled=maps.frames,
@@ -169,6 +174,11 @@ def _changes(maps: Maps) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["variant", "before", "after", "repaired", "spoiled"])
 
 
+def _named(numbers: Mapping[Any, Any]) -> dict[str, Any]:
+    """Say that a table's names are words, which pandas does not know."""
+    return {str(name): value for name, value in numbers.items()}
+
+
 # --- Masks and pictures ---------------------------------------------------------------------------
 
 
@@ -212,6 +222,7 @@ class _Looker:
     """Picks frames and gathers what there is to see and to say about each."""
 
     def __init__(self, opened: Opened) -> None:
+        self._opened = opened
         self._recording = opened.recording
         self._frames = opened.frames
         self._variants = _variants(opened.frames)
@@ -241,8 +252,8 @@ class _Looker:
             if (each.treated, each.control) == (FILTERED, UNFILTERED):
                 found = analysis.most_changed(each.frames, MOVED, harmed=harmed)
                 return [
-                    self._case(int(row.frame), int(row.stamp_ns), float(row.ERR))
-                    for row in found.itertuples()
+                    self._case(row["frame"], row["stamp_ns"], row["ERR"])
+                    for row in found.to_dict("records")
                 ]
         return []
 
@@ -255,10 +266,13 @@ class _Looker:
             frame=frame,
             stamp_ns=stamp_ns,
             variant=variant,
-            rates=own[["ERR", "FPR", "FNR"]].to_dict("index"),
-            parts=self._causes[variant].loc[frame].to_dict(),
+            rates={
+                name: _named(rates)
+                for name, rates in _named(own[["ERR", "FPR", "FNR"]].to_dict("index")).items()
+            },
+            parts=_named(self._causes[variant].loc[frame].to_dict()),
             change=change,
-            notes=() if recording is None else recording.notes(frame),
+            notes=self._opened.notes(frame, variant),
             shots=shots,
             rows=rows or (),
         )
@@ -268,14 +282,14 @@ class _Looker:
         image = recording.image(frame)
         yield Shot("camera", image)
         yield Shot("truth", image, TRUTH, recording.truth(frame))
-        for variant in recording.variants:
+        for variant in recording.variants[:OUTCOMES]:
             errors = recording.layer(variant.name, ERRORS.name, frame)
             yield Shot(f"{variant.name}: errors", image, ERRORS, errors)
 
     def _rows(self, recording: Recording, frame: int) -> Iterator[list[Shot]]:
         """Show each variant's steps: the stages' masks, and all that is not a mask."""
         image = recording.image(frame)
-        for variant in recording.variants:
+        for variant in recording.variants[:STEPS]:
             yield [
                 Shot(spec.name, image, spec, recording.layer(variant.name, spec.name, frame))
                 for spec in variant.layers

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from roadeval.cli import compare, demo, info, messages, replay, report, signals, train
+from roadeval.cli import compare, demo, info, inspect, messages, replay, report, signals, train
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.errors import RoadevalError
 
@@ -23,6 +23,7 @@ app = typer.Typer(
 for _command in (
     replay.replay,
     report.report,
+    inspect.inspect,
     compare.compare,
     info.info,
     train.train,

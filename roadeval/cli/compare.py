@@ -71,10 +71,10 @@ def compare(
     json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> int:
-    """Compare results of a drive, frame by frame; or the variants of one.
+    """Compare results of one drive, or the variants of one result.
 
-    Frames that either trained on are left out. Results of different drives are put side by side
-    without differences. Exit code 4 if a --fail-if condition holds.
+    Frame by frame; those that either trained on are left out. Results of different drives are put
+    side by side without differences. Exit code 4 if a --fail-if condition holds.
     """
     from roadeval import comparing
     from roadeval.cli import changes

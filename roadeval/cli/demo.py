@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 import typer
 
-from roadeval.cli import console, options
+from roadeval.cli import console, options, progress
 from roadeval.cli.exit_codes import ExitCode
 
 DEFAULT: Final = Path("recordings", "demo.mcap")
@@ -25,9 +25,16 @@ def demo(
     100 frames, 640x480, 10 Hz; truth of the road and of shadow. The same seed gives the same
     drive.
     """
+    from roadeval.options import Progress
     from roadeval.synth import DriveSettings, write_drive
 
-    write_drive(output, DriveSettings(seed=seed))
+    output.parent.mkdir(parents=True, exist_ok=True)
+    with progress.watched(quiet) as watch:
+        write_drive(
+            output,
+            DriveSettings(seed=seed),
+            lambda done, total: watch(Progress(done, total, "rendering")),
+        )
     if not quiet:
-        console.results().print(f"{output}", soft_wrap=True)
+        console.emit(str(output))
     return ExitCode.DONE

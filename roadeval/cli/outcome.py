@@ -44,7 +44,8 @@ def accounting(summary: Mapping[str, Any]) -> str:
     if summary["windows"]:
         counted += f" in {summary['windows']} windows"
     skipped = (f"{number} {why}" for why, number in frames["skipped"].items())
-    return ", ".join([f"{frames['read']} frames read", *skipped, counted])
+    of = f" of {frames['in_log']}" if frames["read"] < frames["in_log"] else ""
+    return ", ".join([f"{frames['read']}{of} frames read", *skipped, counted])
 
 
 def _show_scores(summary: Mapping[str, Any], out: Console) -> None:

@@ -171,21 +171,27 @@ def causes(frames: pd.DataFrame, variant: str) -> pd.DataFrame:
     DataFrame
         Indexed by ``frame``: a column a part, in that order. A variant of one stage has one.
     """
-    table = frames.pivot_table(index="frame", columns=["variant", "stage"], values="ERR")
-    stages = [stage for name, stage in table.columns if name == variant]
-    order = list(dict.fromkeys(frames.loc[frames["variant"] == variant, "stage"]))
-    last, given = order[-1], order[-2:-1]
-    if not given or len(stages) < 2:
-        return table[variant][[last]]
-    (before,) = given
-    parts = {before: table[variant, before]}
-    if variant == FILTERED and (UNFILTERED, before) in table:
-        parts = {before: table[UNFILTERED, before]}
-        parts[FILTER] = table[variant, before] - table[UNFILTERED, before]
-    parts[last] = table[variant, last] - table[variant, before]
     import pandas as pd
 
+    names = frames["variant"].unique()
+    own = {name: _errors(frames[frames["variant"] == name]) for name in names}
+    mine = own[variant]
+    last, given = mine.columns[-1], list(mine.columns[-2:-1])
+    if not given:
+        return mine
+    (before,) = given
+    parts = {before: mine[before]}
+    if variant == FILTERED and before in own.get(UNFILTERED, mine[[last]]):
+        without = own[UNFILTERED][before].reindex(mine.index)
+        parts = {before: without, FILTER: mine[before] - without}
+    parts[last] = mine[last] - mine[before]
     return pd.DataFrame(parts)
+
+
+def _errors(rows: pd.DataFrame) -> pd.DataFrame:
+    """Spread a variant's ERR: a row a frame, a column a stage, in the order the stages ran."""
+    stages = rows["stage"].unique()
+    return rows.pivot_table(index="frame", columns="stage", values="ERR")[[*stages]]
 
 
 def worst(

@@ -138,13 +138,12 @@ def compare(
             "moved": [],
             "warnings": [_apart(sides)],
         }
-    base, changes, moved, warnings = sides[0], [], [], []
-    for new in sides[1:]:
-        pair = _Pair(base, new, settings, across_variants=across_variants)
-        changes += pair.changes()
-        moved += pair.moved()
-        warnings += pair.warnings()
-    return found | {"changes": changes, "moved": moved, "warnings": warnings}
+    pairs = [_Pair(sides[0], new, settings, across_variants=across_variants) for new in sides[1:]]
+    return found | {
+        "changes": [row for pair in pairs for row in pair.changes()],
+        "moved": [row for pair in pairs for row in pair.moved()],
+        "warnings": [sentence for pair in pairs for sentence in pair.warnings()],
+    }
 
 
 def judge(comparison: Mapping[str, Any], conditions: Sequence[Condition]) -> list[dict[str, Any]]:
@@ -200,7 +199,7 @@ class _Pair:
 
     def changes(self) -> Iterator[dict[str, Any]]:
         """Yield a row for each variant and stage that both have."""
-        for (variant, stage), rows in self._matched.groupby(["variant", "stage"], sort=False):
+        for variant, stage, rows in _by_mask(self._matched):
             before = rows[["frame", *(f"{c}_base" for c in (*analysis.OUTCOMES, *RATES))]]
             before = before.rename(columns=lambda name: name.removesuffix("_base"))
             rates = COMPARED if stage == self._last[variant] else COMPARED[:1]
@@ -229,15 +228,16 @@ class _Pair:
         rows = rows[rows["variant"] == variant].assign(change=lambda r: r["ERR"] - r["ERR_base"])
         paired = rows.drop(columns="ERR").rename(columns={"change": "ERR"}).set_index("frame")
         for harmed in (True, False):
-            for row in analysis.most_changed(paired, MOVED, harmed=harmed).itertuples():
+            found = analysis.most_changed(paired, MOVED, harmed=harmed)
+            for row in found.to_dict("records"):
                 yield {
                     "result": self._new.label,
                     "variant": variant,
-                    "frame": int(row.frame),
-                    "stamp_ns": int(row.stamp_ns),
-                    "base": float(row.ERR_base),
-                    "new": float(row.ERR_base + row.ERR),
-                    "change": float(row.ERR),
+                    "frame": row["frame"],
+                    "stamp_ns": row["stamp_ns"],
+                    "base": row["ERR_base"],
+                    "new": row["ERR_base"] + row["ERR"],
+                    "change": row["ERR"],
                 }
 
     def warnings(self) -> Iterator[str]:
@@ -262,6 +262,12 @@ class _Pair:
             )
 
 
+def _by_mask(frames: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
+    """Yield each variant and stage with its rows, in the table's order."""
+    for (variant, stage), rows in frames.groupby(["variant", "stage"], sort=False):
+        yield str(variant), str(stage), rows
+
+
 def _stamped(frames: pd.DataFrame) -> pd.DataFrame:
     """Add a key to match frames by: the stamp, and among equal ones the place."""
     place = frames.groupby(["variant", "stage", "stamp_ns"], sort=False).cumcount()
@@ -278,7 +284,7 @@ def _rates(rows: pd.DataFrame) -> dict[str, Any]:
 
 def _levels(side: Side) -> Iterator[dict[str, Any]]:
     last = analysis.final_stages(side.frames)
-    for (variant, stage), rows in side.frames.groupby(["variant", "stage"], sort=False):
+    for variant, stage, rows in _by_mask(side.frames):
         yield {
             "result": side.label,
             "variant": variant,

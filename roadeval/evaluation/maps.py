@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise, permutations
 
 import numpy as np
 import numpy.typing as npt
@@ -41,7 +42,9 @@ class HeatMap:
     def share(self, which: Sums) -> npt.NDArray[np.float64]:
         """Divide by how often a pixel was labelled; NaN where it never was."""
         whole = self.labelled.astype(float)
-        return np.divide(which, whole, out=np.full(whole.shape, np.nan), where=whole > 0)
+        share = np.full(whole.shape, np.nan)
+        np.divide(which, whole, out=share, where=whole > 0)
+        return share
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,14 +93,12 @@ class Maps:
         self.frames += 1
         for variant, stages in masks.items():
             names = list(stages)
-            for before, after in zip(names, names[1:], strict=False):
+            for before, after in pairwise(names):
                 key = variant, before, after
                 step = change(stages[before], stages[after], truth)
                 self.changes[key] = self.changes.get(key, Change()) + step
             self.heat.setdefault(variant, HeatMap()).add(stages[names[-1]], truth)
         last = {variant: list(stages.values())[-1] for variant, stages in masks.items()}
-        for control, before in last.items():
-            for treated, after in last.items():
-                if treated != control:
-                    found = self.paired.get((treated, control), Change())
-                    self.paired[treated, control] = found + change(before, after, truth)
+        for control, treated in permutations(last, 2):
+            found = self.paired.get((treated, control), Change())
+            self.paired[treated, control] = found + change(last[control], last[treated], truth)

@@ -1,12 +1,16 @@
 """Camera logs (MCAP) in and out. No other room knows MCAP."""
 
 from roadeval.logs.damage import Damage
+from roadeval.logs.description import LogDescription, describe
 from roadeval.logs.errors import FrameError, LogError
-from roadeval.logs.frames import Accounting, FrameStream, LoggedFrame
+from roadeval.logs.frames import Accounting, FrameStream
 from roadeval.logs.labels import LabelValues
 from roadeval.logs.log import Log, open_log
+from roadeval.logs.logged import LoggedFrame
 from roadeval.logs.messages import Kind
+from roadeval.logs.pack import Packed, pack
 from roadeval.logs.selection import LabelTopic, Selection
+from roadeval.logs.sidecar import SidecarWriter
 from roadeval.logs.span import Instant, Span, parse_time
 from roadeval.logs.topics import TopicInfo
 from roadeval.logs.writer import LogWriter
@@ -21,12 +25,17 @@ __all__ = [
     "LabelTopic",
     "LabelValues",
     "Log",
+    "LogDescription",
     "LogError",
     "LogWriter",
     "LoggedFrame",
+    "Packed",
     "Selection",
+    "SidecarWriter",
     "Span",
     "TopicInfo",
+    "describe",
     "open_log",
+    "pack",
     "parse_time",
 ]

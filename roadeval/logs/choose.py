@@ -25,6 +25,9 @@ OUTPUT_WORDS: Final = _set(
     "pred preds prediction predictions predicted net network nn cnn dnn model inference "
     "detection detections detected output result results estimate estimated"
 )
+PICTURE_WORDS: Final = _set(
+    "overlay overlays blend blended vis viz visual visualization visualisation debug colored"
+)
 PLAIN_WORDS: Final = _set(
     "camera cam image images img raw compressed front left right rear png mono rect color"
 )
@@ -67,7 +70,8 @@ def choose_truth(
 ) -> tuple[TopicInfo | None, str]:
     """Choose the topic of the road truth; returns it, or None, and why.
 
-    It is an image of single values, or, if ``colors`` are to be told apart, any without loss.
+    An image of single values is preferred; one of ``colors`` where those are asked for, or
+    where there is no other.
 
     Raises
     ------
@@ -78,11 +82,15 @@ def choose_truth(
         return None, "asked to use none"
     if asked is not None:
         return named(topics, asked, "--truth-topic"), "asked for"
-    labels = _label_topics(topics, image, colors=colors)
+    labels = _label_topics(topics, image)
     roads = [topic for topic in labels if not words(topic.name) & SHADOW_WORDS]
-    strong = [topic for topic in roads if _is_plainly_truth(topic)]
-    plain = strong or [topic for topic in roads if _is_plain_mask(topic, image)]
-    plain = _most_alike(plain, image)
+    kinds = [
+        [topic for topic in roads if topic.channels == 3 and _is_plainly_truth(topic)],
+        [topic for topic in roads if topic.channels == 1 and _is_plainly_truth(topic)],
+        [topic for topic in roads if topic.channels == 1 and _is_plain_mask(topic, image)],
+    ]
+    order = kinds if colors else [*kinds[1:], kinds[0]]
+    plain = _most_alike(next((found for found in order if found), []), image)
     if len(plain) == 1:
         by = "colours" if plain[0].channels == 3 else "single channel"
         return plain[0], f"the label image, by its name and its {by}"
@@ -110,7 +118,7 @@ def choose_shadow(
     if asked is not None:
         return named(topics, asked, "--shadow-topic"), "asked for"
     labels = _label_topics(topics, image)
-    shadows = [topic for topic in labels if words(topic.name) & SHADOW_WORDS]
+    shadows = [t for t in labels if words(t.name) & SHADOW_WORDS and t.channels == 1]
     shadows = _most_alike(shadows, image)
     if len(shadows) == 1:
         return shadows[0], "the shadow mask, by its name and its single channel"
@@ -137,18 +145,16 @@ def named(topics: Sequence[TopicInfo], name: str, option: str) -> TopicInfo:
     raise LogError(f"{option} {name}: {what}; its image topics are: {valid}")
 
 
-def _label_topics(
-    topics: Sequence[TopicInfo], image: TopicInfo, *, colors: bool = False
-) -> list[TopicInfo]:
-    """Topics that look like label images and are no network's output."""
+def _label_topics(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:
+    """Topics without loss that look like label images and are no network's output."""
     return [
         topic
         for topic in topics
         if topic.name != image.name
         and topic.count
         and _looks_like_label(topic)
-        and (topic.channels == 1 or (colors and not _is_lossy(topic)))
-        and not words(topic.name) & OUTPUT_WORDS
+        and not _is_lossy(topic)
+        and not words(topic.name) & (OUTPUT_WORDS | PICTURE_WORDS)
     ]
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import zlib
 from array import array
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -12,8 +13,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from roadeval.logs.chunks import ChunkReader, crc_of
-from roadeval.logs.damage import Damage
+from roadeval.logs.chunks import ChunkReader
 from roadeval.logs.errors import BadRecord
 from roadeval.logs.records import (
     MESSAGE_HEAD,
@@ -24,10 +24,12 @@ from roadeval.logs.records import (
     parse,
     walk,
 )
-from roadeval.logs.scan import Gap, Scan
+from roadeval.logs.scan import Scan
 from roadeval.logs.source import Source
 from roadeval.logs.summary import read_summary
 
+BLOCK: Final = 1 << 20
+"""Bytes to take at a time of a whole file."""
 OUTSIDE: Final = -1
 """The chunk number of a message that lies in no chunk."""
 
@@ -78,8 +80,14 @@ class Container:
         By their numbers.
     logs
         Where messages lie, by the number of their channel.
+    summary, scan, reader
+        The file's parts: what it says itself, what was found, and what reads its chunks.
     misled
         Chunks whose message indexes were found to be wrong.
+    saved_ns
+        Log time of the last message saved from a chunk that is cut off.
+    data_is_right
+        Whether the checksum of all data is, None before it was looked at.
     """
 
     def __init__(
@@ -93,8 +101,8 @@ class Container:
         self.path = path
         self.source = Source(path)
         self._wanted = wanted
-        self._reader = ChunkReader(self.source, keep_corrupt=keep_corrupt)
-        self._summary = read_summary(self.source)
+        self.reader = ChunkReader(self.source, keep_corrupt=keep_corrupt)
+        self.summary = read_summary(self.source)
 
         def whole(scan: Scan, message: Message) -> bool:
             channel = scan.channels.get(message.channel_id)
@@ -102,26 +110,28 @@ class Container:
                 channel, scan.schemas.get(channel.schema_id), message
             )
 
-        self._scan = Scan(self.source, self._summary, whole)
-        self.schemas, self.channels = self._scan.schemas, self._scan.channels
-        statistics = self._summary.statistics
-        self._expected = statistics.channel_message_counts if statistics else None
-        self._data_is_wrong = False
-        self._saved_ns: int | None = None
+        self.scan = Scan(self.source, self.summary, whole)
+        self.schemas, self.channels = self.scan.schemas, self.scan.channels
+        self.data_is_right: bool | None = None
+        self.saved_ns: int | None = None
         self.misled: set[int] = set()
         self.logs = self._collect()
 
     @property
     def chunks(self) -> list[Chunk]:
         """The chunks, in the order of the file."""
-        return self._scan.chunks
+        return self.scan.chunks
 
-    def expected_of(self, topic: str) -> int | None:
-        """How many messages of a topic there should be, by the file's own statistics."""
-        if self._expected is None:
-            return None
-        channels = [number for number, channel in self.channels.items() if channel.topic == topic]
-        return sum(self._expected.get(number, 0) for number in channels)
+    @property
+    def expected(self) -> Mapping[int, int]:
+        """How many messages a channel should have, by the file's own statistics, if any."""
+        statistics = self.summary.statistics
+        return statistics.channel_message_counts if statistics else {}
+
+    def topic(self, channel_id: int) -> str:
+        """Name the topic of a channel, or at least the channel."""
+        channel = self.channels.get(channel_id)
+        return channel.topic if channel else f"channel {channel_id}"
 
     def message(self, chunk: int, offset: int) -> Message:
         """Read the message at ``offset`` in a chunk, or in the file if it is `OUTSIDE`.
@@ -133,7 +143,7 @@ class Container:
         """
         if chunk == OUTSIDE:
             return message_at(self.source, offset)
-        return message_at(self._reader.read(self.chunks[chunk]), offset)
+        return message_at(self.reader.read(self.chunks[chunk]), offset)
 
     def look(self, chunk: int, channel_id: int) -> Entries:
         """Find the messages of a channel by looking into a chunk, whatever its indexes say.
@@ -148,22 +158,31 @@ class Container:
 
     def is_bad(self, chunk: int) -> bool:
         """Whether a chunk was found to be unreadable."""
-        return chunk != OUTSIDE and self.chunks[chunk].offset in self._reader.bad
+        return chunk != OUTSIDE and self.chunks[chunk].offset in self.reader.bad
 
     def verify(self) -> None:
         """Read everything once, so that `damage` knows it all."""
         for chunk in self.chunks:
             try:
-                self._reader.read(chunk)
+                self.reader.read(chunk)
             except BadRecord:
                 continue
         self.verify_data()
 
+    def read_all(self, take: Callable[[bytes], object]) -> None:
+        """Hand out the whole file in blocks; check the checksum of all data on the way."""
+        crc, end = 0, self.scan.data_end or 0
+        for offset in range(0, self.source.size, BLOCK):
+            block = self.source.read(offset, BLOCK)
+            take(block)
+            if self.scan.data_crc and offset < end:
+                crc = zlib.crc32(block[: end - offset], crc)
+        self.data_is_right = crc == self.scan.data_crc
+
     def verify_data(self) -> None:
-        """Check the checksum of the whole data section, where the file has one."""
-        scan = self._scan
-        if scan.data_crc and scan.data_end is not None:
-            self._data_is_wrong = crc_of(self.source, scan.data_end) != scan.data_crc
+        """Check the checksum of all data, unless that was done or the file has none."""
+        if self.data_is_right is None and self.scan.data_crc:
+            self.read_all(len)
 
     def close(self) -> None:
         """Close the file."""
@@ -171,10 +190,10 @@ class Container:
 
     def _collect(self) -> dict[int, ChannelLog]:
         """File all messages by channel; look into every chunk if the statistics differ."""
-        logs = self._file_all(look=self._expected is None)
+        counted = self.summary.statistics is not None
+        logs = self._file_all(look=not counted)
         counts = {channel_id: log.count for channel_id, log in logs.items()}
-        expected = {key: count for key, count in (self._expected or {}).items() if count}
-        if self._expected is not None and counts != expected:
+        if counted and counts != {key: count for key, count in self.expected.items() if count}:
             logs = self._file_all(look=True)
         return logs
 
@@ -183,13 +202,13 @@ class Container:
         for number in range(len(self.chunks)):
             for channel_id, entries in self._index(number, look=look).items():
                 self._log(logs, channel_id).add(number, entries)
-        for channel_id, values in self._scan.loose.items():
+        for channel_id, values in self.scan.loose.items():
             self._log(logs, channel_id).add(OUTSIDE, _entries(values))
         return logs
 
     def _index(self, number: int, *, look: bool) -> Mapping[int, Entries]:
         """Messages of a chunk by channel, by its message indexes or by looking into it."""
-        index = self._scan.indexes[number]
+        index = self.scan.indexes[number]
         if index and not look and all(self._is_defined(channel_id) for channel_id in index):
             return index
         try:
@@ -203,7 +222,7 @@ class Container:
 
     def _look(self, number: int) -> Mapping[int, Entries]:
         """Walk through the records of a chunk; learn its channels and where its messages lie."""
-        records = self._reader.read(self.chunks[number])
+        records = self.reader.read(self.chunks[number])
         found: dict[int, array[int]] = {}
         for place in walk(records):
             if place.opcode == Opcode.MESSAGE and place.end - place.body >= MESSAGE_HEAD.size:
@@ -217,7 +236,7 @@ class Container:
                 channel = parse(place.opcode, records.read(place.body, place.end - place.body))
                 self.channels.setdefault(channel.id, channel)
         if self.chunks[number].cut:
-            self._saved_ns = max((max(values[::2]) for values in found.values()), default=None)
+            self.saved_ns = max((max(values[::2]) for values in found.values()), default=None)
         return {channel_id: _entries(values) for channel_id, values in found.items()}
 
     def _log(self, logs: dict[int, ChannelLog], channel_id: int) -> ChannelLog:
@@ -226,74 +245,6 @@ class Container:
             schema = self.schemas.get(channel.schema_id) if channel else None
             logs[channel_id] = ChannelLog(bool(channel and self._wanted(channel, schema)))
         return logs[channel_id]
-
-    @property
-    def damage(self) -> tuple[Damage, ...]:
-        """What is wrong with the file, as far as it is known by now, in its order."""
-        found = [
-            *self._gaps(),
-            *self._bad_chunks(),
-            *self._wrong_indexes(),
-            *self._missing(),
-            *self._unnamed(),
-            *self._wrong_sums(),
-        ]
-        return tuple(sorted(found, key=lambda damage: damage.offset))
-
-    def _gaps(self) -> Iterator[Damage]:
-        for gap in self._scan.gaps:
-            if gap.offset in self._reader.bad and not gap.lossy:
-                continue
-            before = self._saved_ns if self._is_cut(gap) and self._saved_ns else gap.before_ns
-            yield Damage(self.path, gap.offset, gap.reason, gap.lossy, before, gap.after_ns)
-
-    def _is_cut(self, gap: Gap) -> bool:
-        return bool(self.chunks) and self.chunks[-1].cut and gap.offset == self.chunks[-1].offset
-
-    def _bad_chunks(self) -> Iterator[Damage]:
-        for number, chunk in enumerate(self.chunks):
-            if chunk.offset in self._reader.bad:
-                index = self._scan.indexes[number] or {}
-                lost = tuple((self._topic(key), len(entries)) for key, entries in index.items())
-                reason = self._reader.bad[chunk.offset]
-                yield Damage(self.path, chunk.offset, reason, True, chunk.start, chunk.end, lost)
-
-    def _wrong_indexes(self) -> Iterator[Damage]:
-        for number in self.misled:
-            reason = "the message index of a chunk is wrong"
-            yield Damage(self.path, self.chunks[number].offset, reason, lossy=False)
-
-    def _missing(self) -> Iterator[Damage]:
-        """Messages that the file's own statistics count, if nothing else explains the loss."""
-        if any(gap.lossy for gap in self._scan.gaps) or self._reader.bad:
-            return
-        for channel_id, expected in (self._expected or {}).items():
-            found = self.logs[channel_id].count if channel_id in self.logs else 0
-            if found < expected:
-                lost = ((self._topic(channel_id), expected - found),)
-                reason = "messages that the file's own statistics count are missing"
-                yield Damage(self.path, self.source.size, reason, lost=lost)
-
-    def _unnamed(self) -> Iterator[Damage]:
-        for channel_id, log in self.logs.items():
-            if channel_id not in self.channels:
-                reason = f"{log.count} messages of a channel {channel_id} that is defined nowhere"
-                yield Damage(self.path, 0, reason, True, log.first_ns, log.last_ns)
-
-    def _wrong_sums(self) -> Iterator[Damage]:
-        scan = self._scan
-        if scan.data_end is not None and self._summary.problem:
-            yield Damage(self.path, scan.data_end, self._summary.problem, lossy=False)
-        if self._data_is_wrong:
-            unchecked = bool(scan.loose) or not all(chunk.crc for chunk in self.chunks)
-            reason = "the checksum of all data is wrong"
-            if unchecked:
-                reason += ", and nothing tells which message is; any may be"
-            yield Damage(self.path, scan.data_end or 0, reason, lossy=unchecked)
-
-    def _topic(self, channel_id: int) -> str:
-        channel = self.channels.get(channel_id)
-        return channel.topic if channel else f"channel {channel_id}"
 
 
 def _entries(values: array[int]) -> Entries:

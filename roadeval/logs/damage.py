@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from roadeval.logs.container import Container
 
 NS = 1_000_000_000
 
@@ -57,3 +62,75 @@ class Damage:
         if start is not None:
             return f", after {start} s"
         return f", before {end} s" if end is not None else ""
+
+
+def damage_of(container: Container) -> tuple[Damage, ...]:
+    """List what is wrong with a file, as far as it is known by now, in the file's order."""
+    found = [
+        *_gaps(container),
+        *_bad_chunks(container),
+        *_wrong_indexes(container),
+        *_missing(container),
+        *_unnamed(container),
+        *_wrong_sums(container),
+    ]
+    return tuple(sorted(found, key=lambda damage: damage.offset))
+
+
+def _gaps(container: Container) -> Iterator[Damage]:
+    last = container.chunks[-1] if container.chunks else None
+    for gap in container.scan.gaps:
+        if gap.offset in container.reader.bad and not gap.lossy:
+            continue
+        before = gap.before_ns
+        if last is not None and last.cut and last.offset == gap.offset:
+            before = container.saved_ns or before
+        yield Damage(container.path, gap.offset, gap.reason, gap.lossy, before, gap.after_ns)
+
+
+def _bad_chunks(container: Container) -> Iterator[Damage]:
+    for number, chunk in enumerate(container.chunks):
+        reason = container.reader.bad.get(chunk.offset)
+        if reason is not None:
+            index = container.scan.indexes[number] or {}
+            lost = tuple((container.topic(key), len(found)) for key, found in index.items())
+            span = (chunk.start, chunk.end)
+            yield Damage(container.path, chunk.offset, reason, True, *span, lost)
+
+
+def _wrong_indexes(container: Container) -> Iterator[Damage]:
+    for number in container.misled:
+        reason = "the message index of a chunk is wrong"
+        yield Damage(container.path, container.chunks[number].offset, reason, lossy=False)
+
+
+def _missing(container: Container) -> Iterator[Damage]:
+    """Messages that the file's own statistics count, if nothing else explains the loss."""
+    if any(gap.lossy for gap in container.scan.gaps) or container.reader.bad:
+        return
+    for channel_id, expected in container.expected.items():
+        log = container.logs.get(channel_id)
+        missing = expected - (log.count if log else 0)
+        if missing > 0:
+            lost = ((container.topic(channel_id), missing),)
+            reason = "messages that the file's own statistics count are missing"
+            yield Damage(container.path, container.source.size, reason, lost=lost)
+
+
+def _unnamed(container: Container) -> Iterator[Damage]:
+    for channel_id, log in container.logs.items():
+        if channel_id not in container.channels:
+            reason = f"{log.count} messages of a channel {channel_id} that is defined nowhere"
+            yield Damage(container.path, 0, reason, True, log.first_ns, log.last_ns)
+
+
+def _wrong_sums(container: Container) -> Iterator[Damage]:
+    scan, summary = container.scan, container.summary
+    if scan.data_end is not None and summary.problem:
+        yield Damage(container.path, scan.data_end, summary.problem, lossy=False)
+    if container.data_is_right is False:
+        unchecked = bool(scan.loose) or not all(chunk.crc for chunk in container.chunks)
+        reason = "the checksum of all data is wrong"
+        if unchecked:
+            reason += ", and nothing tells which message is; any may be"
+        yield Damage(container.path, scan.data_end or 0, reason, lossy=unchecked)

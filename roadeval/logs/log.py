@@ -13,16 +13,16 @@ import numpy.typing as npt
 from mcap.records import Channel, Schema
 
 from roadeval.logs.container import Container
-from roadeval.logs.damage import Damage
+from roadeval.logs.damage import Damage, damage_of
 from roadeval.logs.decoders import message_is_whole
-from roadeval.logs.errors import LogError
+from roadeval.logs.errors import BadRecord, LogError
 from roadeval.logs.files import files_of
 from roadeval.logs.frames import FrameStream
 from roadeval.logs.labels import LabelValues
 from roadeval.logs.messages import Kind, kind_of
 from roadeval.logs.selection import Asked, Selection, settle
 from roadeval.logs.span import NS, Span
-from roadeval.logs.topics import TopicInfo, describe, sources_by_topic
+from roadeval.logs.topics import TopicInfo, describe_topic, sources_by_topic
 from roadeval.logs.track import Track
 
 
@@ -63,14 +63,13 @@ class Log:
     def __init__(self, path: Path, files: list[Path], *, keep_corrupt: bool = False) -> None:
         self.path = path
         self.name = path.stem if path.is_file() else path.resolve().name
-        self._files = files
         self._containers = [
             Container(f, _is_image, message_is_whole, keep_corrupt=keep_corrupt) for f in files
         ]
         sources = sources_by_topic(self._containers)
         self._tracks = {name: Track(name, found) for name, found in sources.items()}
         self.topics: tuple[TopicInfo, ...] = tuple(
-            describe(name, sources[name], self._tracks[name]) for name in sorted(sources)
+            describe_topic(name, sources[name], self._tracks[name]) for name in sorted(sources)
         )
         starts = [topic.first_ns for topic in self.topics if topic.first_ns is not None]
         ends = [topic.last_ns for topic in self.topics if topic.last_ns is not None]
@@ -83,23 +82,29 @@ class Log:
         return tuple(
             replace(damage, log_start_ns=self.start_ns)
             for container in self._containers
-            for damage in container.damage
+            for damage in damage_of(container)
         )
 
     @property
     def losses(self) -> tuple[str, ...]:
         """What is lost of the log, a sentence each; empty if nothing is.
 
-        Damage in chunks is found when they are read, or by `verify`.
+        Damage inside chunks is found when they are read, or by `verify`.
         """
+        for container in self._containers:
+            container.verify_data()
         lost = [damage for damage in self.damage if damage.lossy]
         kept = [self._kept(topic) for topic in self.topics if topic.is_image]
-        return (*(str(damage) for damage in lost), *kept) if lost else ()
+        return (*map(str, lost), *kept) if lost else ()
+
+    @property
+    def size(self) -> int:
+        """Bytes of all its files."""
+        return sum(container.source.size for container in self._containers)
 
     def _kept(self, topic: TopicInfo) -> str:
         track = self._tracks[topic.name]
-        expected = sum(container.expected_of(topic.name) or 0 for container in self._containers)
-        total = max(expected, len(track))
+        total = max(track.expected(), len(track))
         known = f" of {total}" if total > track.readable() else ""
         until = (topic.last_ns or self.start_ns) - self.start_ns
         return f"{topic.name}: {track.readable()}{known} images kept, up to {until / NS:.3f} s"
@@ -110,11 +115,21 @@ class Log:
             container.verify()
 
     def sha256(self) -> str:
-        """SHA-256 of the file, or of the SHA-256 sums of a folder's files, in hexadecimal."""
+        """SHA-256 of the file, or of the SHA-256 sums of a folder's files, in hexadecimal.
+
+        Raises
+        ------
+        LogError
+            If the disk fails.
+        """
         digests = []
-        for path in self._files:
-            with path.open("rb") as file:
-                digests.append(hashlib.file_digest(file, "sha256").hexdigest())
+        for container in self._containers:
+            digest = hashlib.sha256()
+            try:
+                container.read_all(digest.update)
+            except BadRecord as error:
+                raise LogError(f"{container.path}: {error}") from error
+            digests.append(digest.hexdigest())
         if len(digests) == 1:
             return digests[0]
         return hashlib.sha256("".join(digests).encode()).hexdigest()

@@ -12,14 +12,15 @@ from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf
 from typing import Final
 
 from mcap.opcode import Opcode
-from mcap.records import Channel, ChunkIndex, Schema
+from mcap.records import Channel, Schema
 
 from roadeval.logs.errors import BadRecord
+from roadeval.logs.heads import by_own_head, by_summary, is_within
 from roadeval.logs.layouts import PADDING
 from roadeval.logs.records import (
     CHUNK_HEAD,
@@ -35,7 +36,6 @@ from roadeval.logs.records import (
     Place,
     message_at,
     parse,
-    parse_chunk,
     parse_message_index,
     place_at,
 )
@@ -186,9 +186,9 @@ class Scan:
         index = self._known.get(place.offset)
         head = bytes(self._source.peek(place.body, CHUNK_HEAD_MAX))
         if index is None:
-            chunk = self._own_head(place, head)
+            chunk = by_own_head(place, head, self._source.size, self._search.is_likely)
         else:
-            chunk = _by_index(place, head, index)
+            chunk = by_summary(place, head, index)
             outer = self._source.read(place.offset, HEAD.size)
             if chunk.repaired or outer != HEAD.pack(Opcode.CHUNK, place.end - place.body):
                 reason = "the head of a chunk is damaged; the summary tells what it said"
@@ -202,20 +202,6 @@ class Scan:
             self._saw(chunk.start, chunk.end)
         return end
 
-    def _own_head(self, place: Place, head: bytes | memoryview) -> Chunk:
-        """Read a chunk by its own head, whose two lengths may contradict each other."""
-        chunk, size = parse_chunk(place, head), self._source.size
-        end = chunk.data_offset + chunk.data_size
-        if end != place.end and self._search.is_likely(end):
-            return chunk
-        if end != place.end and self._search.is_likely(place.end):
-            return replace(chunk, data_size=place.end - chunk.data_offset)
-        if end > size and place.end > size and chunk.data_offset <= size:
-            return replace(chunk, data_size=size - chunk.data_offset, cut=True)
-        if end != place.end:
-            raise BadRecord("a chunk whose lengths contradict each other")
-        return chunk
-
     def _message_index(self, place: Place) -> None:
         if place.end - place.body > LARGEST:
             raise BadRecord("a message index of a length that cannot be")
@@ -226,7 +212,7 @@ class Scan:
         index = self.indexes[-1] if self.indexes else None
         if index is None:
             return
-        if channel_id in index or not _within(entries, self.chunks[-1]):
+        if channel_id in index or not is_within(entries, self.chunks[-1]):
             self.indexes[-1] = None
         else:
             index[channel_id] = entries
@@ -299,34 +285,3 @@ def _time_range(summary: Summary) -> tuple[float, float]:
     if not summary.checked or statistics is None or not statistics.message_count:
         return -inf, inf
     return statistics.message_start_time, statistics.message_end_time
-
-
-def _by_index(place: Place, head: bytes | memoryview, index: ChunkIndex) -> Chunk:
-    """Read a chunk by the summary's word; its own head gives the checksum."""
-    data_size = index.compressed_size
-    told = Chunk(
-        place.offset,
-        index.message_start_time,
-        index.message_end_time,
-        index.uncompressed_size,
-        None,
-        index.compression,
-        place.end - data_size,
-        data_size,
-    )
-    with suppress(BadRecord):
-        own = parse_chunk(place, head)
-        if replace(own, crc=None) == told:
-            return own
-    crc = CHUNK_HEAD.unpack_from(head)[3] if len(head) >= CHUNK_HEAD.size else 0
-    return replace(told, crc=crc or None, repaired=True)
-
-
-def _within(entries: Entries, chunk: Chunk) -> bool:
-    """Whether a message index agrees with its chunk's head."""
-    if not len(entries):
-        return True
-    times, offsets = entries[:, 0].view("u8"), entries[:, 1].view("u8")
-    return bool(
-        chunk.start <= times.min() and times.max() <= chunk.end and offsets.max() < chunk.size
-    )

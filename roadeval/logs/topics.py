@@ -72,7 +72,7 @@ class TopicInfo:
         return self.kind is not Kind.OTHER
 
 
-def describe(name: str, sources: Sequence[Source], track: Track) -> TopicInfo:
+def describe_topic(name: str, sources: Sequence[Source], track: Track) -> TopicInfo:
     """Describe a topic from its messages' places and the first one that can be decoded."""
     container, channel_id = sources[0].container, sources[0].channel_id
     channel = container.channels[channel_id]

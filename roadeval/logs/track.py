@@ -127,6 +127,10 @@ class Track:
                 self._stamps[position] = UNREADABLE
         return int(self._stamps[position])
 
+    def expected(self) -> int:
+        """How many messages there should be, by the files' own statistics."""
+        return sum(s.container.expected.get(s.channel_id, 0) for s in self._sources)
+
     def readable(self) -> int:
         """Messages that are in the log, less those in chunks found to be damaged."""
         lost = sum(

@@ -31,6 +31,21 @@ class Pictures(Protocol):
         ...
 
 
+def import_av() -> Any:
+    """Import PyAV.
+
+    Raises
+    ------
+    LogError
+        If it is not installed; says how to.
+    """
+    try:
+        import av
+    except ImportError as error:
+        raise LogError("video needs PyAV: install it with pip install 'roadeval[video]'") from error
+    return av
+
+
 class Video:
     """The frames of a video topic, by position; fastest one after the other.
 
@@ -41,13 +56,7 @@ class Video:
     """
 
     def __init__(self, packets: Pictures) -> None:
-        try:
-            import av
-        except ImportError as error:
-            raise LogError(
-                "video needs PyAV: install it with pip install 'roadeval[video]'"
-            ) from error
-        self._av = av
+        self._av = import_av()
         self._packets = packets
         self._decoder: Any = None
         self._next = 0

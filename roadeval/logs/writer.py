@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
@@ -82,7 +84,9 @@ class LogWriter:
             raise LogError(f"{topic}: format {format!r} is none of {', '.join(FORMATS)}")
         message = CompressedImage(frame_id=frame_id, data=data, format=format)
         message.timestamp.FromNanoseconds(stamp_ns)
-        self._write(topic, message, stamp_ns, stamp_ns if log_time_ns is None else log_time_ns)
+        channel = self._channels.get(topic) or self._protobuf_channel(topic, CompressedImage)
+        data = message.SerializeToString(deterministic=True)
+        self._write(channel, stamp_ns, log_time_ns, data)
 
     def mask(
         self,
@@ -93,7 +97,7 @@ class LogWriter:
         frame_id: str = "camera",
         log_time_ns: int | None = None,
     ) -> None:
-        """Write a ``(H, W)`` uint8 mask or ``(H, W, 3)`` RGB image as a PNG, without loss.
+        """Write a ``(H, W)`` mask, or an image in RGB or RGBA, uint8, as a PNG without loss.
 
         Raises
         ------
@@ -102,32 +106,57 @@ class LogWriter:
         """
         import cv2
 
-        bgr = mask if mask.ndim == 2 else cv2.cvtColor(mask, cv2.COLOR_RGB2BGR)
-        _, png = cv2.imencode(".png", bgr)
+        codes = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
+        stored = mask if mask.ndim == 2 else cv2.cvtColor(mask, codes[mask.shape[2]])
+        _, png = cv2.imencode(".png", stored)
         self.image(
             topic, stamp_ns, png.tobytes(), "png", frame_id=frame_id, log_time_ns=log_time_ns
         )
 
-    def _write(self, topic: str, message: Any, stamp_ns: int, log_time_ns: int) -> None:
-        channel = self._channel(topic, type(message))
+    def json(
+        self,
+        topic: str,
+        stamp_ns: int,
+        message: Mapping[str, Any],
+        schema: tuple[str, str],
+        *,
+        log_time_ns: int | None = None,
+    ) -> None:
+        """Write a message in JSON, with its schema's name and text (JSON Schema).
+
+        Raises
+        ------
+        LogError
+            If the disk is full.
+        """
+        channel = self._channels.get(topic) or self._json_channel(topic, *schema)
+        data = json.dumps(message, allow_nan=False, separators=(",", ":")).encode()
+        self._write(channel, stamp_ns, log_time_ns, data)
+
+    def _write(self, channel: int, stamp_ns: int, log_time_ns: int | None, data: bytes) -> None:
         sequence = self._counts[channel] = self._counts.get(channel, -1) + 1
-        data = message.SerializeToString(deterministic=True)
+        log_time = stamp_ns if log_time_ns is None else log_time_ns
         try:
-            self._writer.add_message(channel, log_time_ns, data, stamp_ns, sequence)
+            self._writer.add_message(channel, log_time, data, stamp_ns, sequence)
         except OSError as error:
             raise LogError(f"{self.path}: cannot be written: {error.strerror}") from error
 
-    def _channel(self, topic: str, message: Any) -> int:
+    def _protobuf_channel(self, topic: str, message: Any) -> int:
         from mcap_protobuf.schema import build_file_descriptor_set
 
-        if topic not in self._channels:
-            name = message.DESCRIPTOR.full_name
-            if name not in self._schemas:
-                schema = build_file_descriptor_set(message).SerializeToString(deterministic=True)
-                self._schemas[name] = self._writer.register_schema(name, "protobuf", schema)
-            self._channels[topic] = self._writer.register_channel(
-                topic, "protobuf", self._schemas[name]
-            )
+        name = message.DESCRIPTOR.full_name
+        if name not in self._schemas:
+            text = build_file_descriptor_set(message).SerializeToString(deterministic=True)
+            self._schemas[name] = self._writer.register_schema(name, "protobuf", text)
+        return self._register(topic, "protobuf", self._schemas[name])
+
+    def _json_channel(self, topic: str, name: str, text: str) -> int:
+        if name not in self._schemas:
+            self._schemas[name] = self._writer.register_schema(name, "jsonschema", text.encode())
+        return self._register(topic, "json", self._schemas[name])
+
+    def _register(self, topic: str, encoding: str, schema: int) -> int:
+        self._channels[topic] = self._writer.register_channel(topic, encoding, schema)
         return self._channels[topic]
 
     def close(self) -> None:

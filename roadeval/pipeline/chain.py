@@ -7,12 +7,28 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from roadeval.data import LayerSpec, Rgb
-from roadeval.pipeline import classify, gated, morphology, shadow, similarity
+from roadeval.pipeline import (
+    classify,
+    context,
+    exposure,
+    gated,
+    morphology,
+    shadow,
+    similarity,
+)
 from roadeval.pipeline.stage import Output, Stage, View
 
 STAGES: Final[Mapping[str, Stage[Any, Any]]] = {
     stage.name: stage
-    for stage in (shadow.STAGE, gated.STAGE, similarity.STAGE, classify.STAGE, morphology.STAGE)
+    for stage in (
+        exposure.STAGE,
+        shadow.STAGE,
+        gated.STAGE,
+        similarity.STAGE,
+        classify.STAGE,
+        context.STAGE,
+        morphology.STAGE,
+    )
 }
 """Every stage that a configuration's ``chain`` may name."""
 
@@ -54,12 +70,12 @@ class Chain:
             output = step.run(View(image, seen, mask))
             seen = seen if output.image is None else output.image
             mask = mask if output.mask is None else output.mask
-            yield step.stage.name, output
+            yield step.stage.reported, output
 
     def filtered(self, image: Rgb) -> Rgb:
-        """Return the image as the chain's filters leave it; itself where there is none."""
+        """Return the image as the chain's filters leave it; itself where there are none."""
         for step in self.steps:
-            if step.stage.is_filter:
+            if not step.stage.yields_mask:
                 output = step.run(View(image, image))
                 image = image if output.image is None else output.image
         return image
@@ -75,5 +91,6 @@ def layers_of(names: Sequence[str], settings: Mapping[str, Any]) -> tuple[LayerS
 
 
 def masks_of(names: Sequence[str]) -> tuple[str, ...]:
-    """List the stages of a chain that yield a road mask, in order: all but the filters."""
-    return tuple(name for name in names if not STAGES[name].is_filter)
+    """List a chain's road masks, in order, by the names that their stages are reported under."""
+    stages = (STAGES[name] for name in names)
+    return tuple(stage.reported for stage in stages if stage.yields_mask)

@@ -105,16 +105,16 @@ def _interpolation(factor: Factor, tolerance: float, rounding: float) -> _Interp
 
     With 256 nodes, the levels themselves, nothing is interpolated.
     """
-    exact = [factor(channel, LEVELS) for channel in (1, 2)]
+    exact = factor(1, LEVELS), factor(2, LEVELS)
     for count in _NODES:
         nodes, matrix = _chebyshev(count) if count < 256 else (LEVELS, np.eye(256))
-        few = [factor(channel, nodes) for channel in (1, 2)]
+        green, blue = factor(1, nodes), factor(2, nodes)
         swell = float(np.abs(matrix).sum(axis=1).max())
-        seen = max(float(np.abs(f - matrix @ g).max()) for f, g in zip(exact, few, strict=True))
-        gap = seen + swell * (count * EPS + 2 * rounding)
+        seen = max(np.abs(exact[0] - matrix @ green).max(), np.abs(exact[1] - matrix @ blue).max())
+        gap = float(seen) + swell * (count * EPS + 2 * rounding)
         if 2 * gap <= tolerance:
             break
-    return _Interpolation(*few, matrix, swell, gap)
+    return _Interpolation(green, blue, matrix, swell, gap)
 
 
 def _chebyshev(count: int) -> tuple[Floats, Floats]:

@@ -15,302 +15,73 @@ Where no component is kept the image passes as it came, bit for bit.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Annotated, Final
+from typing import Final
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-from pydantic import ConfigDict, Field, model_validator
-from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb
 from roadeval.pipeline import shade
-from roadeval.pipeline.fast import KERNELS
+from roadeval.pipeline.gates import (
+    ACCEPTED,
+    NONE,
+    VERDICTS,
+    Components,
+    GatedSettings,
+    Scene,
+    components,
+    judge,
+    look,
+)
+from roadeval.pipeline.scale import enlarged, reduced, stretched
 from roadeval.pipeline.shade import RoadLight
-from roadeval.pipeline.shadow import COMPENSATED, RING_COLOUR, SHADOW, SHADOW_COLOUR
+from roadeval.pipeline.shadow import RING_COLOUR, SHADOW_COLOUR
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
 
-Floats = npt.NDArray[np.float64]
-Labels = npt.NDArray[np.int32]
-Share = Annotated[float, Field(ge=0, le=1)]
-Pixels = Annotated[int, Field(ge=0, le=64)]
+Verdicts = npt.NDArray[np.uint8]
+Map = npt.NDArray[np.float32]
 
-NONE: Final = (0, 0, 0, 0)
-VERDICTS: Final = (
-    LabelClass(0, "none", NONE),
-    LabelClass(1, "accepted", SHADOW_COLOUR),
-    LabelClass(2, "too small", (153, 153, 153, 200)),
-    LabelClass(3, "too far away", (230, 159, 0, 200)),
-    LabelClass(4, "no lit road around it", (240, 228, 66, 200)),
-    LabelClass(5, "too dark for shade", (0, 0, 0, 200)),
-    LabelClass(6, "too bright for shade", (255, 255, 255, 200)),
-    LabelClass(7, "rougher than road", (213, 94, 0, 200)),
-)
-ACCEPTED, SMALL, FAR, ALONE, DARK, BRIGHT, ROUGH = range(1, len(VERDICTS))
 
-CANDIDATES: Final = LayerSpec(
-    "candidates",
-    LayerKind.MASK,
-    "Shadow candidates: dark, and of the road's colour",
-    (LabelClass(0, "none", NONE), LabelClass(1, "candidate", SHADOW_COLOUR)),
-)
+def _mask(name: str, title: str, inside: str) -> LayerSpec:
+    classes = (LabelClass(0, "none", NONE), LabelClass(1, inside, SHADOW_COLOUR))
+    return LayerSpec(name, LayerKind.MASK, title, classes)
+
+
+CANDIDATES: Final = _mask("candidates", "Dark, and of the road's colour", "candidate")
 COMPONENTS: Final = LayerSpec(
     "components", LayerKind.LABELS, "Components, and why they were rejected", VERDICTS
 )
+SHADOW: Final = _mask("shadow", "Accepted shadow", "shadow")
 RINGS: Final = LayerSpec(
     "rings",
     LayerKind.LABELS,
-    "Accepted components and lit road around them",
-    (
-        LabelClass(0, "none", NONE),
-        LabelClass(1, "shadow", SHADOW_COLOUR),
-        LabelClass(2, "ring", RING_COLOUR),
-    ),
+    "Accepted shadow, and lit road around components",
+    (*SHADOW.classes, LabelClass(2, "ring", RING_COLOUR)),
 )
-
-
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
-class GatedSettings:
-    """Settings of the gated filter. Lengths and areas are in pixels of the working image.
-
-    Parameters
-    ----------
-    width
-        Of the working image: wider ones are reduced to it for all that is decided. Texture and
-        penumbra then mean the same for every camera, and the time is the same too.
-    horizon
-        Above this share of the height nothing is a candidate: sky, trees and houses are there.
-    colour_distance
-        Greatest Mahalanobis distance of a candidate's log-chromaticity to the segment from lit to
-        shaded road, and of a lit pixel's to lit road. 3 holds 99 % of a normal cloud.
-    max_green
-        Greatest excess green of either: grass in the shade has nearly the road's colour.
-    min_level
-        Candidates and lit road are brighter than this grey level (0..255): below it a colour is
-        noise.
-    lit_quantile
-        The frame's sunlit level is this quantile of the brightness of all pixels of lit road's
-        colour: few enough to be lit in a frame that is mostly in the shade.
-    darkness
-        Candidates are darker than this share of the sunlit level, rings brighter.
-    min_core
-        Pixels of a component that lie ``CORE`` pixels from its edge: fewer can be judged neither
-        in brightness nor in texture.
-    reach
-        A component's lowest pixel lies below this share of the height. What is wholly further away
-        is a few pixels of parked cars and hedges as often as shade.
-    gap, ring_width
-        Rings begin so far from the component, beyond its penumbra, and are so wide.
-    min_ring
-        Pixels of lit road in the ring: a shadow on the road has road beside it.
-    ratio
-        Least and greatest brightness of the component relative to its ring. Darker is an opening
-        or a car's underside, brighter another pavement. One over the least bounds the gain.
-    max_texture
-        Greatest root mean square of the log brightness about its 5x5 mean, in the core. Shade
-        leaves a road's texture as it is, and roads are smooth; leaves, cars and house fronts are
-        not. This is the gate that keeps the filter from harm.
-    softness
-        Side of the square that the gains are averaged over, so that edges stay soft.
-    """
-
-    width: Annotated[int, Field(ge=32, le=4096)] = 320
-    horizon: Share = 0.35
-    colour_distance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 3.0
-    max_green: Annotated[float, Field(allow_inf_nan=False)] = 0.08
-    min_level: Annotated[float, Field(ge=0, le=255)] = 4.0
-    lit_quantile: Share = 0.8
-    darkness: Share = 0.55
-    min_core: Annotated[int, Field(ge=1)] = 10
-    reach: Share = 0.6
-    gap: Pixels = 2
-    ring_width: Annotated[int, Field(ge=1, le=64)] = 6
-    min_ring: Annotated[int, Field(ge=1)] = 20
-    ratio: tuple[Share, Share] = (0.12, 0.75)
-    max_texture: Annotated[float, Field(ge=0)] = 0.12
-    softness: Annotated[int, Field(ge=1, le=99)] = 5
-
-    @model_validator(mode="after")
-    def _ordered(self) -> GatedSettings:
-        if not 0 < self.ratio[0] < self.ratio[1]:
-            raise ValueError("ratio must be two shares above 0, the lower one first")
-        return self
-
-
-CORE: Final = 2
-"""Pixels from a component's edge to its core: the edge itself is no texture."""
-
-
-# --- Candidates -----------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Scene:
-    """A working image as the gates see it.
-
-    Parameters
-    ----------
-    image
-        ``(h, w, 3)`` uint8 RGB.
-    total
-        ``(h, w)`` uint16, ``R + G + B``.
-    candidates, lit
-        ``(h, w)`` uint8: dark pixels, and bright ones, of the road's colours.
-    """
-
-    image: Rgb
-    total: npt.NDArray[np.uint16]
-    candidates: Mask
-    lit: Mask
-
-
-def look(image: Rgb, road: RoadLight, settings: GatedSettings) -> Scene:
-    """Find the candidates and the lit road of an ``(h, w, 3)`` uint8 RGB image."""
-    total = shade.brightness(image)
-    like = shade.likeness(image, road)
-    possible = shade.excess_green(image, total) < settings.max_green
-    possible &= total > 3 * settings.min_level
-    possible[: round(settings.horizon * len(image))] = False
-    near = np.float32(settings.colour_distance**2)
-    lit = possible & (like.lit < near)
-    limit = settings.darkness * shade.quantile(total, lit.view(np.uint8), settings.lit_quantile)
-    dark = (possible & (like.shaded < near) & (total < limit)).view(np.uint8)
-    square = np.ones((3, 3), np.uint8)
-    dark = cv2.morphologyEx(cv2.morphologyEx(dark, cv2.MORPH_OPEN, square), cv2.MORPH_CLOSE, square)
-    return Scene(image, total, dark, (lit & (total >= limit)).view(np.uint8))
-
-
-# --- Components and rings -------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Components:
-    """What there is to say about each component; entry 0 is the background.
-
-    Parameters
-    ----------
-    labels, rings
-        ``(h, w)`` int32: the component that a pixel belongs to, and the one whose ring it is in.
-    core, ring
-        ``(count,)``: pixels of the core and of the ring.
-    lowest
-        ``(count,)``: the component's lowest row, as a share of the height.
-    ratio
-        ``(count, 3)``: mean of the core over mean of the ring, each channel apart; 1 if unknown.
-    texture
-        ``(count,)``: root mean square of the core's log brightness about its 5x5 mean.
-    """
-
-    labels: Labels
-    rings: Labels
-    core: npt.NDArray[np.int64]
-    ring: npt.NDArray[np.int64]
-    lowest: Floats
-    ratio: Floats
-    texture: Floats
-
-
-def components(scene: Scene, settings: GatedSettings) -> Components:
-    """Label the candidates (Eq. 9) and measure each component against its ring (Eq. 10)."""
-    count, labels, boxes, _ = cv2.connectedComponentsWithStats(scene.candidates)
-    core = np.where(_eroded(scene.candidates, CORE), labels, 0)
-    rings = _rings(scene, labels, settings)
-    inside, around = (_sums(scene.image, part, count) for part in (core, rings))
-    known = (inside[:, 0] > 0) & (around[:, 0] > 0)
-    means = [part[:, 1:4] / np.maximum(part[:, :1], 1) + 1e-3 for part in (inside, around)]
-    ratio = np.where(known[:, None], means[0] / means[1], 1.0)
-    bottom = boxes[:, cv2.CC_STAT_TOP] + boxes[:, cv2.CC_STAT_HEIGHT] - 1
-    texture = _texture(scene.total, core, count)
-    return Components(
-        labels, rings, inside[:, 0], around[:, 0], bottom / len(labels), ratio, texture
-    )
-
-
-def _eroded(mask: Mask, pixels: int) -> npt.NDArray[np.bool_]:
-    side = 2 * pixels + 1
-    eroded = cv2.erode(
-        mask, np.ones((side, side), np.uint8), borderType=cv2.BORDER_CONSTANT, borderValue=0
-    )
-    return eroded > 0
-
-
-def _rings(scene: Scene, labels: Labels, settings: GatedSettings) -> Labels:
-    """Give each pixel of lit road at a ring's distance to the component nearest to it."""
-    distance, nearest = cv2.distanceTransformWithLabels(
-        1 - scene.candidates, cv2.DIST_C, 5, labelType=cv2.DIST_LABEL_CCOMP
-    )
-    # The library numbers components in its own way here.
-    own = np.zeros(nearest.max() + 1, np.int32)
-    inside = labels > 0
-    own[nearest[inside]] = labels[inside]
-    within = (distance > settings.gap) & (distance <= settings.gap + settings.ring_width)
-    rings: Labels = np.where(within & (scene.lit > 0), own[nearest], 0)
-    return rings
-
-
-def _sums(image: Rgb, labels: Labels, count: int) -> npt.NDArray[np.int64]:
-    """Pixels and sums of R, G, B by label, ``(count, 7)``, see `plain.region_sums`."""
-    nowhere = np.zeros(labels.shape, np.uint8)
-    sums: npt.NDArray[np.int64] = KERNELS.region_sums(image, labels, nowhere, count, 0)[0]
-    return sums
-
-
-_LOG_TOTAL: Final = np.log(np.arange(3 * 255 + 1) / 3 + 4).astype(np.float32)
-
-
-def _texture(total: npt.NDArray[np.uint16], core: Labels, count: int) -> Floats:
-    logs = _LOG_TOTAL[total]
-    rough = (logs - cv2.blur(logs, (5, 5))) ** 2
-    here = core > 0
-    n = np.bincount(core[here], minlength=count)
-    return np.sqrt(np.bincount(core[here], rough[here], count) / np.maximum(n, 1))
-
-
-def judge(found: Components, settings: GatedSettings) -> npt.NDArray[np.uint8]:
-    """Say of each component what it is: ``(count,)`` uint8, a value of `VERDICTS`.
-
-    The first gate that it does not pass is the reason; the background is 0.
-    """
-    brightness = found.ratio.mean(axis=1)
-    low, high = settings.ratio
-    verdicts = np.select(
-        [
-            found.core < settings.min_core,
-            found.lowest < settings.reach,
-            found.ring < settings.min_ring,
-            brightness < low,
-            brightness > high,
-            found.texture > settings.max_texture,
-        ],
-        [SMALL, FAR, ALONE, DARK, BRIGHT, ROUGH],
-        ACCEPTED,
-    ).astype(np.uint8)
-    verdicts[0] = 0
-    return verdicts
+COMPENSATED: Final = LayerSpec("compensated", LayerKind.RGB, "Compensated image", exact=False)
 
 
 # --- Compensation ---------------------------------------------------------------------------------
 
 
-def gain_map(
-    found: Components, verdicts: npt.NDArray[np.uint8], settings: GatedSettings
-) -> npt.NDArray[np.float32]:
-    """Gain of each channel at each pixel, ``(h, w, 3)`` float32: 1 wherever nothing is changed.
+def gain_map(found: Components, verdicts: Verdicts, settings: GatedSettings) -> Map:
+    """Gain of each channel at each pixel, ``(h, w, 3)`` float32; 1 where nothing is to change.
 
-    In an accepted component ring over core, but no less than 1 and no more than one over the
-    least ratio; softened towards the outside.
+    In an accepted component it is ring over core, no less than 1 and no more than one over the
+    least ratio; then averaged over a square, so that it rises softly at the edge.
     """
     gains = np.clip(1 / found.ratio, 1.0, 1 / settings.ratio[0])
     gains[verdicts != ACCEPTED] = 1.0
-    side = settings.softness
-    return cv2.blur(gains.astype(np.float32)[found.labels], (side, side))
+    side = (settings.softness, settings.softness)
+    soft: Map = cv2.blur(gains.astype(np.float32)[found.labels], side)
+    return soft
 
 
-def brighten(image: Rgb, gain: npt.NDArray[np.float32]) -> Rgb:
-    """Multiply an ``(H, W, 3)`` uint8 image by gains ``(h, w, 3)`` float32, rounded and clipped."""
-    gain = cv2.resize(gain, (image.shape[1], image.shape[0]))
-    return cv2.multiply(image, gain, dtype=cv2.CV_8U)
+def brighten(image: Rgb, gain: Map) -> Rgb:
+    """Multiply ``(H, W, 3)`` uint8 RGB by gains ``(h, w, 3)`` float32; rounded and clipped."""
+    bright: Rgb = cv2.multiply(image, stretched(gain, image.shape), dtype=cv2.CV_8U)
+    return bright
 
 
 # --- The stage ------------------------------------------------------------------------------------
@@ -318,72 +89,65 @@ def brighten(image: Rgb, gain: npt.NDArray[np.float32]) -> Rgb:
 
 def bind(settings: GatedSettings, road: RoadLight) -> Callable[[View], Output]:
     """Return the filter as a pure function of what it sees."""
-    gain_spec = _gain(settings)
 
     def run(view: View) -> Output:
-        size = (view.image.shape[1], view.image.shape[0])
-        scene = look(_reduced(view.image, settings.width), road, settings)
+        scene = look(reduced(view.image, settings.width), road, settings)
         found = components(scene, settings)
         verdicts = judge(found, settings)
-        shadow = (verdicts == ACCEPTED).view(np.uint8)[found.labels]
-        edge = cv2.dilate(shadow, np.ones((2 * settings.gap + 1,) * 2, np.uint8)) - shadow
         gain = gain_map(found, verdicts, settings)
-        image = brighten(view.image, gain) if shadow.any() else view.image
-        greatest = cv2.resize(cv2.max(cv2.max(*cv2.split(gain)[:2]), cv2.split(gain)[2]), size)
-        masks = [scene.candidates, verdicts[found.labels], shadow, edge]
-        masks.append(np.where(found.rings > 0, 2, shadow).astype(np.uint8))
-        candidates, kinds, shadow, edge, rings = (_enlarged(mask, size) for mask in masks)
+        accepted = bool((verdicts == ACCEPTED).any())
+        image = brighten(view.image, gain) if accepted else view.image
+        maps = _maps(scene, found, verdicts, settings)
+        large = {name: enlarged(mask, view.image.shape) for name, mask in maps.items()}
+        greatest = stretched(np.maximum.reduce(cv2.split(gain)), view.image.shape)
+        arrays: dict[str, Mask | Map] = {**large, "gain": greatest, "compensated": image}
         return Output(
-            layers=(
-                Layer(CANDIDATES, candidates),
-                Layer(COMPONENTS, kinds),
-                Layer(SHADOW, shadow),
-                Layer(RINGS, rings),
-                Layer(gain_spec, greatest),
-                Layer(COMPENSATED, image),
-            ),
+            layers=tuple(Layer(spec, arrays[spec.name]) for spec in layers(settings)),
             image=image,
-            regions={"shadow": shadow, "shadow_edge": edge, "lit": 1 - (shadow | edge)},
-            facts=_facts(verdicts, shadow, greatest),
+            regions={name: large[name] for name in ("shadow", "shadow_edge", "lit")},
+            facts=_facts(large["shadow"], verdicts, greatest),
         )
 
     return run
 
 
-def _reduced(image: Rgb, width: int) -> Rgb:
-    if image.shape[1] <= width:
-        return image
-    height = max(1, round(image.shape[0] * width / image.shape[1]))
-    return cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+def _maps(
+    scene: Scene, found: Components, verdicts: Verdicts, settings: GatedSettings
+) -> dict[str, Mask]:
+    """Masks, label images and regions at the size of the working image, by name."""
+    kinds = verdicts[found.labels]
+    shadow = (kinds == ACCEPTED).view(np.uint8)
+    side = 2 * settings.gap + 1
+    edge = cv2.dilate(shadow, np.ones((side, side), np.uint8)) - shadow
+    return {
+        "candidates": scene.candidates,
+        "components": kinds,
+        "shadow": shadow,
+        "rings": np.where(found.rings > 0, np.uint8(2), shadow),
+        "shadow_edge": edge,
+        "lit": 1 - (shadow | edge),
+    }
 
 
-def _enlarged(mask: Mask, size: tuple[int, int]) -> Mask:
-    return cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST_EXACT)
-
-
-def _facts(
-    verdicts: npt.NDArray[np.uint8], shadow: Mask, gain: npt.NDArray[np.float32]
-) -> dict[str, float]:
+def _facts(shadow: Mask, verdicts: Verdicts, gain: Map) -> dict[str, float]:
     counts = np.bincount(verdicts[1:], minlength=len(VERDICTS))
-    reasons = {kind.name.replace(" ", "_"): float(counts[kind.value]) for kind in VERDICTS[2:]}
+    rejected = {kind.name.replace(" ", "_"): float(counts[kind.value]) for kind in VERDICTS[2:]}
     return {
         "shadow_share": float(shadow.mean()),
         "components": float(len(verdicts) - 1),
         "compensated": float(counts[ACCEPTED]),
         "max_gain": float(gain.max()),
-        **reasons,
+        **rejected,
     }
-
-
-def _gain(settings: GatedSettings) -> LayerSpec:
-    """Describe the map of gains, the greatest of the three channels."""
-    span = (1.0, 1 / settings.ratio[0])
-    return LayerSpec("gain", LayerKind.SCALAR, "Gain", value_range=span, exact=False)
 
 
 def layers(settings: GatedSettings) -> tuple[LayerSpec, ...]:
     """Name the layers of the filter, in the order of its steps."""
-    return CANDIDATES, COMPONENTS, SHADOW, RINGS, _gain(settings), COMPENSATED
+    span = (1.0, 1 / settings.ratio[0])
+    gain = LayerSpec(
+        "gain", LayerKind.SCALAR, "Greatest gain of a channel", value_range=span, exact=False
+    )
+    return CANDIDATES, COMPONENTS, SHADOW, RINGS, gain, COMPENSATED
 
 
 def fit(sample: TrainingSet, _settings: GatedSettings) -> RoadLight:

@@ -123,3 +123,32 @@ def look_up_colours(image: npt.NDArray[np.uint8], table: Codes) -> Codes:
     wide = image.astype(np.int32)
     found: Codes = table[(wide[..., 0] << 16) | (wide[..., 1] << 8) | wide[..., 2]]
     return found
+
+
+def rectified_sum(
+    features: npt.NDArray[np.float32],
+    planes: npt.NDArray[np.float32],
+    bias: npt.NDArray[np.float32],
+    weights: npt.NDArray[np.float32],
+) -> npt.NDArray[np.float32]:
+    """Sum ``sum_k weights[k] max(planes[k] . x + bias[k], 0)`` of every pixel's features x.
+
+    Parameters
+    ----------
+    features
+        ``(F, n)`` float32: a row a feature, a column a pixel.
+    planes, bias, weights
+        ``(K, F)``, ``(K,)`` and ``(K,)`` float32.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(n,)`` float32, added up in the order of the planes.
+    """
+    result = np.zeros(features.shape[1], np.float32)
+    for plane, start, weight in zip(planes, bias, weights, strict=True):
+        side = np.full_like(result, start)
+        for feature, slope in zip(features, plane, strict=True):
+            side += feature * slope
+        result += np.maximum(side, np.float32(0)) * weight
+    return result

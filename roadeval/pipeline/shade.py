@@ -28,8 +28,9 @@ road pixels, and those are puddles, tar and undersides of cars."""
 NOISE: Final = 1e-4
 """Variance of a log-chromaticity that 8-bit JPEG coding alone brings to a mid grey."""
 
-# Eight grey levels more keep the logarithm of dark, noisy pixels from running away.
-_LOG: Final = np.log(np.arange(256) + 8.0).astype(np.float32)
+LOGS: Final = np.log(np.arange(256) + 8.0).astype(np.float32)
+"""``(256,)`` float32: logarithm of a channel; eight grey levels more keep dark, noisy pixels from
+running away."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +52,7 @@ class RoadLight:
 
 def chromaticity(rgb: npt.NDArray[np.uint8]) -> tuple[Map, Map]:
     """``ln R - ln G`` and ``ln B - ln G`` of ``(H, W, 3)`` uint8 RGB, ``(H, W)`` float32 each."""
-    logs = cv2.LUT(rgb, _LOG)
+    logs = cv2.LUT(rgb, LOGS)
     return logs[..., 0] - logs[..., 1], logs[..., 2] - logs[..., 1]
 
 
@@ -114,13 +115,14 @@ def brightness(image: Rgb) -> npt.NDArray[np.uint16]:
 
 
 def excess_green(image: Rgb, total: npt.NDArray[np.uint16]) -> Map:
-    """``(2 G - R - B) / (R + G + B)``, ``(H, W)`` float32: high on grass and leaves; 0 for black."""
+    """``(2 G - R - B) / (R + G + B)``, ``(H, W)`` float32: high on leaves, 0 for black."""
     green = image[..., 1].astype(np.float32)
     whole = total.astype(np.float32)
-    return (3 * green - whole) / np.maximum(whole, 1)
+    index: Map = cv2.divide(3 * green - whole, np.maximum(whole, 1))
+    return index
 
 
 def quantile(values: npt.NDArray[np.uint16], mask: Mask, share: float) -> int:
-    """Least value that at least ``share`` of the masked pixels do not exceed; 0 if there are none."""
+    """Least value that ``share`` of the masked pixels do not exceed; 0 if there are none."""
     counted = np.cumsum(np.bincount(values[mask > 0], minlength=1))
     return int(np.searchsorted(counted, share * counted[-1])) if counted[-1] else 0

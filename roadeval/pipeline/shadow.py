@@ -71,7 +71,8 @@ class ShadowSettings:
     connectivity
         Neighbours that make one component (Eq. 9): 8 or 4.
     ring_width
-        Number of 3x3 dilations that make a buffer ring (Eq. 10).
+        Number of 3x3 dilations that make a buffer ring (Eq. 10), at most 16: the work grows
+        with its square.
     min_area
         Components of fewer pixels are left as they are.
     max_gain
@@ -88,7 +89,7 @@ class ShadowSettings:
     threshold: Literal["otsu", "printed"] = "otsu"
     inclusive: bool = False
     connectivity: Literal[4, 8] = 8
-    ring_width: Annotated[int, Field(ge=1, le=64)] = 1
+    ring_width: Annotated[int, Field(ge=1, le=16)] = 1
     min_area: Annotated[int, Field(ge=1)] = 1
     max_gain: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     statistic: Literal["deviation", "printed"] = "deviation"
@@ -315,15 +316,17 @@ def ring_pairs(
     y, x = np.nonzero(ring)
     rows, columns = labels.shape
     size = rows * columns
-    keys = []
+    pairs = np.empty(0, np.int64)
     for dy in range(-width, width + 1):
+        keys = []
         for dx in range(-width, width + 1):
             v, u = y + dy, x + dx
             valid = (v >= 0) & (v < rows) & (u >= 0) & (u < columns)
             near = labels[v[valid], u[valid]].astype(np.int64)
             keys.append((near * size + y[valid] * columns + x[valid])[near > 0])
-    unique = np.unique(np.concatenate(keys)) if keys else np.empty(0, np.int64)
-    return unique // size, unique % size
+        # Row by row, so that a wide ring's many repetitions never lie in memory together.
+        pairs = np.unique(np.concatenate([pairs, *keys]))
+    return pairs // size, pairs % size
 
 
 # --- The stage ------------------------------------------------------------------------------------

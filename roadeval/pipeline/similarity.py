@@ -29,11 +29,12 @@ class SimilaritySettings:
         with 3 degrees of freedom: the share of normally distributed road colours kept.
     ridge
         Added to the covariance's diagonal, in squared grey levels: a grey camera's covariance
-        is singular. 1 is about the variance that 8-bit JPEG coding alone adds.
+        is singular. 1 is about the variance that 8-bit JPEG coding alone adds; much below 0.001
+        a singular covariance's inverse is lost in rounding.
     """
 
     quantile: Annotated[float, Field(gt=0, lt=1)] = 0.95
-    ridge: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
+    ridge: Annotated[float, Field(ge=1e-3, allow_inf_nan=False)] = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

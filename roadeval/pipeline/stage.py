@@ -65,6 +65,8 @@ class TrainingSet:
         ``(n,)`` bool: its label.
     seed
         For whatever a fit draws at random.
+    road_share
+        Share of road among the frames' labelled pixels; the sample itself is balanced.
     """
 
     images: tuple[Rgb, ...]
@@ -73,6 +75,7 @@ class TrainingSet:
     column: npt.NDArray[np.intp]
     road: npt.NDArray[np.bool_]
     seed: int = 0
+    road_share: float = 0.5
 
     def colours(self) -> npt.NDArray[np.uint8]:
         """``(n, 3)`` uint8 RGB of the sampled pixels."""
@@ -90,7 +93,7 @@ class Stage(Generic[S, P]):
     Parameters
     ----------
     name
-        Bears the mask's layer and the tables' ``stage`` column.
+        In a chain and in a configuration.
     title
         A few words for a person, as ``Phase 1: colour similarity``.
     settings
@@ -106,8 +109,13 @@ class Stage(Generic[S, P]):
     parameters
         The type of the parameters, for reading model files; None if there are none.
     is_filter
-        Whether it only prepares the image. The ``unfiltered`` variant is the chain without its
-        filters.
+        Whether it only prepares the image, and is left out of the ``unfiltered`` variant, which
+        shows what it does.
+    prepares
+        Whether it only prepares the image, in every variant.
+    mask
+        Its mask's layer, and its name in tables and timing, where that is not ``name``: stages
+        that do the same in different ways are tabled under one name.
     """
 
     name: str
@@ -118,3 +126,15 @@ class Stage(Generic[S, P]):
     fit: Callable[[TrainingSet, S], P] | None = None
     parameters: type[P] | None = None
     is_filter: bool = False
+    prepares: bool = False
+    mask: str = ""
+
+    @property
+    def yields_mask(self) -> bool:
+        """Whether it hands out a road mask; else an image for the stages after it."""
+        return not (self.is_filter or self.prepares)
+
+    @property
+    def reported(self) -> str:
+        """Its name in tables, recordings and timing."""
+        return self.mask or self.name

@@ -208,6 +208,15 @@ class Recording:
         return self._reader.stream(store=self._entry)
 
 
+def indexed_chunks(path: Path) -> int:
+    """Count the chunks that a recording's own index lists; 0 if it has no index."""
+    try:
+        store = _store(*_open(path))
+    except RecordingError:
+        return 0
+    return 0 if store is None else len(store)
+
+
 def _open(path: Path) -> tuple[RrdReader, StoreEntry]:
     if not path.is_file():
         raise RecordingError(f"{path}: no such recording")

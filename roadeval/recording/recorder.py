@@ -9,13 +9,14 @@ from types import TracebackType
 from typing import Any, Final, Self
 
 import rerun as rr
-from rerun.chunk import Chunk, RrdReader
+from rerun.chunk import Chunk
 
 from roadeval.data import FrameResult
 from roadeval.recording import blueprint, style, tracks
 from roadeval.recording import layout as at
 from roadeval.recording.encoding import Encoded, Encoder
 from roadeval.recording.layout import Layout, RecordingError
+from roadeval.recording.reading import indexed_chunks
 
 PAGE: Final = 8
 """Frames whose images, notes and table lines share a chunk: what a killed run loses at most."""
@@ -131,7 +132,8 @@ class Recorder:
         """
         self._static(style.results(self._layout, results))
         self._close()
-        self._check()
+        if indexed_chunks(self.partial) < self._chunks:
+            raise self._incomplete()
         self.partial.replace(self.path)
 
     def _add_images(self, encoded: Encoded) -> None:
@@ -184,15 +186,6 @@ class Recorder:
         finally:
             self._stream.disconnect()
             self._stream = None
-
-    def _check(self) -> None:
-        """Compare the file's own index with what was sent to it."""
-        try:
-            complete = len(RrdReader(self.partial).store()) >= self._chunks
-        except RuntimeError:
-            complete = False
-        if not complete:
-            raise self._incomplete()
 
     def _incomplete(self) -> RecordingError:
         return RecordingError(f"{self.partial}: cannot be written any further; is the disk full?")

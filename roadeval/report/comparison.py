@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.report import plots
@@ -55,8 +56,10 @@ def document(content: Content, windows: pd.DataFrame) -> Document:
 def markdown(content: Content) -> str:
     """Write a comparison as Markdown."""
     lines = ["# roadeval comparison", "", _escaped(headline(content)), ""]
-    for condition in content["conditions"]:
-        lines.append(f"- {'**FAIL**' if condition['holds'] else 'ok'}: {_escaped(condition['sentence'])}")
+    lines += [
+        f"- {'**FAIL**' if condition['holds'] else 'ok'}: {_escaped(condition['sentence'])}"
+        for condition in content["conditions"]
+    ]
     lines += ["", *_markdown_table(changes(content)), ""]
     if content["moved"]:
         lines += ["Frames that changed most:", "", *_markdown_table(moved(content)), ""]
@@ -69,41 +72,35 @@ def changes(content: Content) -> Table:
     """Tabulate every result, variant and stage: the rates, and what changed."""
     if not content["same_drive"]:
         return _levels(content)
-    rows: list[list[Cell | str]] = []
-    breaks = []
-    for place, change in enumerate(content["changes"]):
-        if place and change["result"] != content["changes"][place - 1]["result"]:
-            breaks.append(place)
-        told = change["difference"]
-        rows.append(
+    names, rows = _names(content["changes"]), content["changes"]
+    return Table(
+        [*names, "<stage", "base", "new", "difference", "interval", "FPR", "FNR"],
+        [
             [
-                change["result"],
-                change["variant"],
+                *(change[name.removeprefix("<")] for name in names),
                 change["stage"],
                 percent(change["base"]["ERR"]),
                 percent(change["new"]["ERR"]),
-                Cell(points(told["ERR"]["mean"]), bold=change["final"]),
-                interval(told["ERR"]),
+                Cell(points(change["difference"]["ERR"]["mean"]), bold=change["final"]),
+                interval(change["difference"]["ERR"]),
                 *(points(change["new"][r] - change["base"][r]) for r in ("FPR", "FNR")),
             ]
-        )
-    return Table(
-        ["<result", "<variant", "<stage", "base", "new", "difference", "interval", "FPR", "FNR"],
-        rows,
-        breaks=breaks,
-        groups=[("", 3), ("ERR", 4), ("difference", 2)],
+            for change in rows
+        ],
+        breaks=_breaks(rows),
+        groups=[("", len(names) + 1), ("ERR", 4), ("difference", 2)],
         small=True,
     )
 
 
 def moved(content: Content) -> Table:
     """Tabulate the frames whose error rate changed most."""
+    names = _names(content["moved"])
     return Table(
-        ["<result", "<variant", "frame", "stamp", "ERR base", "new", "difference"],
+        [*names, "frame", "<stamp", "ERR base", "new", "difference"],
         [
             [
-                row["result"],
-                row["variant"],
+                *(row[name.removeprefix("<")] for name in names),
                 str(row["frame"]),
                 moment(row["stamp_ns"]),
                 percent(row["base"]),
@@ -112,8 +109,43 @@ def moved(content: Content) -> Table:
             ]
             for row in content["moved"]
         ],
+        breaks=_breaks(content["moved"]),
         small=True,
     )
+
+
+def _levels(content: Content) -> Table:
+    rows = content["changes"]
+    return Table(
+        ["<result", "<variant", "<stage", "frames", *RATES, "IoU"],
+        [
+            [
+                change["result"],
+                change["variant"],
+                change["stage"],
+                number(change["frames"]),
+                *(percent(change["new"][rate]) for rate in (*RATES, "IoU")),
+            ]
+            for change in rows
+        ],
+        breaks=_breaks(rows),
+        small=True,
+    )
+
+
+def _names(rows: Sequence[Content]) -> tuple[str, ...]:
+    """Give the columns that name a row: the result's, unless the variants are the results."""
+    alone = all(row["result"] == row["variant"] for row in rows)
+    return ("<variant",) if alone else ("<result", "<variant")
+
+
+def _breaks(rows: Sequence[Content]) -> list[int]:
+    """Find the rows at which another result begins."""
+    return [
+        place
+        for place, (above, row) in enumerate(pairwise(rows), 1)
+        if above["result"] != row["result"]
+    ]
 
 
 def _blocks(content: Content, windows: pd.DataFrame) -> Iterator[Block]:
@@ -131,22 +163,24 @@ def _blocks(content: Content, windows: pd.DataFrame) -> Iterator[Block]:
     if content["warnings"]:
         yield Points("Beware", content["warnings"], "warning")
     finals = [change for change in content["changes"] if change["final"]]
-    if content["same_drive"]:
+    if not content["same_drive"]:
+        yield Figure(plots.vector(lambda: plots.levels(finals)), "Rates of the final masks.")
+    else:
         yield Figure(
             plots.vector(lambda: plots.forest(finals)),
             "Change of the final mask's rates against the base; bars are intervals, where given.",
         )
-        yield Heading("Over the drive")
+        yield Heading("Over the drive", 2)
         yield Figure(plots.vector(lambda: error_rate("the common frames", windows)), "")
     if content["moved"]:
-        yield Heading("Frames that changed most")
+        yield Heading("Frames that changed most", 2)
         yield moved(content)
 
 
 def _reasons(content: Content) -> Iterator[Block]:
     """Say why there is no interval, once for each reason."""
     reasons = dict.fromkeys(
-        f"{change['result']}, {change['variant']}: no interval for ERR, because {told['reason']}."
+        f"{_name(change)}: no interval for ERR, because {told['reason']}."
         for change in content["changes"]
         if change["final"] and (told := change["difference"].get("ERR"))
         if told["low"] is None
@@ -154,34 +188,20 @@ def _reasons(content: Content) -> Iterator[Block]:
     yield from (Text(reason, "note") for reason in reasons)
 
 
-def _levels(content: Content) -> Table:
-    return Table(
-        ["<result", "<variant", "<stage", "frames", *RATES, "IoU"],
-        [
-            [
-                change["result"],
-                change["variant"],
-                change["stage"],
-                number(change["frames"]),
-                *(percent(change["new"][rate]) for rate in (*RATES, "IoU")),
-            ]
-            for change in content["changes"]
-        ],
-        small=True,
-    )
-
-
 def _told(change: Content) -> str:
     told = change["difference"]["ERR"]
-    name = change["result"] if change["result"] == change["variant"] else (
-        f"{change['result']}, {change['variant']}"
-    )
+    name = _name(change)
     if not defined(told["mean"]):
         return f"{name}: ERR undefined"
     if told["low"] == told["high"] == 0:
         return f"{name}: ERR the same on every frame"
     sure = "no interval" if told["low"] is None else f"{interval(told)}"
     return f"{name}: ERR {points(told['mean'])} pp ({sure})"
+
+
+def _name(change: Content) -> str:
+    same = change["result"] == change["variant"]
+    return str(change["result"]) if same else f"{change['result']}, {change['variant']}"
 
 
 def _result(result: Content) -> str:

@@ -27,7 +27,7 @@ def _facts(found: Findings, drive: dict[str, Any]) -> Iterator[str]:
     count = found.summary["frames"].get("in_log") or found.summary["frames"].get("decoded")
     yield f"{count} frames"
     if drive.get("width"):
-        yield f"{drive['width']} × {drive['height']}"
+        yield f"{drive['width']} \N{MULTIPLICATION SIGN} {drive['height']}"
     if drive.get("rate_hz"):
         yield f"{drive['rate_hz']:.4g} Hz"
     presets = {str(each["preset"]) for each in found.summary["settings"].values()}
@@ -59,10 +59,7 @@ def _unscored(found: Findings) -> Iterator[Block]:
         "whether the filter helps, not which stage is at fault. What follows is what was computed."
     )
     if found.examples:
-        pictures = [
-            (title, picture)
-            for title, picture in outcomes.example_pictures(found.examples)
-        ]
+        pictures = list(outcomes.example_pictures(found.examples))
         yield Strip(pictures, len(found.examples[0].masks) + 1)
     if len(found.coverage):
         table = found.coverage
@@ -70,5 +67,3 @@ def _unscored(found: Findings) -> Iterator[Block]:
             plots.vector(lambda: plots.coverage(table)),
             "The share of the image that the final masks call road. A jump is worth a look.",
         )
-
-

@@ -44,7 +44,7 @@ class Versus:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Heat:
-    """How often a pixel was a false positive and a false negative, ``(H, W)``; NaN if unlabelled."""
+    """How often a pixel was a false positive and a false negative; NaN if never labelled."""
 
     variant: str
     fp: npt.NDArray[np.float64]
@@ -165,5 +165,5 @@ class Findings:
         return totals
 
     def total(self, variant: str) -> Mapping[str, Any]:
-        """Counts and rates of a variant's final mask."""
+        """Give the counts and rates of a variant's final mask."""
         return self.totals[variant][self.finals[variant]]

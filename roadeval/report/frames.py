@@ -92,6 +92,7 @@ def _said(case: Case) -> Iterator[str]:
         first, *rest = case.parts
         terms = [f"{first} {percent(case.parts[first])}"]
         terms += [f"{name} {points(case.parts[name])}" for name in rest]
-        yield f"ERR of {case.variant}: {', '.join(terms)} pp. Most of it comes from {culprit(case)}."
+        told = ", ".join(terms)
+        yield f"ERR of {case.variant}: {told} pp. Most of it comes from {culprit(case)}."
     if case.notes:
         yield " ".join(case.notes)

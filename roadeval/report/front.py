@@ -25,6 +25,10 @@ from roadeval.report.words import defined, listing, number, percent
 
 PAPERS: Final = ("ERR", "FPR", "FNR", "ACC")
 """The rates of the paper that the report tells; the other two mirror FNR and FPR."""
+SIDE_BY_SIDE: Final = 3
+"""More variants than this do not fit beside each other under several rates."""
+CROWDED: Final = 7
+"""Variants and warnings together that leave room for all thumbnails."""
 PARTIAL: Final = (
     "This run did not reach its end: the report covers the part of the recording that can be read."
 )
@@ -40,11 +44,12 @@ def summary(found: Findings) -> Iterator[Block]:
         yield Text(note, "note")
     if found.totals:
         yield key_table(found)
-    if found.thumbnails:
-        pictures = [(shot.title, asset(shot)) for shot in found.thumbnails]
-        yield Strip(pictures, 4)
-        yield Text(_legend(found), "note")
     alarms = list(warnings(found))
+    if found.thumbnails:
+        # A crowded page has room for one row of four only.
+        shown = found.thumbnails[: 4 if len(found.finals) + len(alarms) > CROWDED else None]
+        yield Strip([(shot.title, asset(shot)) for shot in shown], 4)
+        yield Text(_legend(found), "note")
     yield Columns(
         [_accounting(found.summary["frames"])],
         [Points("Beware", alarms, "warning")] if alarms else [Points("Beware", ["Nothing known."])],
@@ -61,7 +66,7 @@ def key_table(found: Findings) -> Table:
     for rate in ("IoU", "F1", "precision"):
         columns[rate] = [found.overlap[name][found.finals[name]][rate] for name in names]
     best = {title: _best(title, values) for title, values in columns.items()}
-    rows = [
+    rows: list[list[Cell | str]] = [
         [
             variant_cell(name, names),
             number(found.total(name)["frames"]),
@@ -133,7 +138,9 @@ def _accounting(frames: Mapping[str, Any]) -> Table:
     ]
     skipped = [(f"skipped: {why}", value) for why, value in frames.get("skipped", {}).items()]
     return Table(
-        ["<frames", "count"], [[name, number(value)] for name, value in [*told, *skipped]], small=True
+        ["<frames", "count"],
+        [[name, number(value)] for name, value in [*told, *skipped]],
+        small=True,
     )
 
 
@@ -168,5 +175,3 @@ def _undefined(found: Findings) -> Iterator[str]:
         if many:
             told = listing([f"{rate} on {count}" for rate, count in many.items()])
             yield f"{variant}: undefined on some of {total['frames']} frames, and left out: {told}."
-
-

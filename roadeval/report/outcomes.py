@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import pandas as pd
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, TRUTH, UNFILTERED, mask_spec
 from roadeval.report import plots
-from roadeval.report.blocks import Block, Cell, Figure, Heading, Strip, Table, Text
+from roadeval.report.blocks import Asset, Block, Cell, Figure, Heading, Strip, Table, Text
 from roadeval.report.figures import Example
 from roadeval.report.findings import Findings, Versus
-from roadeval.report.front import PAPERS, variant_cell
+from roadeval.report.front import PAPERS, SIDE_BY_SIDE, variant_cell
 from roadeval.report.pictures import Shot, asset
 from roadeval.report.rate_figures import error_rate, fp_fn_rate
-from roadeval.report.words import interval, listing, number, percent, points
+from roadeval.report.words import DASH, interval, listing, number, percent, points
 
-SIDE_BY_SIDE = 3
-"""More variants than this do not fit beside each other in the table over the drive."""
-ROAD = mask_spec("road", "road")
+PAPER_ROW: Final = 10
+"""Frames in a row of the paper's figures (section 5)."""
+ROAD: Final = mask_spec("road", "road")
 
 
 def paper(found: Findings) -> Iterator[Block]:
@@ -44,26 +43,30 @@ def _rows(found: Findings) -> Iterator[Block]:
     together = len(names) <= SIDE_BY_SIDE
     for rates in [PAPERS] if together else [(rate,) for rate in PAPERS]:
         yield _row_table(found, names, rates)
+    long = "" if found.rows == PAPER_ROW else f" The paper's rows are of {PAPER_ROW}."
     yield Text(
-        f"Rows of {found.rows} evaluated frames: the mean of the frames' rates in percent, as in "
-        "the paper. The last line is the mean over all evaluated frames.",
+        f"Rows of {found.rows} evaluated frames: the mean of the frames' rates in percent.{long} "
+        "The last line is the mean over all evaluated frames.",
         "note",
     )
 
 
 def _row_table(found: Findings, names: list[str], rates: tuple[str, ...]) -> Table:
-    rows = found.windows.set_index(["variant", "stage", "window"])
+    told = {
+        (row["variant"], row["stage"], row["window"]): row
+        for row in found.windows.to_dict("records")
+    }
     spans = found.windows.drop_duplicates("window").sort_values("window")
     lines: list[list[Cell | str]] = [
         [
-            _span(row.first_frame, row.last_frame),
+            _span(row["first_frame"], row["last_frame"]),
             *(
-                percent(_at(rows, name, found.finals[name], row.window, rate))
+                percent(told.get((name, found.finals[name], row["window"]), {}).get(rate))
                 for rate in rates
                 for name in names
             ),
         ]
-        for row in spans.itertuples()
+        for row in spans.to_dict("records")
     ]
     lines.append(
         [
@@ -80,20 +83,16 @@ def _row_table(found: Findings, names: list[str], rates: tuple[str, ...]) -> Tab
     )
 
 
-def _at(rows: pd.DataFrame, variant: str, stage: str, window: int, rate: str) -> float | None:
-    key = variant, stage, window
-    return float(rows.loc[key, rate]) if key in rows.index else None
-
-
 def _span(first: int, last: int) -> str:
-    return str(first) if first == last else f"{first}–{last}"
+    return str(first) if first == last else f"{first}{DASH}{last}"
 
 
 def _short(name: str) -> str:
     return {FILTERED: "with", UNFILTERED: "without"}.get(name, name)
 
 
-def example_pictures(examples: list[Example]) -> Iterator[tuple[str, object]]:
+def example_pictures(examples: Sequence[Example]) -> Iterator[tuple[str, Asset]]:
+    """Paint figure 2: for each frame the image, each variant's mask over it, and the truth."""
     for example in examples:
         yield f"frame {example.frame}", asset(Shot("", example.image))
         for name, mask in example.masks.items():
@@ -127,7 +126,15 @@ def against(found: Findings) -> Iterator[Block]:
 
 def _paired(found: Findings, each: Versus) -> Iterator[Block]:
     yield Table(
-        ["<rate", each.treated, each.control, "difference, pp", "interval, pp", "frames", "effective"],
+        [
+            "<rate",
+            each.treated,
+            each.control,
+            "difference, pp",
+            "interval, pp",
+            "frames",
+            "effective",
+        ],
         [
             [
                 rate,
@@ -156,9 +163,9 @@ def _paired(found: Findings, each: Versus) -> Iterator[Block]:
     )
 
 
-def _effective(told: object) -> str:
-    frames = told["effective_frames"]  # type: ignore[index]
-    return "–" if frames is None else f"{frames:.0f}"
+def _effective(told: Mapping[str, Any]) -> str:
+    frames = told["effective_frames"]
+    return DASH if frames is None else f"{frames:.0f}"
 
 
 def _method(each: Versus) -> str:
@@ -221,5 +228,3 @@ def _blind(found: Findings, blind: list[Versus]) -> Table:
             for each in blind
         ],
     )
-
-

@@ -56,7 +56,7 @@ def paint(shot: Shot) -> Rgb:
         return shot.image
     match shot.spec.kind:
         case LayerKind.RGB:
-            return shot.array
+            return shot.array.astype(np.uint8, copy=False)
         case LayerKind.SCALAR:
             return _coloured(shot.spec, shot.array)
         case LayerKind.MASK | LayerKind.LABELS:
@@ -69,7 +69,9 @@ def _coloured(spec: LayerSpec, values: npt.NDArray[Any]) -> Rgb:
 
     low, high = spec.value_range
     codes = np.clip((values - low) * (255 / (high - low)), 0, 255).astype(np.uint8)
-    return cv2.cvtColor(cv2.applyColorMap(codes, cv2.COLORMAP_VIRIDIS), cv2.COLOR_BGR2RGB)
+    bgr = cv2.applyColorMap(codes, cv2.COLORMAP_VIRIDIS)
+    rgb: Rgb = cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+    return rgb
 
 
 def _overlaid(image: Rgb, spec: LayerSpec, labels: npt.NDArray[Any]) -> Rgb:
@@ -80,7 +82,8 @@ def _overlaid(image: Rgb, spec: LayerSpec, labels: npt.NDArray[Any]) -> Rgb:
     colours = table[labels]
     opacity = colours[..., 3:] / 255
     mixed = image * DARKEN * (1 - opacity) + colours[..., :3] * opacity
-    return np.rint(mixed).astype(np.uint8)
+    painted: Rgb = np.rint(mixed).astype(np.uint8)
+    return painted
 
 
 def shrunk(image: Rgb, width: int) -> Rgb:

@@ -36,7 +36,8 @@ def vector(draw: Callable[[], Figure]) -> Asset:
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     buffer = io.BytesIO()
-    with mpl.rc_context({**RC, "svg.fonttype": "none", "svg.hashsalt": "roadeval"}):  # type: ignore[arg-type]
+    look: Any = {**RC, "svg.fonttype": "none", "svg.hashsalt": "roadeval"}
+    with mpl.rc_context(look):
         figure = draw()
         FigureCanvasSVG(figure)
         figure.savefig(buffer, format="svg", dpi=200, metadata={"Date": None})
@@ -61,7 +62,7 @@ def difference(
 
     figure = Figure(figsize=(WIDTH, 2.6), layout="constrained")
     ax = figure.subplots()
-    group = -(-len(frames) // BARS)
+    group = max(-(-len(frames) // BARS), 1)
     places = np.arange(0, len(frames), group)
     values = 100 * _grouped(frames["ERR"].to_numpy(float), group)
     look = looks([treated, control])
@@ -75,8 +76,16 @@ def difference(
     ax.axhline(0, color=FAINT, linewidth=0.8)
     _frame_ticks(ax, frames.index.to_numpy())
     ax.set_ylabel("difference of ERR, pp")
-    ax.text(0.005, 0.97, f"{treated} worse", transform=ax.transAxes, va="top", color=FAINT, size=8)
-    ax.text(0.005, 0.03, f"{treated} better", transform=ax.transAxes, color=FAINT, size=8)
+    ax.margins(y=0.12)
+    for height, align, word in ((0.98, "top", "worse"), (0.02, "bottom", "better")):
+        ax.text(
+            *(0.006, height, f"{treated} {word}"),
+            transform=ax.transAxes,
+            va=align,
+            color=FAINT,
+            size=8,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5},
+        )
     return figure
 
 
@@ -173,7 +182,7 @@ def heat(maps: Sequence[Heat]) -> Figure:
         grid[0, column].set_title(title, loc="left")
         bar = figure.colorbar(drawn, ax=grid[:, column], location="bottom", aspect=40, pad=0.02)
         bar.set_label("% of the frames that label the pixel", size=8)
-        bar.outline.set_visible(False)  # type: ignore[operator]
+        bar.outline.set_visible(False)
     return figure
 
 
@@ -223,7 +232,7 @@ def _legend(figure: Figure, variants: Sequence[str]) -> None:
             [],
             [],
             color=look.colour,
-            linestyle=look.dash,
+            linestyle=look.dash,  # type: ignore[arg-type]
             linewidth=look.width,
             marker=None if name == BASELINE else look.marker,
             markersize=5,
@@ -236,10 +245,12 @@ def _legend(figure: Figure, variants: Sequence[str]) -> None:
 
 
 def _frame_ticks(ax: Axes, frames: Any) -> None:
-    """Label places along the evaluated frames with the frames' numbers."""
-    step = max(len(frames) // 10, 1)
-    step = next(s for s in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 10**9) if s >= step)
-    places = np.flatnonzero(frames % step == 0)
+    """Label places along the evaluated frames with round numbers of frames."""
+    from matplotlib.ticker import MaxNLocator
+
+    wanted = MaxNLocator(nbins=10, integer=True).tick_values(frames[0], frames[-1])
+    wanted = wanted[(wanted >= frames[0]) & (wanted <= frames[-1])]
+    places = np.unique(np.searchsorted(frames, wanted))
     ax.set_xticks(places, [str(frame) for frame in frames[places]])
     ax.set_xlim(-0.5, len(frames) - 0.5)
     ax.set_xlabel("frame")
@@ -286,9 +297,40 @@ def forest(changes: Sequence[Mapping[str, Any]]) -> Figure:
                 ax.plot(ends, [place, place], color=INK, linewidth=1.6)
         ax.axvline(0, color=FAINT, linewidth=0.8)
         ax.margins(x=0.15)
+        # Rounding alone must not look like a change.
+        low, high = ax.get_xlim()
+        ax.set_xlim(min(low, -0.1), max(high, 0.1))
         ax.set_title(f"{rate}, pp", loc="left")
         ax.grid(axis="x")
         ax.grid(visible=False, axis="y")
     grid[0].set_yticks(places, names)
     grid[0].set_ylim(len(changes) - 0.5, -0.5)
+    return figure
+
+
+def levels(rows: Sequence[Mapping[str, Any]]) -> Figure:
+    """Draw the rates of several results' final masks, a line of marks a result.
+
+    Parameters
+    ----------
+    rows
+        Rows of a comparison with ``result``, ``variant`` and ``new``.
+    """
+    from matplotlib.figure import Figure
+
+    results = list(dict.fromkeys(row["result"] for row in rows))
+    variants = list(dict.fromkeys(row["variant"] for row in rows))
+    figure = Figure(figsize=(WIDTH, 1.0 + 0.32 * len(results)), layout="constrained")
+    grid = figure.subplots(1, 3, sharey=True)
+    for ax, rate in zip(grid, ("ERR", "FPR", "FNR"), strict=True):
+        for variant, look in looks(variants).items():
+            own = [row for row in rows if row["variant"] == variant]
+            x = [_percent(row["new"][rate]) for row in own]
+            _marks(ax, x, [results.index(row["result"]) for row in own], look)
+        ax.set_title(f"{rate}, %", loc="left")
+        ax.set_xlim(left=0)
+        ax.grid(axis="x")
+    grid[0].set_yticks(range(len(results)), results)
+    grid[0].set_ylim(len(results) - 0.5, -0.5)
+    _legend(figure, variants)
     return figure

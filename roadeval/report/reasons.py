@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.report import plots
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.findings import Findings
-from roadeval.report.front import variant_cell
-from roadeval.report.words import percent, points
+from roadeval.report.front import SIDE_BY_SIDE, variant_cell
+from roadeval.report.words import DASH, percent, points
 
 REGIONS: Final = {
     "shadow": "inside detected shadow",
@@ -23,6 +24,8 @@ REGIONS: Final = {
 """The regions' names for people, in the report's order; row bands follow."""
 FILTER: Final = "filter"
 """Names the filter's part among the stages' in `Findings.parts`."""
+MAPS: Final = 2
+"""Variants whose heat maps share a figure."""
 
 
 def where(found: Findings) -> Iterator[Block]:
@@ -35,13 +38,12 @@ def where(found: Findings) -> Iterator[Block]:
         "Error rate within each region, and the region's share of all wrong pixels beside its "
         "share of all pixels: a mark to the right of the grey bar is more than its share.",
     )
-    yield _regions(found, names)
+    yield from _regions(found, names)
     yield Text(_said(found), "note")
-    if found.heat:
-        maps = found.heat
+    for place in range(0, len(found.heat), MAPS):
         yield Figure(
-            plots.vector(lambda: plots.heat(maps)),
-            f"Where in the image the final masks go wrong, {_counted(found)}. Grey: never labelled.",
+            plots.vector(partial(plots.heat, found.heat[place : place + MAPS])),
+            f"Where the final masks go wrong, {_counted(found)}. Grey: never labelled.",
             width=0.8,
         )
 
@@ -53,25 +55,30 @@ def region_names(found: Findings) -> dict[str, str]:
     height = found.summary["drive"].get("height") or 0
     named = {name: text for name, text in REGIONS.items() if name in present}
     for place, name in enumerate(bands):
-        rows = f"{height * place // len(bands)}–{height * (place + 1) // len(bands) - 1}"
+        first, after = (-(-height * edge // len(bands)) for edge in (place, place + 1))
         end = {0: ", the top", len(bands) - 1: ", the bottom"}.get(place, "")
-        named[name] = (f"image rows {rows}" if height else f"image rows, band {place}") + end
+        named[name] = (
+            f"image rows {first}{DASH}{after - 1}" if height else f"image rows, band {place}"
+        ) + end
     return named
 
 
-def _regions(found: Findings, names: Mapping[str, str]) -> Table:
+def _regions(found: Findings, names: Mapping[str, str]) -> Iterator[Table]:
+    """Tabulate the regions; two tables where the variants do not fit side by side."""
+    shares = {"ERR": "ERR within, %", "errors": "share of its wrong pixels, %"}
+    together = len(found.finals) <= SIDE_BY_SIDE
+    for columns in [[*shares]] if together else [[column] for column in shares]:
+        yield _region_table(found, names, {column: shares[column] for column in columns})
+
+
+def _region_table(found: Findings, names: Mapping[str, str], columns: Mapping[str, str]) -> Table:
     variants = [*found.finals]
-    table = found.regions.set_index(["region", "variant"])
-    pixels = found.regions.drop_duplicates("region").set_index("region")["pixels"]
+    told = {(row["region"], row["variant"]): row for row in found.regions.to_dict("records")}
     rows: list[list[Cell | str]] = [
         [
             text,
-            percent(pixels[region], 1),
-            *(
-                percent(table.loc[(region, name), column], 1)
-                for column in ("ERR", "errors")
-                for name in variants
-            ),
+            percent(told[region, variants[0]]["pixels"], 1),
+            *(percent(told[region, name][column], 1) for column in columns for name in variants),
         ]
         for region, text in names.items()
     ]
@@ -79,14 +86,13 @@ def _regions(found: Findings, names: Mapping[str, str]) -> Table:
     first_band = kinds.index(True) if any(kinds) else len(rows)
     halves = [place for place, region in enumerate(names) if region == "boundary"]
     return Table(
-        ["<region", "of all", *variants, *variants],
+        ["<region", "of all, %", *(name for _ in columns for name in variants)],
         rows,
         breaks=sorted({*halves, first_band} - {0, len(rows)}),
         groups=[
             ("", 1),
-            ("pixels, %", 1),
-            ("ERR within, %", len(variants)),
-            ("share of its wrong pixels, %", len(variants)),
+            ("pixels", 1),
+            *((title, len(variants)) for title in columns.values()),
         ],
         small=True,
     )
@@ -137,7 +143,8 @@ def stages(found: Findings) -> Iterator[Block]:
 
 def _stages(found: Findings) -> Table:
     changes = {
-        (row.variant, row.after): (row.repaired, row.spoiled) for row in found.changes.itertuples()
+        (row["variant"], row["after"]): (row["repaired"], row["spoiled"])
+        for row in found.changes.to_dict("records")
     }
     rows: list[list[Cell | str]] = []
     breaks = []
@@ -183,7 +190,7 @@ def _parts(found: Findings) -> Table:
 
 def _part(parts: Mapping[str, float], part: str) -> str:
     if part not in parts:
-        return "–"
+        return DASH
     first = part == next(iter(parts))
     return percent(parts[part]) if first else points(parts[part])
 
@@ -210,7 +217,10 @@ def _oracles(found: Findings) -> Iterator[Block]:
     table = found.oracles
     yield Table(
         [f"<{name}" if table[name].dtype == object else name for name in table.columns],
-        [[_oracle_cell(name, value) for name, value in row.items()] for row in table.to_dict("records")],
+        [
+            [_oracle_cell(str(name), value) for name, value in row.items()]
+            for row in table.to_dict("records")
+        ],
         small=True,
     )
     yield Text(

@@ -57,13 +57,12 @@ def pdf(document: Document, paper: Paper = Paper.A4) -> bytes:
     with TemporaryDirectory(prefix="roadeval-") as folder:
         for name, content in sources.items():
             Path(folder, name).write_bytes(content)
-        compiled = typst.compile(
+        compiled: bytes = typst.compile(
             Path(folder, _TEMPLATE),
-            root=folder,
+            root=Path(folder),
             format="pdf",
             font_paths=typst.Fonts(include_system_fonts=False, font_paths=[_figures_fonts()]),
         )
-    assert isinstance(compiled, bytes)
     return compiled
 
 

@@ -6,7 +6,8 @@ import math
 from datetime import UTC, datetime
 from typing import Any, Final, TypeGuard
 
-UNDEFINED: Final = "–"
+DASH: Final = "\N{EN DASH}"
+"""Between two numbers; and where a number is undefined."""
 MINUS: Final = "\N{MINUS SIGN}"
 _YEAR_NS: Final = 365 * 24 * 3600 * 1_000_000_000
 
@@ -18,13 +19,13 @@ def defined(number: float | None) -> TypeGuard[float]:
 
 def percent(fraction: float | None, digits: int = 2) -> str:
     """Write a fraction in percent, without the sign: ``24.16``."""
-    return f"{100 * fraction:.{digits}f}" if defined(fraction) else UNDEFINED
+    return f"{100 * fraction:.{digits}f}" if defined(fraction) else DASH
 
 
 def points(fraction: float | None, digits: int = 2) -> str:
     """Write a difference of two fractions in percentage points: ``+7.90``."""
     if not defined(fraction):
-        return UNDEFINED
+        return DASH
     text = f"{100 * fraction:+.{digits}f}"
     return text[1:] if float(text) == 0 else text.replace("-", MINUS)
 

@@ -1,4 +1,4 @@
-"""Other cars: painted on two panels each, a body and a cabin in the sun's way."""
+"""Other cars: painted on five panels each, a body and a cabin in the sun's way."""
 
 from __future__ import annotations
 
@@ -21,6 +21,9 @@ HEIGHT: Final = 1.46
 BODY: Final = (0.0, LENGTH, 0.95)
 CABIN: Final = (0.6, 3.1, HEIGHT)
 """Two boxes that cast the shadow: begin and end from the tail, height, metres."""
+BONNET: Final = (1.05, 0.8)
+BOOT: Final = (0.2, 0.5)
+"""Length of the deck between a car's end and its window, and how far that slopes back, metres."""
 BELT: Final = 0.96
 """Height of the lower edge of the windows, metres."""
 LEAN: Final = 0.30
@@ -55,10 +58,11 @@ class Look:
     Parameters
     ----------
     window, deck, face
-        The end that is nearer to us: the window begins ``bonnet`` metres behind the face and
-        slopes back by ``rake``, the deck lies between.
+        The end that is nearer to us; the deck is the bonnet or the lid of the boot.
     doors, side_windows
         The side, below and above `BELT`.
+    oncoming
+        Whether it is the front that is nearer to us.
     """
 
     window: Picture
@@ -66,14 +70,13 @@ class Look:
     face: Picture
     doors: Picture
     side_windows: Picture
-    bonnet: float
-    rake: float
+    oncoming: bool
 
 
 def paint(body: Colour, oncoming: bool, sun: Sun) -> Look:
-    """Paint a car, seen from behind or, ``oncoming``, from ahead."""
+    """Paint a car: from behind and its left, or, ``oncoming``, from ahead and its left."""
     near = sun.facing(np.array([0.0, 0.0, -1.0]))
-    beside = sun.facing(np.array([-np.sign(sun.azimuth), 0.0, 0.0]))
+    beside = sun.facing(np.array([1.0 if oncoming else -1.0, 0.0, 0.0]))
     above = sun.facing(np.array([0.0, 1.0, 0.0]))
     side, end = _side(body), _end(body, oncoming)
     belt = len(end) - round(BELT * PIXELS_PER_METRE)
@@ -85,8 +88,7 @@ def paint(body: Colour, oncoming: bool, sun: Sun) -> Look:
         face=_lit(end[belt:], near, 0.6),
         doors=_lit(side[belt:], beside, 0.6),
         side_windows=_lit(side[:belt], beside, 0.85),
-        bonnet=1.05 if oncoming else 0.2,
-        rake=0.8 if oncoming else 0.5,
+        oncoming=oncoming,
     )
 
 
@@ -118,15 +120,15 @@ class Car:
         inward = across if camera_x < self.foot[0] else -across
         flank = left if camera_x < self.foot[0] else left + across * WIDTH
         up, above = np.array([0.0, BELT, 0.0]), np.array([0.0, HEIGHT - BELT, 0.0])
-        lean, rake = above + LEAN * inward, above + self.look.rake * along
-        deck = self.look.bonnet * along
+        length, rake = BONNET if self.look.oncoming else BOOT
+        deck, lean, glass = length * along, above + LEAN * inward, above + rake * along
         long, wide = along * LENGTH, across * WIDTH
         return tuple(
             Panel(picture, corner, right, down, self.sunlit)
             for picture, corner, right, down in (
                 (self.look.side_windows, flank + up + lean, long, -lean),
                 (self.look.doors, flank + SEAM * up, long, -SEAM * up),
-                (self.look.window, left + up + deck + rake, wide, -rake),
+                (self.look.window, left + up + deck + glass, wide, -glass),
                 (self.look.deck, left + up + SEAM * deck, wide, -SEAM * deck),
                 (self.look.face, left + SEAM * up, wide, -SEAM * up),
             )
@@ -134,7 +136,10 @@ class Car:
 
     def shadow(self, sun: Sun) -> list[Matrix]:
         """Outlines of the car's shadow on the ground, ``(n, 3)`` metres each."""
-        return [self._outline(sun, *box) for box in (BODY, CABIN)]
+        begin, end, height = CABIN
+        if self.look.oncoming:
+            begin, end = LENGTH - end, LENGTH - begin
+        return [self._outline(sun, *BODY), self._outline(sun, begin, end, height)]
 
     def footprint(self) -> Matrix:
         """``(4, 3)`` corners of the ground below the car."""

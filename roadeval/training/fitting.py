@@ -10,12 +10,12 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import Frame, Rgb, Truth
+from roadeval.data import NON_ROAD, ROAD, Frame, Rgb, Truth
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import STAGES, Chain
 from roadeval.pipeline.stage import TrainingSet
 from roadeval.training.model import Model
-from roadeval.training.sampling import Pixels, sample
+from roadeval.training.sampling import sample
 from roadeval.training.selfsupervision import patch_truth
 from roadeval.training.settings import TrainingSettings
 
@@ -37,7 +37,8 @@ class Plan:
 
     def relevant(self) -> dict[str, Any]:
         """Give the settings that what is learnt depends on: of filters and learning stages."""
-        names = [n for n in self.chain if STAGES[n].is_filter or STAGES[n].fit is not None]
+        stages = [STAGES[name] for name in self.chain]
+        names = [s.name for s in stages if s.fit is not None or not s.yields_mask]
         return {name: dataclasses.asdict(self.settings[name]) for name in names}
 
 
@@ -74,9 +75,12 @@ def fit(
             "choose other frames with --start or --train-frames, or give --model"
         )
     images = tuple(frame.image for frame in frames)
+    where = (pixels.frame, pixels.row, pixels.column, pixels.road)
+    share = _road_share(truths) if source == "truth" else 0.5
+    training_set = TrainingSet(images, *where, settings.seed, share)
     parameters, warnings = {}, []
     for name, plan in plans.items():
-        parameters[name] = _fit_variant(images, pixels, plan, settings.seed)
+        parameters[name] = _fit_variant(training_set, plan)
         warnings += _collapsed(name, images, plan, parameters[name])
     return Model(
         parameters,
@@ -103,19 +107,23 @@ def _truths(frames: Sequence[Frame], settings: TrainingSettings) -> tuple[str, l
     return "patch", [patch_truth(frame.image, settings) for frame in frames]
 
 
-def _fit_variant(images: tuple[Rgb, ...], pixels: Pixels, plan: Plan, seed: int) -> dict[str, Any]:
+def _road_share(truths: Sequence[Truth]) -> float:
+    """Share of road among the labelled pixels; the patch's guess says nothing of it."""
+    road, other = (sum(np.count_nonzero(t == v) for t in truths) for v in (ROAD, NON_ROAD))
+    return road / (road + other)
+
+
+def _fit_variant(training_set: TrainingSet, plan: Plan) -> dict[str, Any]:
     """Fit the stages in order; what follows a filter learns from the images it leaves."""
     parameters: dict[str, Any] = {}
     for name in plan.chain:
         stage = STAGES[name]
         if stage.fit is not None:
-            training_set = TrainingSet(
-                images, pixels.frame, pixels.row, pixels.column, pixels.road, seed
-            )
             parameters[name] = stage.fit(training_set, plan.settings[name])
-        if stage.is_filter:
+        if not stage.yields_mask:
             filter_alone = Chain((name,), plan.settings, parameters)
-            images = tuple(filter_alone.filtered(image) for image in images)
+            left = tuple(filter_alone.filtered(image) for image in training_set.images)
+            training_set = dataclasses.replace(training_set, images=left)
     return parameters
 
 

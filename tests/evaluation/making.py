@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 
 from roadeval.data import Counts, Frame, Mask, StageResult, Tally, Truth, VariantResult
 from roadeval.evaluation import rates
@@ -39,3 +40,28 @@ def a_tally(tp: int, tn: int, fp: int, fn: int, variant: str = "filtered") -> Ta
     """A tally of the final mask with these counts."""
     counts = Counts(tp, tn, fp, fn)
     return Tally(variant, "post", counts, {}, rates.of(counts))
+
+
+def a_table(errors: Mapping[tuple[str, str], Sequence[int]], hertz: float = 10) -> pd.DataFrame:
+    """A ``frames.csv`` by variant and stage: how many of a frame's 100 pixels are wrong.
+
+    Half the pixels are road; all errors are false positives.
+    """
+    rows = []
+    for number in range(max(map(len, errors.values()))):
+        for (variant, stage), wrong in errors.items():
+            if number < len(wrong):
+                counts = Counts(tp=50, tn=50 - wrong[number], fp=wrong[number])
+                rows.append(
+                    {
+                        "frame": number,
+                        "stamp_ns": round(number * 1e9 / hertz),
+                        "log_time_ns": round(number * 1e9 / hertz),
+                        "variant": variant,
+                        "stage": stage,
+                        **{"TP": counts.tp, "TN": counts.tn, "FP": counts.fp, "FN": counts.fn},
+                        "N": counts.n,
+                        **rates.of(counts),
+                    }
+                )
+    return pd.DataFrame(rows)

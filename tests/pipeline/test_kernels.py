@@ -1,5 +1,7 @@
 """The compiled kernels equal their NumPy twins bit for bit, whatever the arrays look like."""
 
+from inspect import isfunction
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -95,6 +97,12 @@ def test_sums_do_not_wrap_at_8_bits(module):
     inside, outside = module.region_sums(white, labels, ring, 2, 1)
     assert inside[1].tolist() == [12, *[12 * 255] * 3, *[12 * 255**2] * 3]
     assert not outside.any()
+
+
+def test_every_kernel_has_a_twin():
+    compiled = {name for name, f in vars(kernels).items() if hasattr(f, "py_func")}
+    twins = {name for name, f in vars(plain).items() if isfunction(f)}
+    assert {n for n in compiled if n[0] != "_"} == {n for n in twins if n[0] != "_"}
 
 
 def test_the_twins_can_be_chosen(monkeypatch):

@@ -1,0 +1,99 @@
+"""The frames worth opening, and the viewer opened at one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from roadeval.data import BASELINE
+from roadeval.errors import RoadevalError
+from roadeval.evaluation import analysis
+from roadeval.opened import Opened
+
+LISTED: Final = 10
+"""Frames that are listed when nobody says how many."""
+
+
+@dataclass(frozen=True, slots=True)
+class Suspect:
+    """A bad frame, and why it is one.
+
+    Parameters
+    ----------
+    rank
+        1 is the worst.
+    frame, stamp_ns
+        Which.
+    rates
+        ERR, FPR and FNR of the final mask.
+    parts
+        How ERR came about, see `roadeval.evaluation.analysis.causes`.
+    notes
+        What the recording says about it.
+    """
+
+    rank: int
+    frame: int
+    stamp_ns: int
+    rates: dict[str, float]
+    parts: dict[str, float]
+    notes: tuple[str, ...]
+
+
+def suspects(opened: Opened, count: int = LISTED, variant: str | None = None) -> list[Suspect]:
+    """Rank the worst frames of a variant's final mask, the first variant's by default.
+
+    Raises
+    ------
+    RoadevalError
+        If nothing was scored, or there is no such variant.
+    """
+    frames = opened.frames
+    names = [n for n in frames["variant"].unique() if n != BASELINE] if len(frames) else []
+    if not names:
+        raise RoadevalError(f"{opened.path}: nothing was scored, so no frame is the worst")
+    chosen = variant or names[0]
+    if chosen not in names:
+        raise RoadevalError(f"{opened.path}: no variant {chosen}; there are {', '.join(names)}")
+    causes, ranked = analysis.causes(frames, chosen), analysis.worst(frames, chosen, count)
+    return [
+        Suspect(
+            rank,
+            row["frame"],
+            row["stamp_ns"],
+            {rate: row[rate] for rate in ("ERR", "FPR", "FNR")},
+            causes.loc[row["frame"]].to_dict(),
+            opened.notes(row["frame"], chosen),
+        )
+        for rank, row in enumerate(ranked.to_dict("records"), 1)
+    ]
+
+
+def view(opened: Opened, frame: int | None, picture: Path | None = None) -> int | None:
+    """Open the viewer at a frame, or draw it into a PNG file; return the frame that it drew.
+
+    Without a frame it opens at the first evaluated one.
+
+    Raises
+    ------
+    RoadevalError
+        If there is no recording or no such frame in it, or the viewer cannot work here.
+    """
+    from roadeval.recording import viewer
+
+    recording = opened.recording
+    if recording is None:
+        raise RoadevalError(
+            f"{opened.path}: a results folder holds no pictures; give the recording (.rrd)"
+        )
+    numbers = recording.frame_numbers
+    if frame is not None and frame not in numbers:
+        held = f"frames {numbers[0]} to {numbers[-1]}" if numbers else "none"
+        raise RoadevalError(f"{opened.path}: no frame {frame}; the recording holds {held}")
+    if frame is None:
+        frame = recording.layout.first_frame
+    if picture is None:
+        viewer.show(recording.path, frame)
+        return frame
+    return viewer.screenshot(recording.path, picture, frame)

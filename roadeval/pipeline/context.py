@@ -1,0 +1,231 @@
+"""Phase 3 with more than colour: a support vector machine on colour, place and texture.
+
+Two grey pixels of one colour, one of the road and one of a wall, differ in where they are and in
+what surrounds them. The machine is the paper's (Eq. 12-16) on a feature map that is written out:
+instead of a kernel, ``phi_k(x) = max(w_k . x + b_k, 0)``, planes of random direction through random
+pixels of the training set [1]_, and a linear machine on phi. Its decision costs the same for every
+training set, and it is evaluated on a working image.
+
+References
+----------
+.. [1] A. Rahimi, B. Recht, Weighted Sums of Random Kitchen Sinks: Replacing Minimization with
+   Randomization in Learning, NIPS 2008.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Annotated, Any, Final
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as validated
+
+from roadeval.data import Layer, LayerKind, LayerSpec, Rgb
+from roadeval.pipeline.classify import SVM
+from roadeval.pipeline.fast import KERNELS
+from roadeval.pipeline.scale import reduced, stretched
+from roadeval.pipeline.shade import LOGS
+from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
+
+Values = npt.NDArray[np.float32]
+
+DECISION: Final = LayerSpec(
+    "decision", LayerKind.SCALAR, "Decision value (Eq. 16)", value_range=(-2.0, 2.0), exact=False
+)
+
+
+@validated(frozen=True, config=ConfigDict(extra="forbid"))
+class ContextSettings:
+    """Settings of the machine.
+
+    Parameters
+    ----------
+    width
+        Of the working image: the machine decides there, and its decision values are interpolated.
+    windows
+        Sides of the squares over which texture is averaged, in its pixels: gravel and leaves
+        show in small ones, a facade in large ones.
+    planes
+        Random planes that make the feature map.
+    c
+        Penalty of a training pixel on the wrong side.
+    threshold
+        A pixel is road where the decision value is above this. None: learnt, see `threshold`.
+    folds
+        Parts of the training frames that are left out in turn to learn the threshold.
+    """
+
+    width: Annotated[int, Field(ge=32, le=4096)] = 320
+    windows: tuple[Annotated[int, Field(ge=1, le=255)], ...] = (5, 15)
+    planes: Annotated[int, Field(ge=1, le=4096)] = 128
+    c: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
+    threshold: Annotated[float, Field(allow_inf_nan=False)] | None = None
+    folds: Annotated[int, Field(ge=2, le=100)] = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RectifiedMachine:
+    """A fitted machine: ``sum_k weights[k] max(planes[k] . x + bias[k], 0) + offset``.
+
+    ``planes`` is ``(K, F)``, ``bias`` and ``weights`` are ``(K,)``, all float32. A pixel is road
+    where the sum is above ``threshold``.
+    """
+
+    planes: Values
+    bias: Values
+    weights: Values
+    offset: float
+    threshold: float
+
+
+# --- Features -------------------------------------------------------------------------------------
+
+
+def features(image: Rgb, windows: tuple[int, ...]) -> Values:
+    """Colour, log-chromaticity, place and texture: ``(F, h, w)`` float32 of ``(h, w, 3)`` RGB.
+
+    Texture is, for each window, the root of the mean absolute slope of the log brightness across
+    and down: kerbs, wheels and house fronts have edges of one direction, leaves of both.
+    """
+    logs = cv2.LUT(image, LOGS)
+    red, green, blue = cv2.split(logs)
+    light = (red + green + blue) / np.float32(3)
+    planes = [*cv2.split(image.astype(np.float32)), red - green, blue - green]
+    planes += _places(*image.shape[:2])
+    slopes = [np.abs(cv2.Sobel(light, cv2.CV_32F, *order)) for order in ((1, 0), (0, 1))]
+    planes += [np.sqrt(cv2.blur(slope, (side, side))) for side in windows for slope in slopes]
+    return np.stack(planes)
+
+
+@lru_cache(maxsize=8)
+def _places(height: int, width: int) -> tuple[Values, Values]:
+    """Column from -1 to 1 and row from 0 to 1 of each pixel's centre, ``(height, width)`` each."""
+    across = (np.arange(width, dtype=np.float32) * 2 + 1) / width - 1
+    down = (np.arange(height, dtype=np.float32) + np.float32(0.5)) / height
+    return tuple(np.meshgrid(across, down))
+
+
+def sampled(sample: TrainingSet, settings: ContextSettings) -> Values:
+    """Features of the sampled pixels, ``(n, F)`` float32."""
+    rows = []
+    for index, image in enumerate(sample.images):
+        here = sample.frame == index
+        small = features(reduced(image, settings.width), settings.windows)
+        height, width = small.shape[1:]
+        row = sample.row[here] * height // image.shape[0]
+        column = sample.column[here] * width // image.shape[1]
+        rows.append((np.flatnonzero(here), small[:, row, column].T))
+    order = np.concatenate([where for where, _ in rows])
+    result: Values = np.concatenate([values for _, values in rows])[np.argsort(order)]
+    return result
+
+
+# --- Learning -------------------------------------------------------------------------------------
+
+
+def fit(sample: TrainingSet, settings: ContextSettings) -> RectifiedMachine:
+    """Draw the planes, solve the linear machine (Eq. 13) on them, and learn the threshold."""
+    values = sampled(sample, settings)
+    planes, bias = draw_planes(values, settings.planes, sample.seed)
+    mapped = np.maximum(values @ planes.T + bias, 0)
+    weights, offset = _solve(mapped, sample.road, settings.c)
+    learnt = settings.threshold
+    if learnt is None:
+        learnt = threshold(left_out(mapped, sample, settings), sample.road, sample.road_share)
+    return RectifiedMachine(planes, bias, weights.astype(np.float32), offset, learnt)
+
+
+def draw_planes(values: Values, count: int, seed: int) -> tuple[Values, Values]:
+    """Draw planes ``(count, F)`` and their bias ``(count,)`` for ``(n, F)`` features.
+
+    Directions are uniform on the sphere of standardised features; each plane goes through a
+    pixel of the training set, and is scaled so that its largest value there is 1.
+    """
+    rng = np.random.default_rng(seed)
+    mean, deviation = values.mean(axis=0), values.std(axis=0)
+    planes = rng.normal(size=(count, values.shape[1]))
+    planes /= np.linalg.norm(planes, axis=1, keepdims=True) * np.where(deviation > 0, deviation, 1)
+    through = values[rng.integers(0, len(values), count)]
+    bias = -(planes * through).sum(axis=1)
+    largest = np.maximum((values @ planes.T + bias).max(axis=0), 1e-6)
+    del mean
+    return (planes / largest[:, None]).astype(np.float32), (bias / largest).astype(np.float32)
+
+
+def _solve(mapped: Values, road: npt.NDArray[np.bool_], c: float) -> tuple[Values, float]:
+    from sklearn.svm import LinearSVC
+
+    machine: Any = LinearSVC(C=c, dual=False).fit(mapped, road)
+    return machine.coef_[0], float(machine.intercept_[0])
+
+
+def left_out(mapped: Values, sample: TrainingSet, settings: ContextSettings) -> Values:
+    """Decision value of each sampled pixel by a machine that has not seen its part of the drive.
+
+    The frames are cut into ``folds`` parts in their order: neighbouring frames look alike.
+    """
+    part = sample.frame * settings.folds // len(sample.images)
+    result = np.zeros(len(mapped), np.float32)
+    for fold in np.unique(part):
+        here = part == fold
+        weights, offset = _solve(mapped[~here], sample.road[~here], settings.c)
+        result[here] = mapped[here] @ weights + offset
+    return result
+
+
+def threshold(values: Values, road: npt.NDArray[np.bool_], road_share: float) -> float:
+    """Give the threshold with the least error on left-out decision ``values``.
+
+    The sample is balanced; frames are not. A missed road pixel counts ``road_share`` over the
+    number of them, a false one the rest over the number of those.
+    """
+    order = np.argsort(values, kind="stable")
+    cost = np.where(road, road_share / road.sum(), -(1 - road_share) / (~road).sum())[order]
+    best = int(np.argmin(np.concatenate([[0.0], cost.cumsum()])))
+    ends = np.concatenate([values[order[:1]] - 1, values[order], values[order[-1:]] + 1])
+    return float((ends[best] + ends[best + 1]) / 2)
+
+
+# --- The stage ------------------------------------------------------------------------------------
+
+
+def decision(image: Rgb, machine: RectifiedMachine, settings: ContextSettings) -> Values:
+    """Decision value (Eq. 16) of each pixel of ``(H, W, 3)`` uint8 RGB, ``(H, W)`` float32."""
+    planes = features(reduced(image, settings.width), settings.windows)
+    values = KERNELS.rectified_sum(
+        planes.reshape(len(planes), -1), machine.planes, machine.bias, machine.weights
+    )
+    return stretched(values.reshape(planes.shape[1:]) + np.float32(machine.offset), image.shape)
+
+
+def bind(settings: ContextSettings, machine: RectifiedMachine) -> Callable[[View], Output]:
+    """Return the machine as a pure function of what it sees."""
+
+    def run(view: View) -> Output:
+        values = decision(view.image, machine, settings)
+        mask = (values > machine.threshold).view(np.uint8)
+        return Output((Layer(DECISION, values), Layer(SVM, mask)), mask=mask)
+
+    return run
+
+
+def layers(_settings: ContextSettings) -> tuple[LayerSpec, ...]:
+    """Name the layers of the machine."""
+    return DECISION, SVM
+
+
+STAGE: Final = Stage(
+    name="context",
+    title="Phase 3: support vector machine on colour, place and texture",
+    settings=ContextSettings,
+    bind=bind,
+    layers=layers,
+    fit=fit,
+    parameters=RectifiedMachine,
+    mask=SVM.name,
+)

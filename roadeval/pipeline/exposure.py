@@ -1,0 +1,103 @@
+"""Exposure and white balance: the ground in front of the vehicle gets the same grey in each frame.
+
+Not in the paper. A classifier of colours learns the exposure and the camera along with the road;
+the reference patch, which is road in nearly every frame, tells both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Final, Literal
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from pydantic import ConfigDict, Field, model_validator
+from pydantic.dataclasses import dataclass as validated
+
+from roadeval.data import Layer, LayerKind, LayerSpec, Rgb
+from roadeval.pipeline.patch import ReferencePatch, patch_mask
+from roadeval.pipeline.stage import Output, Stage, View
+
+EXPOSED: Final = LayerSpec("exposed", LayerKind.RGB, "Exposure by the reference patch", exact=False)
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+@validated(frozen=True, config=ConfigDict(extra="forbid"))
+class ExposureSettings:
+    """Settings of the exposure.
+
+    Parameters
+    ----------
+    level
+        Grey level, 0..255, that the patch's median gets: dark enough to leave what is brighter
+        than road its differences.
+    channels
+        ``each`` channel gets a gain of its own, so that the road turns grey under any light and
+        camera; ``alike``: all get the one of the brightness.
+    least, greatest
+        Bounds of a gain. A patch that is black, or white, says nothing about the light.
+    patch
+        The reference patch.
+    """
+
+    level: Annotated[float, Field(gt=0, lt=255)] = 96.0
+    channels: Literal["each", "alike"] = "each"
+    least: Positive = 0.25
+    greatest: Positive = 6.0
+    patch: ReferencePatch = ReferencePatch()
+
+    @model_validator(mode="after")
+    def _ordered(self) -> ExposureSettings:
+        if self.least > self.greatest:
+            raise ValueError("least must not be above greatest")
+        return self
+
+
+def gains(image: Rgb, settings: ExposureSettings) -> npt.NDArray[np.float64]:
+    """Gain of each channel, ``(3,)``, that brings the patch of an ``(H, W, 3)`` image to the level."""
+    patch = patch_mask(*image.shape[:2], settings.patch)
+    medians = np.array([_median(image, channel, patch) for channel in range(3)])
+    if settings.channels == "alike":
+        medians = np.full(3, medians.mean())
+    return np.clip(settings.level / np.maximum(medians, 1.0), settings.least, settings.greatest)
+
+
+def _median(image: Rgb, channel: int, patch: npt.NDArray[np.uint8]) -> float:
+    """Lower median of a channel over the patch."""
+    counts = cv2.calcHist([image], [channel], patch, [256], [0, 256]).ravel().cumsum()
+    return float(np.searchsorted(counts, counts[-1] / 2))
+
+
+def expose(image: Rgb, gain: npt.NDArray[np.float64]) -> Rgb:
+    """Multiply the channels of an ``(H, W, 3)`` uint8 image by ``(3,)`` gains; rounded, clipped."""
+    table = np.rint(np.arange(256)[:, None] * gain).clip(0, 255).astype(np.uint8)
+    exposed: Rgb = cv2.LUT(image, table[None])
+    return exposed
+
+
+def bind(settings: ExposureSettings, _parameters: None) -> Callable[[View], Output]:
+    """Return the exposure as a pure function of what it sees."""
+
+    def run(view: View) -> Output:
+        gain = gains(view.image, settings)
+        image = expose(view.image, gain)
+        facts = {f"{name}_gain": float(g) for name, g in zip(("red", "green", "blue"), gain)}
+        return Output((Layer(EXPOSED, image),), image=image, facts=facts)
+
+    return run
+
+
+def layers(_settings: ExposureSettings) -> tuple[LayerSpec, ...]:
+    """Name the layer of the exposure."""
+    return (EXPOSED,)
+
+
+STAGE: Final[Stage[ExposureSettings, None]] = Stage(
+    name="exposure",
+    title="Exposure by the reference patch",
+    settings=ExposureSettings,
+    bind=bind,
+    layers=layers,
+    prepares=True,
+)

@@ -1,0 +1,138 @@
+"""Results side by side: which frames are compared, and what is said of them."""
+
+import pytest
+
+from roadeval.evaluation.comparison import (
+    ComparisonError,
+    Side,
+    compare,
+    judge,
+    variants_as_sides,
+)
+from roadeval.evaluation.conditions import Condition, ConditionError
+from roadeval.evaluation.settings import EvaluationSettings
+
+from .making import a_table
+
+SETTINGS = EvaluationSettings(resamples=200)
+POST = ("filtered", "post")
+
+
+def a_side(label, errors, *, digest="d1", **table):
+    return Side(label, "street", digest, a_table({POST: errors}, **table))
+
+
+def test_a_result_against_itself_differs_by_nothing_for_sure():
+    errors = [(7 * number) % 23 for number in range(40)]
+    found = compare([a_side("a", errors), a_side("b", errors)], SETTINGS)
+    (change,) = found["changes"]
+    assert change["base"] == change["new"]
+    for told in change["difference"].values():
+        assert (told["mean"], told["low"], told["high"]) == (0, 0, 0)
+    assert found["moved"] == []
+    assert found["warnings"] == []
+
+
+def test_differences_are_new_minus_base_on_the_frames_that_both_have():
+    base, new = a_side("base", [10, 10, 10, 10]), a_side("new", [12, 14])
+    found = compare([base, new], SETTINGS)
+    (change,) = found["changes"]
+    assert change["frames"] == 2
+    assert change["base"]["ERR"] == pytest.approx(0.10)
+    assert change["difference"]["ERR"]["mean"] == pytest.approx(0.03)
+    assert found["warnings"] == [
+        "2 frames that base evaluated are left out against new, which lacks them or trained on them"
+    ]
+
+
+def test_frames_are_matched_by_their_stamps_not_by_their_numbers():
+    base, new = a_side("base", [10, 20, 30]), a_side("new", [10, 20, 30])
+    shifted = new.frames.assign(frame=new.frames["frame"] + 5)
+    found = compare([base, Side("new", "street", "d1", shifted)], SETTINGS)
+    assert found["changes"][0]["difference"]["ERR"]["mean"] == 0
+
+
+def test_frames_with_the_same_stamp_are_matched_in_their_order():
+    base, new = (a_side(name, [10, 20, 30]) for name in ("base", "new"))
+    frozen = [each.frames.assign(stamp_ns=0) for each in (base, new)]
+    sides = [Side(name, "street", "d1", table) for name, table in zip("ab", frozen, strict=True)]
+    (change,) = compare(sides, SETTINGS)["changes"]
+    assert change["frames"] == 3
+    assert change["difference"]["ERR"]["low"] == 0
+
+
+def test_different_drives_stand_side_by_side_without_differences():
+    sides = [a_side("a", [10] * 20), a_side("b", [30] * 20, digest="d2")]
+    found = compare(sides, SETTINGS)
+    assert not found["same_drive"]
+    assert [change["new"]["ERR"] for change in found["changes"]] == pytest.approx([0.1, 0.3])
+    assert all(change["difference"] == {} for change in found["changes"])
+    assert "different drives" in found["warnings"][0]
+
+
+def test_a_result_that_does_not_know_its_log_is_not_subtracted():
+    sides = [a_side("a", [10] * 20), a_side("b", [10] * 20, digest=None)]
+    found = compare(sides, SETTINGS)
+    assert found["warnings"] == [
+        "b does not say which log it is of: nothing is subtracted"
+    ]
+
+
+def test_another_truth_is_told():
+    base, new = a_side("base", [10, 20]), a_side("new", [10, 20])
+    relabelled = new.frames.assign(N=new.frames["N"] - 1)
+    found = compare([base, Side("new", "street", "d1", relabelled)], SETTINGS)
+    assert "the truth differs on 2 frames" in found["warnings"][0]
+
+
+def test_nothing_in_common_is_an_error():
+    late = a_side("new", [10, 20])
+    late = Side("new", "street", "d1", late.frames.assign(stamp_ns=late.frames["stamp_ns"] + 5))
+    with pytest.raises(ComparisonError, match="no evaluated frame and stage in common"):
+        compare([a_side("base", [10, 20]), late], SETTINGS)
+
+
+def test_frames_that_changed_most_are_named_in_both_directions():
+    base, new = a_side("base", [10] * 4, hertz=1), a_side("new", [10, 30, 10, 5], hertz=1)
+    moved = compare([base, new], SETTINGS)["moved"]
+    assert [(row["frame"], round(row["change"], 2)) for row in moved] == [(1, 0.2), (3, -0.05)]
+
+
+def test_variants_of_one_result_are_compared_with_unfiltered():
+    names = ("filtered", "unfiltered", "other", "blind")
+    frames = a_table({(name, "post"): [10 + place] * 12 for place, name in enumerate(names)})
+    sides = variants_as_sides(frames, "street", "d1")
+    assert [side.label for side in sides] == ["unfiltered", "filtered", "other"]
+    found = compare(sides, SETTINGS, across_variants=True)
+    told = {row["variant"]: row["difference"]["ERR"]["mean"] for row in found["changes"]}
+    assert told == pytest.approx({"filtered": -0.01, "other": 0.01})
+
+
+def test_chosen_variants_keep_their_order_and_must_be_there():
+    frames = a_table({("filtered", "post"): [1], ("unfiltered", "post"): [2]})
+    sides = variants_as_sides(frames, "street", "d1", ["filtered", "unfiltered"])
+    assert [side.label for side in sides] == ["filtered", "unfiltered"]
+    with pytest.raises(ComparisonError, match="no variant net; there are filtered, unfiltered"):
+        variants_as_sides(frames, "street", "d1", ["net", "filtered"])
+    with pytest.raises(ComparisonError, match="two are needed"):
+        variants_as_sides(frames, "street", "d1", ["filtered"])
+
+
+def test_a_condition_is_judged_on_every_new_result():
+    sides = [a_side("base", [10] * 12), a_side("good", [10] * 12), a_side("bad", [12] * 12)]
+    judged = judge(compare(sides, SETTINGS), [Condition.parse("post.filtered.ERR > 1pp")])
+    assert [row["holds"] for row in judged] == [False, True]
+
+
+def test_a_condition_on_what_is_not_there_is_an_error_not_a_pass():
+    found = compare([a_side("a", [1] * 12), a_side("b", [1] * 12)], SETTINGS)
+    with pytest.raises(ConditionError, match=r"post\.net; there are post\.filtered"):
+        judge(found, [Condition.parse("post.net.ERR > 1pp")])
+
+
+def test_a_change_between_different_drives_is_not_judged_but_a_level_is():
+    found = compare([a_side("a", [1] * 12), a_side("b", [9] * 12, digest="d2")], SETTINGS)
+    with pytest.raises(ConditionError, match="different drives"):
+        judge(found, [Condition.parse("post.filtered.ERR > 1pp")])
+    judged = judge(found, [Condition.parse("post.filtered.ERR > 5%")])
+    assert [row["holds"] for row in judged] == [False, True]
