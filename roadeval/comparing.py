@@ -13,7 +13,7 @@ from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import analysis, comparison
 from roadeval.evaluation.comparison import Side
-from roadeval.evaluation.conditions import Condition
+from roadeval.evaluation.conditions import Condition, judge
 from roadeval.opened import Opened
 from roadeval.report.comparison import document, markdown
 from roadeval.report.typeset import Paper, pdf, put
@@ -32,7 +32,8 @@ class Compared:
     Parameters
     ----------
     content
-        See `roadeval.evaluation.comparison.compare`; and ``conditions``, as `judge` gives them.
+        See `roadeval.evaluation.comparison.compare`; and ``conditions``, as
+        `roadeval.evaluation.conditions.judge` gives them.
     windows
         ERR and the rest over the drive, with each result as a variant; empty for different
         drives.
@@ -85,7 +86,7 @@ def compare(
         ]
     settings = analysis.settings_of(opened[0].summary)
     content = comparison.compare(sides, settings, across_variants=across)
-    content["conditions"] = comparison.judge(content, conditions)
+    content["conditions"] = judge(content, conditions)
     windows = _windows(sides, settings.window) if content["same_drive"] else sides[0].frames[:0]
     return Compared(content, windows)
 

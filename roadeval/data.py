@@ -282,13 +282,21 @@ class Health(StrEnum):
     FAILED = "failed"
 
 
+class Pictures(StrEnum):
+    """Which of a frame's pictures are recorded; its numbers always are."""
+
+    ALL = "all"
+    MASKS = "masks"
+    NONE = "none"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameResult:
     """Everything known about one replayed frame: what is recorded and what is tabled.
 
     ``tallies`` is empty unless the frame is evaluated. ``tables`` holds this frame's finished
     lines of ``frames.csv`` and ``regions.csv`` (keys ``frames``, ``regions``; no header).
-    ``notes`` are sentences for a person.
+    ``notes`` are sentences for a person, ``pictures`` says what is recorded beside the numbers.
     """
 
     frame: Frame
@@ -299,3 +307,4 @@ class FrameResult:
     health: Mapping[str, Health] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     tables: Mapping[str, str] = field(default_factory=dict)
+    pictures: Pictures = Pictures.ALL

@@ -10,12 +10,12 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED, Role
+from roadeval.data import ERRORS, FILTERED, FINAL_STAGE, UNFILTERED, Role
 from roadeval.evaluation import analysis
 from roadeval.evaluation.results import Results
 from roadeval.evaluation.scoreboard import COMPARED
 from roadeval.evaluation.verdict import NO_PAIR, NOTHING_SCORED, verdict
-from roadeval.recording import Recording
+from roadeval.recording import Recording, RecordingError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,18 +55,30 @@ class Opened:
         """As ``summary.json``; of an incomplete run, what its tables give."""
         if self.complete:
             return self._tables.summary
-        assert self.recording is not None
-        return _summary_of_part(self.recording)
+        return self._summary_of_part()
 
-    @property
+    @cached_property
     def frames(self) -> pd.DataFrame:
         """The rows of ``frames.csv``."""
-        return self._tables.frames
+        return self._whole(self._tables.frames)
 
-    @property
+    @cached_property
     def regions(self) -> pd.DataFrame:
         """The rows of ``regions.csv``."""
-        return self._tables.regions
+        return self._whole(self._tables.regions)
+
+    @cached_property
+    def frame_numbers(self) -> tuple[int, ...]:
+        """The recorded frames that can be read whole; none of a folder.
+
+        A killed run may have written some layers of its last frames and not others.
+        """
+        if self.recording is None:
+            return ()
+        numbers = list(self.recording.frame_numbers)
+        while not self.complete and numbers and not _is_whole(self.recording, numbers[-1]):
+            numbers.pop()
+        return tuple(numbers)
 
     @property
     def windows(self) -> pd.DataFrame:
@@ -97,27 +109,48 @@ class Opened:
             text = path.read_text(encoding="utf-8") if path.exists() else None
         return pd.read_csv(StringIO(text)) if text else pd.DataFrame()
 
+    def _whole(self, table: pd.DataFrame) -> pd.DataFrame:
+        """Keep the rows of frames that can be read whole."""
+        if self.complete or not len(table):
+            return table
+        return table[table["frame"].isin(self.frame_numbers)]
 
-def _summary_of_part(recording: Recording) -> dict[str, Any]:
-    """Make the summary that a killed run did not get to write, of what it had scored."""
-    layout, roles = recording.layout, Counter(recording.roles.values())
-    frames = recording.frames
-    facts = _facts(frames) if len(frames) else {"verdict": NOTHING_SCORED, "totals": {}}
-    return {
-        "drive": {"name": layout.drive, "width": layout.width, "height": layout.height},
-        "frames": {
-            "decoded": len(recording.frame_numbers),
-            "trained_on": roles[Role.TRAINING],
-            "evaluated": frames["frame"].nunique() if len(frames) else 0,
-        },
-        "difference": {},
-        "warnings": [],
-        "losses": [],
-        "settings": {},
-        "versions": {},
-        "seconds": {},
-        "training": {"source": layout.properties.get("trained_on")},
-    } | facts
+    def _summary_of_part(self) -> dict[str, Any]:
+        """Make the summary that a killed run did not get to write, of what it had scored."""
+        assert self.recording is not None
+        layout, roles = self.recording.layout, self.recording.roles
+        counted = Counter(roles[frame] for frame in self.frame_numbers)
+        facts: dict[str, Any] = {"verdict": NOTHING_SCORED, "totals": {}}
+        return {
+            "drive": {"name": layout.drive, "width": layout.width, "height": layout.height},
+            "frames": {
+                "decoded": len(self.frame_numbers),
+                "trained_on": counted[Role.TRAINING],
+                "evaluated": self.frames["frame"].nunique() if len(self.frames) else 0,
+            },
+            "difference": {},
+            "warnings": [],
+            "losses": [],
+            "settings": {},
+            "versions": {},
+            "seconds": {},
+            "training": {"source": layout.properties.get("trained_on")},
+        } | (_facts(self.frames) if len(self.frames) else facts)
+
+
+def _is_whole(recording: Recording, frame: int) -> bool:
+    """Tell whether every layer of a frame can be read."""
+    try:
+        recording.image(frame)
+        for variant in recording.variants:
+            for spec in variant.layers:
+                recording.layer(variant.name, spec.name, frame)
+            if recording.roles[frame] == Role.EVALUATED:
+                recording.layer(variant.name, ERRORS.name, frame)
+                recording.truth(frame)
+    except RecordingError:
+        return False
+    return True
 
 
 def _facts(frames: pd.DataFrame) -> dict[str, Any]:

@@ -48,7 +48,7 @@ class ReplayOptions:
     jobs
         Worker threads; as many as there are processors by default. Changes no number.
     record
-        What is recorded: ``all``, or ``none``.
+        Whose pictures are recorded: ``all``, ``masks``, ``worst:K``, ``every:N`` or ``none``.
     keep_corrupt
         Keep messages whose checksum is wrong.
     resize_truth

@@ -14,7 +14,7 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation.results import Results, ResultsWriter, summary_text
 from roadeval.evaluation.tables import header, window_lines
 from roadeval.options import Outcome, Progress, ReplayOptions
-from roadeval.recording import NullRecorder, Recorder
+from roadeval.recording import NullRecorder, Rule, recorder_for
 from roadeval.report.figures import write_figures
 from roadeval.run import Run
 from roadeval.training import Model, save_model
@@ -56,10 +56,12 @@ def replay(
         For whatever a user can mend: one line that says what, where, and what to do.
     """
     options, tell = options or ReplayOptions(), on_progress or _silent
+    rule = Rule.parse(options.record)
     with logs.open_log(drive, keep_corrupt=options.keep_corrupt) as log:
         run = Run(log, options, tell)
-        recorder = _recorder(Path(save or Path("recordings", f"{log.name}.rrd")), run, options)
+        path = Path(save or Path("recordings", f"{log.name}.rrd"))
         folder = Path(reports or Path("reports", log.name))
+        recorder = recorder_for(path, run.layout(), rule)
         with recorder, ResultsWriter(folder) as results:
             for result, encoded in run.frames(recorder):
                 recorder.write(encoded)
@@ -107,10 +109,6 @@ def train(
     model = learning.train_on(frames, plans, settings)
     save_model(model, Path(output))
     return model
-
-
-def _recorder(path: Path, run: Run, options: ReplayOptions) -> Recorder | NullRecorder:
-    return NullRecorder() if options.record == "none" else Recorder(path, run.layout())
 
 
 def _texts(windows: Sequence[Any], summary: dict[str, Any]) -> dict[str, str]:

@@ -26,8 +26,8 @@ Processed = tuple[FrameResult, Any]
 class Encoder(Protocol):
     """Whatever turns a frame into what it will record, in any thread."""
 
-    def encode(self, result: FrameResult) -> Any:
-        """Encode a frame."""
+    def encode(self, result: FrameResult, position: int) -> Any:
+        """Encode the frame at ``position`` among those read, from 0."""
 
 
 class Run:
@@ -117,10 +117,10 @@ class Run:
         Decoding, computing, scoring and encoding happen in the worker threads.
         """
 
-        def work(frame: logs.LoggedFrame) -> Processed | None:
-            return self._process(frame, recorder)
+        def work(item: tuple[int, logs.LoggedFrame]) -> Processed | None:
+            return self._process(*item, recorder)
 
-        for processed in ordered(work, self._frames, self._jobs):
+        for processed in ordered(work, enumerate(self._frames), self._jobs):
             self.done += 1
             self._tell(Progress(self.done, self.total, "replaying"))
             if processed is not None:
@@ -128,7 +128,9 @@ class Run:
                 self.gallery.look(self.done, processed[0])
                 yield processed
 
-    def _process(self, logged: logs.LoggedFrame, recorder: Encoder) -> Processed | None:
+    def _process(
+        self, position: int, logged: logs.LoggedFrame, recorder: Encoder
+    ) -> Processed | None:
         try:
             frame = logged.decode()
         except logs.FrameError:
@@ -136,7 +138,7 @@ class Run:
         variants = [runner.run_variant(n, chain, frame.image) for n, chain in self._chains.items()]
         variants += [runner.external_variant(name, mask) for name, mask in frame.external.items()]
         result = self.board.score(frame, self._schedule.role(frame), tuple(variants))
-        return result, recorder.encode(result)
+        return result, recorder.encode(result, position)
 
     def summary(self) -> dict[str, Any]:
         """Give the content of ``summary.json``, but for its format."""

@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import cv2
-import numpy as np
 import pandas as pd
 import pytest
 
@@ -208,6 +207,40 @@ def test_without_a_recording_the_tables_are_the_same(drive, once, tmp_path):
     assert not (tmp_path / "out.rrd").exists()
     frames = (tmp_path / "reports" / "frames.csv").read_bytes()
     assert frames == (once[0] / "reports" / "frames.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("rule", "pictured", "layers"),
+    [
+        ("all", range(26), {"ndi", "post"}),
+        ("masks", range(26), {"post"}),
+        ("every:7", range(0, 26, 7), {"ndi", "post"}),
+    ],
+)
+def test_pictures_are_recorded_by_the_rule(drive, tmp_path, rule, pictured, layers):
+    recording = roadeval.Recording(run(drive, tmp_path, record=rule).recording)
+    assert list(recording.frame_numbers) == list(pictured)
+    assert len(recording.frames.frame.unique()) == 15
+    for layer in ("ndi", "post"):
+        if layer in layers:
+            recording.layer("filtered", layer, 14)
+        else:
+            with pytest.raises(RoadevalError):
+                recording.layer("filtered", layer, 14)
+
+
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_the_worst_frames_pictures_are_those_of_the_highest_err(drive, tmp_path, jobs):
+    recording = roadeval.Recording(run(drive, tmp_path, record="worst:4", jobs=jobs).recording)
+    final = frames_of(tmp_path).query("stage == 'post' and variant != 'blind'")
+    worst = final.groupby("frame").ERR.max().sort_values(ascending=False, kind="stable")
+    assert list(recording.frame_numbers) == sorted(worst.index[:4])
+
+
+@pytest.mark.parametrize("rule", ["worst", "worst:0", "some", "every:-1", ""])
+def test_another_rule_is_refused(drive, tmp_path, rule):
+    with pytest.raises(RoadevalError, match="choose all, masks, worst:K"):
+        run(drive, tmp_path, record=rule)
 
 
 def test_an_error_on_the_way_leaves_no_results_and_a_partial_recording(

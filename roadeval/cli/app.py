@@ -85,32 +85,33 @@ def explain(error: Exception | SystemExit) -> int:
         traceback.print_exception(error)
     match error:
         case signals.Stopped():
-            messages.interrupted("; ".join(_notes(error)) or "stopped before the end")
+            messages.interrupted(_with_notes("stopped before the end", error))
             return error.exit_code
         case typer.TyperException():
             messages.error(_usage(error))
             return error.exit_code
         case RoadevalError():
-            messages.error("; ".join([str(error), *_notes(error)]))
+            messages.error(_with_notes(str(error), error))
             return ExitCode.FAILED
         case BrokenPipeError() | SystemExit(__context__=BrokenPipeError()):
             _drop_stdout()
             return ExitCode.BROKEN_PIPE
         case OSError(strerror=str(reason)):
             where = f": {error.filename}" if error.filename else ""
-            messages.error(f"{reason}{where}")
+            messages.error(_with_notes(f"{reason}{where}", error))
             return ExitCode.FAILED
         case _:
-            messages.error(
+            defect = (
                 f"{type(error).__name__}: {error} (a defect of {messages.PROGRAM}, not of your "
                 "input: run again with ROADEVAL_DEBUG=1 to see where, and please report it)"
             )
+            messages.error(_with_notes(defect, error))
             return ExitCode.DEFECT
 
 
-def _notes(error: BaseException) -> list[str]:
-    """Return what the rooms added to an error on its way out, as where a partial output lies."""
-    return getattr(error, "__notes__", [])
+def _with_notes(sentence: str, error: BaseException) -> str:
+    """Add what the rooms noted on an error on its way out, as where a partial output lies."""
+    return "; ".join([sentence, *getattr(error, "__notes__", ())])
 
 
 def _usage(error: typer.TyperException) -> str:

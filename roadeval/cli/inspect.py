@@ -47,8 +47,8 @@ def inspect(
 ) -> int:
     """Open the viewer at a frame, or list the frames worth opening.
 
-    The viewer works offline and listens on 127.0.0.1 alone. Of frames less than a second apart
-    only the worst is listed.
+    The viewer works offline and listens on 127.0.0.1 alone. Of neighbouring frames only the worst
+    is listed.
     """
     from roadeval import inspecting
     from roadeval.opened import Opened

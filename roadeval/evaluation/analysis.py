@@ -195,11 +195,12 @@ def _errors(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def worst(
-    frames: pd.DataFrame, variant: str, count: int, apart_ns: int = 1_000_000_000
+    frames: pd.DataFrame, variant: str, count: int, apart_ns: int | None = None
 ) -> pd.DataFrame:
     """Pick the frames with the highest final ERR of a variant, the worst first.
 
-    Neighbours fail alike, so of frames less than ``apart_ns`` apart only the worst is picked.
+    Neighbours fail alike, so of frames less than ``apart_ns`` apart only the worst is picked: by
+    default a thirtieth of the drive, and at most a second.
 
     Returns
     -------
@@ -207,11 +208,12 @@ def worst(
         At most ``count`` rows of the table of frames.
     """
     own = finals(frames[frames["variant"] == variant]).dropna(subset=["ERR"])
-    return _apart(own.sort_values("ERR", ascending=False, kind="stable"), count, apart_ns)
+    ranked = own.sort_values("ERR", ascending=False, kind="stable")
+    return _apart(ranked, count, _neighbourhood(own) if apart_ns is None else apart_ns)
 
 
 def most_changed(
-    paired: pd.DataFrame, count: int, *, harmed: bool, apart_ns: int = 1_000_000_000
+    paired: pd.DataFrame, count: int, *, harmed: bool, apart_ns: int | None = None
 ) -> pd.DataFrame:
     """Pick the frames whose ERR rose most (``harmed``) or fell most, of what `pairs` gave.
 
@@ -219,7 +221,15 @@ def most_changed(
     """
     sign = 1 if harmed else -1
     moved = paired[sign * paired["ERR"] > 0].reset_index()
-    return _apart(moved.sort_values("ERR", ascending=not harmed, kind="stable"), count, apart_ns)
+    ranked = moved.sort_values("ERR", ascending=not harmed, kind="stable")
+    return _apart(ranked, count, _neighbourhood(paired) if apart_ns is None else apart_ns)
+
+
+def _neighbourhood(frames: pd.DataFrame) -> int:
+    """Say how far apart two frames' stamps lie, in nanoseconds, if they are no neighbours."""
+    if not len(frames):
+        return 0
+    return int(min((frames["stamp_ns"].max() - frames["stamp_ns"].min()) // 30, 1_000_000_000))
 
 
 def _apart(ranked: pd.DataFrame, count: int, apart_ns: int) -> pd.DataFrame:

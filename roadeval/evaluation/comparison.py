@@ -7,7 +7,7 @@ a difference between them would mix the scene with the method.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Final
 from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import analysis
-from roadeval.evaluation.conditions import Condition, ConditionError
 from roadeval.evaluation.rates import RATES
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import mean_difference
@@ -144,38 +143,6 @@ def compare(
         "moved": [row for pair in pairs for row in pair.moved()],
         "warnings": [sentence for pair in pairs for sentence in pair.warnings()],
     }
-
-
-def judge(comparison: Mapping[str, Any], conditions: Sequence[Condition]) -> list[dict[str, Any]]:
-    """Judge conditions on every new result; a row for each: ``text``, ``holds``, ``sentence``.
-
-    Raises
-    ------
-    ConditionError
-        If a condition asks for what is not there, or for a change between different drives.
-    """
-    rows = []
-    for condition in conditions:
-        if condition.is_change and not comparison["same_drive"]:
-            raise ConditionError(
-                f"{condition.text}: not judged, because the results are of different drives, whose "
-                "difference mixes the scene with the method; limits in % can be judged"
-            )
-        matching = [
-            change
-            for change in comparison["changes"]
-            if (change["stage"], change["variant"]) == (condition.stage, condition.variant)
-        ]
-        if not matching:
-            there = {f"{each['stage']}.{each['variant']}" for each in comparison["changes"]}
-            raise ConditionError(
-                f"{condition.text}: nothing compared is called {condition.stage}."
-                f"{condition.variant}; there are {', '.join(sorted(there))}"
-            )
-        for change in matching:
-            holds, sentence = condition.judge(change)
-            rows.append({"text": condition.text, "holds": holds, "sentence": sentence})
-    return rows
 
 
 class _Pair:

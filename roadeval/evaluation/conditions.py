@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 import operator
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -113,3 +113,35 @@ class Condition:
         else:
             told = f"is {value:.2f} %"
         return holds, f"{what} {told}: {self.text} {'holds' if holds else 'does not hold'}"
+
+
+def judge(comparison: Mapping[str, Any], conditions: Sequence[Condition]) -> list[dict[str, Any]]:
+    """Judge conditions on every new result; a row for each: ``text``, ``holds``, ``sentence``.
+
+    Raises
+    ------
+    ConditionError
+        If a condition asks for what is not there, or for a change between different drives.
+    """
+    rows = []
+    for condition in conditions:
+        if condition.is_change and not comparison["same_drive"]:
+            raise ConditionError(
+                f"{condition.text}: not judged, because the results are of different drives, whose "
+                "difference mixes the scene with the method; limits in % can be judged"
+            )
+        matching = [
+            change
+            for change in comparison["changes"]
+            if (change["stage"], change["variant"]) == (condition.stage, condition.variant)
+        ]
+        if not matching:
+            there = {f"{each['stage']}.{each['variant']}" for each in comparison["changes"]}
+            raise ConditionError(
+                f"{condition.text}: nothing compared is called {condition.stage}."
+                f"{condition.variant}; there are {', '.join(sorted(there))}"
+            )
+        for change in matching:
+            holds, sentence = condition.judge(change)
+            rows.append({"text": condition.text, "holds": holds, "sentence": sentence})
+    return rows

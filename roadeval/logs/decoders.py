@@ -8,23 +8,31 @@ import json
 from collections.abc import Callable
 from contextlib import redirect_stderr
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 from mcap.records import Channel, Schema
 
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.flatbuffer import flatbuffer_reader
-from roadeval.logs.layouts import cdr_reader, is_whole, layout_of, ros1_reader
-from roadeval.logs.messages import Picture, picture_in
+from roadeval.logs.layouts import cdr_reader, is_whole, layout_of, ros1_reader, stamp_of
+from roadeval.logs.messages import Picture, nanoseconds, picture_in
 from roadeval.logs.records import LARGEST, Message
 from roadeval.logs.source import Buffer
 
-Reader = Callable[[Buffer], Picture]
-
-_ZSTD = b"\x28\xb5\x2f\xfd"
+_ZSTD: Final = b"\x28\xb5\x2f\xfd"
 
 
-def reader_for(channel: Channel, schema: Schema | None) -> Reader:
+class Decoder(NamedTuple):
+    """Reads the messages of a channel: the whole picture, or only its stamp in nanoseconds.
+
+    Both raise `BadMessage` for a message that cannot be decoded.
+    """
+
+    picture: Callable[[Buffer], Picture]
+    stamp: Callable[[Buffer], int]
+
+
+def decoder_for(channel: Channel, schema: Schema | None) -> Decoder:
     """Return what decodes the messages of a channel.
 
     The `mcap` project's own decoders where they can, else the layout that the schema's name
@@ -42,7 +50,7 @@ def reader_for(channel: Channel, schema: Schema | None) -> Reader:
             f"{channel.message_encoding!r} messages with {name!r} schema are not readable"
         )
 
-    def read(data: Buffer) -> Picture:
+    def picture(data: Buffer) -> Picture:
         try:
             return picture_in(decode(_unpacked(channel, data)))
         except BadMessage:
@@ -50,7 +58,10 @@ def reader_for(channel: Channel, schema: Schema | None) -> Reader:
         except Exception as error:  # the libraries raise whatever their parsers stumble on
             raise BadMessage(f"the message cannot be decoded: {_line(error)}") from error
 
-    return read
+    layout = layout_of(schema.name) if schema else None
+    if layout is None or channel.message_encoding != "cdr":
+        return Decoder(picture, lambda data: picture(data).stamp_ns)
+    return Decoder(picture, lambda data: nanoseconds(stamp_of(layout, _unpacked(channel, data))))
 
 
 def message_is_whole(channel: Channel, schema: Schema | None, message: Message) -> bool:
@@ -59,7 +70,7 @@ def message_is_whole(channel: Channel, schema: Schema | None, message: Message) 
     if layout and channel.message_encoding == "cdr":
         return is_whole(layout, message.data)
     try:
-        reader_for(channel, schema)(message.data)
+        decoder_for(channel, schema).picture(message.data)
     except BadMessage:
         return False
     return True

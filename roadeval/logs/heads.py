@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
-
-from mcap.records import ChunkIndex
 
 from roadeval.logs.errors import BadRecord
-from roadeval.logs.records import CHUNK_HEAD, Chunk, Entries, Place, parse_chunk
+from roadeval.logs.records import CHUNK_HEAD, Chunk, ChunkIndex, Entries, Place, parse_chunk
 
 
 def by_own_head(
@@ -30,9 +27,9 @@ def by_own_head(
     if end != place.end and is_likely(end):
         return chunk
     if end != place.end and is_likely(place.end):
-        return replace(chunk, data_size=place.end - chunk.data_offset)
+        return chunk._replace(data_size=place.end - chunk.data_offset)
     if min(end, place.end) > file_size >= chunk.data_offset:
-        return replace(chunk, data_size=file_size - chunk.data_offset, cut=True)
+        return chunk._replace(data_size=file_size - chunk.data_offset, cut=True)
     if end != place.end:
         raise BadRecord("a chunk whose lengths contradict each other")
     return chunk
@@ -40,23 +37,12 @@ def by_own_head(
 
 def by_summary(place: Place, head: bytes, index: ChunkIndex) -> Chunk:
     """Read a chunk by the summary's word; its own head gives the checksum."""
-    data_size = index.compressed_size
-    told = Chunk(
-        place.offset,
-        index.message_start_time,
-        index.message_end_time,
-        index.uncompressed_size,
-        None,
-        index.compression,
-        place.end - data_size,
-        data_size,
-    )
     with suppress(BadRecord):
         own = parse_chunk(place, head)
-        if replace(own, crc=None) == told:
+        if own._replace(crc=None) == index.chunk:
             return own
     crc = CHUNK_HEAD.unpack_from(head)[3] if len(head) >= CHUNK_HEAD.size else 0
-    return replace(told, crc=crc or None, repaired=True)
+    return index.chunk._replace(crc=crc or None, repaired=True)
 
 
 def is_within(entries: Entries, chunk: Chunk) -> bool:

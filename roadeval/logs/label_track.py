@@ -55,6 +55,7 @@ class LabelTrack:
     ) -> None:
         self.track = track
         self.unused = 0
+        self._images = images
         self._label = label
         self._last: int | None = None
         clocks = _clocks(images, track, selection.clock)
@@ -62,6 +63,9 @@ class LabelTrack:
 
     def of(self, image: int) -> Label | None:
         """Find the label of the image at a position."""
+        if self._last is None:
+            logged = self._images.log_times[image]
+            self._pairing.begin_near(int(np.searchsorted(self.track.log_times, logged)))
         position = self._pairing.partner(image)
         if position is None:
             return None

@@ -137,7 +137,7 @@ def packed(colors: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint32]:
     return np.asarray(wide[..., 0] << 16 | wide[..., 1] << 8 | wide[..., 2], np.uint32)
 
 
-def seen_in(picture: Picture, labels: LabelValues) -> set[int]:
+def seen_in(picture: Picture, labels: LabelValues, topic: str) -> set[int]:
     """Values, or packed colours, that occur in a label picture.
 
     Raises
@@ -153,7 +153,7 @@ def seen_in(picture: Picture, labels: LabelValues) -> set[int]:
     if pixels.ndim != 2:
         colors = [_unpacked(number) for number in np.unique(packed(pixels)).tolist()]
         raise LogError(
-            f"the labels are colours ({_listed(map(_name, colors))}): say which mean road "
+            f"{topic} holds the colours {_listed(map(_name, colors))}: say which mean road "
             "(--road-color R,G,B, repeatable)"
         )
     return set(np.flatnonzero(np.bincount(pixels.ravel())).tolist())

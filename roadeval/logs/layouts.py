@@ -68,6 +68,12 @@ def is_whole(layout: Layout, data: Buffer) -> bool:
     return cursor.left < PADDING
 
 
+def stamp_of(layout: Layout, data: Buffer) -> Any:
+    """Read only the stamp of a CDR message: the first field, alone or in a header."""
+    first = _Cursor.cdr(data).read(layout[:1])
+    return first.timestamp if hasattr(first, "timestamp") else first.header.stamp
+
+
 class _Cursor:
     """Reads one field after the other."""
 

@@ -131,13 +131,18 @@ def _picture_in(message: Any) -> Picture:
 
 
 def _stamp_ns(message: Any) -> int:
-    """Integer nanoseconds of the header stamp, as a float would round them; 0 without one."""
+    """Integer nanoseconds of the header stamp; 0 without one."""
     if hasattr(message, "header"):
         stamp = message.header.stamp
     elif hasattr(message, "timestamp"):
         stamp = message.timestamp
     else:
         return 0
+    return nanoseconds(stamp)
+
+
+def nanoseconds(stamp: Any) -> int:
+    """Integer nanoseconds of a stamp in any of its forms; a float would round them."""
     if isinstance(stamp, str):
         return parse_time(stamp).ns
     seconds = next(getattr(stamp, name) for name in _SECONDS if hasattr(stamp, name))

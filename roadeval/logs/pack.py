@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -106,7 +106,7 @@ def _pack_folder(
         raise LogError(f"{masks}: no mask has the name of an image in {images}")
     stamps, words = _stamps(files, rate_hz, start_ns)
     with LogWriter(output) as log:
-        for file, stamp in zip(files, stamps, strict=True):
+        for file, stamp in stamps.items():
             log.image(CAMERA, stamp, *_image(file))
             if file in by_image:
                 data = _label(by_image[file])
@@ -115,6 +115,17 @@ def _pack_folder(
     lonely = [file.name for file in _listed(masks) if file not in used] if masks else []
     unlabelled = [file.name for file in files if file not in by_image] if masks else []
     return Packed(output, len(files), len(by_image), tuple(unlabelled), tuple(lonely), words)
+
+
+def _stamps(files: list[Path], rate_hz: float | None, start_ns: int) -> tuple[dict[Path, int], str]:
+    """Give each file its stamp, in the order of the stamps, and say where they come from."""
+    times = {file: time for file in files if (time := _time_in(file.stem)) is not None}
+    if rate_hz is None and len(times) == len(files) == len(set(times.values())):
+        ordered = sorted(times.items(), key=lambda item: item[1])
+        return dict(ordered), "the times in the files' names"
+    rate = rate_hz or DEFAULT_RATE_HZ
+    regular = {file: start_ns + round(i * NS / rate) for i, file in enumerate(files)}
+    return regular, f"{rate:g} images a second"
 
 
 def _pack_video(video: Path, output: Path, rate_hz: float | None, start_ns: int) -> Packed:
@@ -176,21 +187,6 @@ def _as_png(file: Path) -> bytes:
     if pixels is None:
         raise LogError(f"{file}: not a readable image")
     return cv2.imencode(".png", pixels)[1].tobytes()
-
-
-def _stamps(files: list[Path], rate_hz: float | None, start_ns: int) -> tuple[list[int], str]:
-    if rate_hz is None:
-        times = [_time_in(file.stem) for file in files]
-        known = [time for time in times if time is not None]
-        if len(known) == len(files) and known == sorted(set(known)):
-            return known, "the times in the files' names"
-    rate = rate_hz or DEFAULT_RATE_HZ
-    return list(_regular(len(files), rate, start_ns)), f"{rate:g} images a second"
-
-
-def _regular(count: int, rate_hz: float, start_ns: int) -> Iterator[int]:
-    for index in range(count):
-        yield start_ns + round(index * NS / rate_hz)
 
 
 def _time_in(stem: str) -> int | None:

@@ -41,8 +41,11 @@ class Pairing:
         self._images = images
         self._labels = labels
         self._tolerance = tolerance_ns
-        self._near_image = 0
         self._near_label = 0
+
+    def begin_near(self, label: int) -> None:
+        """Look for the next partner around a label; saves reading the way there."""
+        self._near_label = min(label, max(len(self._labels) - 1, 0))
 
     def partner(self, image: int) -> int | None:
         """Position of the label that belongs to the image at a position, if there is one."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 import io
 import struct
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -30,6 +29,10 @@ MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
 """Channel, sequence, log time, publish time."""
 CHUNK_HEAD: Final = struct.Struct("<QQQII")
 """Start time, end time, uncompressed size, CRC, length of the compression's name."""
+CHUNK_INDEX_HEAD: Final = struct.Struct("<QQQQI")
+"""Start time, end time, offset and length of the chunk, bytes of its index offsets."""
+INDEX_OFFSET: Final = struct.Struct("<HQ")
+"""Channel, offset of its message index."""
 INDEX_HEAD: Final = struct.Struct("<HI")
 """Channel, bytes of entries."""
 LARGEST: Final = 1 << 28
@@ -60,8 +63,7 @@ class Message(NamedTuple):
     data: memoryview
 
 
-@dataclass(frozen=True, slots=True)
-class Chunk:
+class Chunk(NamedTuple):
     """A chunk's head: where its compressed data lies and what it claims to hold.
 
     ``offset`` is the record's, ``data_offset`` and ``data_size`` the compressed data's, all in
@@ -81,6 +83,21 @@ class Chunk:
     data_size: int
     cut: bool = False
     repaired: bool = False
+
+
+class ChunkIndex(NamedTuple):
+    """The summary's word on a chunk: its head without the checksum, and where its record ends.
+
+    ``index_offsets`` are packed pairs of a channel and the offset of its message index.
+    """
+
+    chunk: Chunk
+    end: int
+    index_offsets: bytes
+
+    def has_index_at(self, offset: int) -> bool:
+        """Whether one of the chunk's message indexes begins here."""
+        return any(offset == at for _, at in INDEX_OFFSET.iter_unpack(self.index_offsets))
 
 
 class _Strict(ReadDataStream):
@@ -145,6 +162,29 @@ def parse_chunk(place: Place, head: Buffer) -> Chunk:
     name = bytes(head[CHUNK_HEAD.size : data_offset - 8]).decode("utf-8", "replace")
     (data_size,) = struct.unpack_from("<Q", head, data_offset - 8)
     return Chunk(place.offset, start, end, size, crc, name, place.body + data_offset, data_size)
+
+
+def parse_chunk_index(body: Buffer) -> ChunkIndex:
+    """Read what the summary says of a chunk.
+
+    Raises
+    ------
+    BadRecord
+        If its lengths contradict each other.
+    """
+    try:
+        start, end, offset, length, map_length = CHUNK_INDEX_HEAD.unpack_from(body)
+        at = CHUNK_INDEX_HEAD.size + map_length
+        _, name_length = struct.unpack_from("<QI", body, at)
+        name = bytes(body[at + 12 : at + 12 + name_length]).decode()
+        data_size, size = struct.unpack_from("<QQ", body, at + 12 + name_length)
+    except (struct.error, UnicodeDecodeError) as error:
+        raise BadRecord("a chunk index that does not add up") from error
+    if map_length % INDEX_OFFSET.size:
+        raise BadRecord("a chunk index that does not add up")
+    data_offset = offset + length - data_size
+    chunk = Chunk(offset, start, end, size, None, name, data_offset, data_size)
+    return ChunkIndex(chunk, offset + length, bytes(body[CHUNK_INDEX_HEAD.size : at]))
 
 
 def parse_message_index(body: Buffer) -> tuple[int, Entries]:

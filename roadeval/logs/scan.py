@@ -134,7 +134,7 @@ class Scan:
     def _place(self, offset: int) -> Place:
         index = self._known.get(offset)
         if index is not None:
-            return Place(Opcode.CHUNK, offset, offset + HEAD.size, offset + index.chunk_length)
+            return Place(Opcode.CHUNK, offset, offset + HEAD.size, index.end)
         place = place_at(self._source, offset)
         if place.opcode >= PRIVATE and self._search.begins(place.end):
             return place
@@ -173,7 +173,7 @@ class Scan:
         if not MESSAGE_HEAD.size <= place.end - place.body <= LARGEST:
             raise BadRecord("a message of a length that cannot be")
         known = self._known.get(self.chunks[-1].offset) if self.chunks else None
-        if known is not None and place.offset in known.message_index_offsets.values():
+        if known is not None and known.has_index_at(place.offset):
             raise BadRecord("a message where a message index should be")
         head = self._source.peek(place.body, MESSAGE_HEAD.size)
         channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)

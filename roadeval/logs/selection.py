@@ -182,7 +182,7 @@ def look_at_labels(
     seen: set[int] = set()
     for picture in _samples(track):
         try:
-            seen |= seen_in(picture, labels)
+            seen |= seen_in(picture, labels, topic.name)
         except BadMessage:
             continue
     return understand(labels, seen, topic.name)

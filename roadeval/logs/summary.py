@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from mcap.opcode import Opcode
-from mcap.records import Channel, ChunkIndex, Footer, Schema, Statistics
+from mcap.records import Channel, Footer, Schema, Statistics
 
 from roadeval.logs.chunks import crc_of
 from roadeval.logs.errors import BadRecord
-from roadeval.logs.records import HEAD, LARGEST, MAGIC, parse, walk
+from roadeval.logs.records import HEAD, LARGEST, MAGIC, ChunkIndex, parse, parse_chunk_index, walk
 from roadeval.logs.source import Part, Source
 
 FOOTER_SIZE: Final = HEAD.size + 20 + len(MAGIC)
@@ -73,13 +73,16 @@ def _collect(part: Part, *, checked: bool) -> Summary:
         end = place.end
         if place.opcode not in _KEPT:
             continue
-        record = parse(place.opcode, part.peek(place.body, place.end - place.body))
+        body = part.peek(place.body, place.end - place.body)
+        if place.opcode == Opcode.CHUNK_INDEX:
+            index = parse_chunk_index(body)
+            summary.chunks[index.chunk.offset] = index
+            continue
+        record = parse(place.opcode, body)
         if isinstance(record, Schema):
             summary.schemas[record.id] = record
         elif isinstance(record, Channel):
             summary.channels[record.id] = record
-        elif isinstance(record, ChunkIndex):
-            summary.chunks[record.chunk_start_offset] = record
         else:
             statistics = record
     if end != part.size:

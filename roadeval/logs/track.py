@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.logs.container import OUTSIDE, Container
-from roadeval.logs.decoders import Reader, reader_for
+from roadeval.logs.decoders import Decoder, decoder_for
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError
 from roadeval.logs.messages import Picture
 from roadeval.logs.records import Message
@@ -44,7 +44,7 @@ class Track:
     def __init__(self, name: str, sources: Sequence[Source]) -> None:
         self.name = name
         self._sources = sources
-        self._readers: dict[int, Reader | BadMessage] = {}
+        self._decoders: dict[int, Decoder | BadMessage] = {}
         rows = [np.empty((0, 4), np.int64)]
         for number, source in enumerate(sources):
             log = source.container.logs.get(source.channel_id)
@@ -114,7 +114,7 @@ class Track:
         """
         message = self.message(position)
         try:
-            return self._reader(int(self._numbers[position]))(message.data)
+            return self._decoder(position).picture(message.data)
         except BadMessage as error:
             raise self._error(position, str(error)) from error
 
@@ -122,8 +122,9 @@ class Track:
         """Header stamp of a message in nanoseconds, or `UNREADABLE`."""
         if self._stamps[position] == UNREAD:
             try:
-                self._stamps[position] = self.picture(position).stamp_ns
-            except FrameError:
+                data = self.message(position).data
+                self._stamps[position] = self._decoder(position).stamp(data)
+            except (FrameError, BadMessage):
                 self._stamps[position] = UNREADABLE
         return int(self._stamps[position])
 
@@ -142,19 +143,20 @@ class Track:
         )
         return len(self) - lost
 
-    def _reader(self, number: int) -> Reader:
-        if number not in self._readers:
+    def _decoder(self, position: int) -> Decoder:
+        number = int(self._numbers[position])
+        if number not in self._decoders:
             source = self._sources[number]
             channel = source.container.channels[source.channel_id]
             schema = source.container.schemas.get(channel.schema_id)
             try:
-                self._readers[number] = reader_for(channel, schema)
+                self._decoders[number] = decoder_for(channel, schema)
             except BadMessage as error:
-                self._readers[number] = error
-        reader = self._readers[number]
-        if isinstance(reader, BadMessage):
-            raise reader
-        return reader
+                self._decoders[number] = error
+        decoder = self._decoders[number]
+        if isinstance(decoder, BadMessage):
+            raise decoder
+        return decoder
 
     def _error(self, position: int, reason: str) -> FrameError:
         return FrameError(f"{self.name} message {position}: {reason}")

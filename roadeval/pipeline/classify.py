@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Annotated, Final, Literal
 
 import numpy as np
@@ -117,12 +118,15 @@ def decision(
     return result
 
 
+@lru_cache(maxsize=4)
 def colour_table(machine: SupportVectors, settings: SvmSettings) -> npt.NDArray[np.uint8]:
     """Eq. 16 for every colour there is: ``(2^24,)`` uint8 by ``R << 16 | G << 8 | B``, 1 for road.
 
     A pixel's features are its three colours alone, so this is all the machine can say. A value
     from the colour `cube` decides where its error bound keeps it off the threshold; the few
     colours that are left are decided by `decision`.
+
+    The last tables are remembered, each 16 MiB, and must not be written to.
     """
     # Matrices this small gain nothing from threads, and lose all where other work needs a core.
     from threadpoolctl import threadpool_limits
@@ -137,6 +141,7 @@ def colour_table(machine: SupportVectors, settings: SvmSettings) -> npt.NDArray[
                 colours = np.stack([np.full_like(green, red), green, blue], axis=1).astype(np.uint8)
                 exact = decision(colours, machine, settings)
                 table[red, green, blue] = exact > settings.threshold
+    table.flags.writeable = False
     return table.ravel()
 
 

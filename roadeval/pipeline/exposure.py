@@ -55,12 +55,13 @@ class ExposureSettings:
 
 
 def gains(image: Rgb, settings: ExposureSettings) -> npt.NDArray[np.float64]:
-    """Gain of each channel, ``(3,)``, that brings the patch of an ``(H, W, 3)`` image to the level."""
+    """Gain of each channel, ``(3,)``, that brings the patch of ``(H, W, 3)`` RGB to the level."""
     patch = patch_mask(*image.shape[:2], settings.patch)
     medians = np.array([_median(image, channel, patch) for channel in range(3)])
     if settings.channels == "alike":
         medians = np.full(3, medians.mean())
-    return np.clip(settings.level / np.maximum(medians, 1.0), settings.least, settings.greatest)
+    gain = settings.level / np.maximum(medians, 1.0)
+    return np.asarray(np.clip(gain, settings.least, settings.greatest))
 
 
 def _median(image: Rgb, channel: int, patch: npt.NDArray[np.uint8]) -> float:
@@ -82,7 +83,7 @@ def bind(settings: ExposureSettings, _parameters: None) -> Callable[[View], Outp
     def run(view: View) -> Output:
         gain = gains(view.image, settings)
         image = expose(view.image, gain)
-        facts = {f"{name}_gain": float(g) for name, g in zip(("red", "green", "blue"), gain)}
+        facts = {f"{name}_gain": float(gain[c]) for c, name in enumerate(("red", "green", "blue"))}
         return Output((Layer(EXPOSED, image),), image=image, facts=facts)
 
     return run

@@ -65,8 +65,6 @@ class TrainingSet:
         ``(n,)`` bool: its label.
     seed
         For whatever a fit draws at random.
-    road_share
-        Share of road among the frames' labelled pixels; the sample itself is balanced.
     """
 
     images: tuple[Rgb, ...]
@@ -75,7 +73,6 @@ class TrainingSet:
     column: npt.NDArray[np.intp]
     road: npt.NDArray[np.bool_]
     seed: int = 0
-    road_share: float = 0.5
 
     def colours(self) -> npt.NDArray[np.uint8]:
         """``(n, 3)`` uint8 RGB of the sampled pixels."""

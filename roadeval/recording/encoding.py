@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Final
 
-from roadeval.data import ERRORS, Frame, FrameResult, Health, Tally
+from roadeval.data import ERRORS, Frame, FrameResult, Health, LayerKind, Pictures, Tally
 from roadeval.recording import layout as at
 from roadeval.recording.codecs import CameraCodec, Codec, codec
 from roadeval.recording.layout import Layout
+
+FLAT: Final = (LayerKind.MASK, LayerKind.LABELS)
+"""What `Pictures.MASKS` keeps of the layers: small, and without loss."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +52,7 @@ class Encoder:
         return Encoded(
             number=result.frame.number,
             stamp_ns=result.frame.stamp_ns,
-            payloads={at.CAMERA: self._photo(result.frame), **dict(self._layers(result))},
+            payloads=dict(self._pictures(result)),
             scalars=dict(self._scalars(result)),
             counts={at.scalar_path("counts", t.variant, t.stage): _row(t) for t in result.tallies},
             states={
@@ -65,6 +69,12 @@ class Encoder:
             return bytes(frame.payload)
         return self._camera.encode(frame.image)
 
+    def _pictures(self, result: FrameResult) -> Iterator[tuple[str, bytes]]:
+        if result.pictures is Pictures.NONE:
+            return
+        yield at.CAMERA, self._photo(result.frame)
+        yield from self._layers(result)
+
     def _layers(self, result: FrameResult) -> Iterator[tuple[str, bytes]]:
         for path, mask in (
             (at.TRUTH_PATH, result.frame.truth),
@@ -74,6 +84,8 @@ class Encoder:
                 yield path, self.codecs[path].encode(mask)
         for variant in result.variants:
             for layer in variant.layers():
+                if result.pictures is Pictures.MASKS and layer.spec.kind not in FLAT:
+                    continue
                 path = at.layer_path(variant.variant, layer.spec.name)
                 yield path, self.codecs[path].encode(layer.array)
         for name, layer in result.errors.items():

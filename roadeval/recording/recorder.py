@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
@@ -116,6 +117,22 @@ class Recorder:
             self._send(self._pages.take())
             self._flush()
 
+    def write_pictures(self, held: Sequence[Encoded]) -> None:
+        """Append the pictures of frames whose numbers stand already, in order.
+
+        They are cleared right after their frame, so that no later one seems to show them.
+        """
+        numbers = {encoded.number for encoded in held}
+        for encoded in held:
+            self._add_images(encoded)
+            if encoded.number + 1 not in numbers:
+                after = replace(
+                    encoded, number=encoded.number + 1, stamp_ns=encoded.stamp_ns + 1, payloads={}
+                )
+                self._add_images(after)
+            self._send(self._pages.take())
+            self._flush()
+
     def finish(self, results: Mapping[str, str]) -> None:
         """Add the results, close the file and give it its name.
 
@@ -200,7 +217,7 @@ class NullRecorder:
     def __exit__(self, *error: object) -> None:
         """Nothing is open."""
 
-    def encode(self, result: FrameResult) -> None:
+    def encode(self, result: FrameResult, position: int) -> None:
         """Encode nothing."""
 
     def write(self, encoded: None) -> None:

@@ -7,11 +7,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, Final
-
-Plain = dict[str, Any]
-"""A block as JSON has it."""
 
 SUFFIXES: Final = {b"<?xml": "svg", b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
 
@@ -30,84 +27,63 @@ class Asset:
 
 
 @dataclass(frozen=True, slots=True)
-class Heading:
-    """A heading: level 1 is numbered and in the outline, and so is what lies below it."""
+class Block:
+    """Anything that stands on a page; its fields are all that the page is told of it."""
+
+    def plain(self) -> dict[str, Any]:
+        """Give the block as JSON has it: its kind, and its fields; a picture by its name."""
+        own = {each.name: _plain(getattr(self, each.name)) for each in fields(self)}
+        return {"kind": type(self).__name__.lower(), **own}
+
+    def assets(self) -> Iterator[Asset]:
+        """Yield the pictures in it."""
+        for each in fields(self):
+            yield from _assets(getattr(self, each.name))
+
+
+@dataclass(frozen=True, slots=True)
+class Heading(Block):
+    """A heading; one of level 1 is numbered. All are in the outline."""
 
     text: str
     level: int = 1
 
-    def plain(self) -> Plain:
-        """Give the block as JSON has it."""
-        return {"kind": "heading", "text": self.text, "level": self.level}
-
-    def assets(self) -> Iterator[Asset]:
-        """Yield the pictures in it."""
-        return iter(())
-
 
 @dataclass(frozen=True, slots=True)
-class Text:
+class Text(Block):
     """A paragraph. ``style`` is ``body``, ``note`` (small and grey), ``title`` or ``verdict``."""
 
     text: str
     style: str = "body"
 
-    def plain(self) -> Plain:
-        """Give the block as JSON has it."""
-        return {"kind": "text", "text": self.text, "style": self.style}
-
-    def assets(self) -> Iterator[Asset]:
-        """Yield the pictures in it."""
-        return iter(())
-
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class Command(Block):
     """A command to copy."""
 
     text: str
 
-    def plain(self) -> Plain:
-        """Give the block as JSON has it."""
-        return {"kind": "command", "text": self.text}
-
-    def assets(self) -> Iterator[Asset]:
-        """Yield the pictures in it."""
-        return iter(())
-
 
 @dataclass(frozen=True, slots=True)
-class Points:
+class Points(Block):
     """A titled list of sentences; ``tone`` is ``plain`` or ``warning``."""
 
     title: str
     items: Sequence[str]
     tone: str = "plain"
 
-    def plain(self) -> Plain:
-        """Give the block as JSON has it."""
-        return {"kind": "points", "title": self.title, "items": [*self.items], "tone": self.tone}
-
-    def assets(self) -> Iterator[Asset]:
-        """Yield the pictures in it."""
-        return iter(())
-
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class Cell(Block):
     """A table's cell: its text, whether it is bold, and the colour of a dot before it."""
 
     text: str
     bold: bool = False
     dot: str | None = None
 
-    def plain(self) -> Plain:
-        """Give the cell as JSON has it."""
-        return {"text": self.text, "bold": self.bold, "dot": self.dot}
-
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class Table(Block):
     """A table. Columns of numbers stand right, of words left.
 
     Parameters
@@ -133,50 +109,18 @@ class Table:
     caption: str = ""
     small: bool = False
 
-    def plain(self) -> Plain:
-        """Give the block as JSON has it."""
-        return {
-            "kind": "table",
-            "columns": [
-                {"title": title.removeprefix("<"), "words": title.startswith("<")}
-                for title in self.columns
-            ],
-            "rows": [[_cell(cell).plain() for cell in row] for row in self.rows],
-            "breaks": [*self.breaks],
-            "groups": [{"title": title, "span": span} for title, span in self.groups],
-            "caption": self.caption,
-            "small": self.small,
-        }
-
-    def assets(self) -> Iterator[Asset]:
-        """Yield the pictures in it."""
-        return iter(())
-
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class Figure(Block):
     """A picture across ``width`` of the text (0..1), with its caption below."""
 
     picture: Asset
     caption: str
     width: float = 1.0
 
-    def plain(self) -> Plain:
-        """Give the block as JSON has it."""
-        return {
-            "kind": "figure",
-            "picture": self.picture.name,
-            "caption": self.caption,
-            "width": self.width,
-        }
-
-    def assets(self) -> Iterator[Asset]:
-        """Yield the pictures in it."""
-        yield self.picture
-
 
 @dataclass(frozen=True, slots=True)
-class Strip:
+class Strip(Block):
     """Pictures of equal size in rows of ``columns``, each with a few words below it.
 
     ``skip`` leaves as many places of the first row free.
@@ -186,98 +130,36 @@ class Strip:
     columns: int
     skip: int = 0
 
-    def plain(self) -> Plain:
-        """Give the block as JSON has it."""
-        pictures = [{"title": title, "picture": asset.name} for title, asset in self.pictures]
-        return {
-            "kind": "strip",
-            "pictures": pictures,
-            "columns": self.columns,
-            "skip": self.skip,
-        }
-
-    def assets(self) -> Iterator[Asset]:
-        """Yield the pictures in it."""
-        return (asset for _, asset in self.pictures)
-
 
 @dataclass(frozen=True, slots=True)
-class Together:
+class Together(Block):
     """Blocks that no page break may part."""
 
     blocks: Sequence[Block]
 
-    def plain(self) -> Plain:
-        """Give the block as JSON has it."""
-        return {"kind": "together", "blocks": [block.plain() for block in self.blocks]}
-
-    def assets(self) -> Iterator[Asset]:
-        """Yield the pictures in it."""
-        return (asset for block in self.blocks for asset in block.assets())
-
 
 @dataclass(frozen=True, slots=True)
-class Columns:
+class Columns(Block):
     """Two stacks of blocks side by side; the left one takes ``share`` of the width."""
 
     left: Sequence[Block]
     right: Sequence[Block]
     share: float = 0.5
 
-    def plain(self) -> Plain:
-        """Give the block as JSON has it."""
-        left, right = ([block.plain() for block in side] for side in (self.left, self.right))
-        return {"kind": "columns", "left": left, "right": right, "share": self.share}
-
-    def assets(self) -> Iterator[Asset]:
-        """Yield the pictures in it."""
-        return (asset for block in (*self.left, *self.right) for asset in block.assets())
-
 
 @dataclass(frozen=True, slots=True)
-class Contents:
+class Contents(Block):
     """The document's headings with their pages."""
 
-    def plain(self) -> Plain:
-        """Give the block as JSON has it."""
-        return {"kind": "contents"}
-
-    def assets(self) -> Iterator[Asset]:
-        """Yield the pictures in it."""
-        return iter(())
-
 
 @dataclass(frozen=True, slots=True)
-class Break:
+class Break(Block):
     """What follows begins on a new page."""
 
-    def plain(self) -> Plain:
-        """Give the block as JSON has it."""
-        return {"kind": "break"}
-
-    def assets(self) -> Iterator[Asset]:
-        """Yield the pictures in it."""
-        return iter(())
-
-
-Block = (
-    Heading
-    | Text
-    | Command
-    | Points
-    | Table
-    | Figure
-    | Strip
-    | Together
-    | Columns
-    | Contents
-    | Break
-)
-
 
 @dataclass(frozen=True, slots=True)
-class Document:
-    """A document: its titles, its blocks, and the facts of its metadata.
+class Document(Block):
+    """A document: its titles, its blocks, and the words that a search finds it by.
 
     ``kicker`` is the line above the title, ``subtitle`` the one below; ``footer`` stands at the
     foot of every page.
@@ -290,22 +172,29 @@ class Document:
     blocks: Sequence[Block]
     keywords: Sequence[str] = ()
 
-    def plain(self) -> Plain:
-        """Give the document as JSON has it."""
-        return {
-            "kicker": self.kicker,
-            "title": self.title,
-            "subtitle": self.subtitle,
-            "footer": self.footer,
-            "keywords": [*self.keywords],
-            "blocks": [block.plain() for block in self.blocks],
-        }
-
-    def assets(self) -> Mapping[str, bytes]:
+    def files(self) -> Mapping[str, bytes]:
         """Give every picture's bytes by its name."""
-        found = (asset for block in self.blocks for asset in block.assets())
-        return {asset.name: asset.content for asset in found}
+        return {asset.name: asset.content for asset in self.assets()}
 
 
-def _cell(cell: Cell | str) -> Cell:
-    return cell if isinstance(cell, Cell) else Cell(cell)
+def _plain(value: Any) -> Any:
+    match value:
+        case Asset():
+            return value.name
+        case Block():
+            return value.plain()
+        case list() | tuple():
+            return [_plain(item) for item in value]
+        case _:
+            return value
+
+
+def _assets(value: Any) -> Iterator[Asset]:
+    match value:
+        case Asset():
+            yield value
+        case Block():
+            yield from value.assets()
+        case list() | tuple():
+            for item in value:
+                yield from _assets(item)

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.report import plots
 from roadeval.report.blocks import Block, Cell, Document, Figure, Heading, Points, Table, Text
+from roadeval.report.comparison_plots import forest, levels
+from roadeval.report.plots import vector
 from roadeval.report.rate_figures import error_rate
 from roadeval.report.words import defined, interval, listing, moment, number, percent, points
 
@@ -164,14 +165,14 @@ def _blocks(content: Content, windows: pd.DataFrame) -> Iterator[Block]:
         yield Points("Beware", content["warnings"], "warning")
     finals = [change for change in content["changes"] if change["final"]]
     if not content["same_drive"]:
-        yield Figure(plots.vector(lambda: plots.levels(finals)), "Rates of the final masks.")
+        yield Figure(vector(lambda: levels(finals)), "Rates of the final masks.")
     else:
         yield Figure(
-            plots.vector(lambda: plots.forest(finals)),
+            vector(lambda: forest(finals)),
             "Change of the final mask's rates against the base; bars are intervals, where given.",
         )
         yield Heading("Over the drive", 2)
-        yield Figure(plots.vector(lambda: error_rate("the common frames", windows)), "")
+        yield Figure(vector(lambda: error_rate("the common frames", windows)), "")
     if content["moved"]:
         yield Heading("Frames that changed most", 2)
         yield moved(content)

@@ -30,8 +30,8 @@ SMALL: Final = 200
 def gallery(found: Findings) -> Iterator[Block]:
     """Show the worst frames with all their layers, then those that the filter moved most."""
     rule = Text(
-        f"Highest ERR of {next(iter(found.finals))}; of frames less than a second apart only the "
-        "worst. Below the errors stand each variant's steps, from left to right.",
+        f"Highest ERR of {next(iter(found.finals))}; of neighbouring frames only the worst. "
+        "Below the errors stand each variant's steps, from left to right.",
         "note",
     )
     yield from _cards(found, [Heading("The worst frames"), rule], found.worst)

@@ -111,7 +111,7 @@ def regions(table: pd.DataFrame, variants: Sequence[str], names: Mapping[str, st
     for name, look in looks(variants).items():
         own = table[table["variant"] == name].set_index("region").reindex([*names])
         for ax, column in ((left, "ERR"), (right, "errors")):
-            _marks(ax, 100 * own[column].to_numpy(float), rows, look)
+            marks(ax, 100 * own[column].to_numpy(float), rows, look)
     left.set_yticks(rows, list(names.values()))
     left.invert_yaxis()
     left.set_xlabel("ERR within the region, %")
@@ -142,17 +142,17 @@ def stages(totals: Totals) -> Figure:
             own = totals[variant]
             if variant == BASELINE:
                 value = next(iter(own.values()))[rate]
-                ax.axhline(_percent(value), color=look.colour, linestyle=look.dash, linewidth=1.3)
+                ax.axhline(in_percent(value), color=look.colour, linestyle=look.dash, linewidth=1.3)
                 continue
             places = [names.index(stage) for stage in own]
-            values = [_percent(total[rate]) for total in own.values()]
+            values = [in_percent(total[rate]) for total in own.values()]
             ax.plot(places, values, color=look.colour, linestyle=look.dash, linewidth=look.width)
-            _marks(ax, np.array(places), np.array(values), look)
+            marks(ax, np.array(places), np.array(values), look)
         ax.set_xticks(range(len(names)), names)
         ax.set_xlim(-0.3, len(names) - 0.7)
         ax.set_ylim(bottom=0)
         ax.set_title(f"{rate}, %", loc="left")
-    _legend(figure, list(totals))
+    legend(figure, list(totals))
     return figure
 
 
@@ -170,8 +170,8 @@ def heat(maps: Sequence[Heat]) -> Figure:
     ):
         shares = [(each.fp, each.fn)[column] for each in maps]
         top = max(np.nanmax([np.nanmax(np.nan_to_num(share)) for share in shares]), 0.01)
-        palette = LinearSegmentedColormap.from_list("", ["white", colour, "#1A0A00"])
-        palette.set_bad("#BBBBBB")
+        colours = LinearSegmentedColormap.from_list("", ["white", colour, "#1A0A00"])
+        palette = colours.with_extremes(bad="#BBBBBB")
         for ax, each, share in zip(grid[:, column], maps, shares, strict=True):
             drawn = ax.imshow(100 * share, cmap=palette, vmin=0, vmax=100 * top, aspect="auto")
             ax.set_xticks([])
@@ -204,11 +204,12 @@ def coverage(table: pd.DataFrame) -> Figure:
     ax.set_xlabel("frame")
     ax.set_ylabel("image called road, %")
     ax.set_ylim(bottom=0)
-    _legend(figure, list(table.columns))
+    legend(figure, list(table.columns))
     return figure
 
 
-def _marks(ax: Axes, x: Any, y: Any, look: Look) -> None:
+def marks(ax: Axes, x: Any, y: Any, look: Look) -> None:
+    """Draw a variant's marks, and no line between them."""
     face = "white" if look.hollow else look.colour
     ax.plot(
         x,
@@ -224,7 +225,8 @@ def _marks(ax: Axes, x: Any, y: Any, look: Look) -> None:
     )
 
 
-def _legend(figure: Figure, variants: Sequence[str]) -> None:
+def legend(figure: Figure, variants: Sequence[str]) -> None:
+    """Write above the axes which variant is drawn how."""
     from matplotlib.lines import Line2D
 
     handles = [
@@ -265,72 +267,6 @@ def _grouped(values: Any, group: int) -> Any:
     return np.divide(sums, counts, out=np.zeros(len(starts)), where=counts > 0)
 
 
-def _percent(fraction: float | None) -> float:
+def in_percent(fraction: float | None) -> float:
+    """Turn a fraction into percent, an undefined one into NaN."""
     return np.nan if fraction is None else 100 * fraction
-
-
-def forest(changes: Sequence[Mapping[str, Any]]) -> Figure:
-    """Draw each result's change of ERR, FPR and FNR against the base, with its interval.
-
-    Parameters
-    ----------
-    changes
-        Rows of a comparison with ``result``, ``variant`` and ``difference``.
-    """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(WIDTH, 0.8 + 0.26 * len(changes)), layout="constrained")
-    names = [
-        each["result"]
-        if each["result"] == each["variant"]
-        else f"{each['result']}: {each['variant']}"
-        for each in changes
-    ]
-    places = np.arange(len(changes))
-    grid = figure.subplots(1, 3, sharey=True)
-    for ax, rate in zip(grid, ("ERR", "FPR", "FNR"), strict=True):
-        for place, each in zip(places, changes, strict=True):
-            told = each["difference"][rate]
-            ax.plot(_percent(told["mean"]), place, "o", color=INK, markersize=5)
-            if told["low"] is not None:
-                ends = [100 * told["low"], 100 * told["high"]]
-                ax.plot(ends, [place, place], color=INK, linewidth=1.6)
-        ax.axvline(0, color=FAINT, linewidth=0.8)
-        ax.margins(x=0.15)
-        # Rounding alone must not look like a change.
-        low, high = ax.get_xlim()
-        ax.set_xlim(min(low, -0.1), max(high, 0.1))
-        ax.set_title(f"{rate}, pp", loc="left")
-        ax.grid(axis="x")
-        ax.grid(visible=False, axis="y")
-    grid[0].set_yticks(places, names)
-    grid[0].set_ylim(len(changes) - 0.5, -0.5)
-    return figure
-
-
-def levels(rows: Sequence[Mapping[str, Any]]) -> Figure:
-    """Draw the rates of several results' final masks, a line of marks a result.
-
-    Parameters
-    ----------
-    rows
-        Rows of a comparison with ``result``, ``variant`` and ``new``.
-    """
-    from matplotlib.figure import Figure
-
-    results = list(dict.fromkeys(row["result"] for row in rows))
-    variants = list(dict.fromkeys(row["variant"] for row in rows))
-    figure = Figure(figsize=(WIDTH, 1.0 + 0.32 * len(results)), layout="constrained")
-    grid = figure.subplots(1, 3, sharey=True)
-    for ax, rate in zip(grid, ("ERR", "FPR", "FNR"), strict=True):
-        for variant, look in looks(variants).items():
-            own = [row for row in rows if row["variant"] == variant]
-            x = [_percent(row["new"][rate]) for row in own]
-            _marks(ax, x, [results.index(row["result"]) for row in own], look)
-        ax.set_title(f"{rate}, %", loc="left")
-        ax.set_xlim(left=0)
-        ax.grid(axis="x")
-    grid[0].set_yticks(range(len(results)), results)
-    grid[0].set_ylim(len(results) - 0.5, -0.5)
-    _legend(figure, variants)
-    return figure

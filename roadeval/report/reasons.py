@@ -44,7 +44,7 @@ def where(found: Findings) -> Iterator[Block]:
         yield Figure(
             plots.vector(partial(plots.heat, found.heat[place : place + MAPS])),
             f"Where the final masks go wrong, {_counted(found)}. Grey: never labelled.",
-            width=0.8,
+            width=0.68,
         )
 
 

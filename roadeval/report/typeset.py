@@ -16,7 +16,7 @@ from enum import StrEnum
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final
+from typing import Any, Final
 
 from roadeval.errors import RoadevalError
 from roadeval.report.blocks import Document
@@ -48,11 +48,11 @@ def pdf(document: Document, paper: Paper = Paper.A4) -> bytes:
     """
     import typst
 
-    data = _printable(json.dumps(document.plain() | {"paper": _NAMES[paper]}, ensure_ascii=False))
+    data = _printable(document.plain() | {"paper": _NAMES[paper]})
     sources = {
         _TEMPLATE: files("roadeval.report").joinpath(_TEMPLATE).read_bytes(),
-        "document.json": data.encode(),
-        **document.assets(),
+        "document.json": json.dumps(data).encode(),
+        **document.files(),
     }
     with TemporaryDirectory(prefix="roadeval-") as folder:
         for name, content in sources.items():
@@ -95,6 +95,14 @@ def _figures_fonts() -> str:
     return str(Path(get_data_path(), "fonts", "ttf"))
 
 
-def _printable(text: str) -> str:
+def _printable(value: Any) -> Any:
     """Leave out control characters and lone surrogates, which no font has."""
-    return _CONTROL.sub("", text.encode("utf-8", "replace").decode())
+    match value:
+        case str():
+            return _CONTROL.sub("", value.encode("utf-8", "replace").decode())
+        case dict():
+            return {key: _printable(item) for key, item in value.items()}
+        case list():
+            return [_printable(item) for item in value]
+        case _:
+            return value

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import NON_ROAD, ROAD, Frame, Rgb, Truth
+from roadeval.data import Frame, Rgb, Truth
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import STAGES, Chain
 from roadeval.pipeline.stage import TrainingSet
@@ -75,9 +75,9 @@ def fit(
             "choose other frames with --start or --train-frames, or give --model"
         )
     images = tuple(frame.image for frame in frames)
-    where = (pixels.frame, pixels.row, pixels.column, pixels.road)
-    share = _road_share(truths) if source == "truth" else 0.5
-    training_set = TrainingSet(images, *where, settings.seed, share)
+    training_set = TrainingSet(
+        images, pixels.frame, pixels.row, pixels.column, pixels.road, settings.seed
+    )
     parameters, warnings = {}, []
     for name, plan in plans.items():
         parameters[name] = _fit_variant(training_set, plan)
@@ -105,12 +105,6 @@ def _truths(frames: Sequence[Frame], settings: TrainingSettings) -> tuple[str, l
             'or allow training.source = "patch"'
         )
     return "patch", [patch_truth(frame.image, settings) for frame in frames]
-
-
-def _road_share(truths: Sequence[Truth]) -> float:
-    """Share of road among the labelled pixels; the patch's guess says nothing of it."""
-    road, other = (sum(np.count_nonzero(t == v) for t in truths) for v in (ROAD, NON_ROAD))
-    return road / (road + other)
 
 
 def _fit_variant(training_set: TrainingSet, plan: Plan) -> dict[str, Any]:

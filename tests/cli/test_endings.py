@@ -39,7 +39,9 @@ def test_a_signal_has_its_own_exit_code_and_tells_what_is_left(code, name, capsy
     error = Stopped(code)
     error.add_note("the partial recording is out.partial.rrd")
     assert explain(error) == 128 + getattr(signal, name)
-    assert lines(capsys) == ["roadeval: interrupted: the partial recording is out.partial.rrd"]
+    assert lines(capsys) == [
+        "roadeval: interrupted: stopped before the end; the partial recording is out.partial.rrd"
+    ]
 
 
 def test_wrong_usage_points_to_the_help(capsys):
@@ -87,13 +89,15 @@ def test_the_line_is_coloured_at_a_terminal_only(capsys):
     assert lines(capsys) == ["roadeval: error: [bold]not markup[/bold]"]
 
 
-def test_a_reader_of_stdout_who_has_gone_is_no_error():
+@pytest.mark.parametrize("length", [1, 1_000_000], ids=["buffered", "written"])
+def test_a_reader_of_stdout_who_has_gone_is_no_error(length, monkeypatch):
     program = (
         "import sys; from roadeval.cli import app, console\n"
-        "def talk(**_): console.emit('x' * 1_000_000)\n"
+        f"def talk(**_): console.emit('x' * {length})\n"
         "app.app = talk\n"
         "sys.exit(app.main([]))"
     )
+    monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)
     with subprocess.Popen(
         [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as run:

@@ -21,8 +21,8 @@ def total(err, pooled=None, frames=91):
 
 
 TOTALS = {
-    "filtered": {"svm": total(0.2), "post": total(0.0912, pooled=0.0934)},
-    "unfiltered": {"svm": total(0.15), "post": total(0.0847)},
+    "filtered": {"similarity": total(0.2), "post": total(0.0912, pooled=0.0934)},
+    "unfiltered": {"similarity": total(0.15), "post": total(0.0847)},
     "blind": {"post": total(0.0721)},
 }
 
@@ -55,7 +55,7 @@ def lines(results):
 
 def test_every_stage_of_every_variant_is_a_row_in_percent():
     shown = lines(summary())
-    assert "filtered svm 91 20.00 % 20.00 % 50.00 % 50.00 % 50.00 %" in shown
+    assert "filtered similarity 91 20.00 % 20.00 % 50.00 % 50.00 % 50.00 %" in shown
     assert "post 91 9.12 % 9.34 % 50.00 % 50.00 % 50.00 %" in shown
 
 

@@ -48,7 +48,7 @@ def test_the_recorded_masks_scored_against_the_log_give_the_table(car_park, data
         frame = int(row["frame"])
         road, truth = recording.layer(row["variant"], row["stage"], frame) == 1, truths[frame]
         found = [
-            np.ma.sum(outcome)
+            int(np.ma.sum(outcome))
             for outcome in (road & truth, ~road & ~truth, road & ~truth, ~road & truth)
         ]
         assert found == [int(row[name]) for name in ("TP", "TN", "FP", "FN")]

@@ -59,7 +59,10 @@ def a_table(errors: Mapping[tuple[str, str], Sequence[int]], hertz: float = 10) 
                         "log_time_ns": round(number * 1e9 / hertz),
                         "variant": variant,
                         "stage": stage,
-                        **{"TP": counts.tp, "TN": counts.tn, "FP": counts.fp, "FN": counts.fn},
+                        "TP": counts.tp,
+                        "TN": counts.tn,
+                        "FP": counts.fp,
+                        "FN": counts.fn,
                         "N": counts.n,
                         **rates.of(counts),
                     }

@@ -6,10 +6,9 @@ from roadeval.evaluation.comparison import (
     ComparisonError,
     Side,
     compare,
-    judge,
     variants_as_sides,
 )
-from roadeval.evaluation.conditions import Condition, ConditionError
+from roadeval.evaluation.conditions import Condition, ConditionError, judge
 from roadeval.evaluation.settings import EvaluationSettings
 
 from .making import a_table
@@ -73,9 +72,7 @@ def test_different_drives_stand_side_by_side_without_differences():
 def test_a_result_that_does_not_know_its_log_is_not_subtracted():
     sides = [a_side("a", [10] * 20), a_side("b", [10] * 20, digest=None)]
     found = compare(sides, SETTINGS)
-    assert found["warnings"] == [
-        "b does not say which log it is of: nothing is subtracted"
-    ]
+    assert found["warnings"] == ["b does not say which log it is of: nothing is subtracted"]
 
 
 def test_another_truth_is_told():

@@ -7,6 +7,8 @@ from typing import Any
 import cv2
 import numpy as np
 import numpy.typing as npt
+from mcap.writer import CompressionType, Writer
+from mcap_ros2._dynamic import serialize_dynamic
 from mcap_ros2.writer import Writer as Ros2Writer
 
 SECOND = 1_000_000_000
@@ -92,3 +94,38 @@ def drive(
     mask[3:] = 255
     messages += [("/labels", stamp + delay, raw(stamp, mask, "mono8")) for stamp in labels]
     return ros2_log(path, sorted(messages, key=lambda message: message[1]), **options)
+
+
+FRAMES = 12
+START = 1_700_000_000 * SECOND
+PERIOD = SECOND // 10
+CAMERA = "/camera"
+CHANNELS = (
+    (CAMERA, "sensor_msgs/msg/CompressedImage", COMPRESSED),
+    ("/labels", "sensor_msgs/msg/Image", IMAGE),
+)
+CONTAINERS: dict[str, dict[str, Any]] = {
+    "zstd": {"compression": CompressionType.ZSTD},
+    "lz4": {"compression": CompressionType.LZ4},
+    "uncompressed": {"compression": CompressionType.NONE},
+    "unchunked": {"use_chunking": False},
+}
+
+
+def small_log(path: Path, container: str) -> dict[int, bytes]:
+    """Write a camera and its labels in small chunks; give each image by its log time."""
+    images = {START + i * PERIOD: jpeg(grey(20 * i)) for i in range(FRAMES)}
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=1500, enable_data_crcs=True, **CONTAINERS[container])
+        writer.start("ros2", "test")
+        encoders = []
+        for topic, name, text in CHANNELS:
+            schema = writer.register_schema(name, "ros2msg", text.encode())
+            writer.register_channel(topic, "cdr", schema)
+            encoders.append(serialize_dynamic(name, text)[name])
+        for stamp, data in images.items():
+            image, label = compressed(stamp, data), raw(stamp, grey(255), "mono8")
+            writer.add_message(1, stamp, encoders[0](image), stamp)
+            writer.add_message(2, stamp + 5, encoders[1](label), stamp)
+        writer.finish()
+    return images

@@ -9,7 +9,7 @@ import zstandard
 from mcap.records import Channel, Schema
 from mcap_ros2._dynamic import serialize_dynamic
 
-from roadeval.logs.decoders import message_is_whole, reader_for
+from roadeval.logs.decoders import decoder_for, message_is_whole
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages import CompressedPicture, Picture, RawPicture
 from roadeval.logs.records import Message
@@ -35,7 +35,7 @@ def cdr(message: dict[str, Any]) -> bytes:
 
 
 def read(encoding: str, described: Schema | None, data: bytes) -> Picture:
-    return reader_for(channel(encoding), described)(data)
+    return decoder_for(channel(encoding), described).picture(data)
 
 
 RAW = cdr(raw(STAMP, grey(7, 2, 1), "mono8"))
@@ -51,6 +51,12 @@ def test_cdr_is_read_whatever_language_its_schema_is_in(encoding: str, text: str
     assert isinstance(picture, RawPicture)
     assert (picture.stamp_ns, picture.width, picture.height) == (STAMP, 2, 1)
     assert (picture.encoding, picture.step, bytes(picture.data)) == ("mono8", 2, b"\x07\x07")
+
+
+@pytest.mark.parametrize("data", [RAW, PACKED, zstandard.ZstdCompressor().compress(RAW)])
+def test_the_stamp_alone_is_read_without_the_rest(data: bytes) -> None:
+    name = COMPRESSED_NAME if data is PACKED else IMAGE_NAME
+    assert decoder_for(channel("cdr"), schema(name, "")).stamp(data) == STAMP
 
 
 def test_a_schema_that_makes_no_sense_leaves_its_name() -> None:

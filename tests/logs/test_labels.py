@@ -90,20 +90,22 @@ ROAD, LANE, SKY, CAR = (64, 32, 32), (255, 0, 0), (0, 0, 255), (204, 0, 255)
 def test_colours_can_mean_road_and_ignore() -> None:
     picture = colors([ROAD, LANE, SKY, CAR])
     labels = LabelValues(road_colors=(ROAD, LANE), ignore_colors=(CAR,))
-    table = understand(labels, seen_in(picture, labels), "/labels")
+    table = understand(labels, seen_in(picture, labels, "/labels"), "/labels")
     assert table.read(picture).tolist() == [[1, 1, 0, 255]]
     assert table.words == "road is 64,32,32 255,0,0, 204,0,255 is ignored"
 
 
 def test_colours_are_asked_for_with_those_seen() -> None:
-    with pytest.raises(LogError, match=r"colours \(0,0,255 64,32,32\): .*--road-color R,G,B"):
-        seen_in(colors([ROAD, SKY]), LabelValues())
+    with pytest.raises(
+        LogError, match=r"/labels holds the colours 0,0,255 64,32,32: .*--road-color R,G,B"
+    ):
+        seen_in(colors([ROAD, SKY]), LabelValues(), "/labels")
 
 
 def test_a_colour_that_never_occurs_is_refused() -> None:
     labels = LabelValues(road_colors=(LANE,))
     with pytest.raises(LogError, match="--road-color 255,0,0 does not occur in /labels"):
-        understand(labels, seen_in(colors([ROAD, SKY]), labels), "/labels")
+        understand(labels, seen_in(colors([ROAD, SKY]), labels, "/labels"), "/labels")
 
 
 def test_values_and_colours_cannot_be_mixed() -> None:
@@ -115,7 +117,7 @@ def test_of_a_palette_the_indices_count_or_its_colours_as_asked() -> None:
     picture = palette_png([[0, 1, 2]], [*SKY, *ROAD, *CAR])
     assert to_labels(picture).tolist() == [[0, 1, 2]]
     labels = LabelValues(road_colors=(ROAD,))
-    table = understand(labels, seen_in(picture, labels), "/labels")
+    table = understand(labels, seen_in(picture, labels, "/labels"), "/labels")
     assert table.read(picture).tolist() == [[0, 1, 0]]
 
 

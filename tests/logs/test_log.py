@@ -4,8 +4,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.writer import CompressionType
 
-from roadeval.logs import FrameError, Instant, LabelValues, LogError, Span, open_log, parse_time
+from roadeval.logs import (
+    FrameError,
+    Instant,
+    LabelValues,
+    LogError,
+    Span,
+    chunks,
+    open_log,
+    parse_time,
+)
 
 from .making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
 
@@ -94,6 +104,45 @@ def test_log_times_take_the_place_of_zero_stamps(tmp_path: Path) -> None:
         frames = list(log.frames(selection))
     assert [(f.stamp_ns, f.labelled) for f in frames] == [(10, True), (20, True), (30, True)]
     assert any("log times take their place" in reason for reason in selection.reasons)
+
+
+def test_without_any_time_images_and_labels_pair_in_their_order(tmp_path: Path) -> None:
+    mask = png(grey(255))
+    messages = []
+    for _ in range(3):
+        messages += [("/cam", 7, compressed(0, jpeg(grey(9))))]
+        messages += [("/labels", 7, compressed(0, mask, "png"))]
+    path = ros2_log(tmp_path / "zero.mcap", messages)
+    with open_log(path) as log:
+        selection = log.select()
+        assert [frame.labelled for frame in log.frames(selection)] == [True] * 3
+    assert any("their order take their place" in reason for reason in selection.reasons)
+
+
+def test_split_files_in_a_folder_are_one_drive(tmp_path: Path) -> None:
+    (tmp_path / "bag").mkdir()
+    for part in range(3):
+        stamps = STAMPS[3 * part : 3 * part + 3]
+        drive(tmp_path / "bag" / f"bag_{part}.mcap", stamps, stamps)
+    with open_log(tmp_path / "bag") as log:
+        frames = list(log.frames(log.select()))
+    assert log.name == "bag"
+    assert [frame.stamp_ns for frame in frames] == STAMPS[:9]
+    assert all(frame.labelled for frame in frames)
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_chunks_too_big_for_memory_are_read_all_the_same(
+    tmp_path: Path, compression: CompressionType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = drive(tmp_path / "drive.mcap", STAMPS, STAMPS, compression=compression)
+    monkeypatch.setattr(chunks, "BIG", 1000)
+    monkeypatch.setattr(chunks, "BLOCK", 100)
+    with open_log(path) as log:
+        log.verify()
+        frames = [frame.decode() for frame in log.frames(log.select())]
+    assert [frame.stamp_ns for frame in frames] == STAMPS
+    assert log.damage == ()
 
 
 def test_a_bad_image_costs_its_frame_and_is_named(tmp_path: Path) -> None:

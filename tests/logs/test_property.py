@@ -4,34 +4,17 @@ import random
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
-from mcap.writer import CompressionType, Writer
-from mcap_ros2._dynamic import serialize_dynamic
 
 from roadeval.logs import FrameError, LogError, open_log
 from roadeval.logs.container import OUTSIDE, Container
 
-from .making import COMPRESSED, IMAGE, compressed, grey, jpeg, raw
+from .making import CAMERA, CONTAINERS, small_log
 
 CASES = 500
 """Random cases for each container of a finished log, and half as many for an unfinished one."""
 
-FRAMES = 12
-START = 1_700_000_000 * 10**9
-PERIOD = 10**8
-CAMERA = "/camera"
-CHANNELS = (
-    (CAMERA, "sensor_msgs/msg/CompressedImage", COMPRESSED),
-    ("/labels", "sensor_msgs/msg/Image", IMAGE),
-)
-CONTAINERS: dict[str, dict[str, Any]] = {
-    "zstd": {"compression": CompressionType.ZSTD},
-    "lz4": {"compression": CompressionType.LZ4},
-    "uncompressed": {"compression": CompressionType.NONE},
-    "unchunked": {"use_chunking": False},
-}
 RECORD_HEADS = 31
 """Bytes before a message's data: its record's head and its own."""
 
@@ -56,25 +39,6 @@ class Bad:
     last: int
 
 
-def write(path: Path, container: str) -> dict[int, bytes]:
-    """Write a camera and its labels in small chunks; give each image by its log time."""
-    images = {START + i * PERIOD: jpeg(grey(20 * i)) for i in range(FRAMES)}
-    with path.open("wb") as file:
-        writer = Writer(file, chunk_size=1500, enable_data_crcs=True, **CONTAINERS[container])
-        writer.start("ros2", "test")
-        encoders = []
-        for topic, name, text in CHANNELS:
-            schema = writer.register_schema(name, "ros2msg", text.encode())
-            writer.register_channel(topic, "cdr", schema)
-            encoders.append(serialize_dynamic(name, text)[name])
-        for stamp, data in images.items():
-            image, label = compressed(stamp, data), raw(stamp, grey(255), "mono8")
-            writer.add_message(1, stamp, encoders[0](image), stamp)
-            writer.add_message(2, stamp + 5, encoders[1](label), stamp)
-        writer.finish()
-    return images
-
-
 def places(container: Container) -> Iterator[tuple[int, tuple[int, int]]]:
     """By log time, the bytes of the file that an image hangs on: its chunk's, or its own."""
     for number, entries in container.logs[1].blocks:
@@ -88,7 +52,7 @@ def places(container: Container) -> Iterator[tuple[int, tuple[int, int]]]:
 
 
 def make(path: Path, name: str) -> Good:
-    images = write(path, name)
+    images = small_log(path, name)
     data = path.read_bytes()
     container = Container(path, lambda *_: True, lambda *_: True)
     spans = dict(places(container))

@@ -36,8 +36,11 @@ def test_a_stride_gives_the_same_frames(video: Path) -> None:
     assert all(np.array_equal(frame.image, whole[frame.number].image) for frame in some)
 
 
-def test_a_start_amid_the_video_begins_at_the_keyframe_before(video: Path) -> None:
+def test_a_start_amid_the_video_begins_at_the_keyframe_before(
+    video: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     whole = frames(video)
+    monkeypatch.setattr("roadeval.logs.video.PATIENCE", 2)
     with open_log(video) as log:
         stream = log.frames(log.select())
         start = [frame.log_time_ns for frame in stream][7]

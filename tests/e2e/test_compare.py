@@ -1,0 +1,95 @@
+"""``roadeval compare``: what changed, and a guard that fails when it should."""
+
+import json
+
+import pytest
+
+from tests.e2e.commands import DEMO, Replayed, replay, roadeval
+from tests.report.documents import text
+
+LIMIT = ("--fail-if", "post.filtered.ERR > +0.5pp")
+
+
+@pytest.fixture(scope="module")
+def worse(tmp_path_factory) -> Replayed:
+    """The demo's first half with a classifier that is known to fail."""
+    folder = tmp_path_factory.mktemp("worse")
+    (folder / "worse.toml").write_text('[svm]\nkernel = "linear"\n[post]\nfill = false\n')
+    words = ("--config", folder / "worse.toml", "--max-frames", 50, "--record", "none")
+    return replay(folder, DEMO, *words)
+
+
+def test_a_recording_against_itself_differs_by_nothing(demo):
+    run = roadeval("compare", demo.recording, demo.recording, *LIMIT, "--json")
+    assert run.returncode == 0, run.stderr
+    content = json.loads(run.stdout)
+    assert content["same_drive"]
+    for change in content["changes"]:
+        assert change["base"] == change["new"]
+        assert {told["mean"] for told in change["difference"].values()} == {0}
+
+
+def test_a_recording_against_its_own_results_folder_differs_by_nothing_to_the_last_digit(demo):
+    run = roadeval("compare", demo.recording, demo.reports, "--json")
+    means = [
+        told["mean"]
+        for change in json.loads(run.stdout)["changes"]
+        for told in change["difference"].values()
+    ]
+    assert max(map(abs, means)) < 1e-15
+
+
+def test_a_worse_configuration_ends_with_4_and_the_sentence_that_says_why(demo, worse):
+    run = roadeval("compare", demo.recording, worse.reports, *LIMIT)
+    assert run.returncode == 4
+    (why,) = (line for line in run.stderr.splitlines() if "post.filtered.ERR" in line)
+    assert "post.filtered.ERR > +0.5pp holds" in why
+    assert "frames that out evaluated are left out" in run.stderr
+
+
+def test_a_limit_that_is_kept_ends_with_0(demo, worse):
+    kept = ("--fail-if", "post.filtered.ERR < -50pp", "--fail-if", "post.filtered.ERR > 99%")
+    assert roadeval("compare", demo.recording, worse.reports, *kept).returncode == 0
+
+
+def test_the_files_are_written_by_their_endings(demo, worse, tmp_path):
+    names = [tmp_path / f"change.{ending}" for ending in ("pdf", "md", "json")]
+    words = [word for name in names for word in ("-o", name)]
+    run = roadeval("compare", demo.recording, worse.reports, *words, *LIMIT, "-q")
+    assert run.returncode == 4
+    assert run.stdout == ""
+    document, markdown, content = (name.read_bytes() for name in names)
+    final = next(
+        change
+        for change in json.loads(content)["changes"]
+        if (change["variant"], change["stage"]) == ("filtered", "post")
+    )
+    told = f"{100 * final['base']['ERR']:.2f} | {100 * final['new']['ERR']:.2f}"
+    assert told in markdown.decode()
+    assert told.replace(" | ", " ") in text(document)
+
+
+def test_the_variants_of_one_recording_are_compared_with_each_other(demo):
+    run = roadeval("compare", demo.recording, "--json")
+    assert run.returncode == 0, run.stderr
+    content = json.loads(run.stdout)
+    assert [each["label"] for each in content["results"]] == ["unfiltered", "filtered"]
+    final = next(change for change in content["changes"] if change["final"])
+    difference = demo.summary["difference"]["post"]["ERR"]["mean"]
+    assert final["difference"]["ERR"]["mean"] == pytest.approx(difference)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["--fail-if", "ERR > 1"], 2, "is no condition"),
+        (["-o", "change.docx"], 2, "end it in .pdf, .md or .json"),
+        (["--fail-if", "post.net.ERR > 1pp"], 1, "nothing compared is called post.net"),
+        (["--variant", "net"], 1, "no variant net"),
+    ],
+)
+def test_what_cannot_be_done_is_one_line(words, code, said, demo):
+    run = roadeval("compare", demo.recording, demo.reports, *words)
+    assert run.returncode == code
+    assert said in run.stderr
+    assert len(run.stderr.splitlines()) == 1

@@ -1,0 +1,81 @@
+"""``roadeval inspect``: the worst frames, and the real viewer at one of them."""
+
+import json
+from pathlib import Path
+
+import cv2
+import pytest
+
+from tests.e2e.commands import roadeval
+
+DRIVER = Path("/usr/share/vulkan/icd.d")
+drawable = pytest.mark.skipif(
+    not list(DRIVER.glob("lvp_icd*.json")),
+    reason="no driver that draws without a screen (Debian: mesa-vulkan-drivers)",
+)
+
+
+def worst(replayed):
+    rows = [
+        row
+        for row in replayed.table("frames")
+        if (row["variant"], row["stage"]) == ("filtered", "post") and row["ERR"]
+    ]
+    return int(max(rows, key=lambda row: float(row["ERR"]))["frame"])
+
+
+def test_the_list_begins_with_the_worst_frame_and_says_why(demo):
+    listed = json.loads(roadeval("inspect", demo.recording, "--list", "--json").stdout)
+    assert listed[0]["frame"] == worst(demo)
+    assert [each["rank"] for each in listed] == list(range(1, len(listed) + 1))
+    errors = [each["rates"]["ERR"] for each in listed]
+    assert errors == sorted(errors, reverse=True)
+    for each in listed:
+        assert sum(each["parts"].values()) == pytest.approx(each["rates"]["ERR"])
+
+
+def test_the_list_fits_the_terminal(demo):
+    run = roadeval("inspect", demo.reports, "--list")
+    assert run.returncode == 0, run.stderr
+    assert max(map(len, run.stdout.splitlines())) <= 80
+
+
+@drawable
+def test_the_viewer_is_drawn_without_a_screen_at_the_worst_frame(demo, tmp_path):
+    picture = tmp_path / "worst.png"
+    run = roadeval("inspect", demo.recording, "--worst", 1, "--screenshot", picture)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout == f"{picture}: frame {worst(demo)}\n"
+    drawn = cv2.imread(str(picture))
+    assert drawn.shape == (1080, 1920, 3)
+    assert drawn.std() > 20
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["--frame", 123456], 1, "no frame 123456; the recording holds frames 0 to"),
+        (["--frame", 1, "--worst", 1], 2, "give --frame or --worst, not both"),
+        (["--list", "--worst", 1], 2, "--list opens nothing"),
+        (["--worst", 1, "--variant", "net"], 1, "no variant net; there are filtered, unfiltered"),
+    ],
+)
+def test_what_cannot_be_done_is_one_line(words, code, said, demo):
+    run = roadeval("inspect", demo.recording, *words)
+    assert run.returncode == code
+    assert said in run.stderr
+    assert len(run.stderr.splitlines()) == 1
+
+
+def test_a_results_folder_has_nothing_to_open(demo):
+    run = roadeval("inspect", demo.reports, "--frame", 12)
+    assert run.returncode == 1
+    assert "give the recording (.rrd)" in run.stderr
+
+
+def test_without_a_screen_the_way_out_is_told(demo, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    run = roadeval("inspect", demo.recording, "--frame", 12)
+    assert run.returncode == 1
+    assert "--screenshot FILE.png" in run.stderr

@@ -1,0 +1,167 @@
+"""``roadeval report``: one PDF that says what the tables say, from the recording alone."""
+
+import json
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+
+import pytest
+from pypdf import PdfReader
+
+from roadeval.report.words import DASH
+from roadeval.reporting import report as report_of
+from tests.e2e.commands import DEMO, roadeval
+from tests.report.documents import text
+
+SECTIONS = (
+    "Summary",
+    "Over the drive: the paper's tables and figures",
+    "With the filter against without",
+    "Where the errors are",
+    "Which stage broke it",
+    "The worst frames",
+    "Settings, versions, and how to reproduce this",
+)
+
+
+@pytest.fixture(scope="module")
+def report(demo, tmp_path_factory):
+    """The demo's report, made where neither the log nor the results folder is at hand."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    shutil.copy(demo.recording, folder / "drive.rrd")
+    run = roadeval("report", "drive.rrd", "-o", "report.pdf", cwd=folder)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout == "report.pdf\n"
+    return folder / "report.pdf"
+
+
+@pytest.fixture(scope="module")
+def words(report):
+    return text(report.read_bytes())
+
+
+def test_every_section_is_there_in_order(report):
+    outline = [each["/Title"] for each in PdfReader(report).outline if not isinstance(each, list)]
+    assert outline == [f"{number} {title}" for number, title in enumerate(SECTIONS, 1)]
+
+
+def test_the_verdict_and_every_final_rate_are_those_of_the_summary(words, demo):
+    assert demo.summary["verdict"] in words
+    for variant, stages in demo.summary["totals"].items():
+        final = stages["post"]
+        rates = [f"{100 * final[rate]:.2f}" for rate in ("ERR", "FPR", "FNR", "ACC", "pooled_ERR")]
+        assert f"{variant} {final['frames']} {' '.join(rates)}" in words
+
+
+def test_every_row_over_the_drive_is_that_of_the_windows(words, demo):
+    rows = {
+        (row["window"], row["variant"]): row
+        for row in demo.table("windows")
+        if row["stage"] == "post"
+    }
+    for window in {window for window, _ in rows}:
+        own = [rows[window, name] for name in ("filtered", "unfiltered", "blind")]
+        told = [f"{100 * float(row[r]):.2f}" for r in ("ERR", "FPR", "FNR", "ACC") for row in own]
+        assert f"{own[0]['first_frame']}{DASH}{own[0]['last_frame']} {' '.join(told)}" in words
+
+
+def test_the_worst_frame_is_shown_with_the_command_that_opens_it(words, demo):
+    rows = [
+        row
+        for row in demo.table("frames")
+        if (row["variant"], row["stage"]) == ("filtered", "post") and row["ERR"]
+    ]
+    worst = max(rows, key=lambda row: float(row["ERR"]))
+    assert f"roadeval inspect drive.rrd --frame {worst['frame']}" in words
+
+
+def test_the_log_is_named_by_its_hash(words, demo):
+    assert demo.summary["log"]["sha256"] in words
+
+
+def test_a_results_folder_gives_the_same_numbers_without_pictures(demo, words, tmp_path):
+    folder = tmp_path / "results"
+    shutil.copytree(demo.reports, folder)
+    run = roadeval("report", folder)
+    assert run.returncode == 0, run.stderr
+    content = (folder / "report.pdf").read_bytes()
+    assert "without the recording there are no pictures" in text(content)
+    table = re.search(r"final mask frames ERR .*? precision (.*?) frames count", text(content))
+    assert table
+    assert table[1] in words
+
+
+KILLED = """
+import os, signal, sys
+from roadeval import ReplayOptions, replay
+
+def kill_at_40(progress):
+    if progress.stage == "replaying" and progress.done == 40:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+replay(sys.argv[1], save="out.rrd", options=ReplayOptions(jobs=1), on_progress=kill_at_40)
+"""
+
+
+def test_a_killed_run_gives_a_report_of_its_readable_part_marked_on_page_1(tmp_path):
+    command = [sys.executable, "-c", KILLED, DEMO]
+    assert subprocess.run(command, cwd=tmp_path, check=False).returncode == -signal.SIGKILL
+    (recording,) = tmp_path.glob("*.rrd")
+    run = roadeval("report", recording, "-o", tmp_path / "report.pdf")
+    assert run.returncode == 0, run.stderr
+    assert "a partial recording" in run.stderr
+    first = PdfReader(tmp_path / "report.pdf").pages[0].extract_text()
+    assert "This run did not reach its end" in first
+    (evaluated,) = re.findall(r"evaluated (\d+)", first)
+    assert 0 < int(evaluated) < 40
+
+
+def test_without_truth_the_report_says_what_it_cannot_say(unlabelled, tmp_path):
+    run = roadeval("report", unlabelled.recording, "-o", tmp_path / "report.pdf")
+    assert run.returncode == 0, run.stderr
+    words = text((tmp_path / "report.pdf").read_bytes())
+    assert "Without truth nothing can be said about errors" in words
+    assert "ms a frame" in words
+
+
+@pytest.mark.parametrize("name", ["not.rrd", "missing.rrd", "empty"])
+def test_what_is_no_result_is_one_line(name, tmp_path):
+    (tmp_path / "not.rrd").write_text("hello")
+    (tmp_path / "empty").mkdir()
+    run = roadeval("report", tmp_path / name)
+    assert run.returncode == 1
+    assert len(run.stderr.splitlines()) == 1
+    assert name in run.stderr
+
+
+def test_a_recording_by_another_program_is_one_line(tmp_path):
+    import rerun as rr
+
+    stream = rr.RecordingStream("somebody_else")
+    stream.save(tmp_path / "theirs.rrd")
+    stream.log("x", rr.TextDocument("y"))
+    stream.flush()
+    stream.disconnect()
+    run = roadeval("report", tmp_path / "theirs.rrd")
+    assert run.returncode == 1
+    assert "somebody_else" in run.stderr
+
+
+def test_a_results_folder_of_another_format_is_one_line(tmp_path):
+    (tmp_path / "summary.json").write_text(json.dumps({"format": {"name": "other"}}))
+    run = roadeval("report", tmp_path)
+    assert run.returncode == 1
+    assert "not a summary of format roadeval-summary" in run.stderr
+
+
+def test_the_same_result_gives_the_same_file_and_nothing_is_left_beside_nor_fetched(
+    demo, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(socket.socket, "connect", lambda *_: pytest.fail("a connection"))
+    monkeypatch.chdir(tmp_path)
+    paths = [report_of(demo.recording, tmp_path / name) for name in ("a.pdf", "b.pdf")]
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    assert sorted(tmp_path.iterdir()) == paths
