@@ -87,7 +87,7 @@ def view(opened: Opened, frame: int | None, picture: Path | None = None) -> int 
         raise RoadevalError(
             f"{opened.path}: a results folder holds no pictures; give the recording (.rrd)"
         )
-    numbers = opened.frame_numbers
+    numbers = sorted({*opened.pictured, *(opened.frames["frame"] if len(opened.frames) else ())})
     if frame is not None and frame not in numbers:
         held = f"frames {numbers[0]} to {numbers[-1]}" if numbers else "none"
         raise RoadevalError(f"{opened.path}: no frame {frame}; the recording holds {held}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cached_property
@@ -18,6 +17,7 @@ from roadeval.evaluation.verdict import NO_PAIR, NOTHING_SCORED, verdict
 from roadeval.recording import Recording, RecordingError
 
 if TYPE_CHECKING:
+    import numpy.typing as npt
     import pandas as pd
 
 
@@ -68,10 +68,11 @@ class Opened:
         return self._whole(self._tables.regions)
 
     @cached_property
-    def frame_numbers(self) -> tuple[int, ...]:
-        """The recorded frames that can be read whole; none of a folder.
+    def pictured(self) -> tuple[int, ...]:
+        """The frames whose pictures are there; none of a folder.
 
-        A killed run may have written some layers of its last frames and not others.
+        A run may have kept few, and a killed one may have written some layers of its last frames
+        and not others: those are left out.
         """
         if self.recording is None:
             return ()
@@ -79,6 +80,14 @@ class Opened:
         while not self.complete and numbers and not _is_whole(self.recording, numbers[-1]):
             numbers.pop()
         return tuple(numbers)
+
+    def layer(self, variant: str, name: str, frame: int) -> npt.NDArray[Any] | None:
+        """Give a layer of a variant; None where the run did not keep it."""
+        assert self.recording is not None
+        try:
+            return self.recording.layer(variant, name, frame)
+        except RecordingError:
+            return None
 
     @property
     def windows(self) -> pd.DataFrame:
@@ -110,23 +119,23 @@ class Opened:
         return pd.read_csv(StringIO(text)) if text else pd.DataFrame()
 
     def _whole(self, table: pd.DataFrame) -> pd.DataFrame:
-        """Keep the rows of frames that can be read whole."""
+        """Keep the rows of frames that stand in both tables; a killed run may have cut one."""
         if self.complete or not len(table):
             return table
-        return table[table["frame"].isin(self.frame_numbers)]
+        both = set(self._tables.frames["frame"]) & set(self._tables.regions["frame"])
+        return table[table["frame"].isin(both)]
 
     def _summary_of_part(self) -> dict[str, Any]:
         """Make the summary that a killed run did not get to write, of what it had scored."""
         assert self.recording is not None
-        layout, roles = self.recording.layout, self.recording.roles
-        counted = Counter(roles[frame] for frame in self.frame_numbers)
+        layout, scored = self.recording.layout, len(self.frames) > 0
         facts: dict[str, Any] = {"verdict": NOTHING_SCORED, "totals": {}}
         return {
             "drive": {"name": layout.drive, "width": layout.width, "height": layout.height},
             "frames": {
-                "decoded": len(self.frame_numbers),
-                "trained_on": counted[Role.TRAINING],
-                "evaluated": self.frames["frame"].nunique() if len(self.frames) else 0,
+                "with_pictures": len(self.pictured),
+                "trained_on": layout.properties.get("training_frames", 0),
+                "evaluated": self.frames["frame"].nunique() if scored else 0,
             },
             "difference": {},
             "warnings": [],
@@ -135,16 +144,16 @@ class Opened:
             "versions": {},
             "seconds": {},
             "training": {"source": layout.properties.get("trained_on")},
-        } | (_facts(self.frames) if len(self.frames) else facts)
+        } | (_facts(self.frames) if scored else facts)
 
 
 def _is_whole(recording: Recording, frame: int) -> bool:
-    """Tell whether every layer of a frame can be read."""
+    """Tell whether all masks of a frame can be read."""
     try:
         recording.image(frame)
         for variant in recording.variants:
-            for spec in variant.layers:
-                recording.layer(variant.name, spec.name, frame)
+            for stage in variant.stages:
+                recording.layer(variant.name, stage, frame)
             if recording.roles[frame] == Role.EVALUATED:
                 recording.layer(variant.name, ERRORS.name, frame)
                 recording.truth(frame)

@@ -37,6 +37,8 @@ class ChunkReader:
     ----------
     bad
         Why a chunk could not be read, by its offset.
+    kept
+        Why a chunk should not have been, if it was all the same.
     """
 
     def __init__(self, source: Source, *, keep_corrupt: bool = False) -> None:
@@ -45,6 +47,7 @@ class ChunkReader:
         self._cache: OrderedDict[int, Bytes] = OrderedDict()
         self._held = 0
         self.bad: dict[int, str] = {}
+        self.kept: dict[int, str] = {}
 
     def read(self, chunk: Chunk) -> Bytes:
         """Read the records of a chunk; of one that is cut off, those before the cut.
@@ -72,6 +75,7 @@ class ChunkReader:
             _check(records, chunk)
         except BadRecord as error:
             if self._keep_corrupt:
+                self.kept[chunk.offset] = f"{error}, used all the same"
                 return self._rest(chunk)
             self.bad[chunk.offset] = str(error)
             raise

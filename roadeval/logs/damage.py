@@ -96,6 +96,9 @@ def _bad_chunks(container: Container) -> Iterator[Damage]:
             lost = tuple((container.topic(key), len(found)) for key, found in index.items())
             span = (chunk.start, chunk.end)
             yield Damage(container.path, chunk.offset, reason, True, *span, lost)
+        if chunk.offset in container.reader.kept:
+            reason = container.reader.kept[chunk.offset]
+            yield Damage(container.path, chunk.offset, reason, True, chunk.start, chunk.end)
 
 
 def _wrong_indexes(container: Container) -> Iterator[Damage]:

@@ -221,6 +221,8 @@ class Scan:
         if place.end - place.body > LARGEST:
             raise BadRecord("a definition of a length that cannot be")
         record = parse(place.opcode, self._source.peek(place.body, place.end - place.body))
+        if not self._search.begins(place.end):
+            raise BadRecord("a definition of the wrong length")
         known = self.schemas if isinstance(record, Schema) else self.channels
         known.setdefault(record.id, record)
 
@@ -266,6 +268,7 @@ class Scan:
         for entries in self.loose.values():
             if entries and entries[-1] == last.offset:
                 del entries[-2:]
+                self.recent_ns.pop()
         return last.offset, last.offset + 1
 
     def _gap(self, offset: int, end: int, reason: str, *, lossy: bool = True) -> None:

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 BLOCK: Final = 1 << 20
 """Bytes to look through at a time."""
+UNFINISHED: Final = 2**64 - 1
+"""The length that stands before a chunk while it is being written."""
 DAY: Final = 86_400 * 10**9
 """A message logged more than so many nanoseconds from all the recent ones is none."""
 PLAUSIBLE: Final = re.compile(rb"(?=[\x03-\x07\x09\x0c\x0f].{4}\x00{4})", re.DOTALL)
@@ -53,8 +55,14 @@ class Search:
             return False
         if offset + len(MAGIC) == self._source.size:
             return self._source.peek(offset, len(MAGIC)) == MAGIC
-        fits = place.end <= self._source.size or place.opcode in (Opcode.CHUNK, Opcode.MESSAGE)
-        return 0 < place.opcode <= Opcode.DATA_END and fits
+        return 0 < place.opcode <= Opcode.DATA_END and self._fits(place)
+
+    def _fits(self, place: Place) -> bool:
+        """Whether a record ends in the file, or can be the one that the file's end cut off."""
+        length = place.end - place.body
+        cut = place.opcode in (Opcode.CHUNK, Opcode.MESSAGE) and length <= LARGEST
+        unfinished = place.opcode == Opcode.CHUNK and length == UNFINISHED
+        return place.end <= self._source.size or cut or unfinished
 
     def is_message(self, place: Place) -> bool:
         """Whether this is a message of a known channel, logged within a day of a recent one."""

@@ -36,8 +36,9 @@ VERDICTS: Final = (
     LabelClass(5, "too dark for shade", (0, 0, 0, 200)),
     LabelClass(6, "too bright for shade", (255, 255, 255, 200)),
     LabelClass(7, "rougher than road", (213, 94, 0, 200)),
+    LabelClass(8, "too little in the frame", (204, 121, 167, 200)),
 )
-ACCEPTED, SMALL, FAR, ALONE, DARK, BRIGHT, ROUGH = range(1, len(VERDICTS))
+ACCEPTED, SMALL, FAR, ALONE, DARK, BRIGHT, ROUGH, LITTLE = range(1, len(VERDICTS))
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
@@ -59,6 +60,8 @@ class GatedSettings:
     min_level
         Candidates and lit road are brighter than this grey level (0..255): below it a colour is
         noise.
+    max_level
+        Lit road is darker than this grey level: white cars and glare have the road's colour too.
     lit_quantile
         The frame's sunlit level is this quantile of the brightness of all pixels of lit road's
         colour: few enough to be lit in a frame that is mostly in the shade.
@@ -81,6 +84,9 @@ class GatedSettings:
         Greatest root mean square of the log brightness about its 5x5 mean, in the core. Shade
         leaves a road's texture as it is, and roads are smooth; leaves, cars and house fronts are
         not. This is the gate that keeps the filter from harm.
+    min_share
+        Share of the frame that all components which pass the other gates must cover together.
+        Under a clouded sky it is still dark beneath cars, and nowhere else.
     softness
         Side of the square that the gains are averaged over, so that edges stay soft.
     """
@@ -90,6 +96,7 @@ class GatedSettings:
     colour_distance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 3.0
     max_green: Annotated[float, Field(allow_inf_nan=False)] = 0.08
     min_level: Annotated[float, Field(ge=0, le=255)] = 4.0
+    max_level: Annotated[float, Field(ge=0, le=255)] = 235.0
     lit_quantile: Share = 0.8
     darkness: Share = 0.55
     min_core: Annotated[int, Field(ge=1)] = 10
@@ -99,6 +106,7 @@ class GatedSettings:
     min_ring: Annotated[int, Field(ge=1)] = 20
     ratio: tuple[Share, Share] = (0.12, 0.75)
     max_texture: Annotated[float, Field(ge=0)] = 0.12
+    min_share: Share = 0.02
     softness: Annotated[int, Field(ge=1, le=99)] = 5
 
     @model_validator(mode="after")
@@ -148,7 +156,8 @@ def look(image: Rgb, road: RoadLight, settings: GatedSettings) -> Scene:
     dark = (possible & (like.shaded < near) & (total < limit)).view(np.uint8)
     square = np.ones((3, 3), np.uint8)
     dark = cv2.morphologyEx(cv2.morphologyEx(dark, cv2.MORPH_OPEN, square), cv2.MORPH_CLOSE, square)
-    return Scene(image, total, dark, (lit & (total >= limit)).view(np.uint8))
+    lit &= (total >= limit) & (total < 3 * settings.max_level)
+    return Scene(image, total, dark, lit.view(np.uint8))
 
 
 # --- Components and rings -------------------------------------------------------------------------
@@ -162,8 +171,8 @@ class Components:
     ----------
     labels, rings
         ``(h, w)`` int32: the component that a pixel belongs to, and the one whose ring it is in.
-    core, ring
-        ``(count,)``: pixels of the core and of the ring.
+    area, core, ring
+        ``(count,)``: pixels of the component, of its core and of its ring.
     lowest
         ``(count,)``: the component's lowest row, as a share of the height.
     ratio
@@ -174,6 +183,7 @@ class Components:
 
     labels: Labels
     rings: Labels
+    area: npt.NDArray[np.int64]
     core: npt.NDArray[np.int64]
     ring: npt.NDArray[np.int64]
     lowest: Floats
@@ -192,9 +202,8 @@ def components(scene: Scene, settings: GatedSettings) -> Components:
     ratio = np.where(known[:, None], means[0] / means[1], 1.0)
     bottom = boxes[:, cv2.CC_STAT_TOP] + boxes[:, cv2.CC_STAT_HEIGHT] - 1
     texture = _texture(scene.total, core, count)
-    return Components(
-        labels, rings, inside[:, 0], around[:, 0], bottom / len(labels), ratio, texture
-    )
+    sizes = (boxes[:, cv2.CC_STAT_AREA].astype(np.int64), inside[:, 0], around[:, 0])
+    return Components(labels, rings, *sizes, bottom / len(labels), ratio, texture)
 
 
 def _eroded(mask: Mask, pixels: int) -> npt.NDArray[np.bool_]:
@@ -256,4 +265,7 @@ def judge(found: Components, settings: GatedSettings) -> npt.NDArray[np.uint8]:
         ACCEPTED,
     ).astype(np.uint8)
     verdicts[0] = 0
+    accepted = verdicts == ACCEPTED
+    if found.area[accepted].sum() < settings.min_share * found.labels.size:
+        verdicts[accepted] = LITTLE
     return verdicts

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,9 @@ PAGE: Final = 8
 """Frames whose images, notes and table lines share a chunk: what a killed run loses at most."""
 SERIES: Final = 64
 """Frames whose numbers share a chunk."""
+
+LEAST_FREE: Final = 16 << 20
+"""Bytes that must be free at the start: Rerun waits forever if not even the layout fits."""
 
 
 class Recorder:
@@ -58,13 +62,7 @@ class Recorder:
         RecordingError
             If it cannot be written.
         """
-        if self.path.is_dir():
-            raise RecordingError(f"{self.path}: is a folder; name a file in it, ending in .rrd")
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.partial.touch()
-        except OSError as error:
-            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
+        self._make_room()
         # The same input gives the same recording: its identity is its layout's, and properties
         # of the run, which Rerun would add, stay out.
         identity = hashlib.blake2b(self._layout.to_json().encode(), digest_size=16).hexdigest()
@@ -188,9 +186,22 @@ class Recorder:
             raise RuntimeError("a recorder is used inside its 'with' block")
         return self._stream
 
+    def _make_room(self) -> None:
+        if self.path.is_dir():
+            raise RecordingError(f"{self.path}: is a folder; name a file in it, ending in .rrd")
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self.partial.touch()
+            free = shutil.disk_usage(self.partial.parent).free
+        except OSError as error:
+            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
+        if free < LEAST_FREE:
+            self.partial.unlink()
+            raise RecordingError(f"{self.path}: cannot be written: the disk is full")
+
     def _flush(self) -> None:
         try:
-            self._open_stream().flush()
+            self._open_stream().flush(timeout_sec=5)
         except RuntimeError as error:
             raise self._incomplete() from error
 

@@ -24,7 +24,7 @@ def document(found: Findings) -> Document:
 
 
 def _facts(found: Findings, drive: dict[str, Any]) -> Iterator[str]:
-    count = found.summary["frames"].get("in_log") or found.summary["frames"].get("decoded")
+    count = found.summary["frames"].get("in_log") or found.summary["frames"]["evaluated"]
     yield f"{count} frames"
     if drive.get("width"):
         yield f"{drive['width']} \N{MULTIPLICATION SIGN} {drive['height']}"

@@ -32,14 +32,14 @@ class Versus:
     frames
         Indexed by ``frame``: ``stamp_ns``, the differences by rate, ``wrong`` (net pixels).
     pixels
-        Newly right, newly wrong and labelled pixels, on how many frames; None if not known.
+        Newly right, newly wrong and labelled pixels of the frames sampled; None if not known.
     """
 
     treated: str
     control: str
     differences: Mapping[str, Mapping[str, Any]]
     frames: pd.DataFrame
-    pixels: tuple[int, int, int, int] | None = None
+    pixels: tuple[int, int, int] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,7 +97,7 @@ class Findings:
     complete
         Whether the run reached its end.
     pictured
-        Whether the recording with its images is at hand.
+        Frames to evaluate, or without truth all, whose pictures are at hand.
     summary
         As ``summary.json``; of an incomplete run, what could be made of its tables.
     properties
@@ -137,7 +137,7 @@ class Findings:
 
     source: str
     complete: bool
-    pictured: bool
+    pictured: int
     summary: Mapping[str, Any]
     properties: Mapping[str, Any]
     finals: Mapping[str, str]

@@ -92,6 +92,19 @@ def variant_cell(name: str, names: Sequence[str]) -> Cell:
     return Cell(name, dot=looks(list(names))[name].colour)
 
 
+def counted(found: Findings) -> str:
+    """Say which frames' masks were read for what the tables do not hold."""
+    evaluated = found.summary["frames"]["evaluated"]
+    if found.sampled == evaluated:
+        return f"all {evaluated} evaluated frames"
+    if found.pictured == evaluated:
+        return f"{found.sampled} frames spread evenly over the {evaluated} evaluated"
+    return (
+        f"{found.sampled} of the {found.pictured} frames whose pictures were kept, out of "
+        f"{evaluated} evaluated (which may not be a fair sample)"
+    )
+
+
 def warnings(found: Findings) -> Iterator[str]:
     """Say what a reader must know before believing the numbers."""
     yield from map(str, found.summary.get("warnings", ()))
@@ -108,7 +121,7 @@ def warnings(found: Findings) -> Iterator[str]:
     if len(losses) > 3:
         yield f"{len(losses) - 3} more frames were lost; summary.json names them."
     if not found.pictured:
-        yield "Made from a results folder: without the recording there are no pictures."
+        yield "Made without pictures (a results folder holds none): no gallery, no maps."
 
 
 def _how_sure(found: Findings) -> str:

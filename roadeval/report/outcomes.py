@@ -10,7 +10,7 @@ from roadeval.report import plots
 from roadeval.report.blocks import Asset, Block, Cell, Figure, Heading, Strip, Table, Text
 from roadeval.report.figures import Example
 from roadeval.report.findings import Findings, Versus
-from roadeval.report.front import PAPERS, SIDE_BY_SIDE, variant_cell
+from roadeval.report.front import PAPERS, SIDE_BY_SIDE, counted, variant_cell
 from roadeval.report.pictures import Shot, asset
 from roadeval.report.rate_figures import error_rate, fp_fn_rate
 from roadeval.report.words import DASH, interval, listing, number, percent, points
@@ -195,21 +195,14 @@ def _shares(each: Versus) -> str:
 
 def _pixels(found: Findings, each: Versus) -> str:
     assert each.pixels is not None
-    right, wrong, labelled, frames = each.pixels
+    right, wrong, labelled = each.pixels
     net = int(each.frames["wrong"].sum())
     change = f"{number(abs(net))} {'more' if net > 0 else 'fewer'} wrong pixels in all"
     return (
-        f"Of the labelled pixels of {_sample(found, frames)}, {percent(right / labelled)} % are "
+        f"Of the labelled pixels of {counted(found)}, {percent(right / labelled)} % are "
         f"newly right with the filter and {percent(wrong / labelled)} % newly wrong; over all "
         f"frames that leaves {change}."
     )
-
-
-def _sample(found: Findings, frames: int) -> str:
-    evaluated = found.summary["frames"]["evaluated"]
-    if frames == evaluated:
-        return f"all {frames} evaluated frames"
-    return f"{frames} frames spread evenly over the {evaluated} evaluated"
 
 
 def _blind(found: Findings, blind: list[Versus]) -> Table:

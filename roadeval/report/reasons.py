@@ -10,7 +10,7 @@ from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.report import plots
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.findings import Findings
-from roadeval.report.front import SIDE_BY_SIDE, variant_cell
+from roadeval.report.front import SIDE_BY_SIDE, counted, variant_cell
 from roadeval.report.words import DASH, percent, points
 
 REGIONS: Final = {
@@ -111,10 +111,7 @@ def _said(found: Findings) -> str:
 
 
 def _counted(found: Findings) -> str:
-    evaluated = found.summary["frames"]["evaluated"]
-    if found.sampled == evaluated:
-        return f"over all {evaluated} evaluated frames"
-    return f"over {found.sampled} frames spread evenly over the {evaluated} evaluated"
+    return f"over {counted(found)}"
 
 
 # --- Stages ---------------------------------------------------------------------------------------

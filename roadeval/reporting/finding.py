@@ -14,7 +14,7 @@ from roadeval.evaluation.maps import Maps
 from roadeval.evaluation.scoreboard import COMPARED
 from roadeval.opened import Opened
 from roadeval.report.findings import Findings, Heat, Versus
-from roadeval.reporting.looking import Looker, evenly, looking, named
+from roadeval.reporting.looking import Looker, evenly, named, pipelines
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,7 +40,7 @@ def find(opened: Opened) -> Findings:
     return Findings(
         source=str(opened.path),
         complete=opened.complete,
-        pictured=opened.recording is not None,
+        pictured=len(numbers),
         summary=summary,
         properties=opened.properties,
         finals=analysis.final_stages(frames) if scored else {},
@@ -54,7 +54,8 @@ def find(opened: Opened) -> Findings:
         },
         changes=_changes(maps),
         parts={
-            name: named(analysis.causes(frames, name).mean().to_dict()) for name in looking(frames)
+            name: named(analysis.causes(frames, name).mean().to_dict())
+            for name in pipelines(frames)
         },
         heat=[
             Heat(name, each.share(each.fp), each.share(each.fn)) for name, each in maps.heat.items()
@@ -71,10 +72,9 @@ def find(opened: Opened) -> Findings:
 
 
 def _numbers(opened: Opened) -> list[int]:
-    """Give the evaluated frames, or without truth all."""
-    if len(opened.frames):
-        return [int(number) for number in opened.frames["frame"].unique()]
-    return list(opened.frame_numbers)
+    """Give the evaluated frames that have pictures, or without truth all that have."""
+    evaluated = set(opened.frames["frame"]) if len(opened.frames) else set(opened.pictured)
+    return [number for number in opened.pictured if number in evaluated]
 
 
 # --- Tables ---------------------------------------------------------------------------------------
@@ -93,7 +93,7 @@ def _windows(opened: Opened) -> tuple[pd.DataFrame, int]:
 def _versus(frames: pd.DataFrame, summary: dict[str, Any], maps: Maps) -> list[Versus]:
     """Compare with the filter against without, then every variant with the baseline."""
     names = set(frames["variant"])
-    wanted = [(FILTERED, UNFILTERED), *((name, BASELINE) for name in looking(frames))]
+    wanted = [(FILTERED, UNFILTERED), *((name, BASELINE) for name in pipelines(frames))]
     settings, found = analysis.settings_of(summary), []
     for treated, control in wanted:
         if not {treated, control} <= names:
@@ -104,7 +104,7 @@ def _versus(frames: pd.DataFrame, summary: dict[str, Any], maps: Maps) -> list[V
             given = analysis.differences(paired, settings, COMPARED)
             told = {name: asdict(each) for name, each in given.items()}
         change = maps.paired.get((treated, control))
-        pixels = (change.repaired, change.spoiled, change.labelled, maps.frames) if change else None
+        pixels = (change.repaired, change.spoiled, change.labelled) if change else None
         found.append(Versus(treated, control, told, paired, pixels))
     return found
 

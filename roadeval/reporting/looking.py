@@ -25,8 +25,8 @@ STEPS: Final = 2
 """Variants whose errors a frame of the gallery shows, and whose steps."""
 
 
-def looking(frames: pd.DataFrame) -> list[str]:
-    """Name the variants that look at the image."""
+def pipelines(frames: pd.DataFrame) -> list[str]:
+    """Name the variants that look at the image: all but the baseline."""
     names = frames["variant"].unique().tolist() if len(frames) else []
     return [name for name in names if name != BASELINE]
 
@@ -49,13 +49,15 @@ class Looker:
         self._opened = opened
         self._recording = opened.recording
         self._frames = opened.frames
-        self._variants = looking(opened.frames)
+        self._variants = pipelines(opened.frames)
         self._causes = {name: analysis.causes(self._frames, name) for name in self._variants}
 
     def examples(self, numbers: Sequence[int]) -> list[Example]:
+        """Gather frames for figure 2."""
         return [self._example(self._recording, n) for n in numbers] if self._recording else []
 
     def thumbnails(self, numbers: Sequence[int]) -> list[Shot]:
+        """Gather frames to look at in passing."""
         if self._recording is None:
             return []
         return [
@@ -84,8 +86,11 @@ class Looker:
     def _case(self, frame: int, stamp_ns: int, change: float | None = None) -> Case:
         own = analysis.finals(self._frames[self._frames["frame"] == frame]).set_index("variant")
         variant, recording = self._variants[0], self._recording
-        shots = () if recording is None else tuple(self._shots(recording, frame))
-        rows = recording is not None and change is None and list(self._rows(recording, frame))
+        shots: list[Shot] = []
+        rows: list[list[Shot]] = []
+        if recording is not None and frame in self._opened.pictured:
+            shots = list(self._shots(recording, frame))
+            rows = list(self._rows(recording, frame)) if change is None else []
         return Case(
             frame=frame,
             stamp_ns=stamp_ns,
@@ -98,7 +103,7 @@ class Looker:
             change=change,
             notes=self._opened.notes(frame, variant),
             shots=shots,
-            rows=rows or (),
+            rows=rows,
         )
 
     def _shots(self, recording: Recording, frame: int) -> Iterator[Shot]:
@@ -114,17 +119,18 @@ class Looker:
         """Show each variant's steps: the stages' masks, and all that is not a mask."""
         image = recording.image(frame)
         for variant in recording.variants[:STEPS]:
-            yield [
-                Shot(spec.name, image, spec, recording.layer(variant.name, spec.name, frame))
+            layers = [
+                (spec, self._opened.layer(variant.name, spec.name, frame))
                 for spec in variant.layers
                 if spec.kind is not LayerKind.MASK or spec.name in variant.stages
             ]
+            yield [Shot(s.name, image, s, array) for s, array in layers if array is not None]
 
     def _outcome(self, recording: Recording, frame: int) -> Shot:
         """Show the first variant's errors, or without truth its mask."""
         variant = recording.variants[0]
         image = recording.image(frame)
-        if recording.layout.has_truth and len(self._frames):
+        if len(self._frames):
             return Shot("", image, ERRORS, recording.layer(variant.name, ERRORS.name, frame))
         stage = variant.stages[-1]
         spec = next(spec for spec in variant.layers if spec.name == stage)
@@ -133,5 +139,5 @@ class Looker:
 
     def _example(self, recording: Recording, frame: int) -> Example:
         masks = {v.name: recording.layer(v.name, v.stages[-1], frame) for v in recording.variants}
-        truth = recording.truth(frame) if recording.layout.has_truth else None
+        truth = recording.truth(frame) if len(self._frames) else None
         return Example(frame, recording.image(frame), truth, masks)

@@ -12,10 +12,10 @@ LIMIT = ("--fail-if", "post.filtered.ERR > +0.5pp")
 
 @pytest.fixture(scope="module")
 def worse(tmp_path_factory) -> Replayed:
-    """The demo's first half with a classifier that is known to fail."""
+    """The demo's first frames with a classifier that is known to fail."""
     folder = tmp_path_factory.mktemp("worse")
     (folder / "worse.toml").write_text('[svm]\nkernel = "linear"\n[post]\nfill = false\n')
-    words = ("--config", folder / "worse.toml", "--max-frames", 50, "--record", "none")
+    words = ("--config", folder / "worse.toml", "--max-frames", 30, "--record", "none")
     return replay(folder, DEMO, *words)
 
 

@@ -137,6 +137,7 @@ def test_data_of_a_wrong_checksum_is_kept_on_demand(data: Path) -> None:
     path = data / "mcap" / "broken" / "chunk_crc_field_bad.mcap"
     with open_log(path, keep_corrupt=True) as log:
         assert decoded(log) == (40, 40)
+        assert "checksum is wrong, used all the same" in log.losses[0]
 
 
 MEASURE = """

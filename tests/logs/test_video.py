@@ -1,10 +1,14 @@
 """Video in a log: frames that need the frames before them."""
 
 import sys
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
+from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
+from mcap_protobuf.writer import Writer
 
 from roadeval.data import Frame
 from roadeval.logs import FrameError, Instant, Kind, LogError, Span, open_log
@@ -111,3 +115,54 @@ def test_without_the_decoder_its_extra_is_named(
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(LogError, match=r"pip install 'roadeval\[video\]'"):
         frames(video)
+
+
+ENCODERS = {
+    "h264": ("libx264", {"preset": "veryfast", "bf": "0"}),
+    "h265": ("libx265", {"preset": "ultrafast", "x265-params": "bframes=0:log-level=none"}),
+    "vp9": ("libvpx-vp9", {"lag-in-frames": "0", "deadline": "realtime"}),
+    "av1": ("libsvtav1", {"preset": "12", "svtav1-params": "pred-struct=1:lookahead=0"}),
+}
+
+
+def ramp(number: int) -> npt.NDArray[np.uint8]:
+    """A bright bar that moves with the frame's number."""
+    image = np.full((96, 128, 3), 40, np.uint8)
+    image[:, 10 * number : 10 * number + 20] = 200
+    return image
+
+
+def encode(codec: str, count: int) -> list[bytes]:
+    """Encode frames without any that look ahead; a keyframe every fourth."""
+    import av
+
+    name, options = ENCODERS[codec]
+    try:
+        encoder = av.CodecContext.create(name, "w")
+    except av.FFmpegError:
+        pytest.skip(f"PyAV was built without {name}")
+    encoder.width, encoder.height, encoder.pix_fmt = 128, 96, "yuv420p"
+    encoder.framerate, encoder.time_base, encoder.gop_size = 10, Fraction(1, 10), 4
+    encoder.options = options
+    packets = []
+    for number in range(count):
+        frame = av.VideoFrame.from_ndarray(ramp(number), "rgb24")
+        frame.pts = number
+        packets += encoder.encode(frame)
+    packets += encoder.encode(None)
+    return [bytes(packet) for packet in packets]
+
+
+@pytest.mark.parametrize("codec", ENCODERS)
+def test_every_codec_is_decoded_from_any_frame(tmp_path: Path, codec: str) -> None:
+    path = tmp_path / "video.mcap"
+    with path.open("wb") as file, Writer(file) as writer:
+        for number, data in enumerate(encode(codec, 10)):
+            message = CompressedVideo(data=data, format=codec)
+            message.timestamp.FromNanoseconds(number * 100)
+            writer.write_message("/video", message, number * 100)
+    found = frames(path)
+    late = frames(path, Span(Instant(600)))
+    assert [frame.number for frame in found] == list(range(10))
+    assert all(np.abs(f.image.astype(int) - ramp(f.number)).mean() < 5 for f in found)
+    assert all(np.array_equal(a.image, b.image) for a, b in zip(late, found[6:], strict=True))

@@ -93,6 +93,14 @@ def test_a_component_that_no_lit_road_surrounds_is_rejected():
     assert verdict(image) == "no lit road around it"
 
 
+def test_a_white_car_is_no_lit_road():
+    image = road()
+    image[75:115, 50:110] = 250
+    image[PATCH] = np.rint(ROAD * SHADE)
+    assert verdict(image) == "no lit road around it"
+    assert verdict(image, max_level=255) == "accepted"
+
+
 def test_a_component_darker_than_shade_is_rejected():
     assert verdict(road(ROAD * 0.08)) == "too dark for shade"
 
@@ -107,6 +115,13 @@ def test_a_component_rougher_than_road_is_rejected():
     image[PATCH] = np.rint(image[PATCH] * rough)
     assert verdict(image) == "rougher than road"
     assert verdict(image, max_texture=1.0) == "accepted"
+
+
+def test_a_little_darkness_in_a_frame_without_other_shade_is_no_shadow():
+    contact = road(ROAD * SHADE, np.s_[90:100, 70:90])  # as beneath a car under a clouded sky
+    assert verdict(contact) == "too little in the frame"
+    contact[70:110, 5:45] = np.rint(ROAD * SHADE)
+    assert verdict(contact) == "accepted"
 
 
 def test_the_texture_of_a_component_is_the_deviation_of_its_log_brightness():
@@ -177,11 +192,12 @@ def test_far_from_accepted_shade_nothing_changes():
     [
         road(),
         road(ROAD * SHADE, np.s_[94:98, 60:100]),
+        road(ROAD * SHADE, np.s_[90:100, 70:90]),
         np.zeros((9, 11, 3), np.uint8),
         np.full((1, 1, 3), 255, np.uint8),
         np.random.default_rng(0).integers(0, 256, (60, 400, 3), dtype=np.uint8),
     ],
-    ids=["road alone", "a component too small", "black", "one pixel", "noise"],
+    ids=["road alone", "a component too small", "too little", "black", "one pixel", "noise"],
 )
 def test_a_frame_without_accepted_shade_passes_bit_for_bit(image):
     output, layers = run(image)

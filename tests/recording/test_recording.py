@@ -2,14 +2,13 @@
 
 import json
 import os
-import resource
 import signal
 import subprocess
 import sys
 import textwrap
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -44,6 +43,10 @@ def rerun(*words):
 @pytest.fixture(scope="module")
 def drive():
     """Two training frames, 17 evaluated ones with a note on one: more than two pages."""
+    return some_frames()
+
+
+def some_frames():
     frames = [*map(unscored, range(2)), *map(result, range(2, 19))]
     frames[5] = replace(frames[5], notes=("It rains.", "It pours."))
     return frames
@@ -241,25 +244,39 @@ def test_a_killed_run_leaves_all_but_the_last_page(tmp_path):
     np.testing.assert_array_equal(back, next(result(15).variants[0].masks())[1])
 
 
-@contextmanager
-def files_no_larger_than(limit):
-    """Let writing fail beyond so many bytes, as on a full disk."""
-    unlimited = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    try:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, unlimited[1]))
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, unlimited)
-        signal.signal(signal.SIGXFSZ, handler)
+FULL_DISK = """
+import resource, signal, sys
+from pathlib import Path
+from roadeval.recording import RecordingError
+from tests.recording.test_recording import record, some_frames
+
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
+try:
+    record(Path(sys.argv[1]), some_frames())
+except RecordingError as error:
+    print(error)
+"""
 
 
-@pytest.mark.parametrize("share", [0.3, 0.9], ids=["among the frames", "in the final index"])
-def test_a_full_disk_is_told_and_no_output_appears(share, drive, recording, tmp_path):
+@pytest.mark.parametrize("share", [0.45, 0.9], ids=["among the frames", "in the final index"])
+def test_a_full_disk_is_told_and_no_output_appears(share, recording, tmp_path):
+    # In a process of its own: the limit holds for all of it, and it must end by itself.
     limit = int(share * recording.path.stat().st_size)
-    with files_no_larger_than(limit), pytest.raises(RecordingError, match="is the disk full"):
-        record(tmp_path / "out.rrd", drive)
+    command = [sys.executable, "-c", FULL_DISK, str(tmp_path / "out.rrd"), str(limit)]
+    root = Path(__file__).resolve().parents[2]
+    done = subprocess.run(
+        command, cwd=root, check=False, capture_output=True, text=True, timeout=60
+    )
+    assert "is the disk full" in done.stdout, done.stderr
     assert not (tmp_path / "out.rrd").exists()
+
+
+def test_a_disk_that_is_full_from_the_start_is_told_at_once(tmp_path, monkeypatch):
+    monkeypatch.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=1 << 20))
+    with pytest.raises(RecordingError, match="the disk is full"), _recorder(tmp_path / "out.rrd"):
+        pass
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path):
@@ -276,7 +293,7 @@ def _recorder(path):
 
 def test_no_recording_is_made_by_the_recorder_that_does_nothing(drive):
     with NullRecorder() as recorder:
-        recorder.write(recorder.encode(drive[0]))
+        recorder.write(recorder.encode(drive[0], 0))
         recorder.finish(RESULTS)
 
 
