@@ -15,7 +15,9 @@ from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.flow import ordered
 from roadeval.gallery import Gallery
 from roadeval.options import Progress, ReplayOptions
+from roadeval.pipeline.stage import Moment
 from roadeval.recording import Layout
+from roadeval.relay import Relay, Turn
 from roadeval.training import Model
 
 Tell = Callable[[Progress], None]
@@ -117,10 +119,13 @@ class Run:
         Decoding, computing, scoring and encoding happen in the worker threads.
         """
 
-        def work(item: tuple[int, logs.LoggedFrame]) -> Processed | None:
-            return self._process(*item, recorder)
+        def work(item: tuple[int, logs.LoggedFrame, Turn]) -> Processed | None:
+            with item[-1] as turn:
+                return self._process(*item[:2], turn, recorder)
 
-        for processed in ordered(work, enumerate(self._frames), self._jobs):
+        relay = Relay(self._chains)
+        items = ((*item, relay.turn()) for item in enumerate(self._frames))
+        for processed in ordered(work, items, self._jobs):
             self.done += 1
             self._tell(Progress(self.done, self.total, "replaying"))
             if processed is not None:
@@ -129,13 +134,16 @@ class Run:
                 yield processed
 
     def _process(
-        self, position: int, logged: logs.LoggedFrame, recorder: Encoder
+        self, position: int, logged: logs.LoggedFrame, turn: Turn, recorder: Encoder
     ) -> Processed | None:
         try:
             frame = logged.decode()
         except logs.FrameError:
             return None  # it stands in the log's accounting, with the reason
-        variants = [runner.run_variant(n, chain, frame.image) for n, chain in self._chains.items()]
+        variants = [
+            runner.run_variant(name, chain, frame.image, Moment(frame.stamp_ns, turn.batons[name]))
+            for name, chain in self._chains.items()
+        ]
         variants += [runner.external_variant(name, mask) for name, mask in frame.external.items()]
         result = self.board.score(frame, self._schedule.role(frame), tuple(variants))
         return result, recorder.encode(result, position)

@@ -20,16 +20,17 @@ from roadeval.data import (
     mask_spec,
 )
 from roadeval.pipeline.chain import Chain
+from roadeval.pipeline.stage import Moment
 from roadeval.training import Model
 
 EXTERNAL: Final = mask_spec(FINAL_STAGE, "Road mask in the log")
 
 
-def run_variant(name: str, chain: Chain, image: Rgb) -> VariantResult:
+def run_variant(name: str, chain: Chain, image: Rgb, moment: Moment | None = None) -> VariantResult:
     """Run a chain on an ``(H, W, 3)`` uint8 RGB image and time each of its stages."""
     results = []
     start = perf_counter()
-    for stage, output in chain.run(image):
+    for stage, output in chain.run(image, moment):
         seconds = perf_counter() - start
         results.append(
             StageResult(stage, output.layers, output.mask, output.regions, output.facts, seconds)

@@ -1,1 +1,1 @@
-"""."""
+"""The terminal: thin commands, progress, messages, exit codes."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import zlib
 from array import array
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -163,10 +164,8 @@ class Container:
     def verify(self) -> None:
         """Read everything once, so that `damage` knows it all."""
         for chunk in self.chunks:
-            try:
+            with suppress(BadRecord):
                 self.reader.read(chunk)
-            except BadRecord:
-                continue
         self.verify_data()
 
     def read_all(self, take: Callable[[bytes], object]) -> None:
@@ -182,7 +181,8 @@ class Container:
     def verify_data(self) -> None:
         """Check the checksum of all data, unless that was done or the file has none."""
         if self.data_is_right is None and self.scan.data_crc:
-            self.read_all(len)
+            with suppress(BadRecord):
+                self.read_all(len)
 
     def close(self) -> None:
         """Close the file."""

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import Final
 
+from roadeval.logs.damage import Damage
 from roadeval.logs.errors import LogError
 from roadeval.logs.records import MAGIC
 
@@ -34,20 +35,30 @@ _OTHERS: Final = (
 """How many bytes to skip, the bytes that follow, what the file is and how it becomes a log."""
 
 
-def files_of(path: Path) -> list[Path]:
+def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     """List the MCAP files of a log: the file itself, or a rosbag2 folder's in natural order.
+
+    A file of a folder that is no MCAP file costs its part only, and is told.
 
     Raises
     ------
     LogError
-        If there is none, or one is no MCAP file; it says what that is and how to convert it.
+        If there is none; it says what there is instead and how to convert it.
     """
-    files = sorted(path.glob("*.mcap"), key=natural) if path.is_dir() else [path]
+    if not path.is_dir():
+        _check(path)
+        return [path], []
+    files: list[Path] = []
+    damage: list[Damage] = []
+    for file in sorted(path.glob("*.mcap"), key=natural):
+        try:
+            _check(file)
+            files.append(file)
+        except LogError as error:
+            damage.append(Damage(file, 0, str(error).removeprefix(f"{file}: ")))
     if not files:
-        raise LogError(_empty_folder(path))
-    for file in files:
-        _check(file)
-    return files
+        raise LogError(f"{path}: {damage[0]}" if damage else _empty_folder(path))
+    return files, damage
 
 
 def natural(path: Path) -> list[tuple[int, str]]:

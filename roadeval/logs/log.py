@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -42,7 +42,11 @@ def open_log(path: str | Path, *, keep_corrupt: bool = False) -> Log:
         If it is missing, unreadable, or no MCAP log.
     """
     path = Path(path)
-    return Log(path, files_of(path), keep_corrupt=keep_corrupt)
+    files, damage = files_of(path)
+    try:
+        return Log(path, files, damage, keep_corrupt=keep_corrupt)
+    except (BadRecord, OSError) as error:
+        raise LogError(f"{path}: {error}") from error
 
 
 class Log:
@@ -60,9 +64,17 @@ class Log:
         Log times of the first and the last message of all topics; 0 in an empty log.
     """
 
-    def __init__(self, path: Path, files: list[Path], *, keep_corrupt: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path,
+        files: Sequence[Path],
+        damage: Sequence[Damage] = (),
+        *,
+        keep_corrupt: bool = False,
+    ) -> None:
         self.path = path
         self.name = path.stem if path.is_file() else path.resolve().name
+        self._lost_files = damage
         self._containers = [
             Container(f, _is_image, message_is_whole, keep_corrupt=keep_corrupt) for f in files
         ]
@@ -79,10 +91,9 @@ class Log:
     @property
     def damage(self) -> tuple[Damage, ...]:
         """What could not be read, in the order of the files."""
+        found = [damage for container in self._containers for damage in damage_of(container)]
         return tuple(
-            replace(damage, log_start_ns=self.start_ns)
-            for container in self._containers
-            for damage in damage_of(container)
+            replace(damage, log_start_ns=self.start_ns) for damage in (*self._lost_files, *found)
         )
 
     @property

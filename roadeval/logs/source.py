@@ -9,8 +9,10 @@ from roadeval.logs.errors import BadRecord
 
 Buffer = bytes | memoryview
 
-WINDOW: Final = 16 * 1024
+WINDOW: Final = 64 << 10
 """Bytes read at once while walking from record to record."""
+GLANCE: Final = 1 << 10
+"""Bytes read at once after a leap, as over the data of a chunk."""
 
 
 class Bytes(Protocol):
@@ -80,7 +82,8 @@ class Source:
         """Like `read`, through a small window that suits a walk forward."""
         begin = offset - self._window_at
         if begin < 0 or begin + length > len(self._window):
-            self._window = self.read(offset, max(length, WINDOW))
+            walks_on = 0 <= begin <= len(self._window) + GLANCE
+            self._window = self.read(offset, max(length, WINDOW if walks_on else GLANCE))
             self._window_at, begin = offset, 0
         return memoryview(self._window)[begin : begin + length]
 

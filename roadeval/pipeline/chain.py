@@ -16,7 +16,7 @@ from roadeval.pipeline import (
     shadow,
     similarity,
 )
-from roadeval.pipeline.stage import Output, Stage, View
+from roadeval.pipeline.stage import Moment, Output, Stage, View
 
 STAGES: Final[Mapping[str, Stage[Any, Any]]] = {
     stage.name: stage
@@ -60,14 +60,15 @@ class Chain:
     ) -> None:
         self.steps = tuple(_bind(STAGES[name], settings[name], parameters) for name in names)
 
-    def run(self, image: Rgb) -> Iterator[tuple[str, Output]]:
+    def run(self, image: Rgb, moment: Moment | None = None) -> Iterator[tuple[str, Output]]:
         """Yield each stage's name and output on an ``(H, W, 3)`` uint8 RGB image.
 
-        A stage runs when it is asked for, so that a caller can time it.
+        A stage runs when it is asked for, so that a caller can time it. ``moment`` is the frame's
+        place in its drive, for stages that remember.
         """
         seen, mask = image, None
         for step in self.steps:
-            output = step.run(View(image, seen, mask))
+            output = step.run(View(image, seen, mask, moment))
             seen = seen if output.image is None else output.image
             mask = mask if output.mask is None else output.mask
             yield step.stage.reported, output

@@ -14,6 +14,7 @@ References
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -30,7 +31,7 @@ from roadeval.pipeline.classify import SVM
 from roadeval.pipeline.fast import KERNELS
 from roadeval.pipeline.scale import reduced, stretched
 from roadeval.pipeline.shade import LOGS
-from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
+from roadeval.pipeline.stage import Moment, Output, Stage, TrainingSet, View
 
 Values = npt.NDArray[np.float32]
 
@@ -57,6 +58,10 @@ class ContextSettings:
     smoothing
         Side of the square over which decision values are averaged, in pixels of the working
         image: neighbours belong together. 1 leaves them as they are.
+    memory
+        Seconds over which decision values of earlier frames fade, by ``exp(-age / memory)``; 0
+        forgets them. At 15 frames a second 0.2 halves the flicker and leaves ERR as it is; a mask
+        that lags is a price not everybody wants to pay, so it is off.
     threshold
         A pixel is road where the decision value is above this. None: learnt, see `threshold`.
     folds
@@ -68,6 +73,7 @@ class ContextSettings:
     planes: Annotated[int, Field(ge=1, le=4096)] = 128
     c: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
     smoothing: Annotated[int, Field(ge=1, le=255)] = 5
+    memory: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     threshold: Annotated[float, Field(allow_inf_nan=False)] | None = None
     folds: Annotated[int, Field(ge=2, le=100)] = 5
 
@@ -206,21 +212,40 @@ def threshold(values: Values, road: npt.NDArray[np.bool_]) -> float:
 
 
 def decision(image: Rgb, machine: RectifiedMachine, settings: ContextSettings) -> Values:
-    """Decision value (Eq. 16) of each pixel of ``(H, W, 3)`` uint8 RGB, ``(H, W)`` float32."""
-    planes = features(reduced(image, settings.width), settings.windows)
+    """Decision value (Eq. 16) of each pixel of ``(h, w, 3)`` uint8 RGB, ``(h, w)`` float32."""
+    planes = features(image, settings.windows)
     values = KERNELS.rectified_sum(
         planes.reshape(len(planes), -1), machine.planes, machine.bias, machine.weights
     )
     side = (settings.smoothing, settings.smoothing)
-    values = cv2.blur(values.reshape(planes.shape[1:]) + np.float32(machine.offset), side)
-    return stretched(values, image.shape)
+    smooth: Values = cv2.blur(values.reshape(planes.shape[1:]) + np.float32(machine.offset), side)
+    return smooth
+
+
+def remembered(values: Values, moment: Moment, memory: float) -> Values:
+    """Mix decision values with those that the frame before left, and leave them for the next.
+
+    ``memory`` is the time in seconds in which the past fades to 1/e. What does not lie in the
+    past, or was another size, is forgotten.
+    """
+    past = moment.baton.recall()
+    if past is not None:
+        stamp_ns, earlier = past
+        age = (moment.stamp_ns - stamp_ns) / 1e9
+        if age > 0 and earlier.shape == values.shape:
+            values = values + np.float32(math.exp(-age / memory)) * (earlier - values)
+    moment.baton.leave((moment.stamp_ns, values))
+    return values
 
 
 def bind(settings: ContextSettings, machine: RectifiedMachine) -> Callable[[View], Output]:
     """Return the machine as a pure function of what it sees."""
 
     def run(view: View) -> Output:
-        values = decision(view.image, machine, settings)
+        values = decision(reduced(view.image, settings.width), machine, settings)
+        if settings.memory > 0 and view.moment is not None:
+            values = remembered(values, view.moment, settings.memory)
+        values = stretched(values, view.image.shape)
         mask = (values > machine.threshold).view(np.uint8)
         return Output((Layer(DECISION, values), Layer(SVM, mask)), mask=mask)
 

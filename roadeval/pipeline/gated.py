@@ -31,6 +31,7 @@ from roadeval.pipeline.gates import (
     GatedSettings,
     Scene,
     components,
+    eroded,
     judge,
     look,
 )
@@ -69,12 +70,14 @@ def gain_map(found: Components, verdicts: Verdicts, settings: GatedSettings) -> 
     """Gain of each channel at each pixel, ``(h, w, 3)`` float32; 1 where nothing is to change.
 
     In an accepted component it is ring over core, no less than 1 and no more than one over the
-    least ratio; then averaged over a square, so that it rises softly at the edge.
+    least ratio; then averaged over a square, so that it rises softly at the edge. The outermost
+    pixel has some sun already: all of the gain there would leave a bright seam.
     """
     gains = np.clip(1 / found.ratio, 1.0, 1 / settings.ratio[0])
     gains[verdicts != ACCEPTED] = 1.0
+    labels = np.where(eroded((found.labels > 0).view(np.uint8), 1), found.labels, 0)
     side = (settings.softness, settings.softness)
-    soft: Map = cv2.blur(gains.astype(np.float32)[found.labels], side)
+    soft: Map = cv2.blur(gains.astype(np.float32)[labels], side)
     return soft
 
 

@@ -194,7 +194,7 @@ class Components:
 def components(scene: Scene, settings: GatedSettings) -> Components:
     """Label the candidates (Eq. 9) and measure each component against its ring (Eq. 10)."""
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(scene.candidates)
-    core = np.where(_eroded(scene.candidates, CORE), labels, 0)
+    core = np.where(eroded(scene.candidates, CORE), labels, 0)
     rings = _rings(scene, labels, settings)
     inside, around = (_sums(scene.image, part, count) for part in (core, rings))
     known = (inside[:, 0] > 0) & (around[:, 0] > 0)
@@ -206,11 +206,12 @@ def components(scene: Scene, settings: GatedSettings) -> Components:
     return Components(labels, rings, *sizes, bottom / len(labels), ratio, texture)
 
 
-def _eroded(mask: Mask, pixels: int) -> npt.NDArray[np.bool_]:
+def eroded(mask: Mask, pixels: int) -> npt.NDArray[np.bool_]:
+    """Keep what lies more than so many pixels from the mask's outside, ``(h, w)`` bool."""
     side = 2 * pixels + 1
     square = np.ones((side, side), np.uint8)
-    eroded: Mask = cv2.erode(mask, square, borderType=cv2.BORDER_CONSTANT, borderValue=0)
-    return eroded > 0
+    inner: Mask = cv2.erode(mask, square, borderType=cv2.BORDER_CONSTANT, borderValue=0)
+    return inner > 0
 
 
 def _rings(scene: Scene, labels: Labels, settings: GatedSettings) -> Labels:

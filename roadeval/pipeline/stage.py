@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -22,17 +22,37 @@ P = TypeVar("P")
 """Parameters that a stage learns: a frozen dataclass of floats and arrays, or None."""
 
 
+class Baton(Protocol):
+    """Carries what a stage remembers from each frame of a drive to the next."""
+
+    def recall(self) -> Any:
+        """Give what the frame before left; None on the first frame."""
+
+    def leave(self, value: Any) -> None:
+        """Leave a value to the next frame; once a frame."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moment:
+    """A frame's place in its drive: its stamp in nanoseconds, and what the frame before left."""
+
+    stamp_ns: int
+    baton: Baton
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
     """What a stage sees of a frame.
 
     ``original`` is the image as logged, ``image`` the same after the filters that ran before
     this stage, both ``(H, W, 3)`` uint8 RGB; ``mask`` is the previous stage's road mask.
+    ``moment`` is None for an image that stands alone. One stage of a chain may use its baton.
     """
 
     original: Rgb
     image: Rgb
     mask: Mask | None = None
+    moment: Moment | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

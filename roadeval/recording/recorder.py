@@ -25,8 +25,9 @@ PAGE: Final = 8
 SERIES: Final = 64
 """Frames whose numbers share a chunk."""
 
-LEAST_FREE: Final = 16 << 20
-"""Bytes that must be free at the start: Rerun waits forever if not even the layout fits."""
+LEAST_FREE: Final = 64 << 20
+"""Bytes that must stay free on the disk, more than a page takes. Checked before each page: the
+partial recording then ends whole, while Rerun, should a write fail, may wait for it forever."""
 
 
 class Recorder:
@@ -79,6 +80,8 @@ class Recorder:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        if error is not None:
+            error.add_note(f"the partial recording is {self.partial}")
         try:
             self._close()
         except RecordingError:
@@ -96,7 +99,7 @@ class Recorder:
         Raises
         ------
         RecordingError
-            If the file cannot be written any further.
+            If the disk is full.
         """
         if not self._frames:
             self._static(style.timing(encoded.scalars))
@@ -112,6 +115,7 @@ class Recorder:
             self._send(self._series.take())
         if self._frames % PAGE == 0:
             # The file is whole after every page, and memory holds no more than one.
+            self._check_room()
             self._send(self._pages.take())
             self._flush()
 
@@ -128,6 +132,7 @@ class Recorder:
                     encoded, number=encoded.number + 1, stamp_ns=encoded.stamp_ns + 1, payloads={}
                 )
                 self._add_images(after)
+            self._check_room()
             self._send(self._pages.take())
             self._flush()
 
@@ -191,17 +196,18 @@ class Recorder:
             raise RecordingError(f"{self.path}: is a folder; name a file in it, ending in .rrd")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._check_room()
             self.partial.touch()
-            free = shutil.disk_usage(self.partial.parent).free
         except OSError as error:
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
-        if free < LEAST_FREE:
-            self.partial.unlink()
+
+    def _check_room(self) -> None:
+        if shutil.disk_usage(self.path.parent).free < LEAST_FREE:
             raise RecordingError(f"{self.path}: cannot be written: the disk is full")
 
     def _flush(self) -> None:
         try:
-            self._open_stream().flush(timeout_sec=5)
+            self._open_stream().flush()
         except RuntimeError as error:
             raise self._incomplete() from error
 

@@ -1,1 +1,1 @@
-"""."""
+"""Figures and PDFs. Nobody else knows Matplotlib or the typesetter."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import chi2
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Rgb, Truth
 from roadeval.pipeline.fast import KERNELS
 from roadeval.pipeline.patch import patch_mask
+from roadeval.pipeline.similarity import limit
 from roadeval.training.settings import TrainingSettings
 
 
@@ -24,7 +24,7 @@ def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     precision = np.linalg.inv(np.cov(colours, rowvar=False, ddof=0) + np.eye(3))
     squared = KERNELS.mahalanobis_squared(image, colours.mean(axis=0), precision)
     truth = np.full((height, width), IGNORE, np.uint8)
-    truth[squared > chi2.ppf(settings.far, 3)] = NON_ROAD
+    truth[squared > limit(settings.far)] = NON_ROAD
     truth[: round(settings.horizon * height)] = NON_ROAD
     truth[patch] = ROAD
     return truth

@@ -131,6 +131,14 @@ def test_split_files_in_a_folder_are_one_drive(tmp_path: Path) -> None:
     assert all(frame.labelled for frame in frames)
 
 
+def test_a_file_of_a_folder_that_is_no_log_costs_its_part_only(tmp_path: Path) -> None:
+    drive(tmp_path / "bag_0.mcap", STAMPS)
+    (tmp_path / "bag_1.mcap").touch()
+    with open_log(tmp_path) as log:
+        assert len(list(log.frames(log.select()))) == 10
+        assert "bag_1.mcap: the file is empty" in log.losses[0]
+
+
 @pytest.mark.parametrize("compression", list(CompressionType))
 def test_chunks_too_big_for_memory_are_read_all_the_same(
     tmp_path: Path, compression: CompressionType, monkeypatch: pytest.MonkeyPatch

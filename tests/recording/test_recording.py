@@ -195,6 +195,11 @@ def test_the_same_input_gives_the_same_recording_but_for_the_timing(drive, tmp_p
     assert rerun("compare", "--unordered", *same) == 0
 
 
+def test_when_the_run_took_place_is_not_recorded(recording):
+    assert not list(recording._batches("/__properties", "RecordingInfo:start_time", static=True))
+    assert list(recording._batches("/__properties", "RecordingInfo:name", static=True))
+
+
 def _slower(variant):
     stages = tuple(replace(stage, seconds=stage.seconds * 3) for stage in variant.stages)
     return replace(variant, stages=stages)
@@ -244,7 +249,34 @@ def test_a_killed_run_leaves_all_but_the_last_page(tmp_path):
     np.testing.assert_array_equal(back, next(result(15).variants[0].masks())[1])
 
 
-FULL_DISK = """
+def test_a_disk_that_is_full_from_the_start_is_told_at_once(tmp_path, monkeypatch):
+    leave_free(monkeypatch, 1 << 20)
+    with pytest.raises(RecordingError, match="the disk is full"), _recorder(tmp_path / "out.rrd"):
+        pass
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_disk_that_fills_up_is_told_while_the_partial_recording_can_still_be_closed(
+    drive, tmp_path, monkeypatch
+):
+    def write_until_it_is_full(recorder):
+        with recorder:
+            for each in drive:
+                leave_free(monkeypatch, (1 << 30) if each.frame.number < 10 else (1 << 20))
+                recorder.write(recorder.encode(each))
+
+    recorder = _recorder(tmp_path / "out.rrd")
+    with pytest.raises(RecordingError, match="the disk is full"):
+        write_until_it_is_full(recorder)
+    assert rerun("verify", recorder.partial) == 0
+    assert len(Recording(recorder.partial).frame_numbers) == 16
+
+
+def leave_free(monkeypatch, size):
+    monkeypatch.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=size))
+
+
+TOO_LARGE = """
 import resource, signal, sys
 from pathlib import Path
 from roadeval.recording import RecordingError
@@ -259,24 +291,16 @@ except RecordingError as error:
 """
 
 
-@pytest.mark.parametrize("share", [0.45, 0.9], ids=["among the frames", "in the final index"])
-def test_a_full_disk_is_told_and_no_output_appears(share, recording, tmp_path):
-    # In a process of its own: the limit holds for all of it, and it must end by itself.
-    limit = int(share * recording.path.stat().st_size)
-    command = [sys.executable, "-c", FULL_DISK, str(tmp_path / "out.rrd"), str(limit)]
+def test_a_file_whose_index_could_not_be_written_does_not_get_its_name(recording, tmp_path):
+    # In a process of its own, for the limit on the size of files holds for all of it.
+    limit = recording.path.stat().st_size * 9 // 10
+    command = [sys.executable, "-c", TOO_LARGE, str(tmp_path / "out.rrd"), str(limit)]
     root = Path(__file__).resolve().parents[2]
     done = subprocess.run(
         command, cwd=root, check=False, capture_output=True, text=True, timeout=60
     )
     assert "is the disk full" in done.stdout, done.stderr
     assert not (tmp_path / "out.rrd").exists()
-
-
-def test_a_disk_that_is_full_from_the_start_is_told_at_once(tmp_path, monkeypatch):
-    monkeypatch.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=1 << 20))
-    with pytest.raises(RecordingError, match="the disk is full"), _recorder(tmp_path / "out.rrd"):
-        pass
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path):

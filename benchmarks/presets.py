@@ -1,0 +1,143 @@
+"""What the presets do on drives that they were not trained on: IDD Lite, split by drive.
+
+    python benchmarks/presets.py [FOLDER] [--frames N]
+
+FOLDER (or the environment's ROADEVAL_IDD) is ``idd20k_lite`` as downloaded; its *train* part alone
+is read. Half of the drives train, the other half is scored, then the other way round. Of each
+variant it prints the pooled rates of ``post``, the share of truly dark road that is missed, and the
+differences to the variant without filter, with 95 % intervals (bootstrap over drives).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Iterator
+from hashlib import blake2b
+from pathlib import Path
+
+import cv2
+import numpy as np
+from arch.bootstrap import IIDBootstrap
+
+from roadeval.config import Config, preset
+from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame
+from roadeval.evaluation.baselines import BlindPrior
+from roadeval.pipeline.chain import Chain
+from roadeval.training import fit
+
+TP, TN, FP, FN, DARK, DARK_MISSED = range(6)
+
+
+def drives(folder: Path, frames: int) -> dict[str, list[Frame]]:
+    """Read up to ``frames`` frames of each drive, evenly spread."""
+    found = {}
+    for drive in sorted((folder / "leftImg8bit" / "train").iterdir()):
+        paths = sorted(drive.glob("*_image.jpg"))
+        chosen = [paths[i * len(paths) // frames] for i in range(min(frames, len(paths)))]
+        found[drive.name] = [read(path, folder) for path in chosen]
+    return found
+
+
+def read(path: Path, folder: Path) -> Frame:
+    """Read a frame; label 0 is road, 255 is ignored."""
+    label = path.name.replace("_image.jpg", "_label.png")
+    classes = cv2.imread(str(folder / "gtFine" / "train" / path.parent.name / label), 0)
+    truth = np.select([classes == 0, classes == 255], [ROAD, IGNORE], NON_ROAD).astype(np.uint8)
+    image = np.ascontiguousarray(cv2.imread(str(path))[..., ::-1])
+    return Frame(0, 0, 0, image, path.read_bytes(), truth=truth)
+
+
+def dark_road(frame: Frame) -> np.ndarray:
+    """Road darker than half of the 85th percentile of the frame's road."""
+    grey, road = frame.image.mean(axis=2), frame.truth == ROAD
+    return road & (grey < 0.5 * np.percentile(grey[road], 85)) if road.any() else road
+
+
+def counts(mask: np.ndarray, frame: Frame) -> np.ndarray:
+    """Count a mask's outcomes on a frame, and on its dark road."""
+    road, other, dark = frame.truth == ROAD, frame.truth == NON_ROAD, dark_road(frame)
+    found = mask > 0
+    sets = [road & found, other & ~found, other & found, road & ~found, dark, dark & ~found]
+    return np.array([part.sum() for part in sets])
+
+
+def variants() -> Iterator[tuple[str, Config]]:
+    """Give what is compared; ``unfiltered`` first."""
+    yield "unfiltered", preset("paper").without_filter()
+    for name in ("paper", "gated", "robust"):
+        yield name, preset(name)
+
+
+def score(
+    name: str, config: Config, train: list[Frame], test: dict[str, list[Frame]]
+) -> np.ndarray:
+    """Train a variant and count its outcomes on each drive, ``(drives, 6)``."""
+    model = fit(train, {name: config.plan()}, config.training)
+    chain: Chain = config.bind(model.parameters[name])
+    return np.array([sum(counts(last(chain, f), f) for f in frames) for frames in test.values()])
+
+
+def last(chain: Chain, frame: Frame) -> np.ndarray:
+    """Give the chain's final mask."""
+    *_, (_, output) = chain.run(frame.image)
+    return output.mask
+
+
+def err(total: np.ndarray) -> float:
+    """Pooled ERR, in percent."""
+    return 100 * (total[FP] + total[FN]) / total[:DARK].sum()
+
+
+def missed(total: np.ndarray) -> float:
+    """Share of dark road that is missed, in percent."""
+    return 100 * total[DARK_MISSED] / total[DARK]
+
+
+def difference(rate, new: np.ndarray, base: np.ndarray) -> str:
+    """Give a rate's difference with its interval over drives."""
+
+    def of(a: np.ndarray, b: np.ndarray) -> float:
+        return rate(a.sum(axis=0)) - rate(b.sum(axis=0))
+
+    low, high = IIDBootstrap(new, base, seed=0).conf_int(of, 1000, method="percentile").ravel()
+    return f"{of(new, base):+6.1f} [{low:+5.1f}, {high:+5.1f}]"
+
+
+def main() -> None:
+    """Run both folds and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, nargs="?", default=os.environ.get("ROADEVAL_IDD"))
+    parser.add_argument("--frames", type=int, default=2, help="of each drive (default 2)")
+    options = parser.parse_args()
+    if options.folder is None:
+        parser.error("name the folder idd20k_lite, or set ROADEVAL_IDD")
+    found = drives(Path(options.folder), options.frames)
+    halves: list[dict[str, list[Frame]]] = [{}, {}]
+    for name, frames in found.items():
+        halves[blake2b(name.encode()).digest()[0] % 2][name] = frames
+    table: dict[str, list[np.ndarray]] = {}
+    for train, test in (halves, halves[::-1]):
+        learnt = [frame for frames in train.values() for frame in frames]
+        prior = BlindPrior.of_truths([frame.truth for frame in learnt])
+        blind = [
+            sum(counts(prior.mask(f.image.shape[:2]), f) for f in part) for part in test.values()
+        ]
+        table.setdefault("blind", []).append(np.array(blind))
+        for name, config in variants():
+            table.setdefault(name, []).append(score(name, config, learnt, test))
+    print_table({name: np.concatenate(parts) for name, parts in table.items()})
+
+
+def print_table(table: dict[str, np.ndarray]) -> None:
+    """Print rates, and differences to ``unfiltered``, in percent and points."""
+    base = table["unfiltered"]
+    print(f"{'variant':12}{'ERR':>6}{'dark missed':>13}   {'ERR - unfiltered':24}dark - unfiltered")
+    for name, rows in table.items():
+        total = rows.sum(axis=0)
+        ends = [difference(rate, rows, base) for rate in (err, missed)]
+        print(f"{name:12}{err(total):6.1f}{missed(total):13.1f}   {ends[0]:24}{ends[1]}")
+
+
+if __name__ == "__main__":
+    main()
