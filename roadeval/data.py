@@ -210,10 +210,15 @@ class StageResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VariantResult:
-    """What one variant made of one frame, stage by stage in the order they ran."""
+    """What one variant made of one frame, stage by stage in the order they ran.
+
+    ``oracles`` holds, by the name of a stage that was replaced by the truth, the road masks of
+    the stages after it by theirs. They are no results: see `roadeval.pipeline.chain.Chain`.
+    """
 
     variant: str
     stages: tuple[StageResult, ...]
+    oracles: Mapping[str, Mapping[str, Mask]] = field(default_factory=dict)
 
     def masks(self) -> Iterator[tuple[str, Mask]]:
         """Yield each stage that has a road mask, with the mask."""
@@ -274,6 +279,29 @@ class Tally:
     rates: Mapping[str, float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What became of the pixels from one mask to another.
+
+    ``repaired`` are newly right, ``spoiled`` newly wrong, of the ``labelled`` ones.
+    """
+
+    repaired: int = 0
+    spoiled: int = 0
+    labelled: int = 0
+
+    def __add__(self, other: Change) -> Change:
+        return Change(
+            self.repaired + other.repaired,
+            self.spoiled + other.spoiled,
+            self.labelled + other.labelled,
+        )
+
+
+Step = tuple[str, str, str, str]
+"""From one mask to another: variant and stage before, variant and stage after."""
+
+
 class Health(StrEnum):
     """How a variant fared on a frame, for the recording's state lanes."""
 
@@ -295,8 +323,11 @@ class FrameResult:
     """Everything known about one replayed frame: what is recorded and what is tabled.
 
     ``tallies`` is empty unless the frame is evaluated. ``tables`` holds this frame's finished
-    lines of ``frames.csv`` and ``regions.csv`` (keys ``frames``, ``regions``; no header).
-    ``notes`` are sentences for a person, ``pictures`` says what is recorded beside the numbers.
+    lines of the tables that grow frame by frame (keys ``frames``, ``regions``, ``oracles``; no
+    header). ``changes`` are from stage to stage and from final mask to final mask, ``contours``
+    the boundary F of each final mask by variant, and ``oracles`` the counts of what the stages
+    made once one was replaced by the truth, by that one. ``notes`` are sentences for a person,
+    ``pictures`` says what is recorded beside the numbers.
     """
 
     frame: Frame
@@ -307,4 +338,7 @@ class FrameResult:
     health: Mapping[str, Health] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     tables: Mapping[str, str] = field(default_factory=dict)
+    changes: Mapping[Step, Change] = field(default_factory=dict)
+    contours: Mapping[str, float] = field(default_factory=dict)
+    oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)
     pictures: Pictures = Pictures.ALL

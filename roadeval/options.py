@@ -13,6 +13,8 @@ from roadeval.config import Config, Variant, check_variant_name, override, varia
 from roadeval.errors import RoadevalError
 from roadeval.training import TrainingSettings
 
+Color = tuple[int, int, int]
+
 
 class OptionError(RoadevalError):
     """An option that cannot be followed."""
@@ -37,6 +39,8 @@ class ReplayOptions:
         network's output, say, which is then scored beside the pipeline.
     road_labels, ignore_labels
         Values of the truth that mean road, and that are counted nowhere.
+    road_colors, ignore_colors
+        The same for a truth of colours: red, green, blue, 0..255 each.
     start, end
         Range by log time: seconds from the start, nanoseconds, or RFC 3339; the end is not in it.
     every, max_frames
@@ -64,6 +68,8 @@ class ReplayOptions:
     mask_topics: Mapping[str, str] = field(default_factory=dict)
     road_labels: tuple[int, ...] = ()
     ignore_labels: tuple[int, ...] = ()
+    road_colors: tuple[Color, ...] = ()
+    ignore_colors: tuple[Color, ...] = ()
     start: str | None = None
     end: str | None = None
     every: int = 1
@@ -84,9 +90,15 @@ class ReplayOptions:
             truth=self.truth_topic,
             shadow=self.shadow_topic,
             masks=self.mask_topics,
-            labels=logs.LabelValues(self.road_labels, self.ignore_labels),
+            labels=self.labels(),
             sync_tolerance_ns=None if tolerance is None else round(tolerance * 1e6),
             resize_truth=self.resize_truth,
+        )
+
+    def labels(self) -> logs.LabelValues:
+        """Say what the truth's values, or colours, mean."""
+        return logs.LabelValues(
+            self.road_labels, self.ignore_labels, self.road_colors, self.ignore_colors
         )
 
     def span(self) -> logs.Span:

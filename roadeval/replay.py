@@ -11,6 +11,7 @@ from typing import Any
 
 from roadeval import learning, logs
 from roadeval.errors import RoadevalError
+from roadeval.evaluation import rates
 from roadeval.evaluation.results import Results, ResultsWriter, summary_text
 from roadeval.evaluation.tables import header, window_lines
 from roadeval.options import Outcome, Progress, ReplayOptions
@@ -27,6 +28,7 @@ def replay(
     *,
     save: str | Path | None = None,
     reports: str | Path | None = None,
+    mcap: str | Path | None = None,
     options: ReplayOptions | None = None,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> Outcome:
@@ -40,6 +42,8 @@ def replay(
         The recording; ``recordings/<drive>.rrd`` by default.
     reports
         The folder of tables and figures; ``reports/<drive>/`` by default.
+    mcap
+        A log for masks, error maps and rates, with the images' own times; none by default.
     options
         Everything else.
     on_progress
@@ -62,10 +66,11 @@ def replay(
         path = Path(save or Path("recordings", f"{log.name}.rrd"))
         folder = Path(reports or Path("reports", log.name))
         recorder = recorder_for(path, run.layout(), rule)
-        with recorder, ResultsWriter(folder) as results:
+        with recorder, ResultsWriter(folder) as results, _sidecar(mcap) as sidecar:
             for result, encoded in run.frames(recorder):
                 recorder.write(encoded)
                 results.append(result)
+                sidecar.write(result)
             tell(Progress(run.done, run.total, "writing"))
             windows, summary = run.board.windows(), run.summary()
             recorder.finish(_texts(windows, summary))
@@ -73,6 +78,7 @@ def replay(
         tables = Results(folder).windows
         files += write_figures(folder, log.name, tables, run.gallery.examples)
         saved = None if isinstance(recorder, NullRecorder) else recorder.path
+        files += [sidecar.path] if sidecar.path else []
         return Outcome(saved, folder, summary, run.warnings(), run.losses(), tuple(files))
 
 
@@ -109,6 +115,10 @@ def train(
     model = learning.train_on(frames, plans, settings)
     save_model(model, Path(output))
     return model
+
+
+def _sidecar(path: str | Path | None) -> logs.SidecarWriter | logs.NoSidecar:
+    return logs.NoSidecar() if path is None else logs.SidecarWriter(path, rates.of)
 
 
 def _texts(windows: Sequence[Any], summary: dict[str, Any]) -> dict[str, str]:

@@ -93,6 +93,7 @@ class Run:
             has_truth=self._selection.truth is not None,
             has_shadow_truth=self._selection.shadow is not None,
             first_frame=self._schedule.first,
+            rate_hz=self._selection.image.rate_hz,
             tables={name: tables.header(name) for name in ("frames", "regions")},
             properties=self._properties(),
         )
@@ -172,8 +173,8 @@ class Run:
 
     def losses(self) -> tuple[str, ...]:
         """Say which parts of the log were lost."""
-        frames = self._frames.accounting.undecodable
-        return tuple(f"frame {number}: {reason}" for number, reason in sorted(frames.items()))
+        frames = sorted(self._frames.accounting.undecodable.items())
+        return (*self.log.losses, *(f"frame {number}: {reason}" for number, reason in frames))
 
     def _drive(self) -> dict[str, Any]:
         width, height = self._selection.image.size or (0, 0)

@@ -15,6 +15,7 @@ from roadeval.data import (
     Mask,
     Rgb,
     StageResult,
+    Truth,
     VariantLayout,
     VariantResult,
     mask_spec,
@@ -26,17 +27,30 @@ from roadeval.training import Model
 EXTERNAL: Final = mask_spec(FINAL_STAGE, "Road mask in the log")
 
 
-def run_variant(name: str, chain: Chain, image: Rgb, moment: Moment | None = None) -> VariantResult:
-    """Run a chain on an ``(H, W, 3)`` uint8 RGB image and time each of its stages."""
-    results = []
+def run_variant(
+    name: str,
+    chain: Chain,
+    image: Rgb,
+    moment: Moment | None = None,
+    *,
+    truth: Truth | None = None,
+    shadow_truth: Truth | None = None,
+) -> VariantResult:
+    """Run a chain on an ``(H, W, 3)`` uint8 RGB image and time each of its stages.
+
+    Given the truth, run it also with each stage that has an oracle replaced by that, untimed.
+    """
+    results, outputs = [], []
     start = perf_counter()
     for stage, output in chain.run(image, moment):
         seconds = perf_counter() - start
         results.append(
             StageResult(stage, output.layers, output.mask, output.regions, output.facts, seconds)
         )
+        outputs.append(output)
         start = perf_counter()
-    return VariantResult(name, tuple(results))
+    oracles = {} if truth is None else dict(chain.oracles(image, outputs, truth, shadow_truth))
+    return VariantResult(name, tuple(results), oracles)
 
 
 def external_layout(name: str, topic: str) -> VariantLayout:

@@ -10,7 +10,18 @@ from typing import Annotated
 
 import typer
 
-from roadeval.cli import compare, demo, info, inspect, messages, replay, report, signals, train
+from roadeval.cli import (
+    compare,
+    demo,
+    info,
+    inspect,
+    messages,
+    pack,
+    replay,
+    report,
+    signals,
+    train,
+)
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.errors import RoadevalError
 
@@ -27,6 +38,7 @@ for _command in (
     compare.compare,
     info.info,
     train.train,
+    pack.pack,
     demo.demo,
 ):
     app.command()(_command)

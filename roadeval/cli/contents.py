@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from roadeval.cli import console
-from roadeval.errors import RoadevalError
-from roadeval.logs import Log
-from roadeval.options import ReplayOptions
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -18,30 +14,8 @@ if TYPE_CHECKING:
 NS = 1_000_000_000
 
 
-def describe(log: Log, options: ReplayOptions) -> dict[str, Any]:
-    """Describe a log as plain data: times in nanoseconds, rates in hertz.
-
-    ``picks`` says what replay would pick and why, ``problem`` why it could not, or null.
-    """
-    picks: tuple[str, ...] = ()
-    problem = None
-    try:
-        picks = options.select(log).reasons
-    except RoadevalError as error:
-        problem = str(error)
-    return {
-        "path": str(log.path),
-        "start_ns": log.start_ns,
-        "end_ns": log.end_ns,
-        "topics": [asdict(topic) for topic in log.topics],
-        "damage": [str(damage) for damage in log.damage],
-        "picks": list(picks),
-        "problem": problem,
-    }
-
-
 def show(found: Mapping[str, Any], out: Console) -> None:
-    """Print what `describe` found."""
+    """Print what `roadeval.logs.describe` found, as plain data."""
     out.print(f"{found['path']}: {_extent(found)}", soft_wrap=True)
     out.print()
     out.print(_topics(found["topics"]))
@@ -82,7 +56,7 @@ def _topics(topics: list[dict[str, Any]]) -> RenderableType:
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    table.add_column("topic", overflow="fold")
+    table.add_column("topic", no_wrap=True)
     table.add_column("carries", overflow="fold")
     for name in ("size", "messages", "rate"):
         table.add_column(name, justify="right", no_wrap=True)

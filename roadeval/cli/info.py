@@ -16,6 +16,8 @@ def info(
     shadow_topic: options.ShadowTopic = None,
     road_label: options.RoadLabels = None,
     ignore_label: options.IgnoreLabels = None,
+    road_color: options.RoadColors = None,
+    ignore_color: options.IgnoreColors = None,
     sync_tolerance: options.SyncTolerance = None,
     resize_truth: options.ResizeTruth = False,
     keep_corrupt: options.KeepCorrupt = False,
@@ -27,25 +29,29 @@ def info(
     would pick what it picks, or what it would ask for.
     """
     from roadeval.cli import contents, settings
-    from roadeval.logs import open_log
+    from roadeval.logs import describe
     from roadeval.options import ReplayOptions
 
-    labels = settings.labels(road_label, ignore_label)
+    labels = settings.labels(road_label, ignore_label, road_color, ignore_color)
     chosen = ReplayOptions(
         image_topic=image_topic,
         truth_topic=truth_topic,
         shadow_topic=shadow_topic,
         road_labels=labels.road,
         ignore_labels=labels.ignore,
+        road_colors=labels.road_colors,
+        ignore_colors=labels.ignore_colors,
         sync_tolerance_ms=sync_tolerance,
         resize_truth=resize_truth,
     )
-    with open_log(drive, keep_corrupt=keep_corrupt) as log:
-        found = contents.describe(log, chosen)
+    found = describe(drive, chosen.select, keep_corrupt=keep_corrupt)
     if json:
-        console.emit(dumps(found, indent=2, ensure_ascii=False))
+        console.emit(dumps(found.as_dict(), indent=2, ensure_ascii=False))
     else:
-        contents.show(found, console.results())
-    for damage in found["damage"]:
-        messages.lost(damage)
-    return ExitCode.LOSS if found["damage"] else ExitCode.DONE
+        contents.show(found.as_dict(), console.results())
+    for damage in found.damage:
+        if damage not in found.losses:
+            messages.warning(damage)
+    for loss in found.losses:
+        messages.lost(loss)
+    return ExitCode.LOSS if found.losses else ExitCode.DONE

@@ -6,7 +6,7 @@ What can be seen to be wrong without opening a file is wrong usage, by the rooms
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from functools import partial
@@ -23,10 +23,12 @@ _SELECTION: Final = re.compile(r"all|masks|none|(worst|every):[1-9]\d*")
 
 
 class PresetName(StrEnum):
-    """How the paper's equations are read."""
+    """What a run starts from."""
 
     PAPER = "paper"
     PRINTED = "printed"
+    GATED = "gated"
+    ROBUST = "robust"
 
 
 def split_variant(text: str) -> tuple[str, Path]:
@@ -58,12 +60,42 @@ def _checked(check: Callable[[Any], object]) -> Callable[[Any], Any]:
     return callback
 
 
+def split_mask(text: str) -> tuple[str, str]:
+    """Read ``NAME=TOPIC``."""
+    name, _, topic = text.partition("=")
+    if not name or not topic:
+        raise typer.BadParameter(f"{text!r} is not NAME=TOPIC")
+    return name, topic
+
+
+def color(text: str) -> tuple[int, int, int]:
+    """Read ``R,G,B``, 0..255 each."""
+    parts = text.split(",")
+    if len(parts) != 3 or not all(part.strip().isdecimal() for part in parts):
+        raise typer.BadParameter(f"{text!r} is not R,G,B (as 128,64,128)")
+    red, green, blue = (int(part) for part in parts)
+    return red, green, blue
+
+
+def _colors(texts: Sequence[str]) -> None:
+    for text in texts:
+        color(text)
+
+
+def _mask_names(texts: Sequence[str]) -> None:
+    _names(split_mask(text)[0] for text in texts)
+
+
 def _variant_names(texts: Sequence[str]) -> None:
+    _names(split_variant(text)[0] for text in texts)
+
+
+def _names(names: Iterable[str]) -> None:
     from roadeval.config import check_variant_name
     from roadeval.data import FILTERED, UNFILTERED
 
     taken = {FILTERED, UNFILTERED}
-    for name, _ in map(split_variant, texts):
+    for name in names:
         check_variant_name(name, taken)
         taken.add(name)
 
@@ -94,8 +126,9 @@ Preset = Annotated[
     PresetName | None,
     option(
         "--preset",
-        metavar="paper|printed",
-        help="The equations as meant, or with the misprints taken literally. Default: paper.",
+        metavar="paper|printed|gated|robust",
+        help="The equations as meant, or with the misprints taken literally; with a filter that "
+        "does no harm; or for use on a road. Default: paper.",
     ),
 ]
 ConfigFile = Annotated[
@@ -158,6 +191,33 @@ IgnoreLabels = Annotated[
     list[int] | None,
     option(
         "--ignore-label", metavar="V", min=0, help="A truth value to count nowhere. Repeatable."
+    ),
+]
+RoadColors = Annotated[
+    list[str] | None,
+    option(
+        "--road-color",
+        metavar="R,G,B",
+        callback=_checked(_colors),
+        help="A truth colour that is road. Repeatable.",
+    ),
+]
+IgnoreColors = Annotated[
+    list[str] | None,
+    option(
+        "--ignore-color",
+        metavar="R,G,B",
+        callback=_checked(_colors),
+        help="A truth colour to count nowhere. Repeatable.",
+    ),
+]
+MaskTopics = Annotated[
+    list[str] | None,
+    option(
+        "--mask-topic",
+        metavar="NAME=TOPIC",
+        callback=_checked(_mask_names),
+        help="Score masks that the log carries, as one more variant. Repeatable.",
     ),
 ]
 SyncTolerance = Annotated[

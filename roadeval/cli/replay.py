@@ -24,6 +24,12 @@ def replay(
             "--reports", metavar="DIR", help="Tables and figures. Default: reports/<drive>/"
         ),
     ] = None,
+    mcap: Annotated[
+        Path | None,
+        options.option(
+            "--mcap", metavar="OUT.mcap", help="Masks and rates as a log, to open beside DRIVE."
+        ),
+    ] = None,
     preset: options.Preset = None,
     config: options.ConfigFile = None,
     variant: options.Variants = None,
@@ -35,6 +41,9 @@ def replay(
     shadow_topic: options.ShadowTopic = None,
     road_label: options.RoadLabels = None,
     ignore_label: options.IgnoreLabels = None,
+    road_color: options.RoadColors = None,
+    ignore_color: options.IgnoreColors = None,
+    mask_topic: options.MaskTopics = None,
     sync_tolerance: options.SyncTolerance = None,
     resize_truth: options.ResizeTruth = False,
     keep_corrupt: options.KeepCorrupt = False,
@@ -57,7 +66,7 @@ def replay(
     from roadeval.replay import ReplayOptions
     from roadeval.replay import replay as run
 
-    labels = settings.labels(road_label, ignore_label)
+    labels = settings.labels(road_label, ignore_label, road_color, ignore_color)
     chosen = ReplayOptions(
         config=settings.configuration(preset, config),
         variants=settings.variants(variant),
@@ -65,8 +74,11 @@ def replay(
         image_topic=image_topic,
         truth_topic=truth_topic,
         shadow_topic=shadow_topic,
+        mask_topics=settings.masks(mask_topic),
         road_labels=labels.road,
         ignore_labels=labels.ignore,
+        road_colors=labels.road_colors,
+        ignore_colors=labels.ignore_colors,
         start=start,
         end=end,
         every=every,
@@ -80,7 +92,7 @@ def replay(
         resize_truth=resize_truth,
     )
     with progress.watched(quiet) as watch:
-        found = run(drive, save=save, reports=reports, options=chosen, on_progress=watch)
+        found = run(drive, save=save, reports=reports, mcap=mcap, options=chosen, on_progress=watch)
     if json:
         console.emit(summary_text(found.summary).rstrip())
     elif not quiet:

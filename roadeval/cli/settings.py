@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from roadeval.cli.options import PresetName, split_variant, usage
+from roadeval.cli.options import PresetName, color, split_mask, split_variant, usage
 from roadeval.config import Config, load_config
 from roadeval.config import preset as named
 from roadeval.logs import LabelValues
@@ -21,7 +21,22 @@ def variants(texts: Sequence[str] | None) -> dict[str, Config]:
     return {name: load_config(file) for name, file in map(split_variant, texts or ())}
 
 
-def labels(road: Sequence[int] | None, ignore: Sequence[int] | None) -> LabelValues:
-    """Check what the truth's values are said to mean."""
+def masks(texts: Sequence[str] | None) -> dict[str, str]:
+    """Read the topics of ``NAME=TOPIC`` ..., by name."""
+    return dict(map(split_mask, texts or ()))
+
+
+def labels(
+    road: Sequence[int] | None,
+    ignore: Sequence[int] | None,
+    road_colors: Sequence[str] | None = None,
+    ignore_colors: Sequence[str] | None = None,
+) -> LabelValues:
+    """Check what the truth's values, or colours, are said to mean."""
     with usage():
-        return LabelValues(tuple(road or ()), tuple(ignore or ()))
+        return LabelValues(
+            tuple(road or ()),
+            tuple(ignore or ()),
+            tuple(map(color, road_colors or ())),
+            tuple(map(color, ignore_colors or ())),
+        )

@@ -27,6 +27,8 @@ def train(
     truth_topic: options.TruthTopic = None,
     road_label: options.RoadLabels = None,
     ignore_label: options.IgnoreLabels = None,
+    road_color: options.RoadColors = None,
+    ignore_color: options.IgnoreColors = None,
     sync_tolerance: options.SyncTolerance = None,
     resize_truth: options.ResizeTruth = False,
     keep_corrupt: options.KeepCorrupt = False,
@@ -43,7 +45,7 @@ def train(
     from roadeval.replay import ReplayOptions
     from roadeval.replay import train as run
 
-    labels = settings.labels(road_label, ignore_label)
+    labels = settings.labels(road_label, ignore_label, road_color, ignore_color)
     chosen = ReplayOptions(
         config=settings.configuration(preset, config),
         variants=settings.variants(variant),
@@ -51,6 +53,8 @@ def train(
         truth_topic=truth_topic,
         road_labels=labels.road,
         ignore_labels=labels.ignore,
+        road_colors=labels.road_colors,
+        ignore_colors=labels.ignore_colors,
         start=start,
         end=end,
         sync_tolerance_ms=sync_tolerance,

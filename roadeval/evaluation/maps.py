@@ -2,103 +2,128 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise, permutations
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import IGNORE, NON_ROAD, ROAD, Mask, Truth
+from roadeval.data import IGNORE, ROAD, Change, Layer, Mask, Step, Truth
+from roadeval.evaluation.counts import pack
 
-Sums = npt.NDArray[np.int32]
+Sums = npt.NDArray[np.int64]
+FP: Final = 2
+FN: Final = 3
+IGNORED: Final = 4
+"""Classes of `roadeval.data.ERRORS`."""
+CELLS: Final = 160
+"""Cells across the longer side of a heat map, at most."""
+PENDING: Final = 255
+"""Frames whose sum fits in a byte: adding bytes is ten times as fast as adding integers."""
 
 
-@dataclass(slots=True)
 class HeatMap:
     """How often each pixel was labelled, and was a false positive or a false negative.
 
-    All ``(H, W)`` int32. Frames of another size than the first are left out, and counted.
+    Frames of another size than the first are left out, and counted.
     """
 
-    frames: int = 0
-    left_out: int = 0
-    labelled: Sums = field(default_factory=lambda: np.zeros((0, 0), np.int32))
-    fp: Sums = field(default_factory=lambda: np.zeros((0, 0), np.int32))
-    fn: Sums = field(default_factory=lambda: np.zeros((0, 0), np.int32))
+    def __init__(self) -> None:
+        self.frames = 0
+        self.left_out = 0
+        self._sums: Sums = np.zeros((3, 0, 0), np.int64)
+        self._bytes = np.zeros((3, 0, 0), np.uint8)
 
-    def add(self, mask: Mask, truth: Truth) -> None:
-        """Add a frame's mask (0, 1) and truth (0, 1, 255), both ``(H, W)`` uint8."""
+    def add(self, errors: npt.NDArray[np.uint8]) -> None:
+        """Add a frame's errors, ``(H, W)`` uint8 in the classes of `roadeval.data.ERRORS`."""
         if not self.frames:
-            self.labelled, self.fp, self.fn = (np.zeros(truth.shape, np.int32) for _ in range(3))
-        if truth.shape != self.labelled.shape:
+            self._sums = np.zeros((3, *errors.shape), np.int64)
+            self._bytes = np.zeros((3, *errors.shape), np.uint8)
+        if errors.shape != self._bytes.shape[1:]:
             self.left_out += 1
             return
+        if self.frames % PENDING == 0:
+            self._carry()
         self.frames += 1
-        self.labelled += truth != IGNORE
-        self.fp += (mask == 1) & (truth == NON_ROAD)
-        self.fn += (mask == 0) & (truth == ROAD)
+        for sums, found in zip(
+            self._bytes, (errors != IGNORED, errors == FP, errors == FN), strict=True
+        ):
+            np.add(sums, found.view(np.uint8), out=sums)
 
-    def share(self, which: Sums) -> npt.NDArray[np.float64]:
-        """Divide by how often a pixel was labelled; NaN where it never was."""
-        whole = self.labelled.astype(float)
-        share = np.full(whole.shape, np.nan)
-        np.divide(which, whole, out=share, where=whole > 0)
-        return share
+    def sums(self) -> Sums:
+        """``(3, H, W)`` int64: frames that label the pixel, that have it FP, and FN."""
+        self._carry()
+        return self._sums
+
+    def cells(self) -> tuple[int, Sums]:
+        """Sum up square cells, no more than `CELLS` across the longer side.
+
+        Returns
+        -------
+        side, sums
+            The cells' side in pixels, and ``(3, rows, columns)`` int64 as in `sums`. The last row
+            and column may be narrower.
+        """
+        sums = self.sums()
+        side = max(1, -(-max(sums.shape) // CELLS))
+        for axis in (1, 2):
+            if sums.shape[axis]:
+                starts = np.arange(0, sums.shape[axis], side)
+                sums = np.add.reduceat(sums, starts, axis=axis)
+        return side, sums
+
+    def _carry(self) -> None:
+        self._sums += self._bytes
+        self._bytes[:] = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
-    """What became of the pixels from one mask to another: newly right, newly wrong."""
+def changes(masks: Sequence[tuple[str, str, Mask]], truth: Truth) -> dict[Step, Change]:
+    """Count what each stage changed in the mask before it, and each final mask in the others.
 
-    repaired: int = 0
-    spoiled: int = 0
-    labelled: int = 0
-
-    def __add__(self, other: Change) -> Change:
-        return Change(
-            self.repaired + other.repaired,
-            self.spoiled + other.spoiled,
-            self.labelled + other.labelled,
-        )
-
-
-def change(before: Mask, after: Mask, truth: Truth) -> Change:
-    """Count the labelled pixels that ``after`` has right and ``before`` wrong, and the reverse.
-
-    Masks are ``(H, W)`` uint8 (0, 1), the truth (0, 1, 255).
+    Parameters
+    ----------
+    masks
+        Variant, stage and ``(H, W)`` uint8 mask (0, 1), a variant's in the order they ran.
+    truth
+        ``(H, W)`` uint8 (0, 1, 255).
     """
-    differ = (before != after) & (truth != IGNORE)
-    right = differ & (after == truth)
-    repaired = int(np.count_nonzero(right))
-    spoiled = int(np.count_nonzero(differ)) - repaired
-    return Change(repaired, spoiled, int(np.count_nonzero(truth != IGNORE)))
+    bits = pack([mask for _, _, mask in masks])
+    road, labelled = pack([truth == ROAD, truth != IGNORE])
+    whole = int(np.bitwise_count(labelled).sum())
+    wrong = (bits ^ road) & labelled
+    found = {}
+    for before, after in _steps(masks):
+        differ = wrong[before] ^ wrong[after]
+        spoiled = int(np.bitwise_count(differ & wrong[after]).sum())
+        repaired = int(np.bitwise_count(differ & wrong[before]).sum())
+        step = (*masks[before][:2], *masks[after][:2])
+        found[step] = Change(repaired, spoiled, whole)
+    return found
+
+
+def _steps(masks: Sequence[tuple[str, str, Mask]]) -> Iterator[tuple[int, int]]:
+    """Yield the places of a mask before and after: stage to stage, and final to final."""
+    for before, after in pairwise(range(len(masks))):
+        if masks[before][0] == masks[after][0]:
+            yield before, after
+    last = {variant: place for place, (variant, _, _) in enumerate(masks)}
+    yield from permutations(last.values(), 2)
 
 
 @dataclass(slots=True)
 class Maps:
-    """The heat map of every variant's final mask, and every change between its masks.
-
-    ``changes`` are by (variant, stage before, stage after) and ``paired`` by (variant, variant),
-    final mask against final mask.
-    """
+    """The heat map of every variant's final mask, and every change between masks, of a drive."""
 
     heat: dict[str, HeatMap] = field(default_factory=dict)
-    changes: dict[tuple[str, str, str], Change] = field(default_factory=dict)
-    paired: dict[tuple[str, str], Change] = field(default_factory=dict)
+    changes: dict[Step, Change] = field(default_factory=dict)
     frames: int = 0
 
-    def add(self, truth: Truth, masks: Mapping[str, Mapping[str, Mask]]) -> None:
-        """Add a frame: its truth, and the masks by variant and stage in the order they ran."""
+    def add(self, errors: Mapping[str, Layer], found: Mapping[Step, Change]) -> None:
+        """Add a frame: the final masks' errors by variant, and what `changes` counted."""
         self.frames += 1
-        for variant, stages in masks.items():
-            names = list(stages)
-            for before, after in pairwise(names):
-                key = variant, before, after
-                step = change(stages[before], stages[after], truth)
-                self.changes[key] = self.changes.get(key, Change()) + step
-            self.heat.setdefault(variant, HeatMap()).add(stages[names[-1]], truth)
-        last = {variant: list(stages.values())[-1] for variant, stages in masks.items()}
-        for control, treated in permutations(last, 2):
-            found = self.paired.get((treated, control), Change())
-            self.paired[treated, control] = found + change(last[control], last[treated], truth)
+        for variant, layer in errors.items():
+            self.heat.setdefault(variant, HeatMap()).add(layer.array.astype(np.uint8, copy=False))
+        for step, change in found.items():
+            self.changes[step] = self.changes.get(step, Change()) + change

@@ -10,7 +10,7 @@ from roadeval.logs.logged import LoggedFrame
 from roadeval.logs.messages import Kind
 from roadeval.logs.pack import Packed, pack
 from roadeval.logs.selection import LabelTopic, Selection
-from roadeval.logs.sidecar import SidecarWriter
+from roadeval.logs.sidecar import NoSidecar, SidecarWriter
 from roadeval.logs.span import Instant, Span, parse_time
 from roadeval.logs.topics import TopicInfo
 from roadeval.logs.writer import LogWriter
@@ -29,6 +29,7 @@ __all__ = [
     "LogError",
     "LogWriter",
     "LoggedFrame",
+    "NoSidecar",
     "Packed",
     "Selection",
     "SidecarWriter",

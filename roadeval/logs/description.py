@@ -48,7 +48,12 @@ class LogDescription:
         return asdict(self)
 
 
-def describe(path: str | Path, select: Callable[[Log], Selection] = Log.select) -> LogDescription:
+def describe(
+    path: str | Path,
+    select: Callable[[Log], Selection] = Log.select,
+    *,
+    keep_corrupt: bool = False,
+) -> LogDescription:
     """Read a log whole, so that all damage is found, and describe it.
 
     Parameters
@@ -57,13 +62,15 @@ def describe(path: str | Path, select: Callable[[Log], Selection] = Log.select) 
         File or folder.
     select
         Settles what a replay would pick.
+    keep_corrupt
+        Whether data with a wrong checksum count as readable.
 
     Raises
     ------
     LogError
         If it is missing, unreadable, or no MCAP log.
     """
-    with open_log(path) as log:
+    with open_log(path, keep_corrupt=keep_corrupt) as log:
         log.verify()
         picks: tuple[str, ...] = ()
         problem = ""

@@ -113,6 +113,21 @@ class SidecarWriter:
         self._log.__exit__(kind, error, trace)
 
 
+class NoSidecar:
+    """Writes nothing, for a run that was not asked for one."""
+
+    path: Final = None
+
+    def write(self, result: FrameResult) -> None:
+        """Write nothing."""
+
+    def __enter__(self) -> NoSidecar:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Nothing is open."""
+
+
 def _coloured(layer: Layer) -> npt.NDArray[np.uint8]:
     """Paint a label layer in its classes' colours: ``(H, W, 4)`` RGBA."""
     palette = np.zeros((256, 4), np.uint8)

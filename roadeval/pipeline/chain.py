@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from roadeval.data import LayerSpec, Rgb
+from roadeval.data import LayerSpec, Mask, Rgb, Truth
 from roadeval.pipeline import (
     classify,
     context,
@@ -40,6 +40,7 @@ class Step:
     stage: Stage[Any, Any]
     settings: Any
     run: Callable[[View], Output]
+    oracle: Callable[[View, Truth], Output] | None = None
 
 
 class Chain:
@@ -73,6 +74,34 @@ class Chain:
             mask = mask if output.mask is None else output.mask
             yield step.stage.reported, output
 
+    def oracles(
+        self, image: Rgb, outputs: Sequence[Output], road: Truth, shadow: Truth | None
+    ) -> Iterator[tuple[str, dict[str, Mask]]]:
+        """Yield what the chain makes of an image once one of its stages is replaced by the truth.
+
+        Parameters
+        ----------
+        image
+            ``(H, W, 3)`` uint8 RGB.
+        outputs
+            What `run` gave on it.
+        road, shadow
+            The truths, ``(H, W)`` uint8 (0, 1, 255). Without that of shadow filters have none.
+
+        Yields
+        ------
+        stage, masks
+            The stage that was replaced, as it is reported, and the masks of those after it. They
+            see an image that stands alone: what a stage remembers of a drive is not for oracles.
+        """
+        view = View(image, image)
+        for place, (step, output) in enumerate(zip(self.steps, outputs, strict=True)):
+            truth = shadow if step.stage.is_filter else road
+            if step.oracle is not None and truth is not None:
+                perfect = _after(view, step.oracle(view, truth))
+                yield step.stage.reported, dict(_masks(self.steps[place + 1 :], perfect))
+            view = _after(view, output)
+
     def filtered(self, image: Rgb) -> Rgb:
         """Return the image as the chain's filters leave it; itself where there are none."""
         for step in self.steps:
@@ -83,7 +112,23 @@ class Chain:
 
 
 def _bind(stage: Stage[Any, Any], settings: Any, parameters: Mapping[str, Any]) -> Step:
-    return Step(stage, settings, stage.bind(settings, parameters.get(stage.name)))
+    learnt = parameters.get(stage.name)
+    oracle = None if stage.oracle is None else stage.oracle(settings, learnt)
+    return Step(stage, settings, stage.bind(settings, learnt), oracle)
+
+
+def _after(view: View, output: Output) -> View:
+    """Give what the next stage sees."""
+    image = view.image if output.image is None else output.image
+    return replace(view, image=image, mask=view.mask if output.mask is None else output.mask)
+
+
+def _masks(steps: Sequence[Step], view: View) -> Iterator[tuple[str, Mask]]:
+    for step in steps:
+        output = step.run(view)
+        view = _after(view, output)
+        if output.mask is not None:
+            yield step.stage.reported, output.mask
 
 
 def layers_of(names: Sequence[str], settings: Mapping[str, Any]) -> tuple[LayerSpec, ...]:

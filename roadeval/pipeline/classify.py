@@ -15,11 +15,14 @@ from pydantic.dataclasses import dataclass as validated
 from roadeval.data import Layer, LayerSpec, Mask, mask_spec
 from roadeval.pipeline import cube
 from roadeval.pipeline.fast import KERNELS
-from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
+from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask
 
 Floats = npt.NDArray[np.float64]
 
 SVM: Final = mask_spec("svm", "SVM: road (Eq. 16)")
+
+UNDECIDED: Final = 2
+"""In a table of colours: too near to the threshold for a quick value to tell the side."""
 
 _BLOCK: Final = 1 << 20
 """Kernel values computed at once: 8 MB of float64, which stays in the cache."""
@@ -100,13 +103,14 @@ def decision(
 ) -> Floats:
     """Decision value ``sum_i lambda_i y_i K(x, x_i) + b`` of ``(n, 3)`` colours (Eq. 16).
 
-    Returns ``(n,)`` float64, equal to scikit-learn's ``decision_function`` up to rounding.
+    Returns ``(n,)`` float64, equal to scikit-learn's ``decision_function`` up to rounding. A
+    colour's value does not depend on the colours that it is computed with.
     """
     features = (colours - machine.mean) / machine.scale
     if settings.kernel == "linear":
         # Eq. 15: the machine's plane, w = sum_i lambda_i y_i x_i.
-        plane: Floats = features @ (machine.weights @ machine.vectors) + machine.offset
-        return plane
+        plane: Floats = features * (machine.weights @ machine.vectors)
+        return plane.sum(axis=1) + machine.offset
     from scipy.spatial.distance import cdist
 
     result = np.empty(len(features))
@@ -114,7 +118,9 @@ def decision(
     for start in range(0, len(features), rows):
         block = slice(start, start + rows)
         squared = cdist(features[block], machine.vectors, "sqeuclidean")
-        result[block] = np.exp(-settings.gamma * squared) @ machine.weights + machine.offset
+        # Row by row: a product with a matrix rounds a row differently in another company.
+        terms = np.exp(-settings.gamma * squared) * machine.weights
+        result[block] = terms.sum(axis=1) + machine.offset
     return result
 
 
@@ -123,10 +129,11 @@ def colour_table(machine: SupportVectors, settings: SvmSettings) -> npt.NDArray[
     """Eq. 16 for every colour there is: ``(2^24,)`` uint8 by ``R << 16 | G << 8 | B``, 1 for road.
 
     A pixel's features are its three colours alone, so this is all the machine can say. A value
-    from the colour `cube` decides where its error bound keeps it off the threshold; the few
-    colours that are left are decided by `decision`.
+    from the colour `cube` decides where its error bound keeps it off the threshold. The colours
+    that are left, `UNDECIDED` here, `decide` fills in when they are seen: mostly some twenty,
+    but all of them where the machine has learnt nothing and its value is 0 everywhere.
 
-    The last tables are remembered, each 16 MiB, and must not be written to.
+    The last tables are remembered, each 16 MiB.
     """
     # Matrices this small gain nothing from threads, and lose all where other work needs a core.
     from threadpoolctl import threadpool_limits
@@ -136,13 +143,25 @@ def colour_table(machine: SupportVectors, settings: SvmSettings) -> npt.NDArray[
     with threadpool_limits(1, "blas"):
         for red, margin in enumerate(margins):
             table[red] = margin > 0
-            green, blue = np.nonzero(np.abs(margin) <= margins.error)
-            if len(green):
-                colours = np.stack([np.full_like(green, red), green, blue], axis=1).astype(np.uint8)
-                exact = decision(colours, machine, settings)
-                table[red, green, blue] = exact > settings.threshold
-    table.flags.writeable = False
+            table[red][np.abs(margin) <= margins.error] = UNDECIDED
     return table.ravel()
+
+
+def decide(
+    colours: npt.NDArray[np.uint8],
+    table: npt.NDArray[np.uint8],
+    machine: SupportVectors,
+    settings: SvmSettings,
+) -> None:
+    """Fill in what a `colour_table` leaves open of ``(n, 3)`` colours, by their exact values.
+
+    Whichever thread comes first writes the same.
+    """
+    wide = colours.astype(np.int64)
+    index = np.unique((wide[:, 0] << 16) | (wide[:, 1] << 8) | wide[:, 2])
+    index = index[table[index] == UNDECIDED]
+    seen = np.stack([index >> 16, index >> 8 & 255, index & 255], axis=1).astype(np.uint8)
+    table[index] = decision(seen, machine, settings) > settings.threshold
 
 
 def _margins(machine: SupportVectors, settings: SvmSettings) -> cube.Slabs:
@@ -175,6 +194,10 @@ def bind(settings: SvmSettings, machine: SupportVectors) -> Callable[[View], Out
 
     def run(view: View) -> Output:
         mask: Mask = KERNELS.look_up_colours(view.image, table)
+        undecided = mask == UNDECIDED
+        if undecided.any():
+            decide(view.image[undecided], table, machine, settings)
+            mask = KERNELS.look_up_colours(view.image, table)
         return Output((Layer(SVM, mask),), mask=mask)
 
     return run
@@ -193,4 +216,5 @@ STAGE: Final = Stage(
     layers=layers,
     fit=fit,
     parameters=SupportVectors,
+    oracle=perfect_mask,
 )

@@ -31,7 +31,7 @@ from roadeval.pipeline.classify import SVM
 from roadeval.pipeline.fast import KERNELS
 from roadeval.pipeline.scale import reduced, stretched
 from roadeval.pipeline.shade import LOGS
-from roadeval.pipeline.stage import Moment, Output, Stage, TrainingSet, View
+from roadeval.pipeline.stage import Moment, Output, Stage, TrainingSet, View, perfect_mask
 
 Values = npt.NDArray[np.float32]
 
@@ -265,5 +265,6 @@ STAGE: Final = Stage(
     layers=layers,
     fit=fit,
     parameters=RectifiedMachine,
+    oracle=perfect_mask,
     mask=SVM.name,
 )

@@ -92,20 +92,22 @@ def transfer(
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def mahalanobis_squared(
+def mahalanobis(
     image: npt.NDArray[np.uint8],
     mean: npt.NDArray[np.float64],
     precision: npt.NDArray[np.float64],
-) -> npt.NDArray[np.float64]:
-    """See `plain.mahalanobis_squared`."""
+    greatest: float,
+) -> tuple[npt.NDArray[np.float32], Codes]:
+    """See `plain.mahalanobis`."""
     height, width, _ = image.shape
-    result = np.empty((height, width), np.float64)
+    distance = np.empty((height, width), np.float32)
+    near = np.empty((height, width), np.uint8)
     for y in range(height):
         for x in range(width):
             r = image[y, x, 0] - mean[0]
             g = image[y, x, 1] - mean[1]
             b = image[y, x, 2] - mean[2]
-            result[y, x] = (
+            squared = (
                 precision[0, 0] * (r * r)
                 + precision[1, 1] * (g * g)
                 + precision[2, 2] * (b * b)
@@ -113,6 +115,18 @@ def mahalanobis_squared(
                 + 2.0 * precision[0, 2] * (r * b)
                 + 2.0 * precision[1, 2] * (g * b)
             )
+            distance[y, x] = np.sqrt(np.float32(squared))
+            near[y, x] = squared <= greatest
+    return distance, near
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def areas(labels: Labels, count: int) -> npt.NDArray[np.int64]:
+    """See `plain.areas`."""
+    result = np.zeros(count, np.int64)
+    for row in labels:
+        for label in row:
+            result[label] += 1
     return result
 
 

@@ -11,6 +11,7 @@ from pydantic import ConfigDict, Field, field_validator
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, mask_spec
+from roadeval.pipeline.fast import KERNELS
 from roadeval.pipeline.patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View
 
@@ -124,10 +125,11 @@ def keep_region(mask: Mask, patch: Mask | None = None) -> Mask:
     The largest, or, given a ``patch``, the one with most pixels in it where any has some. Of
     equals the first from the top. An empty mask stays empty.
     """
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(np.ascontiguousarray(mask))
+    # The library's own statistics take ten times as long as its labels.
+    count, labels = cv2.connectedComponents(np.ascontiguousarray(mask))
     if count <= 1:
         return mask.copy()
-    votes = stats[1:, cv2.CC_STAT_AREA]
+    votes = KERNELS.areas(labels, count)[1:]
     if patch is not None:
         inside = np.bincount(labels[patch > 0], minlength=count)[1:]
         votes = inside if inside.any() else votes

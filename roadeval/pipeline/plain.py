@@ -96,18 +96,30 @@ def transfer(
     return result
 
 
-def mahalanobis_squared(
+def mahalanobis(
     image: npt.NDArray[np.uint8],
     mean: npt.NDArray[np.float64],
     precision: npt.NDArray[np.float64],
-) -> npt.NDArray[np.float64]:
-    """Square of Eq. 2's distance, ``(x - m)^T P (x - m)``, of every pixel.
+    greatest: float,
+) -> tuple[npt.NDArray[np.float32], Codes]:
+    """Distance of Eq. 2, the root of ``(x - m)^T P (x - m)``, of every pixel.
 
-    ``mean`` is ``(3,)``, ``precision`` the symmetric ``(3, 3)`` inverse covariance. Returns
-    ``(H, W)`` float64.
+    Parameters
+    ----------
+    image
+        ``(H, W, 3)`` uint8.
+    mean, precision
+        m, ``(3,)``, and the symmetric inverse covariance P, ``(3, 3)``.
+    greatest
+        Of the square, up to which a pixel is near.
+
+    Returns
+    -------
+    distance, near
+        ``(H, W)`` float32, and ``(H, W)`` uint8, decided in float64: 1 near, 0 far.
     """
     r, g, b = (image[..., c] - mean[c] for c in range(3))
-    result: npt.NDArray[np.float64] = (
+    squared: npt.NDArray[np.float64] = (
         precision[0, 0] * (r * r)
         + precision[1, 1] * (g * g)
         + precision[2, 2] * (b * b)
@@ -115,7 +127,12 @@ def mahalanobis_squared(
         + 2.0 * precision[0, 2] * (r * b)
         + 2.0 * precision[1, 2] * (g * b)
     )
-    return result
+    return np.sqrt(squared.astype(np.float32)), (squared <= greatest).astype(np.uint8)
+
+
+def areas(labels: Labels, count: int) -> npt.NDArray[np.int64]:
+    """Count the pixels of each of ``count`` labels of an ``(H, W)`` image: ``(count,)`` int64."""
+    return np.bincount(labels.ravel(), minlength=count)
 
 
 def look_up_colours(image: npt.NDArray[np.uint8], table: Codes) -> Codes:

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb
+from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb, Truth
 from roadeval.pipeline import colour
 from roadeval.pipeline.fast import KERNELS
 from roadeval.pipeline.stage import Output, Stage, View
@@ -282,6 +282,19 @@ def compensate(
     return KERNELS.transfer(image, labels, change.source, change.target, change.gain), change
 
 
+def lift(
+    image: Rgb, shadow: Mask, settings: ShadowSettings
+) -> tuple[Rgb, Mask, int, Compensation]:
+    """Compensate what a mask calls shadow: components, rings, transfer (Eq. 9 to 11).
+
+    Returns the image, the rings, the number of components, and what was done to them.
+    """
+    labels, count = connected_components(shadow, settings.connectivity)
+    ring = buffer_ring(shadow, settings.ring_width)
+    image, change = compensate(image, labels, count, ring, settings)
+    return image, ring, count, change
+
+
 def _compensate_hsi(
     image: Rgb, labels: Labels, count: int, ring: Mask, settings: ShadowSettings
 ) -> tuple[Rgb, Compensation]:
@@ -340,9 +353,7 @@ def bind(settings: ShadowSettings, _parameters: None) -> Callable[[View], Output
         codes, histogram = KERNELS.look_up_sum_min(view.image, NDI_CODES)
         threshold = threshold_of(histogram)
         shadow = shadow_mask(codes, threshold, inclusive=settings.inclusive)
-        labels, count = connected_components(shadow, settings.connectivity)
-        ring = buffer_ring(shadow, settings.ring_width)
-        image, change = compensate(view.image, labels, count, ring, settings)
+        image, ring, count, change = lift(view.image, shadow, settings)
         return Output(
             layers=(
                 Layer(NDI, codes),
@@ -354,6 +365,16 @@ def bind(settings: ShadowSettings, _parameters: None) -> Callable[[View], Output
             regions={"shadow": shadow, "shadow_edge": ring, "lit": 1 - (shadow | ring)},
             facts=_facts(threshold, shadow, count, change),
         )
+
+    return run
+
+
+def oracle(settings: ShadowSettings, _parameters: None) -> Callable[[View, Truth], Output]:
+    """Return the filter as it would be if it knew what is shadow; its compensation stays."""
+
+    def run(view: View, truth: Truth) -> Output:
+        shadow = (truth == 1).view(np.uint8)
+        return Output(image=lift(view.image, shadow, settings)[0])
 
     return run
 
@@ -384,4 +405,5 @@ STAGE: Final[Stage[ShadowSettings, None]] = Stage(
     bind=bind,
     layers=layers,
     is_filter=True,
+    oracle=oracle,
 )

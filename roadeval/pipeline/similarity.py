@@ -70,9 +70,7 @@ def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Out
     spec = _distance(settings)
 
     def run(view: View) -> Output:
-        squared = KERNELS.mahalanobis_squared(view.image, road.mean, precision)
-        mask = (squared <= greatest).astype(np.uint8)
-        distance = np.sqrt(squared, dtype=np.float32, casting="same_kind")
+        distance, mask = KERNELS.mahalanobis(view.image, road.mean, precision, greatest)
         return Output((Layer(spec, distance), Layer(SIMILARITY, mask)), mask=mask)
 
     return run

@@ -14,7 +14,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import Layer, LayerSpec, Mask, Rgb
+from roadeval.data import ROAD, Layer, LayerSpec, Mask, Rgb, Truth
 
 S = TypeVar("S")
 """Settings of a stage: a frozen, validated dataclass."""
@@ -130,6 +130,10 @@ class Stage(Generic[S, P]):
         shows what it does.
     prepares
         Whether it only prepares the image, in every variant.
+    oracle
+        ``oracle(settings, parameters)`` returns the stage as it would be if it were perfect: a
+        pure function of `View` and the truth, of shadow for a filter, else of the road. None
+        where nobody asks what a perfect one would bring.
     mask
         Its mask's layer, and its name in tables and timing, where that is not ``name``: stages
         that do the same in different ways are tabled under one name.
@@ -144,6 +148,7 @@ class Stage(Generic[S, P]):
     parameters: type[P] | None = None
     is_filter: bool = False
     prepares: bool = False
+    oracle: Callable[[S, Any], Callable[[View, Truth], Output]] | None = None
     mask: str = ""
 
     @property
@@ -155,3 +160,12 @@ class Stage(Generic[S, P]):
     def reported(self) -> str:
         """Its name in tables, recordings and timing."""
         return self.mask or self.name
+
+
+def perfect_mask(_settings: Any, _parameters: Any) -> Callable[[View, Truth], Output]:
+    """Return the oracle of a stage that yields a road mask: the truth, ignored pixels non-road."""
+
+    def run(_view: View, truth: Truth) -> Output:
+        return Output(mask=(truth == ROAD).view(np.uint8))
+
+    return run

@@ -22,9 +22,9 @@ def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     patch = patch_mask(height, width, settings.patch) > 0
     colours = image[patch].astype(np.float64)
     precision = np.linalg.inv(np.cov(colours, rowvar=False, ddof=0) + np.eye(3))
-    squared = KERNELS.mahalanobis_squared(image, colours.mean(axis=0), precision)
+    _, near = KERNELS.mahalanobis(image, colours.mean(axis=0), precision, limit(settings.far))
     truth = np.full((height, width), IGNORE, np.uint8)
-    truth[squared > limit(settings.far)] = NON_ROAD
+    truth[near == 0] = NON_ROAD
     truth[: round(settings.horizon * height)] = NON_ROAD
     truth[patch] = ROAD
     return truth

@@ -33,8 +33,8 @@ def asked(monkeypatch):
     """What the main job was asked for; it does nothing and is done at once."""
     asked = {"warnings": (), "losses": ()}
 
-    def replay(drive, *, save, reports, options, on_progress):
-        asked.update(drive=drive, save=save, reports=reports, options=options)
+    def replay(drive, *, save, reports, mcap, options, on_progress):
+        asked.update(drive=drive, save=save, reports=reports, mcap=mcap, options=options)
         on_progress(Progress(3, 3, "replaying"))
         return Outcome(None, None, SUMMARY, asked["warnings"], asked["losses"], ())
 
@@ -45,7 +45,7 @@ def asked(monkeypatch):
 def test_the_defaults_are_those_of_the_library(asked):
     assert main(["replay", "drive.mcap"]) == 0
     assert asked["drive"] == Path("drive.mcap")
-    assert asked["save"] is asked["reports"] is None
+    assert asked["save"] is asked["reports"] is asked["mcap"] is None
     assert asked["options"] == ReplayOptions()
 
 
@@ -53,14 +53,15 @@ def test_every_option_arrives(asked, tmp_path):
     settings = tmp_path / "narrow.toml"
     settings.write_text("[shadow]\nring_width = 3\n")
     words = (
-        f"replay drive.mcap --save out.rrd --reports out --preset printed --config {settings} "
+        f"replay drive.mcap --save out.rrd --reports out --mcap o.mcap --preset printed --config {settings} "
         f"--variant narrow={settings} --model city.model --train-frames 5 --train-gap 2 "
         "--image-topic /image --truth-topic /truth --shadow-topic /shadow --road-label 3 "
-        "--road-label 4 --ignore-label 11 --sync-tolerance 2.5 --resize-truth --keep-corrupt "
+        "--road-label 4 --ignore-label 11 --mask-topic net=/net --sync-tolerance 2.5 --resize-truth --keep-corrupt "
         "-S 1.5 -E 2013-05-01T12:00:00Z --every 2 --max-frames 7 --record none --jobs 1"
     )
     assert main(words.split()) == 0
-    assert (asked["save"], asked["reports"]) == (Path("out.rrd"), Path("out"))
+    outputs = (asked["save"], asked["reports"], asked["mcap"])
+    assert outputs == (Path("out.rrd"), Path("out"), Path("o.mcap"))
     options = asked["options"]
     assert options.config.preset == "printed"
     assert options.config.stages["shadow"].ring_width == 3
@@ -72,6 +73,7 @@ def test_every_option_arrives(asked, tmp_path):
         image_topic="/image",
         truth_topic="/truth",
         shadow_topic="/shadow",
+        mask_topics={"net": "/net"},
         road_labels=(3, 4),
         ignore_labels=(11,),
         start="1.5",
@@ -124,3 +126,26 @@ def test_a_configuration_that_cannot_be_used_is_a_known_problem(asked, capsys):
 
 def test_a_preset_alone_is_the_library_s():
     assert job.ReplayOptions().config == Config()
+
+
+def test_the_truth_s_colours_arrive(asked):
+    words = "replay d.mcap --road-color 64,32,32 --road-color 255,0,0 --ignore-color 1,2,3"
+    assert main(words.split()) == 0
+    assert asked["options"].road_colors == ((64, 32, 32), (255, 0, 0))
+    assert asked["options"].ignore_colors == ((1, 2, 3),)
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["--road-color 1,2", "--road-color red", "--mask-topic net", "--mask-topic truth=/x"],
+)
+def test_colours_and_masks_are_checked_before_anything_is_opened(words, capsys):
+    assert main(["replay", "drive.mcap", *words.split()]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_every_preset_can_be_asked_for():
+    from roadeval.cli.options import PresetName
+    from roadeval.config import PRESETS
+
+    assert {name.value for name in PresetName} == set(PRESETS)

@@ -1,52 +1,94 @@
 """Where pixels go wrong over a drive, and what a step changed."""
 
 import numpy as np
+import pytest
 
-from roadeval.evaluation.maps import Change, HeatMap, Maps, change
+from roadeval.data import IGNORE, Change
+from roadeval.evaluation.counts import error_map
+from roadeval.evaluation.maps import HeatMap, Maps, changes
 
 from .making import pixels
 
 TRUTH = pixels("##..", "##.?")
 
 
-def test_a_heat_map_counts_false_positives_and_negatives_pixel_by_pixel():
+def heat_of(*masks, truth=TRUTH):
     heat = HeatMap()
-    heat.add(pixels("#..#", "##.#"), TRUTH)
-    heat.add(pixels("#..#", "##.."), TRUTH)
-    assert heat.fp.tolist() == [[0, 0, 0, 2], [0, 0, 0, 0]]
-    assert heat.fn.tolist() == [[0, 2, 0, 0], [0, 0, 0, 0]]
-    assert heat.labelled[1].tolist() == [2, 2, 2, 0]
+    for mask in masks:
+        heat.add(error_map(mask, truth).array)
+    return heat
 
 
-def test_a_share_is_of_the_frames_that_label_the_pixel_and_undefined_where_none_does():
-    heat = HeatMap()
-    heat.add(pixels("...#", "...."), TRUTH)
-    heat.add(pixels("....", "...."), TRUTH)
-    share = heat.share(heat.fp)
-    assert share[0, 3] == 0.5
-    assert np.isnan(share[1, 3])
+def test_a_heat_map_counts_labels_false_positives_and_negatives_pixel_by_pixel():
+    labelled, fp, fn = heat_of(pixels("#..#", "##.#"), pixels("#..#", "##..")).sums()
+    assert labelled.tolist() == [[2, 2, 2, 2], [2, 2, 2, 0]]
+    assert fp.tolist() == [[0, 0, 0, 2], [0, 0, 0, 0]]
+    assert fn.tolist() == [[0, 2, 0, 0], [0, 0, 0, 0]]
 
 
 def test_a_frame_of_another_size_is_left_out_and_counted():
-    heat = HeatMap()
-    heat.add(TRUTH % 2, TRUTH)
-    heat.add(pixels("#"), pixels("#"))
+    heat = heat_of(TRUTH % 2)
+    heat.add(np.zeros((1, 1), np.uint8))
     assert (heat.frames, heat.left_out) == (1, 1)
+
+
+@pytest.mark.parametrize("frames", [254, 255, 256, 511])
+def test_a_sum_that_does_not_fit_in_a_byte_is_carried(frames):
+    heat = heat_of(*[pixels("#..#", "##..")] * frames)
+    assert heat.sums()[1, 0, 3] == frames
+    assert heat.sums()[1, 0, 3] == frames
+
+
+def test_a_large_map_is_summed_up_in_square_cells_and_loses_nothing():
+    truth = np.zeros((201, 322), np.uint8)
+    mask = np.random.default_rng(0).integers(0, 2, truth.shape, np.uint8)
+    side, cells = heat_of(mask, truth=truth).cells()
+    assert (side, cells.shape) == (3, (3, 67, 108))
+    assert cells[1, 1, 2] == mask[3:6, 6:9].sum()
+    assert cells[1].sum() == mask.sum()
+    assert cells[0, 0, 107] == 3
+
+
+def test_a_small_map_has_a_cell_a_pixel():
+    side, cells = heat_of(pixels("#..#", "##..")).cells()
+    assert side == 1
+    assert cells[1].tolist() == [[0, 0, 0, 1], [0, 0, 0, 0]]
 
 
 def test_a_change_tells_the_newly_right_from_the_newly_wrong_and_counts_no_ignored_pixel():
     before, after = pixels("#..#", "##.."), pixels("##..", ".#.#")
-    assert change(before, after, TRUTH) == Change(repaired=2, spoiled=1, labelled=7)
+    found = changes([("net", "svm", before), ("net", "post", after)], TRUTH)
+    assert found == {("net", "svm", "net", "post"): Change(repaired=2, spoiled=1, labelled=7)}
 
 
-def test_maps_follow_a_mask_from_stage_to_stage_and_variant_to_variant():
-    maps = Maps()
+def test_changes_are_from_stage_to_stage_and_from_final_mask_to_final_mask():
     good, bad = pixels("##..", "##.."), pixels("#...", "##..")
-    masks = {"filtered": {"svm": bad, "post": good}, "unfiltered": {"svm": bad, "post": bad}}
-    maps.add(TRUTH, masks)
-    assert maps.changes["filtered", "svm", "post"] == Change(1, 0, 7)
-    assert maps.changes["unfiltered", "svm", "post"] == Change(0, 0, 7)
-    assert maps.paired["filtered", "unfiltered"] == Change(1, 0, 7)
-    assert maps.paired["unfiltered", "filtered"] == Change(0, 1, 7)
-    assert maps.heat["filtered"].fn.sum() == 0
-    assert maps.heat["unfiltered"].fn.sum() == 1
+    masks = [("a", "svm", bad), ("a", "post", good), ("b", "post", bad)]
+    assert changes(masks, TRUTH) == {
+        ("a", "svm", "a", "post"): Change(1, 0, 7),
+        ("a", "post", "b", "post"): Change(0, 1, 7),
+        ("b", "post", "a", "post"): Change(1, 0, 7),
+    }
+
+
+def test_changes_equal_a_plain_loop_over_pixels():
+    draw = np.random.default_rng(1)
+    truth = draw.choice(np.array([0, 1, IGNORE], np.uint8), (37, 53))
+    before, after = draw.integers(0, 2, (2, 37, 53), np.uint8)
+    repaired = spoiled = 0
+    for t, b, a in zip(truth.flat, before.flat, after.flat, strict=True):
+        repaired += t != IGNORE and b != t and a == t
+        spoiled += t != IGNORE and b == t and a != t
+    found = changes([("x", "svm", before), ("x", "post", after)], truth)
+    expected = Change(repaired, spoiled, int((truth != IGNORE).sum()))
+    assert found == {("x", "svm", "x", "post"): expected}
+
+
+def test_maps_add_up_over_frames():
+    maps = Maps()
+    mask = pixels("#...", "##..")
+    for _ in range(3):
+        maps.add({"a": error_map(mask, TRUTH)}, {("a", "svm", "a", "post"): Change(1, 2, 7)})
+    assert maps.frames == 3
+    assert maps.changes == {("a", "svm", "a", "post"): Change(3, 6, 21)}
+    assert maps.heat["a"].sums()[2, 0, 1] == 3

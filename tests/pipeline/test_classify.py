@@ -46,16 +46,15 @@ def scikit_learns(settings, training):
 
 @pytest.fixture(scope="module", params=SETTINGS.values(), ids=SETTINGS)
 def case(request):
-    """Settings, the machine that was fitted, its table, and scikit-learn's own."""
+    """Settings, the machine that was fitted, its stage, and scikit-learn's own."""
     settings, training = request.param, sample()
     machine = classify.fit(training, settings)
-    table = classify.colour_table(machine, settings)
-    return settings, machine, table, scikit_learns(settings, training)
+    return settings, machine, classify.bind(settings, machine), scikit_learns(settings, training)
 
 
-def index(colours):
-    wide = colours.astype(int)
-    return wide[..., 0] << 16 | wide[..., 1] << 8 | wide[..., 2]
+def road(stage, colours):
+    """What the stage makes of ``(n, 3)`` colours, as an image of one row."""
+    return stage(View(colours[None], colours[None])).mask[0]
 
 
 COLOURS = np.concatenate([noise(1, 8000)[0], sample().colours(), sample(seed=1).colours()])
@@ -67,18 +66,18 @@ def test_decision_values_equal_scikit_learns(case):
     np.testing.assert_allclose(ours, theirs.decision_function(COLOURS), rtol=0, atol=ROUNDING)
 
 
-def test_the_table_equals_predict_on_every_pixel_that_is_not_on_the_threshold(case):
-    settings, _, table, theirs = case
+def test_the_mask_equals_predict_on_every_pixel_that_is_not_on_the_threshold(case):
+    settings, _, stage, theirs = case
     values = theirs.decision_function(COLOURS)
     clear = np.abs(values - settings.threshold) > ROUNDING
     assert clear.mean() > 0.99
     expected = values > settings.threshold if settings.threshold else theirs.predict(COLOURS)
-    np.testing.assert_array_equal(table[index(COLOURS)][clear], expected[clear])
+    np.testing.assert_array_equal(road(stage, COLOURS)[clear], expected[clear])
 
 
 @pytest.mark.parametrize("red", [0, 110, 255])
-def test_the_table_equals_the_definition_next_to_the_threshold(case, red):
-    settings, machine, table, _ = case
+def test_the_mask_equals_the_definition_next_to_the_threshold(case, red):
+    settings, machine, stage, _ = case
     margins = classify._margins(machine, settings)
     assert margins.error < 1e-5  # or the bound would decide nothing
     quick = margins.of_red(red).ravel()
@@ -88,7 +87,7 @@ def test_the_table_equals_the_definition_next_to_the_threshold(case, red):
     assert np.abs(quick[near] - exact).max() <= margins.error
     clear = np.abs(exact) > ROUNDING
     assert clear.mean() > 0.9
-    np.testing.assert_array_equal(table[index(colours)][clear], exact[clear] > 0)
+    np.testing.assert_array_equal(road(stage, colours)[clear], exact[clear] > 0)
 
 
 @pytest.mark.parametrize("kernel", ["rbf", "linear"])
@@ -99,9 +98,39 @@ def test_a_colour_on_the_threshold_is_decided_by_the_definition(kernel, colour):
     machine = classify.fit(sample(40), settings)
     pixel = np.array([colour], np.uint8)
     value = classify.decision(pixel, machine, settings).item()
-    for offset, road in ((-1e-13, 1), (1e-13, 0)):
-        table = classify.colour_table(machine, replace(settings, threshold=value + offset))
-        assert table[index(pixel)].item() == road
+    for offset, expected in ((-1e-13, 1), (1e-13, 0)):
+        stage = classify.bind(replace(settings, threshold=value + offset), machine)
+        assert road(stage, pixel).item() == expected
+
+
+def indifferent():
+    """A machine whose value is 0, the threshold, at every colour."""
+    return classify.SupportVectors(
+        np.zeros(3), np.ones(3), np.full((2, 3), 100.0), np.array([1.0, -1.0]), 0.0
+    )
+
+
+def test_a_machine_that_learnt_nothing_decides_only_the_colours_that_occur(monkeypatch):
+    asked = []
+    exact = classify.decision
+    monkeypatch.setattr(
+        classify,
+        "decision",
+        lambda colours, *rest: asked.append(len(colours)) or exact(colours, *rest),
+    )
+    stage = classify.bind(SvmSettings(), indifferent())
+    image = noise(1, 50)[0]
+    colours = len(np.unique(image, axis=0))
+    assert not road(stage, image).any()
+    assert not road(stage, image).any()
+    assert asked == [colours]
+
+
+def test_a_colour_is_decided_alike_whatever_is_decided_with_it(case):
+    settings, machine, *_ = case
+    whole = classify.decision(COLOURS[:500], machine, settings)
+    alone = [classify.decision(COLOURS[i : i + 1], machine, settings).item() for i in range(500)]
+    assert whole.tolist() == alone
 
 
 def test_the_machine_is_scikit_learns(case):
@@ -149,18 +178,19 @@ def test_decision_values_do_not_depend_on_the_block_size(monkeypatch):
     machine = classify.fit(sample(), settings)
     whole = classify.decision(COLOURS[:100], machine, settings)
     monkeypatch.setattr(classify, "_BLOCK", 1000)
-    np.testing.assert_allclose(
-        classify.decision(COLOURS[:100], machine, settings), whole, atol=1e-12
-    )
+    np.testing.assert_array_equal(classify.decision(COLOURS[:100], machine, settings), whole)
 
 
-def test_the_mask_is_the_table_at_every_pixel(case):
-    settings, machine, table, _ = case
-    run = classify.bind(settings, machine)
+def test_the_mask_is_the_machine_at_every_pixel(case):
+    settings, machine, stage, _ = case
     for image in IMAGES.values():
-        output = run(View(image, image))
+        output = stage(View(image, image))
         assert output.mask.dtype == np.uint8
-        np.testing.assert_array_equal(output.mask, table[index(image)])
+        assert output.mask.shape == image.shape[:2]
+        values = classify.decision(image.reshape(-1, 3), machine, settings)
+        clear = np.abs(values - settings.threshold) > ROUNDING
+        expected = values > settings.threshold
+        np.testing.assert_array_equal(output.mask.ravel()[clear], expected[clear])
         (layer,) = output.layers
         assert layer.array is output.mask
         assert layer.spec == classify.SVM

@@ -31,7 +31,8 @@ def every_kernel(image, width):
         "look_up_sum_min": (image, shadow.NDI_CODES),
         "region_sums": (image, labels, ring, count, width),
         "transfer": (image, labels, source, target, gain),
-        "mahalanobis_squared": (image, np.array([90.5, 101.25, 99.0]), PRECISION),
+        "mahalanobis": (image, np.array([90.5, 101.25, 99.0]), PRECISION, 7.8),
+        "areas": (labels, count),
         "look_up_colours": (image, COLOUR_TABLE),
     }
 
