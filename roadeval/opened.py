@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cached_property
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -109,14 +108,7 @@ class Opened:
 
     def extra(self, name: str) -> pd.DataFrame:
         """Read a further table that the run counted, as ``oracles``; empty if it did not."""
-        import pandas as pd
-
-        if self.recording is not None:
-            text = self.recording.result(name)
-        else:
-            path = self.path / f"{name}.csv"
-            text = path.read_text(encoding="utf-8") if path.exists() else None
-        return pd.read_csv(StringIO(text)) if text else pd.DataFrame()
+        return self._tables.table(name)
 
     def _whole(self, table: pd.DataFrame) -> pd.DataFrame:
         """Keep the rows of frames that stand in both tables; a killed run may have cut one."""

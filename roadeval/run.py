@@ -11,6 +11,7 @@ from roadeval.config import Variant
 from roadeval.data import FrameResult, Role, VariantLayout
 from roadeval.evaluation import tables
 from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.results import STREAMED
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.flow import ordered
 from roadeval.gallery import Gallery
@@ -94,7 +95,7 @@ class Run:
             has_shadow_truth=self._selection.shadow is not None,
             first_frame=self._schedule.first,
             rate_hz=self._selection.image.rate_hz,
-            tables={name: tables.header(name) for name in ("frames", "regions")},
+            tables={name: tables.header(name) for name in STREAMED},
             properties=self._properties(),
         )
 

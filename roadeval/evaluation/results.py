@@ -25,13 +25,18 @@ if TYPE_CHECKING:
 
 FORMAT: Final = {"name": "roadeval-summary", "version": 1}
 SUMMARY: Final = "summary.json"
-STREAMED: Final = ("frames", "regions")
+STREAMED: Final = ("frames", "regions", "oracles")
 """The tables that grow frame by frame."""
-TEXT_COLUMNS: Final = ("variant", "stage", "region")
+SUMS: Final = ("windows", "changes", "heat")
+"""The tables that are written at the end."""
+TEXT_COLUMNS: Final = (
+    *("variant", "stage", "region", "oracle"),
+    *("from_variant", "from_stage", "to_variant", "to_stage"),
+)
 """Columns that are text even where a variant is called ``007``."""
 PARTS: Final = (
-    *("format", "verdict", "drive", "frames", "totals", "difference", "windows", "health"),
-    *("training", "seconds", "warnings", "losses", "settings", "versions", "log"),
+    *("format", "verdict", "drive", "frames", "totals", "beyond", "difference", "oracles"),
+    *("windows", "health", "training", "seconds", "warnings", "losses", "settings", "versions", "log"),
 )
 """The parts of the summary, in the file's order."""
 
@@ -74,7 +79,7 @@ class ResultsWriter:
 
     def __init__(self, folder: Path) -> None:
         self._folder: Final = folder
-        self._scored = False
+        self._filled: Final = {SUMMARY}
         self._open: Final[dict[str, IO[str]]] = {}
         with self._explained():
             folder.mkdir(parents=True, exist_ok=True)
@@ -97,9 +102,14 @@ class ResultsWriter:
         with self._explained():
             for table, lines in result.tables.items():
                 self._open[f"{table}.csv"].write(lines)
-                self._scored = True
+                self._filled.add(f"{table}.csv")
 
-    def finish(self, windows: Iterable[Window], summary: Mapping[str, Any]) -> list[Path]:
+    def finish(
+        self,
+        windows: Iterable[Window],
+        summary: Mapping[str, Any],
+        sums: Mapping[str, str] | None = None,
+    ) -> list[Path]:
         """Complete the tables and give all files their names.
 
         Where no frame was scored there are no tables, and those of an earlier run are removed:
@@ -111,6 +121,8 @@ class ResultsWriter:
             The rows of ``windows.csv``.
         summary
             All of `PARTS` but ``format``.
+        sums
+            The lines of the other tables in `SUMS`, by name.
 
         Returns
         -------
@@ -118,7 +130,10 @@ class ResultsWriter:
             The files written.
         """
         with self._explained():
-            self._begin("windows.csv", tables.header("windows") + tables.window_lines(windows))
+            lines = {"windows": tables.window_lines(windows), **(sums or {})}
+            for table in SUMS:
+                self._begin(f"{table}.csv", tables.header(table) + lines.get(table, ""))
+                self._filled |= {f"{table}.csv"} if lines.get(table) else set()
             self._begin(SUMMARY, summary_text(summary))
             return [self._folder / name for name in list(self._open) if self._complete(name)]
 
@@ -129,7 +144,7 @@ class ResultsWriter:
     def _complete(self, name: str) -> bool:
         """Give a file its name, or remove it if it is a table with nothing in it."""
         self._open.pop(name).close()
-        if self._scored or name == SUMMARY:
+        if name in self._filled:
             self._temporary(name).replace(self._folder / name)
             return True
         self._temporary(name).unlink()
@@ -179,20 +194,23 @@ class Results:
     @property
     def frames(self) -> pd.DataFrame:
         """``frames.csv``: a row per evaluated frame, variant and stage."""
-        return self._table("frames")
+        return self.table("frames")
 
     @property
     def windows(self) -> pd.DataFrame:
         """``windows.csv``: a row per window, variant and stage."""
-        return self._table("windows")
+        return self.table("windows")
 
     @property
     def regions(self) -> pd.DataFrame:
         """``regions.csv``: a row per evaluated frame, variant, stage and region."""
-        return self._table("regions")
+        return self.table("regions")
 
-    def _table(self, name: str) -> pd.DataFrame:
-        """Read a table, bit by bit; one that was not written, nothing being scored, is empty."""
+    def table(self, name: str) -> pd.DataFrame:
+        """Read a table by its name in `roadeval.evaluation.tables.COLUMNS`, bit by bit.
+
+        One that was not written, there being nothing to count, is empty.
+        """
         from pyarrow import csv
 
         path, schema = self._folder / f"{name}.csv", _schema(name)

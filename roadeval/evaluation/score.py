@@ -16,7 +16,7 @@ from roadeval.data import (
     Truth,
     VariantResult,
 )
-from roadeval.evaluation import counts, health, rates, regions, tables
+from roadeval.evaluation import contours, counts, health, maps, rates, regions, tables
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.settings import EvaluationSettings
 
@@ -61,7 +61,9 @@ def score_frame(
     tallies = tally(masks, frame.truth, found)
     finals = {result.variant: result.rates for result in tallies}
     blind = finals.pop(BASELINE, None)
-    final_masks = {variant: mask for variant, _, mask in masks if variant != BASELINE}
+    all_finals = {variant: mask for variant, _, mask in masks}
+    final_masks = {name: mask for name, mask in all_finals.items() if name != BASELINE}
+    oracles = _oracles(variants, frame.truth)
     return FrameResult(
         frame,
         role,
@@ -73,7 +75,11 @@ def score_frame(
         tables={
             "frames": tables.frame_lines(frame, tallies),
             "regions": tables.region_lines(frame, tallies),
+            **({"oracles": tables.oracle_lines(frame, oracles)} if oracles else {}),
         },
+        changes=maps.changes(masks, frame.truth),
+        contours=contours.boundary_f(all_finals, frame.truth, settings.boundary_width),
+        oracles=oracles,
     )
 
 
@@ -113,6 +119,16 @@ def prove(result: Tally, labelled: int) -> None:
             f"{result.variant}/{result.stage}: {whole} in parts {sums} of {labelled} labelled "
             "pixels: please report this as a defect of roadeval"
         )
+
+
+def _oracles(variants: Sequence[VariantResult], truth: Truth) -> dict[str, tuple[Tally, ...]]:
+    """Count the masks that stages made once one was replaced by the truth, by that one."""
+    named: dict[str, list[Named]] = {}
+    for variant in variants:
+        for oracle, masks in variant.oracles.items():
+            own = [(variant.variant, stage, mask) for stage, mask in masks.items()]
+            named.setdefault(oracle, []).extend(own)
+    return {oracle: tally(masks, truth, {}) for oracle, masks in named.items()}
 
 
 def _masks(

@@ -20,9 +20,11 @@ from roadeval.data import (
     Role,
     VariantResult,
 )
-from roadeval.evaluation import windows
+from roadeval.evaluation import tables, windows
 from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.beyond import Beyond
 from roadeval.evaluation.history import History
+from roadeval.evaluation.maps import Maps
 from roadeval.evaluation.rates import RATES
 from roadeval.evaluation.score import score_frame
 from roadeval.evaluation.settings import EvaluationSettings
@@ -58,6 +60,9 @@ class Scoreboard:
         self._roles: Final[Counter[str]] = Counter()
         self._health: Final[defaultdict[str, Counter[str]]] = defaultdict(Counter)
         self._histories: Final[dict[tuple[str, str], History]] = {}
+        self._oracles: Final[dict[tuple[str, str, str], History]] = {}
+        self._maps: Final = Maps()
+        self._beyond: Final = Beyond(settings.boundary_width)
         self._seconds: Final[defaultdict[tuple[str, str], float]] = defaultdict(float)
         self._runs: Final[Counter[tuple[str, str]]] = Counter()
 
@@ -68,6 +73,7 @@ class Scoreboard:
     def add(self, result: FrameResult) -> None:
         """Add a scored frame: in the drive's order, from one thread."""
         self._roles[result.role] += 1
+        self._beyond.add(result)
         for variant in result.variants:
             for stage in variant.stages:
                 self._seconds[variant.variant, stage.stage] += stage.seconds
@@ -81,7 +87,28 @@ class Scoreboard:
                 (tally.variant, tally.stage), History(tally.variant, tally.stage)
             )
             history.append(len(self._frames), tally)
+        for oracle, tallies in result.oracles.items():
+            for tally in tallies:
+                key = tally.variant, oracle, tally.stage
+                history = self._oracles.setdefault(key, History(tally.variant, tally.stage))
+                history.append(len(self._frames), tally)
+        self._maps.add(result.errors, result.changes)
         self._frames.append(result.frame.number)
+
+    def lose(self) -> None:
+        """Say that a frame was read here and could not be decoded."""
+        self._beyond.interrupt()
+
+    def tables(self) -> dict[str, str]:
+        """Give the lines of the tables that sum up the drive, by name; none if nothing is scored.
+
+        ``windows`` is not among them: see `windows`.
+        """
+        texts = {
+            "changes": tables.change_lines(self._maps),
+            "heat": tables.heat_lines(self._maps),
+        }
+        return {name: text for name, text in texts.items() if text}
 
     def roles(self) -> dict[str, int]:
         """Count the frames added so far by role."""
@@ -92,6 +119,13 @@ class Scoreboard:
         sums: dict[str, dict[str, dict[str, Any]]] = {}
         for history in self._ordered():
             sums.setdefault(history.variant, {})[history.stage] = history.totals()
+        return sums
+
+    def oracles(self) -> dict[str, dict[str, dict[str, dict[str, Any]]]]:
+        """Sum up by variant, stage replaced by the truth, and stage after it, as in `totals`."""
+        sums: dict[str, dict[str, dict[str, dict[str, Any]]]] = {}
+        for (variant, oracle, stage), history in self._oracles.items():
+            sums.setdefault(variant, {}).setdefault(oracle, {})[stage] = history.totals()
         return sums
 
     def windows(self) -> list[windows.Window]:
@@ -124,6 +158,8 @@ class Scoreboard:
         return {
             "verdict": self._verdict(differences),
             "totals": self.totals(),
+            "beyond": self._beyond.totals(),
+            "oracles": self.oracles(),
             "difference": {
                 stage: {rate: asdict(difference) for rate, difference in by_rate.items()}
                 for stage, by_rate in differences.items()

@@ -7,10 +7,11 @@ comma.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Final
 
 from roadeval.data import Counts, Frame, Tally
+from roadeval.evaluation.maps import Maps
 from roadeval.evaluation.rates import RATES
 from roadeval.evaluation.windows import Window
 
@@ -23,8 +24,21 @@ COLUMNS: Final[dict[str, tuple[str, ...]]] = {
         *RATES,
         *(f"pooled_{name}" for name in RATES),
     ),
+    "oracles": ("frame", "variant", "oracle", "stage", *COUNT_COLUMNS, *RATES),
+    "changes": (
+        *("from_variant", "from_stage", "to_variant", "to_stage"),
+        *("repaired", "spoiled", "N"),
+    ),
+    "heat": ("variant", "top", "left", "side", "labelled", "FP", "FN"),
 }
-"""The columns of each table, by its name; the file is ``<name>.csv``."""
+"""The columns of each table, by its name; the file is ``<name>.csv``.
+
+``oracles``: a row per evaluated frame, variant, stage replaced by the truth (``oracle``), and
+stage after it. ``changes``: pixels of the drive that one mask has right and the one before wrong
+(``repaired``), and the reverse. ``heat``: a row per variant and square cell of the image of
+``side`` pixels from row ``top`` and column ``left``: how often a pixel of it was labelled, and was
+a false positive or negative in the final mask. The last two are sums over the drive.
+"""
 
 
 def header(table: str) -> str:
@@ -48,6 +62,40 @@ def region_lines(frame: Frame, tallies: Iterable[Tally]) -> str:
         for tally in tallies
         for region, counts in tally.regions.items()
     )
+
+
+def oracle_lines(frame: Frame, oracles: Mapping[str, Iterable[Tally]]) -> str:
+    """Write a frame's lines of ``oracles.csv``."""
+    return "".join(
+        _line(
+            (
+                *(frame.number, tally.variant, oracle, tally.stage),
+                *_cells(tally.counts),
+                *tally.rates.values(),
+            )
+        )
+        for oracle, tallies in oracles.items()
+        for tally in tallies
+    )
+
+
+def change_lines(maps: Maps) -> str:
+    """Write the lines of ``changes.csv``."""
+    return "".join(
+        _line((*step, change.repaired, change.spoiled, change.labelled))
+        for step, change in maps.changes.items()
+    )
+
+
+def heat_lines(maps: Maps) -> str:
+    """Write the lines of ``heat.csv``, without cells that are never labelled."""
+    lines = []
+    for variant, heat in maps.heat.items():
+        side, sums = heat.cells()
+        for row, column in zip(*sums[0].nonzero(), strict=True):
+            place = int(row) * side, int(column) * side
+            lines.append(_line((variant, *place, side, *sums[:, row, column].tolist())))
+    return "".join(lines)
 
 
 def window_lines(windows: Iterable[Window]) -> str:

@@ -105,17 +105,24 @@ class Recording:
     @cached_property
     def frames(self) -> pd.DataFrame:
         """The rows of ``frames.csv``."""
-        return self._table("frames")
+        return self.table("frames")
 
     @cached_property
     def regions(self) -> pd.DataFrame:
         """The rows of ``regions.csv``."""
-        return self._table("regions")
+        return self.table("regions")
 
     @cached_property
     def windows(self) -> pd.DataFrame:
         """The rows of ``windows.csv``."""
-        return _csv(self.result("windows") or "")
+        return self.table("windows")
+
+    def table(self, name: str) -> pd.DataFrame:
+        """Give the rows of a table by its name, as ``oracles``; none if the run counted none."""
+        if name not in self.layout.tables:
+            return _csv(self.result(name) or "")
+        lines = (lines for _, lines in self._rows(at.result_path(name), _TEXT))
+        return _csv("".join((self.layout.tables[name].rstrip(), "\n", *lines)))
 
     def scalars(self, path: str) -> pd.Series[float]:
         """Give the numbers under an entity path, as ``/timing/filtered/svm``, by frame number."""
@@ -181,11 +188,6 @@ class Recording:
                 blobs = batch.column(component).flatten()
                 return {f: _bytes(blob) for f, blob in zip(frames, blobs, strict=True)}
         raise RecordingError(f"{self.path}: {path} has nothing on frame {frame}")
-
-    def _table(self, name: str) -> pd.DataFrame:
-        lines = (lines for _, lines in self._rows(at.result_path(name), _TEXT))
-        header = self.layout.tables.get(name, "").rstrip()
-        return _csv("".join((header, "\n", *lines)) if header else "")
 
     def _rows(self, path: str, component: str) -> Iterator[tuple[int, Any]]:
         for batch in self._batches(path, component, static=False):
