@@ -43,6 +43,12 @@ RESERVED: Final = frozenset(
 )
 """Names that no variant may bear: the tables or the recording use them for something else."""
 
+NAMES: Final = (
+    *("variant", "stage", "region", "oracle"),
+    *("from_variant", "from_stage", "to_variant", "to_stage"),
+)
+"""Columns of the tables that hold names, which are text even where a variant is called ``007``."""
+
 
 # --- Frames -------------------------------------------------------------------------------------
 

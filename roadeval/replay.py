@@ -73,8 +73,9 @@ def replay(
                 sidecar.write(result)
             tell(Progress(run.done, run.total, "writing"))
             windows, summary = run.board.windows(), run.summary()
-            recorder.finish(_texts(windows, summary))
-            files = results.finish(windows, summary)
+            sums = run.board.tables()
+            recorder.finish(_texts(windows, summary, sums))
+            files = results.finish(windows, summary, sums)
         tables = Results(folder).windows
         files += write_figures(folder, log.name, tables, run.gallery.examples)
         saved = None if isinstance(recorder, NullRecorder) else recorder.path
@@ -121,9 +122,10 @@ def _sidecar(path: str | Path | None) -> logs.SidecarWriter | logs.NoSidecar:
     return logs.NoSidecar() if path is None else logs.SidecarWriter(path, rates.of)
 
 
-def _texts(windows: Sequence[Any], summary: dict[str, Any]) -> dict[str, str]:
+def _texts(windows: Sequence[Any], summary: dict[str, Any], sums: dict[str, str]) -> dict[str, str]:
     """Give the results as the recording keeps them: the files' own text."""
-    tables = {"windows": header("windows") + window_lines(windows)} if windows else {}
+    lines = {"windows": window_lines(windows), **sums}
+    tables = {name: header(name) + text for name, text in lines.items() if text}
     return {"summary": summary_text(summary), **tables}
 
 

@@ -130,7 +130,9 @@ class Run:
         for processed in ordered(work, items, self._jobs):
             self.done += 1
             self._tell(Progress(self.done, self.total, "replaying"))
-            if processed is not None:
+            if processed is None:
+                self.board.lose()
+            else:
                 self.board.add(processed[0])
                 self.gallery.look(self.done, processed[0])
                 yield processed
@@ -142,12 +144,18 @@ class Run:
             frame = logged.decode()
         except logs.FrameError:
             return None  # it stands in the log's accounting, with the reason
+        role = self._schedule.role(frame)
+        known = (frame.truth, frame.shadow_truth) if role is Role.EVALUATED else (None, None)
         variants = [
-            runner.run_variant(name, chain, frame.image, Moment(frame.stamp_ns, turn.batons[name]))
+            runner.run_variant(
+                *(name, chain, frame.image, Moment(frame.stamp_ns, turn.batons[name])),
+                truth=known[0],
+                shadow_truth=known[1],
+            )
             for name, chain in self._chains.items()
         ]
         variants += [runner.external_variant(name, mask) for name, mask in frame.external.items()]
-        result = self.board.score(frame, self._schedule.role(frame), tuple(variants))
+        result = self.board.score(frame, role, tuple(variants))
         return result, recorder.encode(result, position)
 
     def summary(self) -> dict[str, Any]:

@@ -156,6 +156,31 @@ def by_region(regions: pd.DataFrame) -> pd.DataFrame:
     return table
 
 
+# --- If a stage were perfect ----------------------------------------------------------------------
+
+
+def oracles(table: pd.DataFrame, frames: pd.DataFrame) -> pd.DataFrame:
+    """Average the final masks' rates once a stage was replaced by the truth.
+
+    Returns
+    -------
+    DataFrame
+        ``variant``, ``oracle``, ``ERR``, ``FPR``, ``FNR``, the ``frames`` it is known on, and
+        ``as_is``: the ERR on the same frames as it really is. Empty if nothing was counted.
+    """
+    import pandas as pd
+
+    if not len(table):
+        return pd.DataFrame()
+    last = table.groupby(["variant", "oracle"], sort=False)["stage"].transform("last")
+    own = finals(frames)[["frame", "variant", "ERR"]].rename(columns={"ERR": "as_is"})
+    both = table[table["stage"] == last].merge(own, on=["frame", "variant"])
+    grouped = both.groupby(["variant", "oracle"], sort=False)
+    sums = grouped[["ERR", "FPR", "FNR", "as_is"]].mean()
+    sums["frames"] = grouped.size()
+    return sums.reset_index()
+
+
 # --- Which stage broke it -------------------------------------------------------------------------
 
 

@@ -53,11 +53,11 @@ class Flicker:
         self._before = None
 
     def totals(self, name: str) -> dict[str, Any]:
-        """Give ``flicker``, ``truth_flicker`` and the number of ``pairs``; NaN if there is none."""
+        """Give ``flicker``, ``truth_flicker`` and the number of ``pairs``; None without a pair."""
         labelled = self._labelled[name]
         return {
-            "flicker": self._changed[name] / labelled if labelled else math.nan,
-            "truth_flicker": self._true[name] / labelled if labelled else math.nan,
+            "flicker": self._changed[name] / labelled if labelled else None,
+            "truth_flicker": self._true[name] / labelled if labelled else None,
             "pairs": self._pairs[name],
         }
 
@@ -96,11 +96,13 @@ class Beyond:
     def totals(self) -> dict[str, dict[str, Any]]:
         """Give by variant: mean ``boundary_F`` over ``frames`` that have it, and the flicker.
 
+        The baseline, whose mask is always the same, has no flicker.
+
         See `roadeval.evaluation.contours.boundary_f` and `Flicker`.
         """
         return {
             name: {
-                "boundary_F": total / count if count else math.nan,
+                "boundary_F": total / count if count else None,
                 "frames": count,
                 "width": self._width,
                 **self._flicker.totals(name),

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Final, Self
 
-from roadeval.data import FrameResult
+from roadeval.data import NAMES, FrameResult
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import tables
 from roadeval.evaluation.rates import RATES
@@ -29,14 +29,10 @@ STREAMED: Final = ("frames", "regions", "oracles")
 """The tables that grow frame by frame."""
 SUMS: Final = ("windows", "changes", "heat")
 """The tables that are written at the end."""
-TEXT_COLUMNS: Final = (
-    *("variant", "stage", "region", "oracle"),
-    *("from_variant", "from_stage", "to_variant", "to_stage"),
-)
-"""Columns that are text even where a variant is called ``007``."""
 PARTS: Final = (
     *("format", "verdict", "drive", "frames", "totals", "beyond", "difference", "oracles"),
-    *("windows", "health", "training", "seconds", "warnings", "losses", "settings", "versions", "log"),
+    *("windows", "health", "training", "seconds", "warnings", "losses"),
+    *("settings", "versions", "log"),
 )
 """The parts of the summary, in the file's order."""
 
@@ -133,7 +129,7 @@ class ResultsWriter:
             lines = {"windows": tables.window_lines(windows), **(sums or {})}
             for table in SUMS:
                 self._begin(f"{table}.csv", tables.header(table) + lines.get(table, ""))
-                self._filled |= {f"{table}.csv"} if lines.get(table) else set()
+                self._filled.update([f"{table}.csv"] if lines.get(table) else [])
             self._begin(SUMMARY, summary_text(summary))
             return [self._folder / name for name in list(self._open) if self._complete(name)]
 
@@ -227,7 +223,7 @@ def _schema(table: str) -> Any:
     import pyarrow as pa
 
     def kind(column: str) -> Any:
-        if column in TEXT_COLUMNS:
+        if column in NAMES:
             return pa.string()
         return pa.float64() if column.removeprefix("pooled_") in RATES else pa.int64()
 

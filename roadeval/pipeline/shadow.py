@@ -282,9 +282,7 @@ def compensate(
     return KERNELS.transfer(image, labels, change.source, change.target, change.gain), change
 
 
-def lift(
-    image: Rgb, shadow: Mask, settings: ShadowSettings
-) -> tuple[Rgb, Mask, int, Compensation]:
+def lift(image: Rgb, shadow: Mask, settings: ShadowSettings) -> tuple[Rgb, Mask, int, Compensation]:
     """Compensate what a mask calls shadow: components, rings, transfer (Eq. 9 to 11).
 
     Returns the image, the rings, the number of components, and what was done to them.

@@ -16,7 +16,7 @@ import numpy.typing as npt
 import pyarrow as pa
 from rerun.chunk import LazyChunkStream, LazyStore, RrdReader, StoreEntry
 
-from roadeval.data import VariantLayout
+from roadeval.data import NAMES, VariantLayout
 from roadeval.recording import layout as at
 from roadeval.recording.codecs import Codec
 from roadeval.recording.encoding import Encoder
@@ -261,4 +261,6 @@ def _store(reader: RrdReader, entry: StoreEntry) -> LazyStore | None:
 def _csv(text: str) -> pd.DataFrame:
     import pandas as pd
 
-    return pd.read_csv(io.StringIO(text)) if text else pd.DataFrame()
+    if not text:
+        return pd.DataFrame()
+    return pd.read_csv(io.StringIO(text), dtype=dict.fromkeys(NAMES, str))

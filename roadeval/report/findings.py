@@ -122,7 +122,9 @@ class Findings:
     heat
         For each variant.
     oracles
-        The table ``oracles`` if the run counted it, else empty.
+        As `roadeval.evaluation.analysis.oracles` gives; empty if the run counted none.
+    beyond
+        Boundary F and flicker of each final mask, as in ``summary.json``.
     sampled
         Frames that ``heat`` and ``changes`` were counted on; 0 if they are not there.
     examples
@@ -150,6 +152,7 @@ class Findings:
     parts: Mapping[str, Mapping[str, float]]
     heat: Sequence[Heat]
     oracles: pd.DataFrame
+    beyond: Mapping[str, Mapping[str, Any]]
     sampled: int
     examples: Sequence[Example]
     thumbnails: Sequence[Shot]

@@ -65,6 +65,8 @@ def key_table(found: Findings) -> Table:
     columns["pooled ERR"] = [found.total(name)["pooled_ERR"] for name in names]
     for rate in ("IoU", "F1", "precision"):
         columns[rate] = [found.overlap[name][found.finals[name]][rate] for name in names]
+    if found.beyond:
+        columns["boundary F"] = [found.beyond.get(name, {}).get("boundary_F") for name in names]
     best = {title: _best(title, values) for title, values in columns.items()}
     rows: list[list[Cell | str]] = [
         [
@@ -82,9 +84,14 @@ def key_table(found: Findings) -> Table:
         rows,
         caption=(
             "Percent. The paper's rates are means over the evaluated frames; pooled ERR, IoU, F1 "
-            "and precision are of all pixels together. Bold: the best."
+            f"and precision are of all pixels together.{_edge(found)} Bold: the best."
         ),
     )
+
+
+def _edge(found: Findings) -> str:
+    widths = {told["width"] for told in found.beyond.values()}
+    return f" Boundary F: the road's edge within {widths.pop()} pixels." if widths else ""
 
 
 def variant_cell(name: str, names: Sequence[str]) -> Cell:

@@ -113,6 +113,7 @@ def against(found: Findings) -> Iterator[Block]:
         yield from _paired(found, each)
     if not filters:
         yield Text("The two were not both run, so there is nothing to compare.")
+    yield from _flicker(found)
     if blind:
         yield Heading("Against a guess that never looks at the image", 2)
         yield _blind(found, blind)
@@ -160,6 +161,33 @@ def _paired(found: Findings, each: Versus) -> Iterator[Block]:
         plots.vector(lambda: plots.difference(frames, each.treated, each.control, told)),
         f"ERR of {each.treated} minus {each.control}, frame by frame. Dashed: the mean; grey band: "
         "its interval, where one is given.",
+    )
+
+
+def _flicker(found: Findings) -> Iterator[Block]:
+    """Tabulate how much of each final mask changes from frame to frame, beside the truth's own."""
+    told = {name: each for name, each in found.beyond.items() if each["pairs"]}
+    if not told:
+        return
+    yield Heading("From one frame to the next", 2)
+    yield Table(
+        ["<final mask", "flicker, %", "the truth's own, %", "beyond it, pp", "pairs of frames"],
+        [
+            [
+                variant_cell(name, [*found.finals]),
+                Cell(percent(each["flicker"]), bold=True),
+                percent(each["truth_flicker"]),
+                points(each["flicker"] - each["truth_flicker"]),
+                number(each["pairs"]),
+            ]
+            for name, each in told.items()
+        ],
+    )
+    yield Text(
+        "Flicker: the share of pixels, labelled in both of two frames read one after the other, "
+        "whose mask differs. What moves must change, as the truth does; only what goes beyond it "
+        "is unrest. Motion is not taken out.",
+        "note",
     )
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.report import plots
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.findings import Findings
 from roadeval.report.front import SIDE_BY_SIDE, counted, variant_cell
-from roadeval.report.words import DASH, percent, points
+from roadeval.report.words import DASH, number, percent, points
 
 REGIONS: Final = {
     "shadow": "inside detected shadow",
@@ -211,21 +211,30 @@ def _oracles(found: Findings) -> Iterator[Block]:
     if not len(found.oracles):
         return
     yield Heading("If a stage were perfect", 2)
-    table = found.oracles
-    yield Table(
-        [f"<{name}" if table[name].dtype == object else name for name in table.columns],
+    rows: list[list[Cell | str]] = [
         [
-            [_oracle_cell(str(name), value) for name, value in row.items()]
-            for row in table.to_dict("records")
+            variant_cell(row["variant"], [*found.totals]),
+            f"perfect {row['oracle']}",
+            percent(row["as_is"]),
+            Cell(percent(row["ERR"]), bold=True),
+            points(row["ERR"] - row["as_is"]),
+            percent(row["FPR"]),
+            percent(row["FNR"]),
+            number(row["frames"]),
+        ]
+        for row in found.oracles.to_dict("records")
+    ]
+    yield Table(
+        [
+            *("<variant", "<if there were a", "ERR as it is", "ERR then", "change, pp"),
+            *("FPR then", "FNR then", "frames"),
         ],
+        rows,
         small=True,
     )
     yield Text(
-        "Oracles: a stage's output replaced by the truth while replaying. Not a result, but a "
-        "bound on what mending that stage could bring.",
+        "Oracles: the stage's output replaced by the truth while replaying, and the stages after "
+        "it run on that; ignored pixels count as non-road, or lit. No result, but a bound on "
+        "what mending the stage could bring, and what the stages after it lose by themselves.",
         "note",
     )
-
-
-def _oracle_cell(name: str, value: Any) -> str:
-    return percent(value) if isinstance(value, float) and not name.endswith("frame") else str(value)

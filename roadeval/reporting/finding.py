@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from io import StringIO
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, FILTERED, UNFILTERED
-from roadeval.evaluation import analysis
-from roadeval.evaluation.maps import Maps
+from roadeval.data import BASELINE, FILTERED, NAMES, UNFILTERED
+from roadeval.evaluation import analysis, counts, maps, tables
 from roadeval.evaluation.scoreboard import COMPARED
 from roadeval.opened import Opened
 from roadeval.report.findings import Findings, Heat, Versus
@@ -32,10 +32,10 @@ def find(opened: Opened) -> Findings:
     """Find out everything that the report tells."""
     frames, summary = opened.frames, opened.summary
     numbers = _numbers(opened)
-    maps = _maps(opened, numbers)
+    changes, heat, sampled = _sums(opened, numbers)
     scored = len(frames) > 0
     windows, rows = _windows(opened) if scored else (frames, 0)
-    versus = _versus(frames, summary, maps) if scored else []
+    versus = _versus(frames, summary, changes) if scored else []
     look = Looker(opened)
     return Findings(
         source=str(opened.path),
@@ -52,16 +52,17 @@ def find(opened: Opened) -> Findings:
             variant: {stage: analysis.overlap(total) for stage, total in stages.items()}
             for variant, stages in summary["totals"].items()
         },
-        changes=_changes(maps),
+        changes=_stages(changes),
         parts={
             name: named(analysis.causes(frames, name).mean().to_dict())
             for name in pipelines(frames)
         },
-        heat=[
-            Heat(name, each.share(each.fp), each.share(each.fn)) for name, each in maps.heat.items()
-        ],
-        oracles=opened.extra("oracles"),
-        sampled=maps.frames,
+        heat=[_heat(str(name), cells) for name, cells in heat.groupby("variant", sort=False)]
+        if len(heat)
+        else [],
+        oracles=analysis.oracles(opened.extra("oracles"), frames),
+        beyond=summary.get("beyond", {}),
+        sampled=sampled,
         examples=look.examples(evenly(numbers, EXAMPLES)),
         thumbnails=look.thumbnails(evenly(numbers, THUMBNAILS)),
         worst=look.worst(),
@@ -90,7 +91,7 @@ def _windows(opened: Opened) -> tuple[pd.DataFrame, int]:
     return analysis.rows(opened.frames, size), size
 
 
-def _versus(frames: pd.DataFrame, summary: dict[str, Any], maps: Maps) -> list[Versus]:
+def _versus(frames: pd.DataFrame, summary: dict[str, Any], changes: pd.DataFrame) -> list[Versus]:
     """Compare with the filter against without, then every variant with the baseline."""
     names = set(frames["variant"])
     wanted = [(FILTERED, UNFILTERED), *((name, BASELINE) for name in pipelines(frames))]
@@ -103,40 +104,89 @@ def _versus(frames: pd.DataFrame, summary: dict[str, Any], maps: Maps) -> list[V
         if told is None or control != UNFILTERED:
             given = analysis.differences(paired, settings, COMPARED)
             told = {name: asdict(each) for name, each in given.items()}
-        change = maps.paired.get((treated, control))
-        pixels = (change.repaired, change.spoiled, change.labelled) if change else None
-        found.append(Versus(treated, control, told, paired, pixels))
+        found.append(Versus(treated, control, told, paired, _pixels(changes, treated, control)))
     return found
 
 
-def _changes(maps: Maps) -> pd.DataFrame:
+def _pixels(changes: pd.DataFrame, treated: str, control: str) -> tuple[int, int, int] | None:
+    """Give newly right, newly wrong and all labelled pixels from a final mask to another."""
+    if not len(changes):
+        return None
+    between = (changes["from_variant"] == control) & (changes["to_variant"] == treated)
+    for repaired, spoiled, labelled in changes.loc[
+        between & (changes["N"] > 0), ["repaired", "spoiled", "N"]
+    ].to_numpy():
+        return int(repaired), int(spoiled), int(labelled)
+    return None
+
+
+def _stages(changes: pd.DataFrame) -> pd.DataFrame:
+    """Keep what stages changed, as shares of labelled pixels."""
     import pandas as pd
 
-    rows = [
-        (*key, change.repaired / change.labelled, change.spoiled / change.labelled)
-        for key, change in maps.changes.items()
-        if change.labelled
-    ]
-    return pd.DataFrame(rows, columns=["variant", "before", "after", "repaired", "spoiled"])
+    if not len(changes):
+        return pd.DataFrame()
+    own = changes[(changes["from_variant"] == changes["to_variant"]) & (changes["N"] > 0)]
+    return pd.DataFrame(
+        {
+            "variant": own["to_variant"],
+            "before": own["from_stage"],
+            "after": own["to_stage"],
+            "repaired": own["repaired"] / own["N"],
+            "spoiled": own["spoiled"] / own["N"],
+        }
+    )
 
 
 # --- Masks and pictures ---------------------------------------------------------------------------
 
 
-def _maps(opened: Opened, numbers: Sequence[int]) -> Maps:
-    """Sum up the masks of evenly spread frames, which the tables do not hold."""
-    maps, recording = Maps(), opened.recording
+def _sums(opened: Opened, numbers: Sequence[int]) -> tuple[pd.DataFrame, pd.DataFrame, int]:
+    """Give the tables ``changes`` and ``heat``, and the number of frames that they sum up.
+
+    A run that was killed did not get to write them: they are made of the masks of evenly spread
+    frames then.
+    """
+    import pandas as pd
+
+    changes, heat = opened.extra("changes"), opened.extra("heat")
+    if len(changes) or len(heat):
+        return changes, heat, opened.frames["frame"].nunique()
+    sample = _sample(opened, numbers)
+    lines = {"changes": tables.change_lines(sample), "heat": tables.heat_lines(sample)}
+    made = {
+        name: pd.read_csv(StringIO(tables.header(name) + text), dtype=dict.fromkeys(NAMES, str))
+        for name, text in lines.items()
+    }
+    return made["changes"], made["heat"], sample.frames
+
+
+def _sample(opened: Opened, numbers: Sequence[int]) -> maps.Maps:
+    """Sum up the masks of evenly spread frames."""
+    found, recording = maps.Maps(), opened.recording
     if recording is None or not len(opened.frames):
-        return maps
+        return found
     for number in evenly(numbers, SAMPLED):
-        masks = {
-            variant.name: {
-                stage: recording.layer(variant.name, stage, number) for stage in variant.stages
-            }
+        truth = recording.truth(number)
+        masks = [
+            (variant.name, stage, recording.layer(variant.name, stage, number))
             for variant in recording.variants
-        }
-        maps.add(recording.truth(number), masks)
-    return maps
+            for stage in variant.stages
+        ]
+        finals = {variant: mask for variant, _, mask in masks}
+        errors = {name: counts.error_map(mask, truth) for name, mask in finals.items()}
+        found.add(errors, maps.changes(masks, truth))
+    return found
+
+
+def _heat(variant: str, cells: pd.DataFrame) -> Heat:
+    """Spread the cells of a variant's heat map; NaN where none was labelled."""
+    side = cells["side"].to_numpy()[0]
+    rows, columns = (cells[edge].to_numpy() // side for edge in ("top", "left"))
+    shares = np.full((2, rows.max() + 1, columns.max() + 1), np.nan)
+    for share, outcome in zip(shares, ("FP", "FN"), strict=True):
+        share[rows, columns] = cells[outcome] / cells["labelled"]
+    return Heat(variant, shares[0], shares[1])
 
 
 def _coverage(opened: Opened, numbers: Sequence[int]) -> pd.DataFrame:

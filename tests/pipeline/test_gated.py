@@ -170,6 +170,13 @@ def test_the_gain_rises_softly_over_the_edge():
     assert ((edge > 1.01) & (edge < edge[-1] - 0.01)).sum() == 4
 
 
+def test_the_outermost_pixel_of_the_shade_gets_no_more_than_half_of_what_is_missing():
+    _, layers = run(road(ROAD * SHADE, noise=0))
+    gain = layers["gain"][95]
+    assert gain[60] - 1 < 0.5 * (gain[80] - 1)
+    assert gain[58] == 1
+
+
 def test_no_gain_is_larger_than_the_least_ratio_allows():
     image = road([21, 30, 60])
     wide = RoadLight(np.zeros(2), np.eye(2), GREY.shift)

@@ -1,0 +1,239 @@
+"""How fast roadeval is, against what: see benchmarks/README.md.
+
+    python -m benchmarks [--drive FILE] [--sizes 640x480 ...] [--jobs 1 2] [--repeat 3]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from benchmarks import drives, processes
+from benchmarks.drives import Source
+from benchmarks.plainly import PlainWay
+from benchmarks.replaying import Held, floor, hold, loop, whole
+from benchmarks.timing import Spread, ratios, table, timed
+from roadeval import logs, runner
+from roadeval.data import Frame
+from roadeval.flow import one_thread_each
+from roadeval.options import ReplayOptions
+from roadeval.recording import Rule, recorder_for
+from roadeval.run import Run
+
+Rows = list[dict[str, Any]]
+PARTS = ("replay", "stages", "plain", "reading", "process")
+
+
+def main() -> None:
+    """Measure what was asked for, print the tables and write the JSON."""
+    options = _arguments()
+    source = Source(options.drive, tuple(options.road_label), tuple(options.ignore_label))
+    frames = source.frames(options.frames)
+    found: dict[str, Any] = {"machine": _machine(), "drive": options.drive.name, "sizes": {}}
+    with tempfile.TemporaryDirectory() as folder:
+        for size in options.sizes:
+            name = "{}x{}".format(*size)
+            measured = _at_size(frames, size, Path(folder), options)
+            found["sizes"][name] = measured
+            for part, rows in measured.items():
+                print(table(f"{options.drive.stem} {name}: {part}", rows), flush=True)
+    if options.output:
+        options.output.write_text(json.dumps(found, indent=2, default=_json) + "\n")
+
+
+def _at_size(
+    frames: list[Frame], size: tuple[int, int], folder: Path, options: argparse.Namespace
+) -> dict[str, Rows]:
+    drive = drives.write(folder / "drive.mcap", frames, size)
+    run = ReplayOptions(jobs=1)
+    found: dict[str, Rows] = {}
+    if "replay" in options.parts:
+        held = hold(drive, run)
+        found["end to end and the codec floor"] = [
+            row for jobs in options.jobs for row in _replay(drive, held, folder, jobs, options)
+        ]
+    if {"stages", "plain"} & set(options.parts):
+        mine = _stages(drive, folder)
+        found["each stage alone, ms a frame"] = [
+            {"stage": name, "ms": Spread.of(times)} for name, times in mine.items()
+        ]
+        if "plain" in options.parts:
+            found["against the plain way, ms a frame"] = _plain(drive, mine, folder, options)
+    if "reading" in options.parts:
+        found["reading and decoding alone, ms a frame"] = _reading(frames, size, folder)
+    if "process" in options.parts:
+        found["processes"] = _process(frames, size, folder, options)
+    return found
+
+
+def _replay(
+    drive: Path, held: Held, folder: Path, jobs: int, options: argparse.Namespace
+) -> Rows:
+    """Measure loop, floor and whole side by side, so that a busy machine slows all of them."""
+    run, count = ReplayOptions(jobs=jobs), len(held.files)
+    rounds = []
+    for _ in range(options.repeat + 1):
+        rounds.append(
+            (loop(drive, run, folder), floor(held, folder, jobs), whole(drive, run, folder))
+        )
+    loops, floors, wholes = zip(*rounds[1:], strict=True)  # the first warms the caches
+    once = Spread.of([a - b for a, b in zip(wholes, loops, strict=True)])
+    spare = 1.5 * Spread.of(floors).median - Spread.of(loops).median
+    ms = [Spread.of([1e3 * t / count for t in times]) for times in (loops, floors, wholes)]
+    row = {
+        "jobs": jobs,
+        "frames": count,
+        "floor ms/frame": ms[1],
+        "loop ms/frame": ms[0],
+        "loop / floor": ratios(loops, floors),
+        "whole / floor": ratios(wholes, floors),
+        "once, s": once,
+        "whole <= 1.5 floor from": f"{once.median / spare * count:.0f} frames"
+        if spare > 0
+        else "never",
+        "layers kB/frame": round(held.layer_bytes / 1e3),
+    }
+    return [row]
+
+
+def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
+    """Seconds of each part of every frame, one after the other in one thread."""
+    times: dict[str, list[float]] = {}
+
+    def lap(name: str, seconds: float) -> None:
+        times.setdefault(name, []).append(seconds)
+
+    options = ReplayOptions(jobs=1)
+    with logs.open_log(drive) as log, one_thread_each():
+        run = Run(log, options, lambda _progress: None)
+        recorder = recorder_for(folder / "stages.rrd", run.layout(), Rule.parse("all"))
+        with recorder:
+            for position, logged in enumerate(log.frames(options.select(log))):
+                frame, seconds = timed(logged.decode)
+                lap("decode", seconds)
+                variants = [runner.run_variant(n, c, frame.image) for n, c in run._chains.items()]
+                for variant in variants:
+                    for stage in variant.stages:
+                        lap(f"{variant.variant} {stage.stage}", stage.seconds)
+                role = run._schedule.role(frame)
+                result, seconds = timed(lambda: run.board.score(frame, role, tuple(variants)))  # noqa: B023
+                lap("score", seconds)
+                encoded, seconds = timed(lambda: recorder.encode(result, position))  # noqa: B023
+                lap("encode", seconds)
+                lap("write", timed(lambda: recorder.write(encoded))[1])  # noqa: B023
+            recorder.finish({})
+    return times
+
+
+def _plain(
+    drive: Path, mine: dict[str, list[float]], folder: Path, options: argparse.Namespace
+) -> Rows:
+    run_options = ReplayOptions(jobs=1)
+    with logs.open_log(drive) as log:
+        run = Run(log, run_options, lambda _progress: None)
+        frames = [each.decode() for each in log.frames(run_options.select(log))]
+    plain = PlainWay(frames, run_options)
+    for name, parameters in run.model.parameters.items():
+        plain.require_same_machine(name, parameters["svm"])
+    plain.save(folder / "plain.rrd")
+    step = max(1, len(frames) // options.plain_frames)
+    for frame in frames[step // 2 :: step][: options.plain_frames]:
+        variants = [runner.run_variant(n, c, frame.image) for n, c in run._chains.items()]
+        plain.run(frame, tuple(variants))
+    ours = {name: Spread.of(times).median for name, times in mine.items()}
+    mean_write = sum(mine["write"]) / len(mine["write"])  # it writes every eighth frame
+    ours["all record"] = ours["encode"] + mean_write
+    theirs = {name: Spread.of(times).median for name, times in plain.times.items()}
+    rows = [_against(name, theirs[name], ours[name]) for name in theirs]
+    for title, left_out in (("sum", ""), ("sum without svm", "svm")):
+        names = [name for name in theirs if not left_out or not name.endswith(left_out)]
+        sums = [sum(each[name] for name in names) for each in (theirs, ours)]
+        rows.append(_against(title, *sums))
+    return rows
+
+
+def _against(name: str, theirs: float, ours: float) -> dict[str, Any]:
+    return {
+        "stage": name,
+        "plain": f"{1e3 * theirs:.4g}",
+        "roadeval": f"{1e3 * ours:.4g}",
+        "times faster": f"{theirs / ours:.4g}",
+    }
+
+
+def _reading(frames: list[Frame], size: tuple[int, int], folder: Path) -> Rows:
+    rows = []
+    for form in drives.FORMS:
+        path = drives.write_form(folder / "reading.mcap", frames[:30], size, form)
+        times = []
+        for _ in range(3):
+            with logs.open_log(path) as log, one_thread_each():
+                stream = log.frames(log.select())
+                for _ in range(len(stream)):
+                    times.append(timed(lambda: next(stream).decode())[1])  # noqa: B023
+        rows.append({"form": form, "ms": Spread.of([1e3 * t for t in times])})
+    return rows
+
+
+def _process(
+    frames: list[Frame], size: tuple[int, int], folder: Path, options: argparse.Namespace
+) -> Rows:
+    short = drives.write(folder / "short.mcap", frames, size, options.memory_frames)
+    first, cold = processes.cold(short, folder)
+    rows = [
+        {"what": "--help, CPU s", "value": Spread.of([processes.help_cpu() for _ in range(5)])},
+        {"what": "first recorded frame after, s", "value": f"{first:.3g}"},
+        {"what": f"cold run of {options.memory_frames} frames, s", "value": f"{cold:.3g}"},
+    ]
+    for times in (1, 10):
+        count = times * options.memory_frames
+        drive = drives.write(folder / "long.mcap", frames, size, count)
+        peak = processes.peak_mib(drive, folder)
+        rows.append({"what": f"peak memory, {count} frames, MiB", "value": f"{peak:.0f}"})
+    return rows
+
+
+def _machine() -> dict[str, Any]:
+    return {
+        "platform": platform.platform(),
+        "python": platform.python_version(),
+        "cores": os.cpu_count(),
+        "load": os.getloadavg(),
+    }
+
+
+def _json(value: Any) -> Any:
+    return asdict(value) if isinstance(value, Spread) else str(value)
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, height = text.split("x")
+    return int(width), int(height)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("--drive", type=Path, default=Path("recordings/demo.mcap"))
+    parser.add_argument("--road-label", type=int, action="append", default=[])
+    parser.add_argument("--ignore-label", type=int, action="append", default=[])
+    parser.add_argument(
+        "--sizes", type=_size, nargs="+", default=[(640, 480), (1280, 720), (1920, 1080)]
+    )
+    parser.add_argument("--jobs", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--repeat", type=int, default=3, help="rounds after the warming one")
+    parser.add_argument("--frames", type=int, default=100, help="of the drive, at most")
+    parser.add_argument("--plain-frames", type=int, default=2)
+    parser.add_argument("--memory-frames", type=int, default=40, help="and ten times as many")
+    parser.add_argument("--parts", choices=PARTS, nargs="+", default=PARTS)
+    parser.add_argument("-o", "--output", type=Path, help="the results as JSON")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()

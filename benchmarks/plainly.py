@@ -1,0 +1,102 @@
+"""The plain way: the pipeline as the tests hold ours to, each stage timed, its masks compared.
+
+NumPy expressions, scikit-image, scikit-learn's ``predict``, and ``rr.log`` of the arrays as they
+are. `tests.pipeline.reference` is that pipeline; here it is only cut into stages.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from roadeval.data import FILTERED, UNFILTERED, Frame, VariantResult
+from roadeval.options import ReplayOptions
+from roadeval.pipeline.chain import Chain
+from roadeval.pipeline.stage import TrainingSet
+from roadeval.training.sampling import sample
+from tests.pipeline import reference
+
+Times = dict[str, list[float]]
+
+
+class PlainWay:
+    """Both variants, trained on the frames and pixels that `roadeval.replay` trains on."""
+
+    def __init__(self, frames: list[Frame], options: ReplayOptions) -> None:
+        settings = options.training()
+        first = frames[: settings.frames]
+        pixels = sample([frame.truth for frame in first], settings)
+        where = pixels.frame, pixels.row, pixels.column, pixels.road
+        self.models = {}
+        for variant in options.all_variants():
+            plan = variant.config.plan()
+            filters = [name for name in plan.chain if name == "shadow"]
+            chain = Chain(filters, plan.settings, {})
+            images = tuple(chain.filtered(frame.image) for frame in first)
+            colours = TrainingSet(images, *where).colours()
+            self.models[variant.name] = reference.train(colours, pixels.road)
+        self.times: Times = {}
+        self._stream = rr.RecordingStream("plain", recording_id="plain")
+
+    def save(self, path: Path) -> None:
+        """Log to a file."""
+        self._stream.save(path)
+
+    def require_same_machine(self, variant: str, machine: Any) -> None:
+        """Refuse to compare two models that are not the same."""
+        theirs = self.models[variant].machine[-1]
+        np.testing.assert_array_equal(theirs.support_vectors_, machine.vectors)
+        np.testing.assert_array_equal(theirs.dual_coef_[0], machine.weights)
+
+    def run(self, frame: Frame, ours: tuple[VariantResult, ...]) -> None:
+        """Run, time and log both variants of a frame; raise if a mask differs from ours."""
+        self._stream.set_time("frame", sequence=frame.number)
+        self._log({"camera": frame.image}, "camera")
+        for result in ours:
+            layers = self._layers(frame.image, result.variant)
+            self._log(layers, result.variant)
+            for stage, mask in result.masks():
+                np.testing.assert_array_equal(layers[stage], mask, f"{result.variant} {stage}")
+
+    def _layers(self, image: np.ndarray, variant: str) -> dict[str, np.ndarray]:
+        model, found, clock = self.models[variant], {}, perf_counter()
+        if variant != UNFILTERED:
+            codes = reference.ndi_codes(image)
+            shadow = reference.shadow_mask(codes)
+            changed = np.clip(np.rint(reference.compensate(image, shadow)), 0, 255)
+            image = changed.astype(np.uint8)
+            rings = shadow + 2 * reference.rings(shadow)
+            found |= {"ndi": codes, "shadow": shadow, "rings": rings, "compensated": image}
+            clock = self._lap(f"{FILTERED} shadow", clock)
+        found["distance"] = reference.distance(image, model)
+        found["similarity"] = found["distance"] ** 2 <= reference.CHI2_95
+        clock = self._lap(f"{variant} similarity", clock)
+        # Not `decision`: a user asks for the classes.
+        classes = model.machine.predict(image.reshape(-1, 3)).reshape(image.shape[:2])
+        found["svm"] = classes.astype(bool)
+        clock = self._lap(f"{variant} svm", clock)
+        found["post"] = reference.post(found["svm"])
+        found["boundary"] = reference.boundary(found["post"])
+        self._lap(f"{variant} post", clock)
+        return found
+
+    def _log(self, layers: dict[str, np.ndarray], where: str) -> None:
+        start = perf_counter()
+        for name, array in layers.items():
+            picture: Any = rr.SegmentationImage(array.astype(np.uint8))
+            if array.ndim == 3:
+                picture = rr.Image(array)
+            elif name == "distance":
+                picture = rr.DepthImage(array.astype(np.float32))
+            self._stream.log(f"{where}/{name}", picture)
+        self._stream.flush()
+        self._lap("all record", start)
+
+    def _lap(self, name: str, since: float) -> float:
+        now = perf_counter()
+        self.times.setdefault(name, []).append(now - since)
+        return now

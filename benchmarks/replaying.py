@@ -1,0 +1,120 @@
+"""`replay` against the codec floor: the same frames, threads, codecs and recorder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Final
+
+import cv2
+import numpy as np
+
+import roadeval
+from roadeval import logs
+from roadeval.data import FrameResult
+from roadeval.evaluation.results import ResultsWriter
+from roadeval.flow import ordered
+from roadeval.options import ReplayOptions
+from roadeval.recording import Rule, recorder_for
+from roadeval.run import Run
+
+ALL: Final = Rule.parse("all")
+HELD_BYTES: Final = 400 << 20
+"""Of layers computed beforehand and held for the floor, which goes round them."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """What the floor works on: files to decode, and finished frames to encode and write."""
+
+    files: list[tuple[bytes, ...]]
+    results: list[FrameResult]
+    layout: Any
+    layer_bytes: float
+    """Encoded, a frame, beyond the camera's own file and the truths."""
+
+    def frames(self) -> Iterator[tuple[int, tuple[bytes, ...], FrameResult]]:
+        """Yield every frame's number and files, with one of the held results."""
+        for number, files in enumerate(self.files):
+            result = self.results[number % len(self.results)]
+            frame = replace(result.frame, number=number, stamp_ns=(number + 1) * 100_000_000)
+            yield number, files, replace(result, frame=frame)
+
+
+def hold(drive: Path, options: ReplayOptions) -> Held:
+    """Run the pipeline once, before any clock runs, and keep what the floor needs."""
+    with logs.open_log(drive) as log:
+        run = Run(log, options, lambda _progress: None)
+        files, results, sizes = [], [], []
+        recorder = recorder_for(drive.with_suffix(".held.rrd"), run.layout(), ALL)
+        every = 1
+        for position, logged in enumerate(log.frames(options.select(log), options.span())):
+            files.append(_files(logged))
+            if position % every:
+                continue
+            result, kept = run._process(position, logged, recorder)
+            results.append(result)
+            sizes.append(_layer_bytes(kept.encoded.payloads))
+            every = max(1, round(run.total * _bytes(result) / HELD_BYTES))
+        return Held(files, results, run.layout(), float(np.mean(sizes)))
+
+
+def _files(logged: Any) -> tuple[bytes, ...]:
+    pictures = [logged._picture, *(label.picture for label in logged._labels.values())]
+    return tuple(bytes(picture.data) for picture in pictures)
+
+
+def _layer_bytes(payloads: dict[str, bytes]) -> int:
+    import lz4.block
+
+    # Label images lie raw in a payload; the recording compresses its chunks with LZ4.
+    given = ("/camera", "/truth", "/true_shadow")
+    mine = (payload for path, payload in payloads.items() if path not in given)
+    return sum(min(len(p), len(lz4.block.compress(p))) for p in mine)
+
+
+def _bytes(result: FrameResult) -> int:
+    return sum(layer.array.nbytes for v in result.variants for layer in v.layers())
+
+
+def floor(held: Held, folder: Path, jobs: int) -> float:
+    """Seconds to decode every file and to encode and write the held layers, and no more."""
+
+    def work(item: tuple[int, tuple[bytes, ...], FrameResult]) -> Any:
+        number, files, result = item
+        for flags, data in zip((cv2.IMREAD_COLOR_RGB, *[-1] * 9), files, strict=False):
+            cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+        return recorder.encode(result, number)
+
+    recorder = recorder_for(folder / "floor.rrd", held.layout, ALL)
+    start = perf_counter()
+    with recorder:
+        for encoded in ordered(work, held.frames(), jobs):
+            recorder.write(encoded)
+        recorder.finish({})
+    return perf_counter() - start
+
+
+def loop(drive: Path, options: ReplayOptions, folder: Path) -> float:
+    """Seconds of `replay` without its training, its summary and its figures."""
+    with logs.open_log(drive) as log:
+        run = Run(log, options, lambda _progress: None)
+        recorder = recorder_for(folder / "loop.rrd", run.layout(), ALL)
+        start = perf_counter()
+        with recorder, ResultsWriter(folder / "reports") as results:
+            for result, encoded in run.frames(recorder):
+                recorder.write(encoded)
+                results.append(result)
+            recorder.finish({})
+            seconds = perf_counter() - start
+            results.finish(run.board.windows(), run.summary())
+        return seconds
+
+
+def whole(drive: Path, options: ReplayOptions, folder: Path) -> float:
+    """Seconds of `replay` as a user calls it: training, tables and figures too."""
+    start = perf_counter()
+    roadeval.replay(drive, save=folder / "out.rrd", reports=folder / "reports", options=options)
+    return perf_counter() - start
