@@ -1,6 +1,6 @@
 """How fast roadeval is, against what: see benchmarks/README.md.
 
-    python -m benchmarks [--drive FILE] [--sizes 640x480 ...] [--jobs 1 2] [--repeat 3]
+python -m benchmarks [--drive FILE] [--sizes 640x480 ...] [--jobs 1 2] [--repeat 3]
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import os
 import platform
 import tempfile
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,11 @@ from benchmarks.drives import Source
 from benchmarks.plainly import PlainWay
 from benchmarks.replaying import Held, floor, hold, loop, whole
 from benchmarks.timing import Spread, ratios, table, timed
-from roadeval import logs, runner
+from roadeval import logs
 from roadeval.data import Frame
 from roadeval.flow import one_thread_each
 from roadeval.options import ReplayOptions
-from roadeval.recording import Rule, recorder_for
+from roadeval.recording import NullRecorder, Rule, recorder_for
 from roadeval.run import Run
 
 Rows = list[dict[str, Any]]
@@ -61,7 +62,8 @@ def _at_size(
     if {"stages", "plain"} & set(options.parts):
         mine = _stages(drive, folder)
         found["each stage alone, ms a frame"] = [
-            {"stage": name, "ms": Spread.of(times)} for name, times in mine.items()
+            {"stage": name, "ms": Spread.of([1e3 * t for t in times])}
+            for name, times in mine.items()
         ]
         if "plain" in options.parts:
             found["against the plain way, ms a frame"] = _plain(drive, mine, folder, options)
@@ -72,9 +74,7 @@ def _at_size(
     return found
 
 
-def _replay(
-    drive: Path, held: Held, folder: Path, jobs: int, options: argparse.Namespace
-) -> Rows:
+def _replay(drive: Path, held: Held, folder: Path, jobs: int, options: argparse.Namespace) -> Rows:
     """Measure loop, floor and whole side by side, so that a busy machine slows all of them."""
     run, count = ReplayOptions(jobs=jobs), len(held.files)
     rounds = []
@@ -114,20 +114,18 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
         run = Run(log, options, lambda _progress: None)
         recorder = recorder_for(folder / "stages.rrd", run.layout(), Rule.parse("all"))
         with recorder:
-            for position, logged in enumerate(log.frames(options.select(log))):
-                frame, seconds = timed(logged.decode)
-                lap("decode", seconds)
-                variants = [runner.run_variant(n, c, frame.image) for n, c in run._chains.items()]
-                for variant in variants:
+            for position, (result, encoded) in enumerate(run.frames(recorder)):
+                lap("write", timed(partial(recorder.write, encoded))[1])
+                for variant in result.variants:
                     for stage in variant.stages:
                         lap(f"{variant.variant} {stage.stage}", stage.seconds)
-                role = run._schedule.role(frame)
-                result, seconds = timed(lambda: run.board.score(frame, role, tuple(variants)))  # noqa: B023
-                lap("score", seconds)
-                encoded, seconds = timed(lambda: recorder.encode(result, position))  # noqa: B023
-                lap("encode", seconds)
-                lap("write", timed(lambda: recorder.write(encoded))[1])  # noqa: B023
+                # Once more, for the clock: both change nothing.
+                given = result.frame, result.role, result.variants
+                lap("score", timed(partial(run.board.score, *given))[1])
+                lap("encode", timed(partial(recorder.encode, result, position))[1])
             recorder.finish({})
+        for logged in log.frames(options.select(log)):
+            lap("decode", timed(logged.decode)[1])
     return times
 
 
@@ -138,14 +136,15 @@ def _plain(
     with logs.open_log(drive) as log:
         run = Run(log, run_options, lambda _progress: None)
         frames = [each.decode() for each in log.frames(run_options.select(log))]
+        step = max(1, len(frames) // options.plain_frames)
+        chosen = range(len(frames))[step // 2 :: step][: options.plain_frames]
+        results = [r for i, (r, _) in enumerate(run.frames(NullRecorder())) if i in chosen]
     plain = PlainWay(frames, run_options)
     for name, parameters in run.model.parameters.items():
         plain.require_same_machine(name, parameters["svm"])
     plain.save(folder / "plain.rrd")
-    step = max(1, len(frames) // options.plain_frames)
-    for frame in frames[step // 2 :: step][: options.plain_frames]:
-        variants = [runner.run_variant(n, c, frame.image) for n, c in run._chains.items()]
-        plain.run(frame, tuple(variants))
+    for result in results:
+        plain.run(result.frame, result.variants)
     ours = {name: Spread.of(times).median for name, times in mine.items()}
     mean_write = sum(mine["write"]) / len(mine["write"])  # it writes every eighth frame
     ours["all record"] = ours["encode"] + mean_write

@@ -47,17 +47,13 @@ def hold(drive: Path, options: ReplayOptions) -> Held:
     """Run the pipeline once, before any clock runs, and keep what the floor needs."""
     with logs.open_log(drive) as log:
         run = Run(log, options, lambda _progress: None)
-        files, results, sizes = [], [], []
+        results, sizes = [], []
         recorder = recorder_for(drive.with_suffix(".held.rrd"), run.layout(), ALL)
-        every = 1
-        for position, logged in enumerate(log.frames(options.select(log), options.span())):
-            files.append(_files(logged))
-            if position % every:
-                continue
-            result, kept = run._process(position, logged, recorder)
-            results.append(result)
-            sizes.append(_layer_bytes(kept.encoded.payloads))
-            every = max(1, round(run.total * _bytes(result) / HELD_BYTES))
+        for position, (result, kept) in enumerate(run.frames(recorder)):
+            if position % max(1, -(-run.total * _bytes(result) // HELD_BYTES)) == 0:
+                results.append(result)
+                sizes.append(_layer_bytes(kept.encoded.payloads))
+        files = [_files(logged) for logged in log.frames(options.select(log), options.span())]
         return Held(files, results, run.layout(), float(np.mean(sizes)))
 
 

@@ -12,6 +12,8 @@ import roadeval
 from roadeval import ReplayOptions, RoadevalError
 from roadeval.config import Config, load_config
 from roadeval.evaluation.results import summary_text
+from roadeval.evaluation.results import Results
+from roadeval.evaluation.tables import COLUMNS
 from roadeval.logs import LogWriter, open_log
 from tests.training.making import frame
 
@@ -142,9 +144,9 @@ def test_figures_are_written(once):
 
 def test_the_number_of_workers_changes_no_number(drive, once, tmp_path):
     run(drive, tmp_path, jobs=1)
-    for table in ("frames.csv", "windows.csv", "regions.csv"):
-        other = (tmp_path / "reports" / table).read_bytes()
-        assert other == (once[0] / "reports" / table).read_bytes()
+    for table in COLUMNS:
+        other = (tmp_path / "reports" / f"{table}.csv").read_bytes()
+        assert other == (once[0] / "reports" / f"{table}.csv").read_bytes()
 
 
 def test_frames_after_training_can_be_left_out(drive, tmp_path):
@@ -289,3 +291,66 @@ def test_an_error_on_the_way_leaves_no_results_and_a_partial_recording(
 def test_no_workers_are_refused(drive, tmp_path, jobs):
     with pytest.raises(RoadevalError, match="at least one worker"):
         run(drive, tmp_path, jobs=jobs)
+
+
+def test_sums_and_oracles_are_the_same_in_the_folder_and_in_the_recording(once):
+    folder, outcome = once
+    recording, results = roadeval.Recording(outcome.recording), Results(folder / "reports")
+    for table in ("oracles", "changes", "heat"):
+        written = results.table(table)
+        assert len(written)
+        pd.testing.assert_frame_equal(recording.table(table), written)
+
+
+def test_changes_are_what_the_recorded_masks_show(once):
+    folder, outcome = once
+    recording = roadeval.Recording(outcome.recording)
+    changes = Results(folder / "reports").table("changes")
+    step = changes.query("from_stage == 'svm' and to_variant == 'unfiltered'").iloc[0]
+    repaired = spoiled = 0
+    for number in frames_of(folder).frame.unique():
+        truth = recording.truth(number)
+        svm, post = (recording.layer("unfiltered", name, number) for name in ("svm", "post"))
+        repaired += ((svm != truth) & (post == truth)).sum()
+        spoiled += ((svm == truth) & (post != truth)).sum()
+    assert repaired + spoiled > 0
+    assert (step.repaired, step.spoiled, step.N) == (repaired, spoiled, 15 * 24 * 32)
+
+
+def test_heat_maps_add_up_to_the_tables(once):
+    folder, _ = once
+    heat = Results(folder / "reports").table("heat").groupby("variant")[["labelled", "FP", "FN"]]
+    final = frames_of(folder).query("stage == 'post'").groupby("variant")[["N", "FP", "FN"]]
+    for variant, sums in heat.sum().iterrows():
+        assert sums.tolist() == final.sum().loc[variant].tolist()
+
+
+def test_a_perfect_svm_is_counted_on_evaluated_frames_alone_and_in_no_other_table(once):
+    folder, outcome = once
+    oracles = Results(folder / "reports").table("oracles")
+    assert set(zip(oracles.variant, oracles.oracle, oracles.stage, strict=True)) == {
+        (variant, "svm", "post") for variant in ("filtered", "unfiltered")
+    }
+    assert set(oracles.frame) == set(frames_of(folder).frame)
+    total = outcome.summary["oracles"]["filtered"]["svm"]["post"]
+    assert total["frames"] == 15
+    assert total["FP"] == oracles[oracles.variant == "filtered"].FP.sum()
+
+
+def test_a_mask_in_the_log_has_no_oracles(drive, tmp_path):
+    outcome = run(drive, tmp_path, mask_topics={"net": "/net/road_mask_prediction"})
+    assert set(outcome.summary["oracles"]) == {"filtered", "unfiltered"}
+    assert outcome.summary["beyond"]["net"]["boundary_F"] == 1
+
+
+def test_flicker_is_counted_from_each_evaluated_frame_to_the_next_one_read(once, drive, tmp_path):
+    """Frame 20 has no truth, so neither 19 to 20 nor 20 to 21 is a pair."""
+    _, outcome = once
+    assert outcome.summary["beyond"]["filtered"]["pairs"] == 9 + 4
+    every = run(drive, tmp_path, every=2, train_frames=4).summary
+    assert every["beyond"]["filtered"]["pairs"] == (6 - 1) + (2 - 1)
+
+
+def test_a_broken_frame_is_no_neighbour(tmp_path):
+    log = write_log(tmp_path / "hurt.mcap", broken=13)
+    assert run(log, tmp_path).summary["beyond"]["filtered"]["pairs"] == 2 + 5 + 4

@@ -18,6 +18,8 @@ SUMMARY = {
     "difference": {},
     "windows": 0,
     "health": {},
+    "beyond": {},
+    "oracles": {},
     "training": {},
     "seconds": {},
     "warnings": [],

@@ -77,8 +77,8 @@ def test_changes_equal_a_plain_loop_over_pixels():
     before, after = draw.integers(0, 2, (2, 37, 53), np.uint8)
     repaired = spoiled = 0
     for t, b, a in zip(truth.flat, before.flat, after.flat, strict=True):
-        repaired += t != IGNORE and b != t and a == t
-        spoiled += t != IGNORE and b == t and a != t
+        repaired += t not in (IGNORE, b) and a == t
+        spoiled += t not in (IGNORE, a) and b == t
     found = changes([("x", "svm", before), ("x", "post", after)], truth)
     expected = Change(repaired, spoiled, int((truth != IGNORE).sum()))
     assert found == {("x", "svm", "x", "post"): expected}

@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.results import PARTS, Results, ResultsError, ResultsWriter, summary_text
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.tables import COLUMNS
 
 from .making import a_frame, a_variant, pixels
 
@@ -28,6 +30,7 @@ def a_board() -> Scoreboard:
 
 def scored(board: Scoreboard, role: Role = Role.EVALUATED) -> Iterator[FrameResult]:
     variant = a_variant("filtered", {"post": MASK}, {"shadow": MASK})
+    variant = replace(variant, oracles={"svm": {"post": MASK}})
     for number, truth in enumerate(TRUTHS):
         result = board.score(a_frame(truth, number + 5), role, (variant,))
         board.add(result)
@@ -45,7 +48,7 @@ def write(folder: Path, role: Role = Role.EVALUATED) -> list[Path]:
     with ResultsWriter(folder) as writer:
         for result in scored(board, role):
             writer.append(result)
-        return writer.finish(board.windows(), the_rest(board))
+        return writer.finish(board.windows(), the_rest(board), board.tables())
 
 
 def names(folder: Path) -> set[str]:
@@ -60,6 +63,9 @@ def test_the_columns_are_those_of_the_design(tmp_path: Path) -> None:
         "windows": "window,first_frame,last_frame,frames,variant,stage,ACC,ERR,TPR,FNR,TNR,FPR,"
         "pooled_ACC,pooled_ERR,pooled_TPR,pooled_FNR,pooled_TNR,pooled_FPR",
         "regions": "frame,variant,stage,region,TP,TN,FP,FN,N",
+        "oracles": "frame,variant,oracle,stage,TP,TN,FP,FN,N,ACC,ERR,TPR,FNR,TNR,FPR",
+        "changes": "from_variant,from_stage,to_variant,to_stage,repaired,spoiled,N",
+        "heat": "variant,top,left,side,labelled,FP,FN",
     }
 
 
@@ -98,6 +104,44 @@ def test_a_variant_named_like_a_number_keeps_its_name(tmp_path: Path) -> None:
     assert Results(tmp_path).frames["variant"].tolist() == ["007"]
 
 
+def test_the_sums_over_the_drive_read_back(tmp_path: Path) -> None:
+    write(tmp_path)
+    results = Results(tmp_path)
+    between = results.table("changes").set_index(["from_variant", "to_variant"])
+    assert between["N"].to_dict() == {("filtered", "blind"): 23, ("blind", "filtered"): 23}
+    heat, frames = results.table("heat"), results.frames
+    own = frames[frames["variant"] == "filtered"]
+    assert heat[["labelled", "FP", "FN"]].sum().tolist() == own[["N", "FP", "FN"]].sum().tolist()
+
+
+def test_oracles_have_a_row_per_frame_variant_oracle_and_stage_and_read_back(
+    tmp_path: Path,
+) -> None:
+    write(tmp_path)
+    told = Results(tmp_path).table("oracles")
+    assert told[["frame", "variant", "oracle", "stage"]].to_numpy().tolist() == [
+        [number, "filtered", "svm", "post"] for number in (5, 6, 7)
+    ]
+
+
+def test_a_table_that_nothing_was_counted_for_is_not_written_and_an_earlier_one_removed(
+    tmp_path: Path,
+) -> None:
+    write(tmp_path)
+    board = Scoreboard(EvaluationSettings(), ["net"], None)
+    with ResultsWriter(tmp_path) as writer:
+        result = board.score(
+            a_frame(TRUTHS[0]), Role.EVALUATED, (a_variant("net", {"post": MASK}),)
+        )
+        board.add(result)
+        writer.append(result)
+        writer.finish(board.windows(), the_rest(board), board.tables())
+    assert names(tmp_path) == {
+        *("frames.csv", "regions.csv", "windows.csv", "heat.csv", "summary.json"),
+    }
+    assert Results(tmp_path).table("oracles").empty
+
+
 def test_regions_have_a_row_per_frame_variant_stage_and_region(tmp_path: Path) -> None:
     write(tmp_path)
     regions = Results(tmp_path).regions
@@ -129,8 +173,8 @@ def test_nothing_bears_its_name_before_all_is_complete(tmp_path: Path) -> None:
         for result in scored(board):
             writer.append(result)
         assert all(name.startswith(".") for name in names(tmp_path))
-        writer.finish(board.windows(), the_rest(board))
-    assert names(tmp_path) == {"frames.csv", "regions.csv", "windows.csv", "summary.json"}
+        writer.finish(board.windows(), the_rest(board), board.tables())
+    assert names(tmp_path) == {*(f"{table}.csv" for table in COLUMNS), "summary.json"}
 
 
 def test_an_interrupted_run_leaves_the_earlier_results(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """A drive's score, from its frames to its sums."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -164,3 +165,46 @@ class TestTheSelfCheck:
         bands = {"band_0": Counts(tp=2), "band_1": Counts(tn=2, fp=2)}
         with pytest.raises(CountsNotConservedError):
             prove(Tally("net", "post", self.whole, bands), 6)
+
+
+class TestOracles:
+    variant = replace(FILTERED, oracles={"svm": {"post": pixels("##..", "##.#")}})
+
+    def test_are_counted_apart_and_named_after_the_stage_that_was_replaced(self) -> None:
+        result = a_board().score(a_frame(TRUTH, 4), Role.EVALUATED, (self.variant,))
+        assert result.oracles["svm"][0].counts == Counts(tp=4, tn=3)
+        assert result.tables["oracles"].startswith("4,filtered,svm,post,4,3,0,0,7,1.0,0.0,")
+
+    def test_are_never_among_the_results(self) -> None:
+        frame, own = a_frame(TRUTH), (self.variant, UNFILTERED)
+        with_oracles = a_board().score(frame, Role.EVALUATED, own)
+        without = a_board().score(frame, Role.EVALUATED, (FILTERED, UNFILTERED))
+        assert with_oracles.tallies == without.tallies
+        assert with_oracles.tables["frames"] == without.tables["frames"]
+        assert "oracles" not in without.tables
+
+    def test_are_summed_up_by_variant_oracle_and_stage(self) -> None:
+        board = a_board()
+        for number in range(3):
+            result = board.score(a_frame(TRUTH, number), Role.EVALUATED, (self.variant,))
+            board.add(result)
+        assert board.oracles()["filtered"]["svm"]["post"]["TP"] == 12
+        assert board.summary()["oracles"]["filtered"]["svm"]["post"]["ERR"] == 0
+        assert list(board.totals()["filtered"]) == ["svm", "post"]
+
+
+def test_changes_and_heat_maps_are_summed_up_over_the_drive() -> None:
+    texts = a_drive(3, a_board(BlindPrior.of_truths([TRUTH]))).tables()
+    changes = texts["changes"].splitlines()
+    assert "filtered,svm,filtered,post,3,0,21" in changes
+    assert "unfiltered,post,filtered,post,0,3,21" in changes
+    assert "filtered,post,unfiltered,post,3,0,21" in changes
+    assert "blind,post,filtered,post,0,3,21" in changes
+    heat = texts["heat"].splitlines()
+    assert "filtered,1,1,1,3,0,3" in heat
+    assert "unfiltered,1,1,1,3,0,0" in heat
+    assert not [line for line in heat if line.startswith("filtered,1,3,")]
+
+
+def test_a_drive_without_scores_has_no_sums() -> None:
+    assert a_board().tables() == {}

@@ -1,0 +1,90 @@
+"""What a chain makes of an image once one of its stages is replaced by the truth."""
+
+import numpy as np
+import pytest
+
+from roadeval.pipeline import shadow
+from roadeval.pipeline.chain import STAGES, Chain
+from roadeval.pipeline.stage import View
+from tests.pipeline.images import noise
+from tests.pipeline.test_chain import NAMES, SETTINGS, fitted
+
+IMAGE = noise(40, 60)
+ROAD = np.zeros((40, 60), np.uint8)
+ROAD[20:, 10:50] = 1
+ROAD[:, 40:45] = 255
+TRULY_DARK = np.zeros((40, 60), np.uint8)
+TRULY_DARK[25:35, 20:30] = 1
+TRULY_DARK[:, 58:] = 255
+
+
+@pytest.fixture(scope="module", params=SETTINGS.values(), ids=SETTINGS)
+def chain(request):
+    return Chain(NAMES, request.param, fitted(request.param))
+
+
+def oracles(chain, shadow_truth=TRULY_DARK):
+    outputs = [output for _, output in chain.run(IMAGE)]
+    return dict(chain.oracles(IMAGE, outputs, ROAD, shadow_truth))
+
+
+def masks(steps_of, image):
+    return {name: output.mask for name, output in steps_of.run(image) if output.mask is not None}
+
+
+def test_a_perfect_svm_is_the_truth_with_ignored_pixels_as_non_road_given_to_post(chain):
+    given = (ROAD == 1).astype(np.uint8)
+    post = chain.steps[-1]
+    expected = STAGES["post"].bind(post.settings, None)
+    told = oracles(chain)["svm"]
+    assert list(told) == ["post"]
+    np.testing.assert_array_equal(told["post"], expected(View(IMAGE, IMAGE, given)).mask)
+
+
+def test_a_perfect_filter_compensates_true_shadow_and_all_stages_follow(chain):
+    settings = chain.steps[0].settings
+    image, *_ = shadow.lift(IMAGE, (TRULY_DARK == 1).astype(np.uint8), settings)
+    assert (image != IMAGE).any()
+    own = {step.stage.name: step.settings for step in chain.steps}
+    after = Chain(NAMES[1:], own, fitted(own))
+    told = oracles(chain)["shadow"]
+    assert list(told) == ["similarity", "svm", "post"]
+    for name, mask in masks(after, image).items():
+        np.testing.assert_array_equal(told[name], mask, err_msg=name)
+
+
+def test_a_filter_that_is_told_what_it_found_gives_what_it_gave(chain):
+    outputs = [output for _, output in chain.run(IMAGE)]
+    told = dict(chain.oracles(IMAGE, outputs, ROAD, outputs[0].regions["shadow"]))
+    for name, mask in masks(chain, IMAGE).items():
+        np.testing.assert_array_equal(told["shadow"][name], mask, err_msg=name)
+
+
+def test_without_true_shadow_no_filter_is_replaced(chain):
+    assert list(oracles(chain, None)) == ["svm"]
+
+
+def test_the_replaced_stage_sees_the_image_that_those_before_it_made(chain):
+    names = ("exposure", *NAMES)
+    settings = {step.stage.name: step.settings for step in chain.steps}
+    settings["exposure"] = STAGES["exposure"].settings()
+    longer = Chain(names, settings, fitted(settings))
+    outputs = [output for _, output in longer.run(IMAGE)]
+    assert outputs[0].image is not None
+    assert (outputs[0].image != IMAGE).any()
+    told = dict(longer.oracles(IMAGE, outputs, ROAD, outputs[1].regions["shadow"]))
+    for name, mask in masks(longer, IMAGE).items():
+        np.testing.assert_array_equal(told["shadow"][name], mask, err_msg=name)
+
+
+def test_running_oracles_changes_no_output(chain):
+    outputs = [output for _, output in chain.run(IMAGE)]
+    before = [None if o.mask is None else o.mask.copy() for o in outputs]
+    dict(chain.oracles(IMAGE, outputs, ROAD, TRULY_DARK))
+    for mask, output in zip(before, outputs, strict=True):
+        if mask is not None:
+            np.testing.assert_array_equal(mask, output.mask)
+
+
+def test_every_machine_and_the_paper_s_filter_have_an_oracle():
+    assert {name for name, stage in STAGES.items() if stage.oracle} == {"shadow", "svm", "context"}

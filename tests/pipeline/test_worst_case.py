@@ -1,0 +1,62 @@
+"""Noise that makes tens of thousands of components costs no more a pixel than a small image."""
+
+from time import thread_time
+
+import numpy as np
+import pytest
+
+from roadeval.flow import one_thread_each
+from roadeval.pipeline.chain import Chain
+from tests.pipeline.test_chain import SETTINGS
+
+SMALL, LARGE = (180, 320), (1440, 2560)
+"""One is 64 times the other: what grew with the square would take 64 times as long a pixel."""
+
+
+def specks(shape):
+    """Grey, with a saturated pixel in the middle of many a square of 3 x 3: each a component."""
+    rng = np.random.default_rng(0)
+    image = np.full((*shape, 3), 128, np.uint8)
+    centres = image[1::3, 1::3]
+    coloured = rng.random(centres.shape[:2]) < 0.7
+    centres[coloured] = rng.choice([0, 255], (coloured.sum(), 3))
+    centres[coloured, 1] = 0
+    return image
+
+
+def components_and_seconds(shape, runs):
+    """How many components the filter finds, and the least CPU time of filter and morphology."""
+    image, seconds = specks(shape), []
+    chain = Chain(("shadow",), SETTINGS["paper"], {})
+    chain_of_masks = Chain(("post",), SETTINGS["paper"], {})
+    with one_thread_each():
+        for _ in range(runs):
+            start = thread_time()
+            ((_, output),) = chain.run(image)
+            run_post(chain_of_masks, image, output.regions["shadow"])
+            seconds.append(thread_time() - start)
+    return output.facts["components"], min(seconds)
+
+
+def run_post(chain, image, mask):
+    from roadeval.pipeline.stage import View
+
+    (step,) = chain.steps
+    step.run(View(image, image, mask))
+
+
+@pytest.fixture(scope="module")
+def measured():
+    components_and_seconds(SMALL, 1)  # compiles
+    return {shape: components_and_seconds(shape, 5) for shape in (SMALL, LARGE)}
+
+
+def test_the_noise_makes_very_many_components(measured):
+    assert measured[LARGE][0] > 50_000
+    assert measured[LARGE][0] > 40 * measured[SMALL][0]
+
+
+def test_the_time_a_pixel_does_not_grow_with_the_number_of_components(measured):
+    small, large = (seconds / np.prod(shape) for shape, (_, seconds) in measured.items())
+    # The larger image leaves the cache, which costs a factor of two or so.
+    assert large < 8 * small, (small, large)
