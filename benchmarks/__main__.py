@@ -20,8 +20,8 @@ from benchmarks.drives import Source
 from benchmarks.plainly import PlainWay
 from benchmarks.replaying import Held, floor, hold, loop, whole
 from benchmarks.timing import Spread, ratios, table, timed
-from roadeval import logs
-from roadeval.data import Frame
+from roadeval import logs, runner
+from roadeval.data import Frame, Role
 from roadeval.flow import one_thread_each
 from roadeval.options import ReplayOptions
 from roadeval.recording import NullRecorder, Rule, recorder_for
@@ -77,11 +77,10 @@ def _at_size(
 def _replay(drive: Path, held: Held, folder: Path, jobs: int, options: argparse.Namespace) -> Rows:
     """Measure loop, floor and whole side by side, so that a busy machine slows all of them."""
     run, count = ReplayOptions(jobs=jobs), len(held.files)
-    rounds = []
-    for _ in range(options.repeat + 1):
-        rounds.append(
-            (loop(drive, run, folder), floor(held, folder, jobs), whole(drive, run, folder))
-        )
+    rounds = [
+        (loop(drive, run, folder), floor(held, folder, jobs), whole(drive, run, folder))
+        for _ in range(options.repeat + 1)
+    ]
     loops, floors, wholes = zip(*rounds[1:], strict=True)  # the first warms the caches
     once = Spread.of([a - b for a, b in zip(wholes, loops, strict=True)])
     spare = 1.5 * Spread.of(floors).median - Spread.of(loops).median
@@ -114,18 +113,22 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
         run = Run(log, options, lambda _progress: None)
         recorder = recorder_for(folder / "stages.rrd", run.layout(), Rule.parse("all"))
         with recorder:
-            for position, (result, encoded) in enumerate(run.frames(recorder)):
-                lap("write", timed(partial(recorder.write, encoded))[1])
-                for variant in result.variants:
+            for position, logged in enumerate(log.frames(options.select(log))):
+                frame, seconds = timed(logged.decode)
+                lap("decode", seconds)
+                variants = tuple(
+                    runner.run_variant(n, c, frame.image) for n, c in run._chains.items()
+                )
+                for variant in variants:
                     for stage in variant.stages:
                         lap(f"{variant.variant} {stage.stage}", stage.seconds)
-                # Once more, for the clock: both change nothing.
-                given = result.frame, result.role, result.variants
-                lap("score", timed(partial(run.board.score, *given))[1])
-                lap("encode", timed(partial(recorder.encode, result, position))[1])
+                score = partial(run.board.score, frame, Role.EVALUATED, variants)
+                result, seconds = timed(score)
+                lap("score", seconds)
+                encoded, seconds = timed(partial(recorder.encode, result, position))
+                lap("encode", seconds)
+                lap("write", timed(partial(recorder.write, encoded))[1])
             recorder.finish({})
-        for logged in log.frames(options.select(log)):
-            lap("decode", timed(logged.decode)[1])
     return times
 
 
@@ -174,8 +177,7 @@ def _reading(frames: list[Frame], size: tuple[int, int], folder: Path) -> Rows:
         for _ in range(3):
             with logs.open_log(path) as log, one_thread_each():
                 stream = log.frames(log.select())
-                for _ in range(len(stream)):
-                    times.append(timed(lambda: next(stream).decode())[1])  # noqa: B023
+                times += [timed(lambda: next(stream).decode())[1] for _ in range(len(stream))]  # noqa: B023
         rows.append({"form": form, "ms": Spread.of([1e3 * t for t in times])})
     return rows
 

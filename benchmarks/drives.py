@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import cv2
 import numpy as np
+from mcap_ros2.writer import Writer
 
 from roadeval import logs
 from roadeval.data import Frame
@@ -85,8 +86,6 @@ def write_form(path: Path, frames: list[Frame], size: tuple[int, int], form: str
 
 
 def _write_ros2(path: Path, images: list[np.ndarray], encoding: str) -> None:
-    from mcap_ros2.writer import Writer
-
     raw = encoding == "raw"
     with path.open("wb") as file:
         writer = Writer(file)
@@ -103,8 +102,12 @@ def _write_ros2(path: Path, images: list[np.ndarray], encoding: str) -> None:
 def _ros2_raw(image: np.ndarray) -> dict[str, Any]:
     height, width, _ = image.shape
     return {
-        **{"height": height, "width": width, "encoding": "rgb8"},
-        **{"is_bigendian": 0, "step": 3 * width, "data": image.tobytes()},
+        "height": height,
+        "width": width,
+        "encoding": "rgb8",
+        "is_bigendian": 0,
+        "step": 3 * width,
+        "data": image.tobytes(),
     }
 
 

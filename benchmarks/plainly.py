@@ -87,12 +87,7 @@ class PlainWay:
     def _log(self, layers: dict[str, np.ndarray], where: str) -> None:
         start = perf_counter()
         for name, array in layers.items():
-            picture: Any = rr.SegmentationImage(array.astype(np.uint8))
-            if array.ndim == 3:
-                picture = rr.Image(array)
-            elif name == "distance":
-                picture = rr.DepthImage(array.astype(np.float32))
-            self._stream.log(f"{where}/{name}", picture)
+            self._stream.log(f"{where}/{name}", _picture(name, array))
         self._stream.flush()
         self._lap("all record", start)
 
@@ -100,3 +95,11 @@ class PlainWay:
         now = perf_counter()
         self.times.setdefault(name, []).append(now - since)
         return now
+
+
+def _picture(name: str, array: np.ndarray) -> Any:
+    if array.ndim == 3:
+        return rr.Image(array)
+    if name == "distance":
+        return rr.DepthImage(array.astype(np.float32))
+    return rr.SegmentationImage(array.astype(np.uint8))

@@ -9,6 +9,7 @@ from time import perf_counter
 from typing import Any, Final
 
 import cv2
+import lz4.block
 import numpy as np
 
 import roadeval
@@ -63,8 +64,6 @@ def _files(logged: Any) -> tuple[bytes, ...]:
 
 
 def _layer_bytes(payloads: dict[str, bytes]) -> int:
-    import lz4.block
-
     # Label images lie raw in a payload; the recording compresses its chunks with LZ4.
     given = ("/camera", "/truth", "/true_shadow")
     mine = (payload for path, payload in payloads.items() if path not in given)

@@ -11,8 +11,7 @@ import pytest
 import roadeval
 from roadeval import ReplayOptions, RoadevalError
 from roadeval.config import Config, load_config
-from roadeval.evaluation.results import summary_text
-from roadeval.evaluation.results import Results
+from roadeval.evaluation.results import Results, summary_text
 from roadeval.evaluation.tables import COLUMNS
 from roadeval.logs import LogWriter, open_log
 from tests.training.making import frame
@@ -306,13 +305,15 @@ def test_changes_are_what_the_recorded_masks_show(once):
     folder, outcome = once
     recording = roadeval.Recording(outcome.recording)
     changes = Results(folder / "reports").table("changes")
-    step = changes.query("from_stage == 'svm' and to_variant == 'unfiltered'").iloc[0]
+    step = changes.query("from_stage == 'similarity' and to_variant == 'unfiltered'").iloc[0]
     repaired = spoiled = 0
     for number in frames_of(folder).frame.unique():
         truth = recording.truth(number)
-        svm, post = (recording.layer("unfiltered", name, number) for name in ("svm", "post"))
-        repaired += ((svm != truth) & (post == truth)).sum()
-        spoiled += ((svm == truth) & (post != truth)).sum()
+        before, after = (
+            recording.layer("unfiltered", stage, number) for stage in ("similarity", "svm")
+        )
+        repaired += ((before != truth) & (after == truth)).sum()
+        spoiled += ((before == truth) & (after != truth)).sum()
     assert repaired + spoiled > 0
     assert (step.repaired, step.spoiled, step.N) == (repaired, spoiled, 15 * 24 * 32)
 

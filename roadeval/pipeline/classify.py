@@ -109,8 +109,9 @@ def decision(
     features = (colours - machine.mean) / machine.scale
     if settings.kernel == "linear":
         # Eq. 15: the machine's plane, w = sum_i lambda_i y_i x_i.
-        plane: Floats = features * (machine.weights @ machine.vectors)
-        return plane.sum(axis=1) + machine.offset
+        terms = features * (machine.weights @ machine.vectors)
+        plane: Floats = terms.sum(axis=1) + machine.offset
+        return plane
     from scipy.spatial.distance import cdist
 
     result = np.empty(len(features))

@@ -55,11 +55,12 @@ def test_every_option_arrives(asked, tmp_path):
     settings = tmp_path / "narrow.toml"
     settings.write_text("[shadow]\nring_width = 3\n")
     words = (
-        f"replay drive.mcap --save out.rrd --reports out --mcap o.mcap --preset printed "
-        f"--config {settings} --variant narrow={settings} --model city.model --train-frames 5 --train-gap 2 "
-        "--image-topic /image --truth-topic /truth --shadow-topic /shadow --road-label 3 "
-        "--road-label 4 --ignore-label 11 --mask-topic net=/net --sync-tolerance 2.5 "
-        "--resize-truth --keep-corrupt -S 1.5 -E 2013-05-01T12:00:00Z --every 2 --max-frames 7 --record none --jobs 1"
+        "replay drive.mcap --save out.rrd --reports out --mcap o.mcap --preset printed "
+        f"--config {settings} --variant narrow={settings} --model city.model --train-frames 5 "
+        "--train-gap 2 --image-topic /image --truth-topic /truth --shadow-topic /shadow "
+        "--road-label 3 --road-label 4 --ignore-label 11 --mask-topic net=/net "
+        "--sync-tolerance 2.5 --resize-truth --keep-corrupt -S 1.5 -E 2013-05-01T12:00:00Z "
+        "--every 2 --max-frames 7 --record none --jobs 1"
     )
     assert main(words.split()) == 0
     outputs = (asked["save"], asked["reports"], asked["mcap"])

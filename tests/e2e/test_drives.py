@@ -9,7 +9,10 @@ FIGURES = [
     for figure in ("fig2_masks", "fig3a_error_rate", "fig3b_fp_fn_rate")
     for suffix in ("pdf", "png")
 ]
-TABLES = ["frames.csv", "regions.csv", "summary.json", "windows.csv"]
+TABLES = [
+    *("frames.csv", "windows.csv", "regions.csv", "summary.json"),
+    *("changes.csv", "heat.csv", "oracles.csv"),
+]
 
 
 @pytest.fixture(params=["demo", "street", "car_park"])

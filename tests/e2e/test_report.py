@@ -78,6 +78,40 @@ def test_the_worst_frame_is_shown_with_the_command_that_opens_it(words, demo):
     assert f"roadeval inspect drive.rrd --frame {worst['frame']}" in words
 
 
+def test_what_was_counted_while_replaying_is_told_of_all_evaluated_frames(words, demo):
+    frames = demo.summary["frames"]["evaluated"]
+    (row,) = (
+        row
+        for row in demo.table("changes")
+        if (row["from_variant"], row["to_variant"]) == ("unfiltered", "filtered")
+    )
+    right, wrong = (100 * int(row[n]) / int(row["N"]) for n in ("repaired", "spoiled"))
+    assert (
+        f"Of the labelled pixels of all {frames} evaluated frames, {right:.2f} % are newly right "
+        f"with the filter and {wrong:.2f} % newly wrong"
+    ) in words
+    assert f"Where the final masks go wrong, over all {frames} evaluated frames" in words
+
+
+def test_every_oracle_is_told_as_one(words, demo):
+    told = words.partition("If a stage were perfect")[2]
+    for variant, oracles in demo.summary["oracles"].items():
+        for oracle, stages in oracles.items():
+            now, then = demo.summary["totals"][variant]["post"]["ERR"], stages["post"]["ERR"]
+            row = f"{variant} perfect {oracle} {100 * now:.2f} {100 * then:.2f} "
+            assert row in told
+    assert set(demo.summary["oracles"]["filtered"]) == {"shadow", "svm"}
+    assert "Oracles:" in told
+
+
+def test_boundary_f_and_flicker_are_those_of_the_summary(words, demo):
+    for variant, each in demo.summary["beyond"].items():
+        assert re.search(rf"{variant} [^a-z]* {100 * each['boundary_F']:.2f}", words)
+        if each["pairs"]:
+            own = f"{100 * each['flicker']:.2f} {100 * each['truth_flicker']:.2f}"
+            assert f"{variant} {own} " in words
+
+
 def test_the_log_is_named_by_its_hash(words, demo):
     assert demo.summary["log"]["sha256"] in words
 
@@ -113,7 +147,10 @@ def test_a_killed_run_gives_a_report_of_its_readable_part_marked_on_page_1(tmp_p
     run = roadeval("report", recording, "-o", tmp_path / "report.pdf")
     assert run.returncode == 0, run.stderr
     assert "a partial recording" in run.stderr
-    first = PdfReader(tmp_path / "report.pdf").pages[0].extract_text()
+    pages = [page.extract_text() for page in PdfReader(tmp_path / "report.pdf").pages]
+    first = pages[0]
+    assert any("Where the final masks go wrong, over all" in page for page in pages)
+    assert any("If a stage were perfect" in page for page in pages)
     assert "This run did not reach its end" in first
     (evaluated,) = re.findall(r"evaluated (\d+)", first)
     assert 0 < int(evaluated) < 32
