@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from roadeval.errors import RoadevalError
 from roadeval.training import TrainingSettings
 
 Color = tuple[int, int, int]
+AnyPath = str | Path
 
 
 class OptionError(RoadevalError):
@@ -126,6 +127,17 @@ class ReplayOptions:
         if self.jobs is not None and self.jobs < 1:
             raise OptionError(f"--jobs {self.jobs}: at least one worker is needed")
         return self.jobs or os.cpu_count() or 1
+
+
+def keep_apart(inputs: Iterable[AnyPath | None], outputs: Iterable[AnyPath | None]) -> None:
+    """Refuse, as an `OptionError`, an output that would replace an input or another output."""
+    taken = {Path(path).resolve() for path in inputs if path is not None}
+    for path in outputs:
+        if path is None:
+            continue
+        if Path(path).resolve() in taken:
+            raise OptionError(f"{path}: is an input or another output; name a file of its own")
+        taken.add(Path(path).resolve())
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -14,7 +15,7 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation import rates
 from roadeval.evaluation.results import Results, ResultsWriter, summary_text
 from roadeval.evaluation.tables import header, window_lines
-from roadeval.options import Outcome, Progress, ReplayOptions
+from roadeval.options import Outcome, Progress, ReplayOptions, keep_apart
 from roadeval.recording import NullRecorder, Rule, recorder_for
 from roadeval.report.figures import write_figures
 from roadeval.run import Run
@@ -62,11 +63,13 @@ def replay(
     options, tell = options or ReplayOptions(), on_progress or _silent
     rule = Rule.parse(options.record)
     with logs.open_log(drive, keep_corrupt=options.keep_corrupt) as log:
-        run = Run(log, options, tell)
         path = Path(save or Path("recordings", f"{log.name}.rrd"))
         folder = Path(reports or Path("reports", log.name))
-        recorder = recorder_for(path, run.layout(), rule)
-        with recorder, ResultsWriter(folder) as results, _sidecar(mcap) as sidecar:
+        keep_apart((drive, options.model), (path, mcap))
+        with ResultsWriter(folder) as results, _sidecar(mcap) as sidecar, ExitStack() as opened:
+            run = Run(log, options, tell)
+            recorder = recorder_for(path, run.layout(), rule)
+            opened.enter_context(recorder)
             for result, encoded in run.frames(recorder):
                 recorder.write(encoded)
                 results.append(result)
@@ -101,6 +104,7 @@ def train(
         If a drive has no truth, or there is nothing to learn.
     """
     options, tell = options or ReplayOptions(), on_progress or _silent
+    keep_apart(drives, (output,))
     settings, frames = options.training(), []
     total = settings.frames * len(drives)
     for drive in drives:

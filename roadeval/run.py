@@ -178,7 +178,18 @@ class Run:
             if self._selection.truth
             else ("the log has no road truth: there is nothing to score, only masks to look at",)
         )
-        return (*unlabelled, *self.model.warnings)
+        return (*unlabelled, *self._unheeded(), *self.model.warnings)
+
+    def _unheeded(self) -> tuple[str, ...]:
+        """Say which variants ask for a training or a scoring that is not this run's."""
+        config = self._options.config
+        return tuple(
+            f"{variant.name}: its own [{room}] is not followed: all variants of a run are trained "
+            "and scored alike, as --preset, --config and the options say"
+            for variant in self._variants
+            for room in ("training", "evaluation")
+            if getattr(variant.config, room) != getattr(config, room)
+        )
 
     def losses(self) -> tuple[str, ...]:
         """Say which parts of the log were lost."""

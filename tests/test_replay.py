@@ -286,6 +286,25 @@ def test_an_error_on_the_way_leaves_no_results_and_a_partial_recording(
     assert partial.layer("unfiltered", "svm", 5).shape == (24, 32)
 
 
+@pytest.mark.parametrize("output", ["save", "mcap"])
+def test_an_output_never_replaces_the_drive(tmp_path, output):
+    log = write_log(tmp_path / "small.mcap")
+    before = log.read_bytes()
+    with pytest.raises(RoadevalError, match="is an input or another output"):
+        roadeval.replay(log, **{"save": tmp_path / "o.rrd", "reports": tmp_path, output: log})
+    with pytest.raises(RoadevalError, match="is an input or another output"):
+        roadeval.train([log], log)
+    assert log.read_bytes() == before
+
+
+def test_a_variant_s_own_training_is_not_followed_and_this_is_said(drive, tmp_path):
+    (tmp_path / "v.toml").write_text("[training]\nframes = 3")
+    config = load_config(tmp_path / "v.toml")
+    outcome = run(drive, tmp_path, variants={"v": config}, max_frames=14)
+    assert outcome.summary["totals"]["v"]["post"]["frames"] == 4
+    assert any("v: its own [training] is not followed" in text for text in outcome.warnings)
+
+
 @pytest.mark.parametrize("jobs", [0, -2])
 def test_no_workers_are_refused(drive, tmp_path, jobs):
     with pytest.raises(RoadevalError, match="at least one worker"):

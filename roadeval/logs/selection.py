@@ -77,11 +77,12 @@ class Selection:
         lines = [f"image: {self.image.name} ({self.image_why})"]
         named = {"truth": self.truth, "shadow truth": self.shadow}
         named |= {f"mask {name}": topic for name, topic in self.masks.items()}
-        lines += [
-            f"{name}: {label.topic.name} ({label.why}; {label.labels.words})"
-            for name, label in named.items()
-            if label
-        ]
+        for name, label in named.items():
+            if label:
+                words = label.labels.words
+                if label is self.shadow:
+                    words = words.replace("road is", "shadow is")
+                lines.append(f"{name}: {label.topic.name} ({label.why}; {words})")
         return (*lines, *self.notes)
 
 

@@ -202,7 +202,9 @@ class Recorder:
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
 
     def _check_room(self) -> None:
-        if shutil.disk_usage(self.path.parent).free < LEAST_FREE:
+        disk = shutil.disk_usage(self.path.parent)
+        # A place that is no disk, as /proc, has no room to tell of.
+        if disk.total and disk.free < LEAST_FREE:
             raise RecordingError(f"{self.path}: cannot be written: the disk is full")
 
     def _flush(self) -> None:

@@ -23,7 +23,7 @@ def report(
         A recording, whole or partial, or a results folder, or either opened already. Without a
         recording there are no pictures.
     output
-        By default ``report.pdf`` in the results folder, or ``reports/<drive>/report.pdf``.
+        By default ``report.pdf`` in the results folder, or ``reports/<recording>.pdf``.
     paper
         A4 or Letter.
 
@@ -38,5 +38,6 @@ def report(
         If there is nothing to read there, or the file cannot be written.
     """
     opened = result if isinstance(result, Opened) else Opened(result)
-    folder = opened.path if opened.recording is None else Path("reports", opened.name)
-    return put(Path(output or folder / "report.pdf"), pdf(document(find(opened)), paper))
+    beside = opened.path / "report.pdf"
+    usual = beside if opened.recording is None else Path("reports", f"{opened.path.stem}.pdf")
+    return put(Path(output or usual), pdf(document(find(opened)), paper))
