@@ -55,11 +55,12 @@ def inspect(
 
     if frame is not None and worst is not None:
         raise typer.BadParameter("give --frame or --worst, not both")
-    if listed and (frame is not None or worst is not None or screenshot is not None):
-        raise typer.BadParameter("--list opens nothing; give it alone")
+    if listed and (frame is not None or screenshot is not None):
+        raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
     opened = Opened(recording)
     if listed:
-        _list(inspecting.suspects(opened, variant=variant), as_json=json)
+        wanted = {} if worst is None else {"count": worst}
+        _list(inspecting.suspects(opened, variant=variant, **wanted), as_json=json)
         return ExitCode.DONE
     if worst is not None:
         ranked = inspecting.suspects(opened, worst, variant)

@@ -60,7 +60,7 @@ def test_the_viewer_is_drawn_without_a_screen_at_the_worst_frame(demo, tmp_path)
             "no frame 123456; the recording holds frames 0 to 99",
         ),
         (["--frame", 1, "--worst", 1], 2, "give --frame or --worst, not both"),
-        (["--list", "--worst", 1], 2, "--list opens nothing"),
+        (["--list", "--frame", 1], 2, "--list opens nothing"),
         (["--worst", 1, "--variant", "net"], 1, "no variant net; there are filtered, unfiltered"),
     ],
 )
