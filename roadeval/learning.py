@@ -141,6 +141,6 @@ def spread(frames: Callable[[], Iterable[Readable]], count: int) -> Iterator[Fra
     ``frames`` begins anew at each call: once to see which are labelled, once to read them.
     """
     numbers = [frame.number for frame in frames() if frame.labelled]
-    step = max(1, len(numbers) // count)
-    chosen = frozenset(numbers[::step][:count])
+    taken = min(count, len(numbers))
+    chosen = frozenset(numbers[i * len(numbers) // taken] for i in range(taken))
     yield from _decoded(frame for frame in frames() if frame.number in chosen)

@@ -100,7 +100,13 @@ def test_a_model_from_a_file_leaves_its_own_frames_out(tmp_path):
 def test_training_frames_are_spread_over_a_drive():
     frames = log(20, unlabelled=(0,))
     chosen = [f.number for f in spread(lambda: frames, 4)]
-    assert chosen == [1, 5, 9, 13]
+    assert chosen == [1, 5, 10, 15]
+
+
+def test_training_frames_reach_the_end_of_a_drive_hardly_longer_than_their_number():
+    chosen = [f.number for f in spread(lambda: log(19), 10)]
+    assert len(chosen) == 10
+    assert chosen[-1] >= 17
 
 
 def test_a_short_drive_gives_what_it_has():

@@ -80,7 +80,7 @@ class Recorder:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if error is not None:
+        if error is not None and self.partial.exists():
             error.add_note(f"the partial recording is {self.partial}")
         try:
             self._close()

@@ -273,7 +273,9 @@ def test_a_disk_that_fills_up_is_told_while_the_partial_recording_can_still_be_c
 
 
 def leave_free(monkeypatch, size):
-    monkeypatch.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=size))
+    monkeypatch.setattr(
+        "shutil.disk_usage", lambda folder: SimpleNamespace(total=1 << 40, free=size)
+    )
 
 
 TOO_LARGE = """
