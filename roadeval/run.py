@@ -15,7 +15,7 @@ from roadeval.evaluation.results import STREAMED
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.flow import ordered
 from roadeval.gallery import Gallery
-from roadeval.options import Progress, ReplayOptions
+from roadeval.options import OptionError, Progress, ReplayOptions
 from roadeval.pipeline.stage import Moment
 from roadeval.recording import Layout
 from roadeval.relay import Relay, Turn
@@ -71,6 +71,8 @@ class Run:
     def _learn(self) -> tuple[Model, learning.Schedule]:
         options, settings = self._options, self._options.training()
         if options.model is not None:
+            if options.train_frames is not None or options.train_gap is not None:
+                raise OptionError("--train-frames and --train-gap do not go with --model")
             return learning.from_file(options.model, self._variants)
         labelled = self._selection.truth is not None and settings.source != "patch"
         total = min(settings.frames, self.total)
