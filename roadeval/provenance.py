@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Final
 
 from roadeval.config import Variant
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.training import TrainingSettings
 from roadeval.version import VERSION
 
 PACKAGES: Final = (
@@ -28,6 +31,14 @@ def versions() -> dict[str, str]:
     return found
 
 
-def settings(variants: Sequence[Variant]) -> dict[str, Any]:
-    """Give every variant's effective settings, in the shape of its TOML file."""
-    return {variant.name: variant.config.as_dict() for variant in variants}
+def settings(
+    variants: Sequence[Variant], training: TrainingSettings, evaluation: EvaluationSettings
+) -> dict[str, Any]:
+    """Give every variant's effective settings, in the shape of its TOML file.
+
+    ``training`` and ``evaluation`` are the run's: all its variants are trained and scored alike.
+    """
+    configs = {
+        v.name: replace(v.config, training=training, evaluation=evaluation) for v in variants
+    }
+    return {name: config.as_dict() for name, config in configs.items()}

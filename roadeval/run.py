@@ -168,7 +168,9 @@ class Run:
             "training": self._training(),
             "warnings": list(self.warnings()),
             "losses": list(self.losses()),
-            "settings": provenance.settings(self._variants),
+            "settings": provenance.settings(
+                self._variants, self._options.training(), self._options.config.evaluation
+            ),
             "versions": provenance.versions(),
             "log": {"path": str(self.log.path), "sha256": self.log.sha256()},
         }

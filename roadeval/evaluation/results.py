@@ -131,6 +131,8 @@ class ResultsWriter:
                 self._begin(f"{table}.csv", tables.header(table) + lines.get(table, ""))
                 self._filled.update([f"{table}.csv"] if lines.get(table) else [])
             self._begin(SUMMARY, summary_text(summary))
+            # From here to the end an earlier run's summary would stand beside this one's tables.
+            (self._folder / SUMMARY).unlink(missing_ok=True)
             return [self._folder / name for name in list(self._open) if self._complete(name)]
 
     def _begin(self, name: str, text: str) -> None:
