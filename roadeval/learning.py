@@ -4,15 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
-from typing import Protocol
+from typing import Final, Protocol
 
 from roadeval.config import Variant
 from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.training import Model, Plan, TrainingError, TrainingSettings, fit, load_model
+
+BY_PATCH: Final = (
+    "the model learnt from the reference patch in front of the vehicle, which is a guess"
+)
+
+GREATEST_MEMORY: Final = 2 << 30
+"""Bytes that the training frames of a run may take: they are held decoded, all of them."""
 
 
 class Readable(Protocol):
@@ -57,6 +65,28 @@ class Schedule:
         return Role.UNLABELLED if frame.truth is None else Role.EVALUATED
 
 
+@dataclass(slots=True)
+class Memory:
+    """Counts what the training frames take, so that no number of them fills the machine."""
+
+    frames: int = 0
+    taken: int = 0
+
+    def hold(self, frame: Frame) -> Frame:
+        """Give a frame that is going to be held; a `TrainingError` if it is one too many."""
+        masks = [frame.truth, frame.shadow_truth, *frame.external.values()]
+        # Two filters in a row leave two more images of each frame while a variant is fitted.
+        self.taken += 3 * frame.image.nbytes + sum(m.nbytes for m in masks if m is not None)
+        self.taken += len(frame.payload)
+        if self.taken > GREATEST_MEMORY:
+            raise TrainingError(
+                f"training holds its frames decoded, and more than {self.frames} of them would "
+                f"take over {GREATEST_MEMORY >> 20} MiB; lower --train-frames"
+            )
+        self.frames += 1
+        return frame
+
+
 def plans_of(variants: Sequence[Variant]) -> dict[str, Plan]:
     """Give what training needs to know of each variant, by name."""
     return {variant.name: variant.config.plan() for variant in variants}
@@ -66,12 +96,12 @@ def from_file(path: Path, variants: Sequence[Variant]) -> tuple[Model, Schedule]
     """Read a model file and make sure that it was made for these variants."""
     model = load_model(path)
     for name, plan in plans_of(variants).items():
-        model.require(name, plan.relevant(), path)
+        model.require(name, plan, path)
     return model, Schedule(model.digests)
 
 
 def from_log(
-    frames: Iterable[Readable],
+    frames: Callable[[], Iterable[Readable]],
     variants: Sequence[Variant],
     settings: TrainingSettings,
     on_frame: Callable[[int], None],
@@ -83,7 +113,8 @@ def from_log(
     Parameters
     ----------
     frames
-        The frames of the selected range, in order. Only as many are decoded as are needed.
+        Gives the frames of the selected range, in order and from the first at each call. Only as
+        many are decoded as are needed.
     variants
         What to train.
     settings
@@ -91,23 +122,24 @@ def from_log(
     on_frame
         Called with the number of training frames decoded so far.
     labelled
-        Whether the log has a truth; then only frames that have one train, and some must be
-        left to evaluate.
+        Whether the log's truth may teach; then only frames that have one train, and some must
+        be left to evaluate. Where no frame of the range has one, the first ones train.
 
     Raises
     ------
     TrainingError
         If there is nothing to learn from, or nothing left to evaluate.
     """
-    wanted = (f for f in frames if f.labelled) if labelled else iter(frames)
+    wanted, by_truth = _teachers(frames, labelled=labelled)
     chosen: list[Frame] = []
+    memory = Memory()
     for frame in _decoded(wanted):
-        chosen.append(frame)
+        chosen.append(memory.hold(frame))
         on_frame(len(chosen))
         if len(chosen) == settings.frames:
             break
     rest = list(zip(range(settings.gap + 1), wanted, strict=False))
-    if labelled and chosen and len(rest) <= settings.gap:
+    if by_truth and chosen and len(rest) <= settings.gap:
         raise TrainingError(
             f"the range has {len(chosen) + len(rest)} labelled frames, and training would take "
             f"{len(chosen)} of them and {settings.gap} more as a gap: none is left to evaluate; "
@@ -115,8 +147,50 @@ def from_log(
         )
     numbers = [readable.number for _, readable in rest]
     model = train_on(chosen, plans_of(variants), settings)
+    if labelled and not by_truth:
+        model = _told(model, f"no frame of the range has road truth: {BY_PATCH}")
     first = numbers[settings.gap] if len(numbers) > settings.gap else None
     return model, Schedule(model.digests, frozenset(numbers[: settings.gap]), first)
+
+
+def _teachers(
+    frames: Callable[[], Iterable[Readable]], *, labelled: bool
+) -> tuple[Iterator[Readable], bool]:
+    """Give the frames that may train, and whether by their truth: all, where none has one."""
+    if labelled:
+        wanted = (frame for frame in frames() if frame.labelled)
+        for first in wanted:
+            return chain([first], wanted), True
+    return iter(frames()), False
+
+
+def from_drives(
+    frames: Mapping[Path, Sequence[Frame]], variants: Sequence[Variant], settings: TrainingSettings
+) -> Model:
+    """Train on frames of some drives, by the drives' paths.
+
+    Raises
+    ------
+    TrainingError
+        If some drives have truth and others have none, or none has although the settings insist
+        on it, or there is nothing to learn from.
+    """
+    bare = [path for path, own in frames.items() if not any(f.truth is not None for f in own)]
+    insists = settings.source == "truth" or len(bare) < len(frames)
+    if bare and insists and settings.source != "patch":
+        raise TrainingError(
+            f"{bare[0]}: no road truth to train on in the range; name its topic with "
+            '--truth-topic, leave the drive out, or set training.source = "patch"'
+        )
+    every = [frame for own in frames.values() for frame in own]
+    model = train_on(every, plans_of(variants), settings)
+    if bare and settings.source == "auto":
+        model = _told(model, f"no drive has road truth in the range: {BY_PATCH}")
+    return model
+
+
+def _told(model: Model, warning: str) -> Model:
+    return replace(model, warnings=(warning, *model.warnings))
 
 
 def train_on(
@@ -135,12 +209,22 @@ def _decoded(frames: Iterator[Readable]) -> Iterator[Frame]:
             yield readable.decode()
 
 
-def spread(frames: Callable[[], Iterable[Readable]], count: int) -> Iterator[Frame]:
-    """Decode ``count`` labelled frames, spread evenly over those that there are.
+def spread(
+    frames: Callable[[], Iterable[Readable]], count: int, *, labelled: bool
+) -> Iterator[Frame]:
+    """Decode ``count`` frames, spread evenly over those that there are.
 
-    ``frames`` begins anew at each call: once to see which are labelled, once to read them.
+    Parameters
+    ----------
+    frames
+        Begins anew at each call: once to see which there are, once to read them.
+    count
+        At most so many.
+    labelled
+        Take labelled ones alone, if there is any.
     """
-    numbers = [frame.number for frame in frames() if frame.labelled]
+    seen = {frame.number: frame.labelled for frame in frames()}
+    numbers = [number for number, has_truth in seen.items() if has_truth and labelled] or [*seen]
     taken = min(count, len(numbers))
     chosen = frozenset(numbers[i * len(numbers) // taken] for i in range(taken))
     yield from _decoded(frame for frame in frames() if frame.number in chosen)

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.config import Variant
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.training import TrainingSettings
 from roadeval.version import VERSION
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
 PACKAGES: Final = (
     *("mcap", "numpy", "opencv-python-headless", "scikit-learn", "scipy"),
     *("numba", "rerun-sdk", "pandas", "matplotlib"),
 )
 """The packages whose version can change a number or a file."""
+
+ELSEWHERE: Final = ("config", "variants", "model", "train_frames", "train_gap", "jobs")
+"""Options that the summary tells under ``settings`` or ``training``, or that change no number."""
 
 
 def versions() -> dict[str, str]:
@@ -42,3 +48,12 @@ def settings(
         v.name: replace(v.config, training=training, evaluation=evaluation) for v in variants
     }
     return {name: config.as_dict() for name, config in configs.items()}
+
+
+def selection(options: DataclassInstance) -> dict[str, Any]:
+    """Give what was asked of the log, by the options' names: topics, labels, range, stride.
+
+    None stands for an option that was not given, so that its default held.
+    """
+    named = (field.name for field in fields(options))
+    return {name: getattr(options, name) for name in named if name not in ELSEWHERE}

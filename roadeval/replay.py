@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import Any
 
 from roadeval import learning, logs
-from roadeval.errors import RoadevalError
+from roadeval.data import Frame
 from roadeval.evaluation import rates
 from roadeval.evaluation.results import Results, ResultsWriter, summary_text
 from roadeval.evaluation.tables import header, window_lines
@@ -96,28 +96,28 @@ def train(
     """Train every variant on some drives, and write the model file.
 
     From each drive ``training.frames`` labelled frames are taken, spread evenly over the
-    selected range.
+    selected range. Frames without truth are taken where ``training.source`` is ``patch``, or
+    ``auto`` and no drive has truth.
 
     Raises
     ------
     RoadevalError
-        If a drive has no truth, or there is nothing to learn.
+        If some drives have truth and others none, or there is nothing to learn.
     """
     options, tell = options or ReplayOptions(), on_progress or _silent
     keep_apart(drives, (output,))
-    settings, frames = options.training(), []
-    total = settings.frames * len(drives)
+    settings = options.training()
+    total, by_truth = settings.frames * len(drives), settings.source != "patch"
+    memory = learning.Memory()
+    frames: dict[Path, list[Frame]] = {}
     for drive in drives:
         with logs.open_log(drive, keep_corrupt=options.keep_corrupt) as log:
-            selection = options.select(log)
-            if selection.truth is None:
-                raise RoadevalError(f"{log.path}: no road truth to train on; see --truth-topic")
-            span = options.span()
-            for frame in learning.spread(partial(log.frames, selection, span), settings.frames):
-                frames.append(frame)
-                tell(Progress(len(frames), total, "training"))
-    plans = learning.plans_of(options.all_variants())
-    model = learning.train_on(frames, plans, settings)
+            there = partial(log.frames, options.select(log), options.span())
+            frames[log.path] = []
+            for frame in learning.spread(there, settings.frames, labelled=by_truth):
+                frames[log.path].append(memory.hold(frame))
+                tell(Progress(memory.frames, total, "training"))
+    model = learning.from_drives(frames, options.all_variants(), settings)
     save_model(model, Path(output))
     return model
 

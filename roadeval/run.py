@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, Protocol
 
 from roadeval import learning, logs, provenance, runner
@@ -77,7 +78,7 @@ class Run:
         labelled = self._selection.truth is not None and settings.source != "patch"
         total = min(settings.frames, self.total)
         return learning.from_log(
-            self.log.frames(self._selection, options.span()),
+            partial(self.log.frames, self._selection, options.span()),
             self._variants,
             settings,
             lambda done: self._tell(Progress(done, total, "training")),
@@ -168,6 +169,7 @@ class Run:
             "training": self._training(),
             "warnings": list(self.warnings()),
             "losses": list(self.losses()),
+            "selection": provenance.selection(self._options),
             "settings": provenance.settings(
                 self._variants, self._options.training(), self._options.config.evaluation
             ),
@@ -182,7 +184,19 @@ class Run:
             if self._selection.truth
             else ("the log has no road truth: there is nothing to score, only masks to look at",)
         )
-        return (*unlabelled, *self._unheeded(), *self.model.warnings)
+        return (*unlabelled, *self._unheeded(), *self._near_training(), *self.model.warnings)
+
+    def _near_training(self) -> tuple[str, ...]:
+        """Say whether frames next to those that trained a model file are evaluated."""
+        roles = Counter(self.board.roles())
+        own = roles[Role.TRAINING]
+        if self._options.model is None or not own or not roles[Role.EVALUATED]:
+            return ()
+        return (
+            f"{own} of the model's {len(self.model.digests)} training frames lie in this drive; "
+            "their neighbours are evaluated and look alike, which flatters the result: use a "
+            "model of other drives",
+        )
 
     def _unheeded(self) -> tuple[str, ...]:
         """Say which variants ask for a training or a scoring that is not this run's."""

@@ -1,13 +1,15 @@
 """Which frames train, which are left out, and which are evaluated."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import pytest
 
+from roadeval import learning
 from roadeval.config import Config, variants_of
 from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
-from roadeval.learning import Schedule, from_file, from_log, spread
+from roadeval.learning import Schedule, from_drives, from_file, from_log, spread
 from roadeval.training import TrainingError, TrainingSettings, save_model
 from tests.training.making import frame
 
@@ -46,7 +48,7 @@ def roles(frames, schedule: Schedule) -> str:
 
 def learn(logged, *, labelled: bool = True, **settings):
     wanted = TrainingSettings(**settings)
-    return from_log(logged, VARIANTS, wanted, lambda done: None, labelled=labelled)
+    return from_log(lambda: logged, VARIANTS, wanted, lambda done: None, labelled=labelled)
 
 
 def test_the_first_labelled_frames_train_and_the_rest_is_evaluated():
@@ -76,6 +78,27 @@ def test_without_truth_the_first_frames_train():
     assert roles(frames, schedule) == "ttuuu"
 
 
+def test_where_the_truth_labels_nothing_in_the_range_the_first_frames_train():
+    frames = log(5, unlabelled=tuple(range(5)))
+    model, schedule = learn(frames, frames=2)
+    assert model.source == "patch"
+    assert roles(frames, schedule) == "ttuuu"
+    assert "no frame of the range has road truth: the model learnt from" in model.warnings[0]
+
+
+def test_who_insists_on_truth_is_not_given_the_patch():
+    with pytest.raises(TrainingError, match="no truth to train on"):
+        learn(log(5, unlabelled=tuple(range(5))), frames=2, source="truth")
+
+
+def test_training_frames_are_bounded_in_memory(monkeypatch):
+    # A frame of 24x32 takes three images of 2304 bytes, a truth of 768, and its payload of 2304.
+    monkeypatch.setattr(learning, "GREATEST_MEMORY", 3 * 9984)
+    learn(log(6), frames=3)
+    with pytest.raises(TrainingError, match=r"more than 3 of them would take .*--train-frames"):
+        learn(log(6), frames=4)
+
+
 @pytest.mark.parametrize(("frames", "gap"), [(4, 0), (2, 2), (9, 0)])
 def test_leaving_no_frame_to_evaluate_is_an_error(frames, gap):
     with pytest.raises(TrainingError, match="none is left to evaluate; lower --train-frames"):
@@ -99,15 +122,55 @@ def test_a_model_from_a_file_leaves_its_own_frames_out(tmp_path):
 
 def test_training_frames_are_spread_over_a_drive():
     frames = log(20, unlabelled=(0,))
-    chosen = [f.number for f in spread(lambda: frames, 4)]
+    chosen = [f.number for f in spread(lambda: frames, 4, labelled=True)]
     assert chosen == [1, 5, 10, 15]
 
 
 def test_training_frames_reach_the_end_of_a_drive_hardly_longer_than_their_number():
-    chosen = [f.number for f in spread(lambda: log(19), 10)]
+    chosen = [f.number for f in spread(lambda: log(19), 10, labelled=True)]
     assert len(chosen) == 10
     assert chosen[-1] >= 17
 
 
 def test_a_short_drive_gives_what_it_has():
-    assert len(list(spread(lambda: log(3), 10))) == 3
+    assert len(list(spread(lambda: log(3), 10, labelled=True))) == 3
+
+
+def test_all_frames_are_spread_where_the_truth_is_not_asked_for_or_there_is_none():
+    half = log(20, unlabelled=tuple(range(10)))
+    assert [f.number for f in spread(lambda: half, 4, labelled=False)] == [0, 5, 10, 15]
+    bare = log(20, unlabelled=tuple(range(20)))
+    assert [f.number for f in spread(lambda: bare, 4, labelled=True)] == [0, 5, 10, 15]
+
+
+LABELLED = [frame(n) for n in range(2)]
+BARE = [frame(n, labelled=False) for n in range(2, 4)]
+
+
+def of_drives(source: str, **frames):
+    drives = {Path(name): own for name, own in frames.items()}
+    return from_drives(drives, VARIANTS, TrainingSettings(source=source))
+
+
+def test_drives_without_truth_train_by_the_patch_and_this_is_said():
+    model = of_drives("auto", a=BARE)
+    assert model.source == "patch"
+    assert "no drive has road truth in the range: the model learnt from" in model.warnings[0]
+
+
+def test_who_asks_for_the_patch_gets_it_without_a_word():
+    model = of_drives("patch", a=BARE, b=LABELLED)
+    assert (model.source, model.warnings) == ("patch", ())
+
+
+@pytest.mark.parametrize(
+    ("source", "frames"),
+    [
+        ("auto", {"a": LABELLED, "b": BARE}),
+        ("auto", {"a": LABELLED, "b": []}),
+        ("truth", {"b": BARE}),
+    ],
+)
+def test_a_drive_without_truth_among_others_is_named(source, frames):
+    with pytest.raises(TrainingError, match=r"^b: no road truth to train on in the range"):
+        of_drives(source, **frames)

@@ -161,6 +161,51 @@ def test_a_model_file_leaves_its_own_frames_out_and_evaluates_the_rest(drive, tm
     assert outcome.summary["frames"]["evaluated"] == 20
 
 
+def test_training_frames_of_the_drive_itself_are_warned_of(drive, tmp_path):
+    roadeval.train([drive], tmp_path / "m.model", options=ReplayOptions(train_frames=5))
+    warnings = run(drive, tmp_path, model=tmp_path / "m.model").summary["warnings"]
+    assert any("5 of the model's 5 training frames lie in this drive; their" in w for w in warnings)
+
+
+def test_a_model_of_another_drive_is_not_warned_of(drive, tmp_path):
+    half = ReplayOptions(train_frames=5, end="1.25")
+    roadeval.train([drive], tmp_path / "m.model", options=half)
+    outcome = run(drive, tmp_path, model=tmp_path / "m.model", start="1.25")
+    assert outcome.summary["frames"]["evaluated"] > 0
+    assert not [text for text in outcome.warnings if "training frames lie" in text]
+
+
+def test_a_range_without_truth_is_replayed_by_the_patch(drive, tmp_path):
+    # Frame 20 alone has no truth.
+    outcome = run(drive, tmp_path, start="2.0", end="2.1")
+    assert outcome.summary["training"]["source"] == "patch"
+    assert outcome.summary["frames"]["evaluated"] == 0
+    assert any("no frame of the range has road truth" in text for text in outcome.warnings)
+
+
+def test_a_log_without_truth_trains_a_model_for_others(drive, tmp_path):
+    bare = write_log(tmp_path / "bare.mcap", truth=False)
+    (tmp_path / "c.toml").write_text('[training]\nsource = "patch"')
+    options = ReplayOptions(config=load_config(tmp_path / "c.toml"))
+    assert roadeval.train([bare], tmp_path / "m.model", options=options).source == "patch"
+    assert roadeval.train([bare, drive], tmp_path / "m.model", options=options).source == "patch"
+    assert run(bare, tmp_path, model=tmp_path / "m.model").summary["training"]["frames"] == 10
+
+
+def test_the_memory_of_training_is_bounded_over_all_drives(drive, tmp_path, monkeypatch):
+    other = write_log(tmp_path / "other.mcap")
+    monkeypatch.setattr("roadeval.learning.GREATEST_MEMORY", 15 * 10_000)
+    with pytest.raises(RoadevalError, match=r"more than 1\d of them would take"):
+        roadeval.train([drive, other], tmp_path / "m.model")
+
+
+def test_a_drive_without_truth_is_no_help_to_others(drive, tmp_path):
+    bare = write_log(tmp_path / "bare.mcap", truth=False)
+    with pytest.raises(RoadevalError, match=r"bare\.mcap: no road truth to train on"):
+        roadeval.train([drive, bare], tmp_path / "m.model")
+    assert not (tmp_path / "m.model").exists()
+
+
 def test_a_model_made_for_other_settings_is_refused(drive, tmp_path):
     roadeval.train([drive], tmp_path / "m.model")
     (tmp_path / "c.toml").write_text("[svm]\ngamma = 3.0")
@@ -311,13 +356,31 @@ def test_no_workers_are_refused(drive, tmp_path, jobs):
         run(drive, tmp_path, jobs=jobs)
 
 
-def test_sums_and_oracles_are_the_same_in_the_folder_and_in_the_recording(once):
+@pytest.mark.parametrize("table", COLUMNS)
+def test_a_table_is_the_same_in_the_folder_and_in_the_recording_bit_by_bit(once, table):
     folder, outcome = once
     recording, results = roadeval.Recording(outcome.recording), Results(folder / "reports")
-    for table in ("oracles", "changes", "heat"):
-        written = results.table(table)
-        assert len(written)
-        pd.testing.assert_frame_equal(recording.table(table), written)
+    written = results.table(table)
+    assert len(written)
+    pd.testing.assert_frame_equal(recording.table(table), written, check_exact=True)
+
+
+def test_the_summary_tells_what_was_asked_of_the_log(drive, tmp_path):
+    asked = {
+        "truth_topic": "/truth/road",
+        "road_labels": (255,),
+        "start": "0.2",
+        "every": 2,
+        "max_frames": 12,
+        "sync_tolerance_ms": 3.0,
+        "record": "none",
+        "resize_truth": True,
+    }
+    run(drive, tmp_path, train_frames=4, jobs=1, **asked)
+    told = json.loads((tmp_path / "reports" / "summary.json").read_text())["selection"]
+    assert {name: told[name] for name in asked} == asked | {"road_labels": [255]}
+    assert (told["end"], told["mask_topics"], told["keep_corrupt"]) == (None, {}, False)
+    assert not {"jobs", "config", "train_frames"} & set(told)
 
 
 def test_changes_are_what_the_recorded_masks_show(once):

@@ -1,4 +1,4 @@
-"""``roadeval train``: a model from drives with truth, for use on others."""
+"""``roadeval train``: a model from some drives, for use on others."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from roadeval.cli.exit_codes import ExitCode
 
 def train(
     drives: Annotated[
-        list[Path], typer.Argument(metavar="DRIVE", help="Camera logs (MCAP) with truth.")
+        list[Path], typer.Argument(metavar="DRIVE", help="Camera logs (MCAP), mostly with truth.")
     ],
     *,
     output: Annotated[
@@ -38,8 +38,9 @@ def train(
 ) -> int:
     """Train a model on some drives, for use on others.
 
-    The training frames are labelled ones, spread evenly over each drive. Replay never evaluates
-    them, on whatever drive it meets them.
+    The training frames are labelled ones, spread evenly over each drive. Where no drive has road
+    truth, or training.source is "patch", the ground in front of the vehicle is taken for road.
+    Replay never evaluates the training frames, on whatever drive it meets them.
     """
     from roadeval.cli import settings
     from roadeval.replay import ReplayOptions
@@ -69,6 +70,6 @@ def train(
     if not quiet:
         console.emit(
             f"{output}: {', '.join(model.parameters)}; trained on {len(model.digests)} frames, "
-            f"{model.pixels} pixels"
+            f"{model.pixels} pixels, by the {model.source}"
         )
     return ExitCode.DONE

@@ -1,22 +1,17 @@
-"""Pixels by outcome (section 5): many masks in many regions, counted in one pass.
-
-Masks are packed to bits, so that one machine word holds 64 pixels, and the pixels that lie in a
-mask, in a region and on the road are the set bits of three words' conjunction.
-"""
+"""Pixels by outcome (section 5): many masks in many regions, counted in one pass."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import ERRORS, IGNORE, NON_ROAD, ROAD, Counts, Layer, Mask, Truth
-
-Bits = npt.NDArray[np.uint64]
-"""``(K, words)`` uint64: K masks, 64 pixels a word, padded with zeros."""
+from roadeval.data import ERRORS, Counts, Layer, Mask, Truth
+from roadeval.evaluation.bits import Bits, TruthBits, everywhere, flat
+from roadeval.kernels import KERNELS
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,54 +22,32 @@ class MaskCounts:
     regions: dict[str, Counts]
 
 
-def count(
-    masks: Sequence[Mask], truth: Truth, regions: Mapping[str, Mask]
-) -> tuple[MaskCounts, ...]:
+def count(masks: Bits, truth: TruthBits, regions: Mapping[str, Bits]) -> tuple[MaskCounts, ...]:
     """Count TP, TN, FP and FN of each mask, in the whole frame and in each region.
 
     Parameters
     ----------
     masks
-        Each ``(H, W)`` uint8 or bool, non-zero for road.
+        ``(K, H, words)``: road.
     truth
-        ``(H, W)`` uint8: 0 non-road, 1 road, 255 ignored; ignored pixels are in no count.
+        Ignored pixels are in no count.
     regions
-        Each ``(H, W)`` uint8 or bool, non-zero inside; regions may overlap.
+        ``(H, words)`` each; regions may overlap.
 
     Returns
     -------
     tuple of MaskCounts
         One for each mask, in their order.
-
-    Raises
-    ------
-    ValueError
-        If a mask or a region has not the truth's shape.
     """
-    _require_shape(truth.shape, *masks, *regions.values())
-    inside = pack([np.ones(truth.shape, np.uint8), *regions.values()])
-    road = inside & pack([truth == ROAD])
-    other = inside & pack([truth == NON_ROAD])
-    positives, negatives = _ones(road), _ones(other)
+    whole = everywhere(truth.shape)
+    inside, classes = flat([whole, *regions.values()]), flat([truth.road, truth.other])
+    positives, negatives = KERNELS.count_bits(flat([whole]), classes, inside)[0]
     counted = []
-    for mask in pack(masks):
-        tp, fp = _ones(road & mask), _ones(other & mask)
+    for tp, fp in KERNELS.count_bits(flat(masks), classes, inside):
         table = np.stack([tp, negatives - fp, fp, positives - tp], axis=1).tolist()
-        whole, *parts = (Counts(*row) for row in table)
-        counted.append(MaskCounts(whole, dict(zip(regions, parts, strict=True))))
+        total, *parts = (Counts(*row) for row in table)
+        counted.append(MaskCounts(total, dict(zip(regions, parts, strict=True))))
     return tuple(counted)
-
-
-def pack(masks: Sequence[npt.NDArray[np.uint8] | npt.NDArray[np.bool_]]) -> Bits:
-    """Pack equally large masks to bits, one row a mask."""
-    if not masks:
-        return np.zeros((0, 0), np.uint64)
-    size = -(-masks[0].size // 64) * 8
-    packed = np.zeros((len(masks), size), np.uint8)
-    for row, mask in zip(packed, masks, strict=True):
-        bits = np.packbits(mask)
-        row[: bits.size] = bits
-    return packed.view(np.uint64)
 
 
 def error_map(mask: Mask, truth: Truth) -> Layer:
@@ -92,11 +65,6 @@ def error_map(mask: Mask, truth: Truth) -> Layer:
     return Layer(ERRORS, cv2.LUT(truth * np.uint8(2) + mask, _OUTCOMES))
 
 
-def labelled_pixels(truth: Truth) -> int:
-    """Count the pixels that the truth does not ignore: N of Eq. 24 and 25."""
-    return int(truth.size - np.count_nonzero(truth == IGNORE))
-
-
 def _outcomes() -> npt.NDArray[np.uint8]:
     """Tabulate class by ``2 * truth + mask`` modulo 256, where an ignored pixel has 254 or 255."""
     value = {label.name: label.value for label in ERRORS.classes}
@@ -106,15 +74,3 @@ def _outcomes() -> npt.NDArray[np.uint8]:
 
 
 _OUTCOMES: Final = _outcomes()
-
-
-def _ones(bits: Bits) -> npt.NDArray[np.int64]:
-    """Count the set bits of each row."""
-    ones: npt.NDArray[np.int64] = np.bitwise_count(bits).sum(axis=1, dtype=np.int64)
-    return ones
-
-
-def _require_shape(shape: tuple[int, ...], *arrays: npt.NDArray[np.uint8]) -> None:
-    for array in arrays:
-        if array.shape != shape:
-            raise ValueError(f"shape {array.shape} differs from the truth's {shape}")

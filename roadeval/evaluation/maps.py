@@ -10,10 +10,12 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import IGNORE, ROAD, Change, Layer, Mask, Step, Truth
-from roadeval.evaluation.counts import pack
+from roadeval.data import Change, Layer, Step
+from roadeval.evaluation.bits import Bits, TruthBits, ones
 
 Sums = npt.NDArray[np.int64]
+Name = tuple[str, str]
+"""A mask's variant and stage."""
 FP: Final = 2
 FN: Final = 3
 IGNORED: Final = 4
@@ -79,36 +81,35 @@ class HeatMap:
         self._bytes[:] = 0
 
 
-def changes(masks: Sequence[tuple[str, str, Mask]], truth: Truth) -> dict[Step, Change]:
+def changes(names: Sequence[Name], masks: Bits, truth: TruthBits) -> dict[Step, Change]:
     """Count what each stage changed in the mask before it, and each final mask in the others.
 
     Parameters
     ----------
+    names
+        Variant and stage of each mask, a variant's in the order they ran.
     masks
-        Variant, stage and ``(H, W)`` uint8 mask (0, 1), a variant's in the order they ran.
+        ``(K, H, words)``.
     truth
-        ``(H, W)`` uint8 (0, 1, 255).
+        Ignored pixels are in no count.
     """
-    bits = pack([mask for _, _, mask in masks])
-    road, labelled = pack([truth == ROAD, truth != IGNORE])
-    whole = int(np.bitwise_count(labelled).sum())
-    wrong = (bits ^ road) & labelled
+    labelled = truth.labelled
+    whole = ones(labelled)
+    wrong = (masks ^ truth.road) & labelled
     found = {}
-    for before, after in _steps(masks):
-        differ = wrong[before] ^ wrong[after]
-        spoiled = int(np.bitwise_count(differ & wrong[after]).sum())
-        repaired = int(np.bitwise_count(differ & wrong[before]).sum())
-        step = (*masks[before][:2], *masks[after][:2])
-        found[step] = Change(repaired, spoiled, whole)
+    for before, after in _steps(names):
+        spoiled = ones(wrong[after] & ~wrong[before])
+        repaired = ones(wrong[before] & ~wrong[after])
+        found[*names[before], *names[after]] = Change(repaired, spoiled, whole)
     return found
 
 
-def _steps(masks: Sequence[tuple[str, str, Mask]]) -> Iterator[tuple[int, int]]:
+def _steps(names: Sequence[Name]) -> Iterator[tuple[int, int]]:
     """Yield the places of a mask before and after: stage to stage, and final to final."""
-    for before, after in pairwise(range(len(masks))):
-        if masks[before][0] == masks[after][0]:
+    for before, after in pairwise(range(len(names))):
+        if names[before][0] == names[after][0]:
             yield before, after
-    last = {variant: place for place, (variant, _, _) in enumerate(masks)}
+    last = {variant: place for place, (variant, _) in enumerate(names)}
     yield from permutations(last.values(), 2)
 
 

@@ -7,24 +7,30 @@ from functools import lru_cache
 
 import numpy as np
 
-from roadeval.data import NON_ROAD, ROAD, Frame, Mask, Truth, VariantResult
+from roadeval.data import Frame, Mask, VariantResult
+from roadeval.evaluation.bits import Bits, TruthBits, everywhere, square
 
 
 def of_frame(
-    frame: Frame, variants: Iterable[VariantResult], *, boundary_width: int, bands: int
-) -> dict[str, Mask]:
-    """Collect every region of a labelled frame, each ``(H, W)`` uint8, 1 inside.
+    frame: Frame,
+    truth: TruthBits,
+    variants: Iterable[VariantResult],
+    *,
+    boundary_width: int,
+    bands: int,
+) -> dict[str, Bits]:
+    """Collect every region of a labelled frame, ``(H, words)`` each.
 
     ``true_shadow`` is there where the log has that truth. The filter's regions are there where a
     variant has the filter.
     """
-    assert frame.truth is not None
-    found = detected(variants)
+    masks = detected(variants)
     if frame.shadow_truth is not None:
-        found["true_shadow"] = (frame.shadow_truth == 1).view(np.uint8)
-    found["boundary"] = boundary(frame.truth, boundary_width)
-    found["interior"] = found["boundary"] ^ np.uint8(1)
-    return found | dict(row_bands(frame.truth.shape[:2], bands))
+        masks["true_shadow"] = (frame.shadow_truth == 1).view(np.uint8)
+    found = dict(zip(masks, truth.pack(*masks.values()), strict=True))
+    found["boundary"] = boundary(truth, boundary_width)
+    found["interior"] = found["boundary"] ^ everywhere(truth.shape)
+    return found | dict(row_bands(truth.shape, bands))
 
 
 def detected(variants: Iterable[VariantResult]) -> dict[str, Mask]:
@@ -41,32 +47,20 @@ def detected(variants: Iterable[VariantResult]) -> dict[str, Mask]:
     return found
 
 
-def boundary(truth: Truth, width: int) -> Mask:
-    """Mark the pixels within ``width`` of the edge between road and non-road.
+def boundary(truth: TruthBits, width: int) -> Bits:
+    """Mark the pixels within ``width`` of the edge between road and non-road, ``(H, words)``.
 
     A pixel belongs to it if the square of side ``2 * width + 1`` around it holds both road and
     non-road of the truth. An ignored pixel is neither, so where road meets ignored pixels there
-    is no edge.
-
-    Parameters
-    ----------
-    truth
-        ``(H, W)`` uint8: 0, 1, or 255 for ignored.
-    width
-        Pixels on either side of the edge, in chessboard distance.
+    is no edge. ``width`` is in pixels on either side, in chessboard distance.
     """
-    import cv2
-
-    square = np.ones((2 * width + 1, 2 * width + 1), np.uint8)
-    near_road = cv2.dilate((truth == ROAD).view(np.uint8), square)
-    near_other = cv2.dilate((truth == NON_ROAD).view(np.uint8), square)
-    both: Mask = near_road & near_other
-    return both
+    element = square(width)
+    return truth.grow(truth.road, element) & truth.grow(truth.other, element)
 
 
 @lru_cache(maxsize=8)
-def row_bands(shape: tuple[int, int], bands: int) -> Mapping[str, Mask]:
-    """Cut the image's rows into ``bands`` stripes of equal height to within a row.
+def row_bands(shape: tuple[int, int], bands: int) -> Mapping[str, Bits]:
+    """Cut an image's rows into stripes of equal height to within a row, ``(H, words)`` each.
 
     Parameters
     ----------
@@ -76,7 +70,8 @@ def row_bands(shape: tuple[int, int], bands: int) -> Mapping[str, Mask]:
         Number of stripes; ``band_0`` is the topmost.
     """
     stripe = np.arange(shape[0]) * bands // shape[0]
+    whole = everywhere(shape)
     return {
-        f"band_{index}": np.repeat((stripe == index).astype(np.uint8)[:, None], shape[1], axis=1)
+        f"band_{index}": np.where((stripe == index)[:, None], whole, np.uint64(0))
         for index in range(bands)
     }

@@ -13,15 +13,13 @@ from roadeval.data import (
     Mask,
     Role,
     Tally,
-    Truth,
     VariantResult,
 )
 from roadeval.evaluation import contours, counts, health, maps, rates, regions, tables
 from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.bits import Bits, TruthBits, ones
+from roadeval.evaluation.maps import Name
 from roadeval.evaluation.settings import EvaluationSettings
-
-Named = tuple[str, str, Mask]
-"""A road mask with its variant and stage."""
 
 
 class CountsNotConservedError(RuntimeError):
@@ -54,16 +52,18 @@ def score_frame(
         return FrameResult(frame, role, variants)
     if frame.truth is None:
         raise ValueError(f"frame {frame.number} is to be evaluated, but has no truth")
-    masks = _masks(variants, prior, frame.truth)
+    truth = TruthBits.of(frame.truth)
+    masks = _masks(variants, prior, truth.shape)
+    bits = truth.pack(*masks.values())
     found = regions.of_frame(
-        frame, variants, boundary_width=settings.boundary_width, bands=settings.bands
+        frame, truth, variants, boundary_width=settings.boundary_width, bands=settings.bands
     )
-    tallies = tally(masks, frame.truth, found)
+    tallies = tally(list(masks), bits, truth, found)
+    final_bits = {variant: mask for (variant, _), mask in zip(masks, bits, strict=True)}
     finals = {result.variant: result.rates for result in tallies}
     blind = finals.pop(BASELINE, None)
-    all_finals = {variant: mask for variant, _, mask in masks}
-    final_masks = {name: mask for name, mask in all_finals.items() if name != BASELINE}
-    oracles = _oracles(variants, frame.truth)
+    final_masks = {variant: mask for (variant, _), mask in masks.items() if variant != BASELINE}
+    oracles = _oracles(variants, truth)
     return FrameResult(
         frame,
         role,
@@ -77,13 +77,15 @@ def score_frame(
             "regions": tables.region_lines(frame, tallies),
             **({"oracles": tables.oracle_lines(frame, oracles)} if oracles else {}),
         },
-        changes=maps.changes(masks, frame.truth),
-        contours=contours.boundary_f(all_finals, frame.truth, settings.boundary_width),
+        changes=maps.changes(list(masks), bits, truth),
+        contours=contours.boundary_f(final_bits, truth, settings.boundary_width),
         oracles=oracles,
     )
 
 
-def tally(masks: Sequence[Named], truth: Truth, found: Mapping[str, Mask]) -> tuple[Tally, ...]:
+def tally(
+    names: Sequence[Name], masks: Bits, truth: TruthBits, found: Mapping[str, Bits]
+) -> tuple[Tally, ...]:
     """Count named masks in the regions ``found``, and prove that no pixel was lost.
 
     Raises
@@ -92,11 +94,11 @@ def tally(masks: Sequence[Named], truth: Truth, found: Mapping[str, Mask]) -> tu
         If the counts of a mask do not add up to the labelled pixels, or its parts not to the
         whole.
     """
-    counted = counts.count([mask for _, _, mask in masks], truth, found)
-    labelled = counts.labelled_pixels(truth)
+    counted = counts.count(masks, truth, found)
+    labelled = ones(truth.labelled)
     tallies = tuple(
-        Tally(variant, stage, result.whole, result.regions, rates.of(result.whole))
-        for (variant, stage, _), result in zip(masks, counted, strict=True)
+        Tally(*name, result.whole, result.regions, rates.of(result.whole))
+        for name, result in zip(names, counted, strict=True)
     )
     for result in tallies:
         prove(result, labelled)
@@ -121,20 +123,23 @@ def prove(result: Tally, labelled: int) -> None:
         )
 
 
-def _oracles(variants: Sequence[VariantResult], truth: Truth) -> dict[str, tuple[Tally, ...]]:
+def _oracles(variants: Sequence[VariantResult], truth: TruthBits) -> dict[str, tuple[Tally, ...]]:
     """Count the masks that stages made once one was replaced by the truth, by that one."""
-    named: dict[str, list[Named]] = {}
+    named: dict[str, dict[Name, Mask]] = {}
     for variant in variants:
         for oracle, masks in variant.oracles.items():
-            own = [(variant.variant, stage, mask) for stage, mask in masks.items()]
-            named.setdefault(oracle, []).extend(own)
-    return {oracle: tally(masks, truth, {}) for oracle, masks in named.items()}
+            own = {(variant.variant, stage): mask for stage, mask in masks.items()}
+            named.setdefault(oracle, {}).update(own)
+    return {
+        oracle: tally(list(masks), truth.pack(*masks.values()), truth, {})
+        for oracle, masks in named.items()
+    }
 
 
 def _masks(
-    variants: Sequence[VariantResult], prior: BlindPrior | None, truth: Truth
-) -> list[Named]:
-    named = [(v.variant, stage, mask) for v in variants for stage, mask in v.masks()]
+    variants: Sequence[VariantResult], prior: BlindPrior | None, shape: tuple[int, int]
+) -> dict[Name, Mask]:
+    named = {(v.variant, stage): mask for v in variants for stage, mask in v.masks()}
     if prior is not None:
-        named.append((BASELINE, FINAL_STAGE, prior.mask((truth.shape[0], truth.shape[1]))))
+        named[BASELINE, FINAL_STAGE] = prior.mask(shape)
     return named

@@ -48,9 +48,9 @@ def header(table: str) -> str:
 
 def frame_lines(frame: Frame, tallies: Iterable[Tally]) -> str:
     """Write a frame's lines of ``frames.csv``."""
-    times = (frame.number, frame.stamp_ns, frame.log_time_ns)
+    times = f"{frame.number},{frame.stamp_ns},{frame.log_time_ns}"
     return "".join(
-        _line((*times, tally.variant, tally.stage, *_cells(tally.counts), *tally.rates.values()))
+        f"{times},{tally.variant},{tally.stage},{_counts(tally.counts)},{_rates(tally)}\n"
         for tally in tallies
     )
 
@@ -58,7 +58,7 @@ def frame_lines(frame: Frame, tallies: Iterable[Tally]) -> str:
 def region_lines(frame: Frame, tallies: Iterable[Tally]) -> str:
     """Write a frame's lines of ``regions.csv``."""
     return "".join(
-        _line((frame.number, tally.variant, tally.stage, region, *_cells(counts)))
+        f"{frame.number},{tally.variant},{tally.stage},{region},{_counts(counts)}\n"
         for tally in tallies
         for region, counts in tally.regions.items()
     )
@@ -67,13 +67,8 @@ def region_lines(frame: Frame, tallies: Iterable[Tally]) -> str:
 def oracle_lines(frame: Frame, oracles: Mapping[str, Iterable[Tally]]) -> str:
     """Write a frame's lines of ``oracles.csv``."""
     return "".join(
-        _line(
-            (
-                *(frame.number, tally.variant, oracle, tally.stage),
-                *_cells(tally.counts),
-                *tally.rates.values(),
-            )
-        )
+        f"{frame.number},{tally.variant},{oracle},{tally.stage},"
+        f"{_counts(tally.counts)},{_rates(tally)}\n"
         for oracle, tallies in oracles.items()
         for tally in tallies
     )
@@ -112,8 +107,12 @@ def window_lines(windows: Iterable[Window]) -> str:
     )
 
 
-def _cells(counts: Counts) -> tuple[int, ...]:
-    return counts.tp, counts.tn, counts.fp, counts.fn, counts.n
+def _counts(counts: Counts) -> str:
+    return f"{counts.tp},{counts.tn},{counts.fp},{counts.fn},{counts.n}"
+
+
+def _rates(tally: Tally) -> str:
+    return ",".join(map(_cell, tally.rates.values()))
 
 
 def _line(cells: Iterable[str | int | float]) -> str:

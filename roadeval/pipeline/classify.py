@@ -13,8 +13,9 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerSpec, Mask, mask_spec
+from roadeval.kernels import KERNELS
 from roadeval.pipeline import cube
-from roadeval.pipeline.fast import KERNELS
+from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask
 
 Floats = npt.NDArray[np.float64]
@@ -76,6 +77,13 @@ class SupportVectors:
     vectors: Floats
     weights: Floats
     offset: float
+
+    def __post_init__(self) -> None:
+        check_arrays(self, np.float64, mean=(3,), scale=(3,))
+        check_arrays(self, np.float64, vectors=("m", 3), weights=("m",), offset=())
+        check_range("mean", self.mean, 0, 255)
+        check_range("scale", self.scale, 1e-6, 255)
+        check_range("offset", self.offset, -GREATEST, GREATEST)
 
 
 def fit(sample: TrainingSet, settings: SvmSettings) -> SupportVectors:

@@ -27,8 +27,9 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Rgb
+from roadeval.kernels import KERNELS
 from roadeval.pipeline.classify import SVM
-from roadeval.pipeline.fast import KERNELS
+from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.scale import reduced, stretched
 from roadeval.pipeline.shade import LOGS
 from roadeval.pipeline.stage import Moment, Output, Stage, TrainingSet, View, perfect_mask
@@ -91,6 +92,13 @@ class RectifiedMachine:
     weights: Values
     offset: float
     threshold: float
+
+    def __post_init__(self) -> None:
+        check_arrays(self, np.float32, planes=("K", "F"), bias=("K",), weights=("K",))
+        check_arrays(self, np.float32, offset=(), threshold=())
+        check_range("offset", self.offset, -GREATEST, GREATEST)
+        if self.planes.shape[1] < 7 or self.planes.shape[1] % 2 == 0:
+            raise ValueError("planes has not seven columns and two for each window of texture")
 
 
 # --- Features -------------------------------------------------------------------------------------

@@ -16,8 +16,8 @@ from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Mask, Rgb
+from roadeval.kernels import KERNELS
 from roadeval.pipeline import shade
-from roadeval.pipeline.fast import KERNELS
 from roadeval.pipeline.shade import RoadLight
 from roadeval.pipeline.shadow import RING_COLOUR, SHADOW_COLOUR
 
@@ -229,9 +229,8 @@ def _rings(scene: Scene, labels: Labels, settings: GatedSettings) -> Labels:
 
 
 def _sums(image: Rgb, labels: Labels, count: int) -> npt.NDArray[np.int64]:
-    """Pixels and sums of R, G, B by label, ``(count, 7)``, see `plain.region_sums`."""
-    nowhere = np.zeros(labels.shape, np.uint8)
-    sums: npt.NDArray[np.int64] = KERNELS.region_sums(image, labels, nowhere, count, 0)[0]
+    """Pixels and sums of R, G, B by label, ``(count, 7)``, see `kernels.plain.run_sums`."""
+    sums: npt.NDArray[np.int64] = KERNELS.run_sums(image, KERNELS.label_runs(labels), count)
     return sums
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Mask, Rgb
+from roadeval.pipeline.parameters import check_arrays, check_covariance, check_range
 from roadeval.pipeline.stage import TrainingSet
 
 Floats = npt.NDArray[np.float64]
@@ -48,6 +49,14 @@ class RoadLight:
     mean: Floats
     covariance: Floats
     shift: Floats
+
+    def __post_init__(self) -> None:
+        check_arrays(self, np.float64, mean=(2,), covariance=(2, 2), shift=(2,))
+        # No two logarithms of a channel lie further apart than ln(263 / 8) = 3.5.
+        check_range("mean", self.mean, -4, 4)
+        check_range("shift", self.shift, -8, 8)
+        check_range("covariance", self.covariance, -16, 16)
+        check_covariance("covariance", self.covariance, 1e-9)
 
 
 def chromaticity(rgb: npt.NDArray[np.uint8]) -> tuple[Map, Map]:

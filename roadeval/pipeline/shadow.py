@@ -6,7 +6,7 @@
 | 7 | `otsu_threshold`, `printed_threshold` |
 | 8 | `shadow_mask` |
 | 9 | `connected_components` |
-| 10 | `buffer_ring`, counted per component in `plain.region_sums` |
+| 10 | `buffer_ring`, counted per component in `roadeval.kernels.plain.ring_sums` |
 | 11 | `compensation`, `compensate` |
 """
 
@@ -23,8 +23,8 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb, Truth
+from roadeval.kernels import KERNELS
 from roadeval.pipeline import colour
-from roadeval.pipeline.fast import KERNELS
 from roadeval.pipeline.stage import Output, Stage, View
 
 Floats = npt.NDArray[np.float64]
@@ -173,10 +173,22 @@ def shadow_mask(codes: Codes, threshold: int | None, *, inclusive: bool) -> Mask
 # --- Regions: Eq. 9-10 ----------------------------------------------------------------------------
 
 
-def connected_components(shadow: Mask, connectivity: int) -> tuple[Labels, int]:
-    """Eq. 9's fixed point for every seed: ``(H, W)`` int32 labels from 1, and their number."""
-    count, labels = cv2.connectedComponents(shadow, connectivity=connectivity, ltype=cv2.CV_32S)
-    return labels, count - 1
+@dataclass(frozen=True, slots=True, eq=False)
+class Components:
+    """Connected components, numbered from 1.
+
+    ``labels`` is ``(H, W)`` int32, 0 outside. ``runs`` is ``(n, 4)`` int32: row, first column,
+    column after the last, and label of each of their rows' stretches. ``count`` is their number.
+    """
+
+    labels: Labels
+    runs: npt.NDArray[np.int32]
+    count: int
+
+
+def connected_components(shadow: Mask, connectivity: int) -> Components:
+    """Eq. 9's fixed point for every seed: the 4- or 8-connected components of a mask."""
+    return Components(*KERNELS.components(shadow, connectivity))
 
 
 def buffer_ring(shadow: Mask, width: int) -> Mask:
@@ -213,7 +225,7 @@ class Compensation:
 
 
 def moments_of_sums(sums: npt.NDArray[np.int64]) -> Moments:
-    """Moments by label from `plain.region_sums`.
+    """Moments by label from `roadeval.kernels.plain.run_sums`.
 
     The variance is taken about the grey level next to the mean, in integers: nothing cancels,
     a constant component has a deviation of exactly 0, and no component is too large.
@@ -267,19 +279,19 @@ def compensation(inside: Moments, ring: Moments, settings: ShadowSettings) -> Co
 
 
 def compensate(
-    image: Rgb, labels: Labels, count: int, ring: Mask, settings: ShadowSettings
+    image: Rgb, found: Components, ring: Mask, settings: ShadowSettings
 ) -> tuple[Rgb, Compensation]:
     """Apply Eq. 11 to every component of an ``(H, W, 3)`` uint8 RGB image.
 
-    ``labels`` has ``count`` components from 1; ``ring`` is the union of their buffer rings.
+    ``ring`` is the union of their buffer rings.
     """
-    labelled = count + 1
     if settings.colour_space == "hsi":
-        return _compensate_hsi(image, labels, labelled, ring, settings)
-    sums = KERNELS.region_sums(image, labels, ring, labelled, settings.ring_width)
-    inside, around = (moments_of_sums(part) for part in sums)
+        return _compensate_hsi(image, found, ring, settings)
+    count, width = found.count + 1, settings.ring_width
+    inside = moments_of_sums(KERNELS.run_sums(image, found.runs, count))
+    around = moments_of_sums(KERNELS.ring_sums(image, found.labels, ring, count, width))
     change = compensation(inside, around, settings)
-    return KERNELS.transfer(image, labels, change.source, change.target, change.gain), change
+    return KERNELS.transfer(image, found.runs, change.source, change.target, change.gain), change
 
 
 def lift(image: Rgb, shadow: Mask, settings: ShadowSettings) -> tuple[Rgb, Mask, int, Compensation]:
@@ -287,23 +299,23 @@ def lift(image: Rgb, shadow: Mask, settings: ShadowSettings) -> tuple[Rgb, Mask,
 
     Returns the image, the rings, the number of components, and what was done to them.
     """
-    labels, count = connected_components(shadow, settings.connectivity)
+    found = connected_components(shadow, settings.connectivity)
     ring = buffer_ring(shadow, settings.ring_width)
-    image, change = compensate(image, labels, count, ring, settings)
-    return image, ring, count, change
+    image, change = compensate(image, found, ring, settings)
+    return image, ring, found.count, change
 
 
 def _compensate_hsi(
-    image: Rgb, labels: Labels, count: int, ring: Mask, settings: ShadowSettings
+    image: Rgb, found: Components, ring: Mask, settings: ShadowSettings
 ) -> tuple[Rgb, Compensation]:
     """Compensate saturation and value, keep the hue, and convert back (section 4.2, step 5)."""
-    label, pixel = ring_pairs(labels, ring, settings.ring_width)
+    label, pixel = ring_pairs(found.labels, ring, settings.ring_width)
     flat = image.reshape(-1, 3)
-    shadow = np.flatnonzero(labels)
-    k = labels.ravel()[shadow]
+    shadow = np.flatnonzero(found.labels)
+    k = found.labels.ravel()[shadow]
     values = _saturation_value(flat[shadow])
-    inside = moments_of_values(k, values, count)
-    around = moments_of_values(label, _saturation_value(flat[pixel]), count)
+    inside = moments_of_values(k, values, found.count + 1)
+    around = moments_of_values(label, _saturation_value(flat[pixel]), found.count + 1)
     change = compensation(inside, around, settings)
     mapped = change.target[k] + (values - change.source[k]) * change.gain[k]
     mapped = np.clip(mapped, 0.0, 1.0)
@@ -348,7 +360,7 @@ def bind(settings: ShadowSettings, _parameters: None) -> Callable[[View], Output
     threshold_of = otsu_threshold if settings.threshold == "otsu" else printed_threshold
 
     def run(view: View) -> Output:
-        codes, histogram = KERNELS.look_up_sum_min(view.image, NDI_CODES)
+        codes, histogram = KERNELS.look_up_sum_min(cv2.split(view.image), NDI_CODES)
         threshold = threshold_of(histogram)
         shadow = shadow_mask(codes, threshold, inclusive=settings.inclusive)
         image, ring, count, change = lift(view.image, shadow, settings)
@@ -383,7 +395,7 @@ def _facts(
     gains = change.gain[change.applied]
     return {
         "threshold": float("nan") if threshold is None else threshold / 127.5 - 1.0,
-        "shadow_share": float(shadow.mean()),
+        "shadow_share": cv2.countNonZero(shadow) / shadow.size,
         "components": float(count),
         "compensated": float(change.applied.sum()),
         "max_gain": float(gains.max()) if gains.size else 1.0,

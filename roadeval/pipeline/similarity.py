@@ -6,13 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Final
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerKind, LayerSpec, mask_spec
-from roadeval.pipeline.fast import KERNELS
+from roadeval.kernels import KERNELS
+from roadeval.pipeline.parameters import check_arrays, check_covariance, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
 
 SIMILARITY: Final = mask_spec("similarity", "Similar to road (Eq. 2)")
@@ -44,6 +46,13 @@ class RoadColour:
     mean: npt.NDArray[np.float64]
     covariance: npt.NDArray[np.float64]
 
+    def __post_init__(self) -> None:
+        check_arrays(self, np.float64, mean=(3,), covariance=(3, 3))
+        check_range("mean", self.mean, 0, 255)
+        check_range("covariance", self.covariance, -(255**2), 255**2)
+        # One grey alone has no variance; the rest is rounding, and far below the least ridge.
+        check_covariance("covariance", self.covariance, -1e-6)
+
 
 def fit(sample: TrainingSet, _settings: SimilaritySettings) -> RoadColour:
     """Estimate m and S of Eq. 2 from the road pixels of the training set."""
@@ -70,7 +79,7 @@ def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Out
     spec = _distance(settings)
 
     def run(view: View) -> Output:
-        distance, mask = KERNELS.mahalanobis(view.image, road.mean, precision, greatest)
+        distance, mask = KERNELS.mahalanobis(cv2.split(view.image), road.mean, precision, greatest)
         return Output((Layer(spec, distance), Layer(SIMILARITY, mask)), mask=mask)
 
     return run

@@ -11,6 +11,7 @@ import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, NAMES, UNFILTERED
 from roadeval.evaluation import analysis, counts, maps, tables
+from roadeval.evaluation.bits import TruthBits
 from roadeval.evaluation.scoreboard import COMPARED
 from roadeval.opened import Opened
 from roadeval.report.findings import Findings, Heat, Versus
@@ -168,14 +169,15 @@ def _sample(opened: Opened, numbers: Sequence[int]) -> maps.Maps:
         return found
     for number in evenly(numbers, SAMPLED):
         truth = recording.truth(number)
-        masks = [
-            (variant.name, stage, recording.layer(variant.name, stage, number))
+        masks = {
+            (variant.name, stage): recording.layer(variant.name, stage, number)
             for variant in recording.variants
             for stage in variant.stages
-        ]
-        finals = {variant: mask for variant, _, mask in masks}
+        }
+        finals = {variant: mask for (variant, _), mask in masks.items()}
         errors = {name: counts.error_map(mask, truth) for name, mask in finals.items()}
-        found.add(errors, maps.changes(masks, truth))
+        packed = TruthBits.of(truth)
+        found.add(errors, maps.changes(list(masks), packed.pack(*masks.values()), packed))
     return found
 
 

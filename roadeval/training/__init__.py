@@ -1,7 +1,8 @@
 """How the pipeline learns: which frames, which pixels, what is fitted, and the model file."""
 
-from roadeval.training.fitting import Plan, TrainingError, fit
+from roadeval.training.fitting import TrainingError, fit
 from roadeval.training.model import Model, load_model, save_model
+from roadeval.training.plan import Plan
 from roadeval.training.settings import TrainingSettings
 
 __all__ = [

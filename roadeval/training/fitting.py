@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -15,6 +14,7 @@ from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import STAGES, Chain
 from roadeval.pipeline.stage import TrainingSet
 from roadeval.training.model import Model
+from roadeval.training.plan import Plan
 from roadeval.training.sampling import sample
 from roadeval.training.selfsupervision import patch_truth
 from roadeval.training.settings import TrainingSettings
@@ -26,20 +26,6 @@ rest of it, has collapsed."""
 
 class TrainingError(RoadevalError):
     """Frames that nothing can be learnt from, and why."""
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """What a variant's chain is, as training needs to know it: stages and their settings."""
-
-    chain: tuple[str, ...]
-    settings: Mapping[str, Any]
-
-    def relevant(self) -> dict[str, Any]:
-        """Give the settings that what is learnt depends on: of filters and learning stages."""
-        stages = [STAGES[name] for name in self.chain]
-        names = [s.name for s in stages if s.fit is not None or not s.yields_mask]
-        return {name: dataclasses.asdict(self.settings[name]) for name in names}
 
 
 def fit(

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import zipfile
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field, ValidationError
+from pydantic.dataclasses import dataclass as validated
 
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import STAGES
+from roadeval.pipeline.parameters import check_arrays, check_range
+from roadeval.training.plan import Plan, relevant
 
 FORMAT: Final = "roadeval-model"
 VERSION: Final = 1
@@ -56,23 +60,38 @@ class Model:
     prior: npt.NDArray[np.float32] | None = None
     warnings: tuple[str, ...] = field(default=())
 
-    def require(self, variant: str, settings: Mapping[str, Any], path: Path) -> None:
-        """Refuse, as a `ModelError`, a variant that this model was not made for."""
+    def __post_init__(self) -> None:
+        if self.prior is not None:
+            check_arrays(self, np.float32, prior=("H", "W"))
+            check_range("prior", self.prior, 0, 1)
+
+    def require(self, variant: str, plan: Plan, path: Path) -> None:
+        """Refuse, as a `ModelError`, a variant that this model was not made for.
+
+        Settings that a stage's decision alone follows may differ.
+        """
         if variant not in self.settings:
             known = ", ".join(sorted(self.settings))
             raise ModelError(
                 f"{path}: the model has no variant {variant} (it has {known}); "
                 "train one with the same --config and --variant options"
             )
-        made_for = self.settings[variant]
+        # Earlier versions kept the settings of the decision too.
+        made_for = {name: relevant(name, kept) for name, kept in self.settings[variant].items()}
         # Through JSON, as the file has been: tuples and lists are the same there.
-        wanted = json.loads(json.dumps(settings))
+        wanted = json.loads(json.dumps(plan.relevant()))
         for name in sorted({*made_for, *wanted}):
             if made_for.get(name) != wanted.get(name):
                 raise ModelError(
                     f"{path}: the model was made for other settings of {name} in variant "
                     f"{variant} ({_difference(made_for.get(name), wanted.get(name))}); "
                     "train one with the settings of this run"
+                )
+        for name in plan.learning():
+            if name not in self.parameters.get(variant, {}):
+                raise ModelError(
+                    f"{path}: the model file is incomplete: {name} of variant {variant} has "
+                    "learnt nothing; train it again"
                 )
 
 
@@ -113,8 +132,10 @@ def save_model(model: Model, path: Path) -> None:
             np.savez_compressed(file, allow_pickle=False, **arrays)
         partial.replace(path)
     except OSError as error:
-        partial.unlink(missing_ok=True)
         raise ModelError(f"{path}: cannot write the model: {error.strerror}") from error
+    finally:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
 
 
 def load_model(path: Path) -> Model:
@@ -123,18 +144,10 @@ def load_model(path: Path) -> Model:
     Raises
     ------
     ModelError
-        If the file is missing, no model, damaged, or of a later version.
+        If the file is missing, no model, damaged, or of a later version, or if it holds what
+        no training gives: arrays of a wrong shape, numbers that are not finite.
     """
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-        header = json.loads(arrays.pop("header").tobytes())
-    except FileNotFoundError as error:
-        raise ModelError(f"{path}: there is no such model file") from error
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, AttributeError) as error:
-        raise ModelError(
-            f"{path}: not a model file, or a damaged one; make one with 'roadeval train'"
-        ) from error
+    header, arrays = _content(path)
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise ModelError(f"{path}: not a model file; make one with 'roadeval train'")
     if header.get("version") != VERSION:
@@ -144,32 +157,73 @@ def load_model(path: Path) -> Model:
         )
     try:
         return _model(header, arrays)
-    except (KeyError, TypeError, ValueError) as error:
-        raise ModelError(f"{path}: the model file is incomplete: {error}") from error
+    except ValueError as error:
+        raise ModelError(f"{path}: a damaged model file: {_line(error)}; train it again") from error
 
 
-def _model(header: Mapping[str, Any], arrays: dict[str, npt.NDArray[Any]]) -> Model:
-    prior = arrays.pop("prior", None)
-    parts: dict[str, dict[str, dict[str, Any]]] = {variant: {} for variant in header["settings"]}
-    for name, array in arrays.items():
-        variant, stage, entry = name.split("/")
-        parts[variant].setdefault(stage, {})[entry] = array.item() if array.ndim == 0 else array
-    return Model(
-        {
-            variant: {stage: _parameters(stage, values) for stage, values in stages.items()}
-            for variant, stages in parts.items()
-        },
-        header["settings"],
-        header["source"],
-        frozenset(header["digests"]),
-        int(header["pixels"]),
-        prior,
-        tuple(header["warnings"]),
-    )
+def _content(path: Path) -> tuple[Any, dict[str, npt.NDArray[Any]]]:
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        return json.loads(arrays.pop("header").tobytes()), arrays
+    except FileNotFoundError as error:
+        raise ModelError(f"{path}: there is no such model file") from error
+    except (IsADirectoryError, PermissionError) as error:
+        raise ModelError(f"{path}: cannot read the model: {error.strerror}") from error
+    except Exception as error:  # archives are read by four libraries, each with errors of its own
+        raise ModelError(
+            f"{path}: not a model file, or a damaged one; make one with 'roadeval train'"
+        ) from error
 
 
-def _parameters(stage: str, values: Mapping[str, Any]) -> Any:
-    kind = STAGES[stage].parameters
+@validated(frozen=True)
+class _Header:
+    """What stands in a model file beside the arrays: see `Model`."""
+
+    settings: dict[str, dict[str, dict[str, Any]]]
+    source: Literal["truth", "patch"]
+    digests: frozenset[str]
+    pixels: Annotated[int, Field(ge=0)]
+    warnings: tuple[str, ...]
+
+
+def _model(content: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) -> Model:
+    """Put a model together; a ValueError if a part is missing, or is not what it must be."""
+    names = [entry.name for entry in dataclasses.fields(_Header)]
+    given: dict[str, Any] = {name: content.get(name) for name in names}
+    header = _Header(**given)
+    parts: dict[str, dict[str, dict[str, Any]]] = {variant: {} for variant in header.settings}
+    for name in arrays.keys() - {"prior"}:
+        variant, _, rest = name.partition("/")
+        stage, _, entry = rest.partition("/")
+        if variant not in parts:
+            raise ValueError(f"array {name} belongs to no variant")
+        parts[variant].setdefault(stage, {})[entry] = arrays[name]
+    parameters = {
+        variant: {stage: _parameters(variant, stage, each) for stage, each in stages.items()}
+        for variant, stages in parts.items()
+    }
+    return Model(parameters, **vars(header), prior=arrays.get("prior"))
+
+
+def _parameters(variant: str, stage: str, arrays: Mapping[str, npt.NDArray[Any]]) -> Any:
+    kind = STAGES[stage].parameters if stage in STAGES else None
     if kind is None:
-        raise ValueError(f"stage {stage} learns nothing")
-    return kind(**values)
+        raise ValueError(f"{variant}/{stage} is no stage that learns")
+    names = {entry.name for entry in dataclasses.fields(kind)}
+    if names != arrays.keys():
+        wrong = ", ".join(sorted(names ^ arrays.keys()))
+        raise ValueError(f"arrays of {variant}/{stage} are missing or unknown: {wrong}")
+    values = {name: array if array.ndim else array.item() for name, array in arrays.items()}
+    try:
+        return kind(**values)
+    except ValueError as error:
+        raise ValueError(f"{variant}/{stage}: {error}") from error
+
+
+def _line(error: ValueError) -> str:
+    """Say in one line what is wrong."""
+    if not isinstance(error, ValidationError):
+        return str(error)
+    problem = error.errors(include_url=False)[0]
+    return f"{'.'.join(map(str, problem['loc']))}: {problem['msg'].lower()}"

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Rgb, Truth
-from roadeval.pipeline.fast import KERNELS
+from roadeval.kernels import KERNELS
 from roadeval.pipeline.patch import patch_mask
 from roadeval.pipeline.similarity import limit
 from roadeval.training.settings import TrainingSettings
@@ -22,7 +23,8 @@ def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     patch = patch_mask(height, width, settings.patch) > 0
     colours = image[patch].astype(np.float64)
     precision = np.linalg.inv(np.cov(colours, rowvar=False, ddof=0) + np.eye(3))
-    _, near = KERNELS.mahalanobis(image, colours.mean(axis=0), precision, limit(settings.far))
+    mean, far = colours.mean(axis=0), limit(settings.far)
+    _, near = KERNELS.mahalanobis(cv2.split(image), mean, precision, far)
     truth = np.full((height, width), IGNORE, np.uint8)
     truth[near == 0] = NON_ROAD
     truth[: round(settings.horizon * height)] = NON_ROAD

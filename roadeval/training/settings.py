@@ -20,7 +20,8 @@ class TrainingSettings:
         ``auto``: the log's truth where it has one, else the reference patch; ``truth`` or
         ``patch`` insists.
     frames
-        The first so many labelled frames of the range (all frames count for ``patch``).
+        The first so many labelled frames of the range (all frames count for ``patch``). They are
+        held decoded, which bounds the number of large ones below the one allowed here.
     gap
         Frames after them that are not evaluated either: the neighbours of a training frame
         look like it, and flatter the result.

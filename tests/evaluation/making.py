@@ -10,12 +10,18 @@ import pandas as pd
 
 from roadeval.data import Counts, Frame, Mask, StageResult, Tally, Truth, VariantResult
 from roadeval.evaluation import rates
+from roadeval.evaluation.bits import Bits
 
 
 def pixels(*rows: str) -> npt.NDArray[np.uint8]:
     """Read an image from text: ``#`` is 1, ``.`` is 0, ``?`` is ignored."""
     values = {"#": 1, ".": 0, "?": 255}
     return np.array([[values[char] for char in row] for row in rows], np.uint8)
+
+
+def unpacked(bits: Bits, width: int) -> npt.NDArray[np.uint8]:
+    """Give the mask of ``width`` pixels a row that bits stand for."""
+    return np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little", count=width)
 
 
 def a_frame(truth: Truth | None, number: int = 0, shadow: Truth | None = None) -> Frame:

@@ -4,12 +4,21 @@ import numpy as np
 import pytest
 
 from roadeval.data import IGNORE, Change
+from roadeval.evaluation import maps
+from roadeval.evaluation.bits import TruthBits
 from roadeval.evaluation.counts import error_map
-from roadeval.evaluation.maps import HeatMap, Maps, changes
+from roadeval.evaluation.maps import HeatMap, Maps
 
 from .making import pixels
 
 TRUTH = pixels("##..", "##.?")
+
+
+def changes(masks, truth):
+    """Count the changes between masks that are not packed yet."""
+    packed = TruthBits.of(truth)
+    bits = packed.pack(*(mask for _, _, mask in masks))
+    return maps.changes([(variant, stage) for variant, stage, _ in masks], bits, packed)
 
 
 def heat_of(*masks, truth=TRUTH):
@@ -85,10 +94,10 @@ def test_changes_equal_a_plain_loop_over_pixels():
 
 
 def test_maps_add_up_over_frames():
-    maps = Maps()
+    found = Maps()
     mask = pixels("#...", "##..")
     for _ in range(3):
-        maps.add({"a": error_map(mask, TRUTH)}, {("a", "svm", "a", "post"): Change(1, 2, 7)})
-    assert maps.frames == 3
-    assert maps.changes == {("a", "svm", "a", "post"): Change(3, 6, 21)}
-    assert maps.heat["a"].sums()[2, 0, 1] == 3
+        found.add({"a": error_map(mask, TRUTH)}, {("a", "svm", "a", "post"): Change(1, 2, 7)})
+    assert found.frames == 3
+    assert found.changes == {("a", "svm", "a", "post"): Change(3, 6, 21)}
+    assert found.heat["a"].sums()[2, 0, 1] == 3

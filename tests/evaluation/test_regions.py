@@ -3,32 +3,48 @@
 import numpy as np
 
 from roadeval.evaluation import regions
+from roadeval.evaluation.bits import TruthBits
 
-from .making import a_frame, a_variant, pixels
+from .making import a_frame, a_variant, pixels, unpacked
+
+
+def boundary(truth, width):
+    return unpacked(regions.boundary(TruthBits.of(truth), width), truth.shape[1])
+
+
+def row_bands(shape, bands):
+    packed = regions.row_bands(shape, bands).items()
+    return {name: unpacked(bits, shape[1]) for name, bits in packed}
+
+
+def of_frame(frame, bands):
+    truth = TruthBits.of(frame.truth)
+    found = regions.of_frame(frame, truth, [], boundary_width=1, bands=bands).items()
+    return {name: unpacked(bits, frame.truth.shape[1]) for name, bits in found}
 
 
 def test_the_boundary_lies_within_its_width_on_both_sides_of_the_edge() -> None:
     truth = pixels("...####", "...####")
-    assert (regions.boundary(truth, 1) == pixels("..##...", "..##...")).all()
-    assert (regions.boundary(truth, 2) == pixels(".####..", ".####..")).all()
+    assert (boundary(truth, 1) == pixels("..##...", "..##...")).all()
+    assert (boundary(truth, 2) == pixels(".####..", ".####..")).all()
 
 
 def test_the_boundary_turns_corners() -> None:
     truth = pixels("....", ".#..", "....", "....")
-    assert (regions.boundary(truth, 1) == pixels("###.", "###.", "###.", "....")).all()
+    assert (boundary(truth, 1) == pixels("###.", "###.", "###.", "....")).all()
 
 
 def test_road_that_meets_ignored_pixels_has_no_edge_there() -> None:
     truth = pixels("##???..", "##???..")
-    assert not regions.boundary(truth, 1).any()
+    assert not boundary(truth, 1).any()
 
 
 def test_a_frame_of_one_class_has_no_boundary() -> None:
-    assert not regions.boundary(pixels("###", "###"), 2).any()
+    assert not boundary(pixels("###", "###"), 2).any()
 
 
 def test_bands_go_from_top_to_bottom_and_share_the_rows() -> None:
-    bands = regions.row_bands((7, 2), 5)
+    bands = row_bands((7, 2), 5)
     assert list(bands) == ["band_0", "band_1", "band_2", "band_3", "band_4"]
     assert sum(bands.values()).tolist() == [[1, 1]] * 7
     rows = [int(np.count_nonzero(band[:, 0])) for band in bands.values()]
@@ -38,7 +54,7 @@ def test_bands_go_from_top_to_bottom_and_share_the_rows() -> None:
 
 
 def test_more_bands_than_rows_leave_some_empty() -> None:
-    bands = regions.row_bands((2, 3), 5)
+    bands = row_bands((2, 3), 5)
     assert sum(bands.values()).tolist() == [[1, 1, 1]] * 2
 
 
@@ -53,14 +69,14 @@ def test_a_region_is_the_same_for_all_variants() -> None:
 def test_a_frame_has_true_shadow_only_if_the_log_has_it() -> None:
     truth = pixels("##..")
     every = {"boundary", "interior", "band_0", "band_1"}
-    found = regions.of_frame(a_frame(truth), [], boundary_width=1, bands=2)
+    found = of_frame(a_frame(truth), 2)
     assert set(found) == every
     shadowed = a_frame(truth, shadow=pixels("#.?#"))
-    found = regions.of_frame(shadowed, [], boundary_width=1, bands=2)
+    found = of_frame(shadowed, 2)
     assert set(found) == every | {"true_shadow"}
     assert (found["true_shadow"] == pixels("#..#")).all()
 
 
 def test_interior_is_what_the_boundary_leaves() -> None:
-    found = regions.of_frame(a_frame(pixels("...###")), [], boundary_width=1, bands=1)
+    found = of_frame(a_frame(pixels("...###")), 1)
     assert (found["interior"] == pixels("##..##")).all()

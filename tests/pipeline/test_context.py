@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from roadeval.pipeline import context, kernels, plain
+from roadeval.kernels import compiled, plain
+from roadeval.pipeline import context
 from roadeval.pipeline.chain import STAGES, layers_of, masks_of
 from roadeval.pipeline.context import ContextSettings
 from roadeval.pipeline.stage import Moment, TrainingSet, View
@@ -171,7 +172,7 @@ def test_the_compiled_kernel_equals_its_plain_twin(pixels):
         rng.normal(size=shape).astype(np.float32) for shape in ((5, pixels), (7, 5), 7, 7)
     )
     np.testing.assert_array_equal(
-        kernels.rectified_sum(features, planes, bias, weights),
+        compiled.rectified_sum(features, planes, bias, weights),
         plain.rectified_sum(features, planes, bias, weights),
     )
 

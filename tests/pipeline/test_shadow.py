@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 from skimage.filters import threshold_otsu
 
+from roadeval.kernels import plain
 from roadeval.pipeline import shadow
 from roadeval.pipeline.shadow import ShadowSettings
 from roadeval.pipeline.stage import View
@@ -22,7 +23,7 @@ PRINTED = ShadowSettings(
 
 
 def codes_of(image):
-    return shadow.KERNELS.look_up_sum_min(image, shadow.NDI_CODES)
+    return shadow.KERNELS.look_up_sum_min(cv2.split(image), shadow.NDI_CODES)
 
 
 def run(image, options=None):
@@ -176,7 +177,8 @@ CROSS, SQUARE = ndimage.generate_binary_structure(2, 1), ndimage.generate_binary
 @given(shadowed=masks)
 @settings(max_examples=60)
 def test_components_are_the_fixed_points_of_the_iteration(connectivity, b, shadowed):
-    labels, count = shadow.connected_components(shadowed, connectivity)
+    found = shadow.connected_components(shadowed, connectivity)
+    labels, count = found.labels, found.count
     assert set(np.unique(labels)) - {0} == set(range(1, count + 1))
     assert ((labels > 0) == shadowed).all()
     for seed in zip(*np.nonzero(shadowed), strict=True):
@@ -212,7 +214,7 @@ def literal_rings(shadowed, labels, width):
 @given(shadowed=masks, width=st.integers(1, 3))
 @settings(max_examples=60)
 def test_rings_equal_the_dilation_of_each_component_alone(connectivity, shadowed, width):
-    labels, _ = shadow.connected_components(shadowed, connectivity)
+    labels = shadow.connected_components(shadowed, connectivity).labels
     union = shadow.buffer_ring(shadowed, width)
     label, pixel = shadow.ring_pairs(labels, union, width)
     expected = list(literal_rings(shadowed, labels, width))
@@ -226,9 +228,14 @@ def test_a_pixel_between_two_components_counts_in_both_rings():
     image = noise(1, 7)
     labels = np.array([[0, 1, 0, 0, 2, 0, 0]], np.int32)
     ring = shadow.buffer_ring((labels > 0).astype(np.uint8), 2)
-    _, outside = shadow.KERNELS.region_sums(image, labels, ring, 3, 2)
+    outside = shadow.KERNELS.ring_sums(image, labels, ring, 3, 2)
     assert outside[1, 1:4].tolist() == image[0, [0, 2, 3]].sum(axis=0).tolist()
     assert outside[2, 1:4].tolist() == image[0, [2, 3, 5, 6]].sum(axis=0).tolist()
+
+
+def one(labels):
+    """The component that a hand-made label image holds."""
+    return shadow.Components(labels, plain.label_runs(labels), 1)
 
 
 # --- Eq. 11 ---------------------------------------------------------------------------------------
@@ -240,12 +247,12 @@ def test_compensation_by_hand():
     image = np.repeat(grey[..., None], 3, axis=2)
     labels = np.array([[0, 1, 0], [0, 1, 0]], np.int32)
     ring = (labels == 0).astype(np.uint8)
-    result, change = shadow.compensate(image, labels, 1, ring, ShadowSettings())
+    result, change = shadow.compensate(image, one(labels), ring, ShadowSettings())
     assert change.gain[1].tolist() == [3.0, 3.0, 3.0]
     assert result[..., 0].tolist() == [[94, 94, 106], [94, 106, 106]]
 
     printed = ShadowSettings(statistic="printed")
-    result, change = shadow.compensate(image, labels, 1, ring, printed)
+    result, change = shadow.compensate(image, one(labels), ring, printed)
     assert change.gain[1, 0] == pytest.approx(4 / 36)
     assert result[..., 0].tolist() == [[94, 100, 106], [94, 100, 106]]
 
@@ -290,9 +297,9 @@ options = st.builds(
 
 def check_rgb(image, chosen):
     shadowed = run(image, chosen)[1]["shadow"]
-    labels, count = shadow.connected_components(shadowed, chosen.connectivity)
+    found = shadow.connected_components(shadowed, chosen.connectivity)
     ring = shadow.buffer_ring(shadowed, chosen.ring_width)
-    result, _ = shadow.compensate(image, labels, count, ring, chosen)
+    result, _ = shadow.compensate(image, found, ring, chosen)
     connectivity = 2 if chosen.connectivity == 8 else 1
     assert_rounded(result, literal_eq_11(image, shadowed, chosen, connectivity))
     np.testing.assert_array_equal(result[shadowed == 0], image[shadowed == 0])
@@ -330,7 +337,7 @@ def test_a_component_gets_the_mean_and_deviation_of_its_ring():
     labels = np.zeros((40, 40), np.int32)
     labels[10:30, 10:30] = 1
     ring = shadow.buffer_ring(labels.astype(np.uint8), 3)
-    result, _ = shadow.compensate(image, labels, 1, ring, ShadowSettings(ring_width=3))
+    result, _ = shadow.compensate(image, one(labels), ring, ShadowSettings(ring_width=3))
     around, inside = image[ring > 0].astype(float), result[labels > 0].astype(float)
     # Rounding moves no pixel, and so neither statistic, by more than half a level.
     np.testing.assert_allclose(inside.mean(axis=0), around.mean(axis=0), rtol=0, atol=0.5)
@@ -341,7 +348,7 @@ def test_a_constant_component_takes_the_mean_of_its_ring_with_gain_1():
     image = picture("....", ".#..", "....")
     labels = mask("....", ".#..", "....").astype(np.int32)
     ring = shadow.buffer_ring(labels.astype(np.uint8), 1)
-    result, change = shadow.compensate(image, labels, 1, ring, ShadowSettings())
+    result, change = shadow.compensate(image, one(labels), ring, ShadowSettings())
     assert change.gain[1].tolist() == [1.0, 1.0, 1.0]
     assert result[1, 1].tolist() == np.rint(image[ring > 0].mean(axis=0)).tolist()
 
@@ -351,7 +358,7 @@ def test_a_component_without_a_ring_is_left_as_it_is(colour_space):
     image = noise(3, 4)
     labels, ring = np.ones((3, 4), np.int32), np.zeros((3, 4), np.uint8)
     chosen = ShadowSettings(colour_space=colour_space)
-    result, change = shadow.compensate(image, labels, 1, ring, chosen)
+    result, change = shadow.compensate(image, one(labels), ring, chosen)
     np.testing.assert_array_equal(result, image)
     assert change.applied.tolist() == [False, False]
 
@@ -361,14 +368,14 @@ def test_the_gain_may_be_bounded_and_is_not_by_default():
     labels = np.array([[0, 1, 1, 0]], np.int32)
     ring = np.array([[1, 0, 0, 1]], np.uint8)
     for most, gain in ((None, 125.0), (4.0, 4.0)):
-        _, change = shadow.compensate(image, labels, 1, ring, ShadowSettings(max_gain=most))
+        _, change = shadow.compensate(image, one(labels), ring, ShadowSettings(max_gain=most))
         assert change.gain[1, 0] == gain
 
 
 @given(images())
 def test_moments_equal_numpy_on_the_pixels_themselves(image):
     labels = np.ones(image.shape[:2], np.int32)
-    sums, _ = shadow.KERNELS.region_sums(image, labels, np.zeros_like(labels, np.uint8), 2, 1)
+    sums = shadow.KERNELS.run_sums(image, one(labels).runs, 2)
     moments = shadow.moments_of_sums(sums)
     pixels = image.reshape(-1, 3).astype(float)
     assert moments.pixels[1] == len(pixels)
@@ -438,9 +445,9 @@ def test_facts_state_threshold_components_and_gains():
     assert facts["threshold"] == pytest.approx(shadow.otsu_threshold(histogram) / 127.5 - 1)
     assert facts["shadow_share"] == pytest.approx(3 / 15)
     assert facts["components"] == facts["compensated"] == 2
-    labels, count = shadow.connected_components(run(image)[1]["shadow"], 8)
-    ring = shadow.buffer_ring((labels > 0).astype(np.uint8), 1)
-    _, change = shadow.compensate(image, labels, count, ring, ShadowSettings())
+    found = shadow.connected_components(run(image)[1]["shadow"], 8)
+    ring = shadow.buffer_ring((found.labels > 0).astype(np.uint8), 1)
+    _, change = shadow.compensate(image, found, ring, ShadowSettings())
     assert facts["max_gain"] == change.gain.max() > 3
     assert facts["gains_above_3"] == (change.gain > 3).any(axis=1).sum() == 1
     left = shadow.bind(ShadowSettings(min_area=2), None)(View(image, image)).facts

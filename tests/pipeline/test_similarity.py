@@ -1,5 +1,6 @@
 """Eq. 2 against SciPy and scikit-learn."""
 
+import cv2
 import numpy as np
 import pytest
 from scipy.spatial.distance import mahalanobis
@@ -59,7 +60,7 @@ def test_distance_equals_scikit_learns():
     model = EmpiricalCovariance().fit(grey_road())
     expected = model.mahalanobis(noise(20, 20).reshape(-1, 3))
     distance, _ = similarity.KERNELS.mahalanobis(
-        noise(20, 20), model.location_, model.precision_, 7.8
+        cv2.split(noise(20, 20)), model.location_, model.precision_, 7.8
     )
     np.testing.assert_allclose(distance.ravel(), np.sqrt(expected), rtol=1e-6)
 

@@ -6,8 +6,7 @@ import pytest
 from roadeval.config import Config
 from roadeval.data import IGNORE
 from roadeval.pipeline.chain import Chain
-from roadeval.training import TrainingError, TrainingSettings, fit
-from roadeval.training.fitting import Plan
+from roadeval.training import Plan, TrainingError, TrainingSettings, fit
 from roadeval.training.selfsupervision import patch_truth
 from tests.training.making import frame, plans
 

@@ -3,12 +3,14 @@
 import dataclasses
 import json
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from roadeval.config import Config
+from roadeval.config import Config, preset
 from roadeval.errors import RoadevalError
+from roadeval.pipeline.context import ContextSettings
 from roadeval.training import Model, TrainingSettings, fit, load_model, save_model
 from tests.training.making import frame, plans
 
@@ -50,7 +52,7 @@ def test_nothing_is_left_beside_the_model(path):
 
 def test_the_settings_it_was_made_for_are_accepted(path):
     for name, plan in plans().items():
-        load_model(path).require(name, plan.relevant(), path)
+        load_model(path).require(name, plan, path)
 
 
 def test_other_settings_are_refused_by_name(path):
@@ -59,7 +61,7 @@ def test_other_settings_are_refused_by_name(path):
     settings["svm"] = type(settings["svm"])(gamma=2.0)
     plan = dataclasses.replace(config.plan(), settings=settings)
     with pytest.raises(RoadevalError, match=r"settings of svm .*gamma 0.5 there, 2.0 here"):
-        load_model(path).require("filtered", plan.relevant(), path)
+        load_model(path).require("filtered", plan, path)
 
 
 def test_settings_of_stages_that_learn_nothing_do_not_matter(path):
@@ -67,12 +69,49 @@ def test_settings_of_stages_that_learn_nothing_do_not_matter(path):
     settings = dict(config.stages)
     settings["post"] = type(settings["post"])(element=9)
     plan = dataclasses.replace(config.plan(), settings=settings)
-    load_model(path).require("filtered", plan.relevant(), path)
+    load_model(path).require("filtered", plan, path)
+
+
+@pytest.mark.parametrize(
+    ("name", "stage", "setting"),
+    [
+        ("paper", "svm", {"threshold": 0.3}),
+        ("paper", "similarity", {"quantile": 0.5, "ridge": 4.0}),
+        ("robust", "context", {"smoothing": 1, "memory": 0.2}),
+    ],
+)
+def test_settings_that_decide_and_teach_nothing_may_differ(tmp_path, name, stage, setting):
+    plan = preset(name).plan()
+    save_model(fit([frame(0)], {"x": plan}, TrainingSettings()), tmp_path / "x.model")
+    settings = {**plan.settings, stage: dataclasses.replace(plan.settings[stage], **setting)}
+    other = dataclasses.replace(plan, settings=settings)
+    load_model(tmp_path / "x.model").require("x", other, tmp_path / "x.model")
+
+
+@pytest.mark.parametrize("thresholds", [(None, 0.3), (0.3, None), (0.3, 0.2)])
+def test_a_threshold_that_is_learnt_or_given_in_its_place_must_agree(tmp_path, thresholds):
+    plan = preset("robust").plan()
+    made, wanted = (
+        dataclasses.replace(
+            plan, settings={**plan.settings, "context": ContextSettings(threshold=threshold)}
+        )
+        for threshold in thresholds
+    )
+    model = fit([frame(0)], {"x": made}, TrainingSettings())
+    with pytest.raises(RoadevalError, match=r"settings of context .*threshold"):
+        model.require("x", wanted, tmp_path / "x.model")
+
+
+def test_files_that_kept_the_settings_of_the_decision_too_are_accepted(model, path):
+    kept = {name: dict(stages) for name, stages in model.settings.items()}
+    kept["filtered"]["svm"] = {**kept["filtered"]["svm"], "threshold": 0.0}
+    save_model(dataclasses.replace(model, settings=kept), path)
+    load_model(path).require("filtered", plans()["filtered"], path)
 
 
 def test_a_variant_it_was_not_trained_for_is_refused(path):
     with pytest.raises(RoadevalError, match=r"no variant night .it has filtered, unfiltered"):
-        load_model(path).require("night", {}, path)
+        load_model(path).require("night", plans()["filtered"], path)
 
 
 def test_a_missing_file_is_one_line(tmp_path):
@@ -122,3 +161,33 @@ def test_a_later_version_is_refused(path):
 def test_a_folder_that_is_missing_is_one_line(model, tmp_path):
     with pytest.raises(RoadevalError, match="cannot write the model"):
         save_model(model, tmp_path / "no" / "city.model")
+
+
+@pytest.mark.parametrize("end", [KeyboardInterrupt, MemoryError])
+def test_whatever_ends_the_writing_leaves_no_file(model, tmp_path, monkeypatch, end):
+    def torn(file, **given):
+        file.write(b"half")
+        raise end
+
+    monkeypatch.setattr(np, "savez_compressed", torn)
+    with pytest.raises(end):
+        save_model(model, tmp_path / "city.model")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupted_writing_leaves_the_model_that_was_there(model, path, monkeypatch):
+    before = path.read_bytes()
+    monkeypatch.setattr(np, "savez_compressed", Mock(side_effect=KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        save_model(model, path)
+    assert path.read_bytes() == before
+
+
+def test_a_file_in_the_place_of_a_folder_is_one_line(model, path):
+    with pytest.raises(RoadevalError, match="cannot write the model"):
+        save_model(model, path / "city.model")
+
+
+def test_a_folder_is_no_model(tmp_path):
+    with pytest.raises(RoadevalError, match="cannot read the model: Is a directory"):
+        load_model(tmp_path)

@@ -1,0 +1,97 @@
+"""Masks as bits: a machine word holds 64 pixels, so that many masks are counted in one pass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from math import isqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import NON_ROAD, ROAD, Mask, Truth
+from roadeval.kernels import KERNELS
+
+Bits = npt.NDArray[np.uint64]
+"""``(H, words)`` uint64 of an ``(H, W)`` mask, the leftmost pixel in the lowest bit; those beyond
+the width are 0. ``(K, H, words)`` of K masks."""
+Reach = npt.NDArray[np.int64]
+"""``(r + 1,)``: how far a symmetric element extends sideways, by rows from its centre."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TruthBits:
+    """A truth as bits: ``shape`` (H, W), the ``road`` and the ``other`` (non-road) pixels."""
+
+    shape: tuple[int, int]
+    road: Bits
+    other: Bits
+
+    @classmethod
+    def of(cls, truth: Truth) -> TruthBits:
+        """Pack an ``(H, W)`` uint8 truth (0, 1, 255)."""
+        height, width = truth.shape
+        return cls((height, width), _pack(truth == ROAD), _pack(truth == NON_ROAD))
+
+    @property
+    def labelled(self) -> Bits:
+        """The pixels that are not ignored."""
+        return self.road | self.other
+
+    def pack(self, *masks: Mask) -> Bits:
+        """Pack masks of the truth's shape, non-zero inside: ``(K, H, words)``.
+
+        Raises
+        ------
+        ValueError
+            If one has another shape.
+        """
+        for mask in masks:
+            if mask.shape != self.shape:
+                raise ValueError(f"shape {mask.shape} differs from the truth's {self.shape}")
+        packed = np.zeros((len(masks), *self.road.shape), np.uint64)
+        for bits, mask in zip(packed, masks, strict=True):
+            bits[:] = _pack(mask)
+        return packed
+
+    def grow(self, bits: Bits, reach: Reach) -> Bits:
+        """Dilate a mask of the truth's shape by an element."""
+        grown: Bits = KERNELS.grow(bits, reach, self.shape[1])
+        return grown
+
+
+def ones(bits: Bits) -> int:
+    """Count the set bits."""
+    return int(np.bitwise_count(bits).sum())
+
+
+@lru_cache(maxsize=8)
+def everywhere(shape: tuple[int, int]) -> Bits:
+    """Give the mask that holds every pixel of an image of ``shape`` (H, W)."""
+    return _pack(np.ones(shape, np.uint8))
+
+
+@lru_cache(maxsize=8)
+def square(radius: int) -> Reach:
+    """Give the offsets within ``radius``, in chessboard distance."""
+    return np.full(radius + 1, radius)
+
+
+@lru_cache(maxsize=8)
+def disk(radius: int) -> Reach:
+    """Give the offsets within ``radius``, in Euclidean distance."""
+    return np.array([isqrt(radius**2 - row**2) for row in range(radius + 1)])
+
+
+def flat(masks: Bits | Sequence[Bits]) -> Bits:
+    """Lay each mask's rows one after the other: ``(K, H * words)``."""
+    stacked = np.asarray(masks, np.uint64)
+    return stacked.reshape(len(stacked), stacked.shape[1] * stacked.shape[2])
+
+
+def _pack(mask: npt.NDArray[np.uint8] | npt.NDArray[np.bool_]) -> Bits:
+    packed = np.packbits(mask, axis=1, bitorder="little")
+    if packed.shape[1] % 8:
+        packed = np.pad(packed, ((0, 0), (0, -packed.shape[1] % 8)))
+    return packed.view(np.uint64)

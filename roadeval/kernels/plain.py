@@ -1,0 +1,308 @@
+"""The twins of the compiled kernels: the definitions, and the way out where none compile."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+Codes = npt.NDArray[np.uint8]
+Labels = npt.NDArray[np.int32]
+Runs = npt.NDArray[np.int32]
+Sums = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.uint8]
+Planes = Sequence[npt.NDArray[np.uint8]]
+Bits = npt.NDArray[np.uint64]
+"""64 pixels a word, the leftmost in the lowest bit."""
+
+
+# --- Colours --------------------------------------------------------------------------------------
+
+
+def look_up_sum_min(planes: Planes, table: Codes) -> tuple[Codes, npt.NDArray[np.int64]]:
+    """Look every pixel up by the sum and the minimum of its channels.
+
+    Parameters
+    ----------
+    planes
+        Red, green and blue, ``(H, W)`` uint8 each.
+    table
+        ``(766, 256)`` uint8, indexed by ``R + G + B`` and ``min(R, G, B)``.
+
+    Returns
+    -------
+    codes, histogram
+        ``(H, W)`` uint8, and ``(256,)`` int64: how often each code occurs.
+    """
+    codes = table[np.sum(planes, axis=0, dtype=np.int64), np.min(planes, axis=0)]
+    return codes, np.bincount(codes.ravel(), minlength=256)
+
+
+def run_sums(image: npt.NDArray[np.uint8], runs: Runs, count: int) -> Sums:
+    """Sum the colours of every label's runs.
+
+    Parameters
+    ----------
+    image
+        ``(H, W, 3)`` uint8.
+    runs
+        ``(n, 4)`` int32, see `components`.
+    count
+        Number of labels, background included.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(count, 7)`` int64: pixels, sums of R, G, B, and sums of their squares.
+    """
+    y, x, label = _pixels(runs)
+    return _sums(label, image[y, x], count)
+
+
+def ring_sums(
+    image: npt.NDArray[np.uint8], labels: Labels, ring: Codes, count: int, width: int
+) -> Sums:
+    """Sum the colours of every component's buffer ring (Eq. 10).
+
+    Parameters
+    ----------
+    image
+        ``(H, W, 3)`` uint8.
+    labels
+        ``(H, W)`` int32: 0 outside the shadow, else the component.
+    ring
+        ``(H, W)`` uint8: nonzero on pixels outside the shadow that some dilation reaches.
+    count
+        Number of labels, background included.
+    width
+        Number of 3x3 dilations: a ring pixel lies within this Chebyshev distance.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(count, 7)`` int64, as in `run_sums`. A pixel counts once in each component that
+        reaches it.
+    """
+    y, x = np.nonzero(ring)
+    padded = np.pad(labels, width)
+    window = np.lib.stride_tricks.sliding_window_view(padded, (2 * width + 1, 2 * width + 1))
+    near = window[y, x].reshape(len(y), (2 * width + 1) ** 2)
+    pixel = np.repeat(np.arange(len(y)), near.shape[1])
+    pairs = np.unique(pixel * count + near.ravel())
+    pairs = pairs[pairs % count > 0]
+    return _sums(pairs % count, image[y, x][pairs // count], count)
+
+
+def _pixels(runs: Runs) -> tuple[npt.NDArray[np.int64], ...]:
+    """Row, column and label of every pixel of some runs, ``(n,)`` each."""
+    y, start, end, label = runs.T.astype(np.int64)
+    length = end - start
+    first = np.repeat(start - np.cumsum(length) + length, length)
+    return np.repeat(y, length), first + np.arange(len(first)), np.repeat(label, length)
+
+
+def _sums(labels: npt.NDArray[np.integer], colours: npt.NDArray[np.uint8], count: int) -> Sums:
+    values = colours.astype(np.float64)
+    columns: list[npt.NDArray[np.float64]] = [np.bincount(labels, minlength=count).astype(float)]
+    # Sums of 8-bit values and of their squares stay far below 2^53: float64 adds them exactly.
+    columns += [np.bincount(labels, values[:, c], count).astype(float) for c in range(3)]
+    columns += [np.bincount(labels, values[:, c] ** 2, count).astype(float) for c in range(3)]
+    return np.stack(columns, axis=1).astype(np.int64)
+
+
+def transfer(
+    image: npt.NDArray[np.uint8],
+    runs: Runs,
+    source: npt.NDArray[np.float64],
+    target: npt.NDArray[np.float64],
+    gain: npt.NDArray[np.float64],
+) -> npt.NDArray[np.uint8]:
+    """Map each component's colours to ``target + (I - source) * gain``, rounded and clipped.
+
+    ``runs`` are ``(n, 4)``, see `components`; ``source``, ``target`` and ``gain`` ``(count, 3)``
+    float64, by label and channel. Returns ``(H, W, 3)`` uint8, elsewhere as it was.
+    """
+    result = image.copy()
+    y, x, k = _pixels(runs)
+    value = target[k] + (image[y, x] - source[k]) * gain[k]
+    result[y, x] = np.clip(np.rint(value), 0, 255).astype(np.uint8)
+    return result
+
+
+def mahalanobis(
+    planes: Planes,
+    mean: npt.NDArray[np.float64],
+    precision: npt.NDArray[np.float64],
+    greatest: float,
+) -> tuple[npt.NDArray[np.float32], Codes]:
+    """Distance of Eq. 2, the root of ``(x - m)^T P (x - m)``, of every pixel.
+
+    Parameters
+    ----------
+    planes
+        Red, green and blue, ``(H, W)`` uint8 each.
+    mean, precision
+        m, ``(3,)``, and the symmetric inverse covariance P, ``(3, 3)``.
+    greatest
+        Of the square, up to which a pixel is near.
+
+    Returns
+    -------
+    distance, near
+        ``(H, W)`` float32, and ``(H, W)`` uint8, decided in float64: 1 near, 0 far.
+    """
+    r, g, b = (plane - level for plane, level in zip(planes, mean, strict=True))
+    squared: npt.NDArray[np.float64] = (
+        precision[0, 0] * (r * r)
+        + precision[1, 1] * (g * g)
+        + precision[2, 2] * (b * b)
+        + 2.0 * precision[0, 1] * (r * g)
+        + 2.0 * precision[0, 2] * (r * b)
+        + 2.0 * precision[1, 2] * (g * b)
+    )
+    return np.sqrt(squared.astype(np.float32)), (squared <= greatest).astype(np.uint8)
+
+
+def look_up_colours(image: npt.NDArray[np.uint8], table: Codes) -> Codes:
+    """Look every pixel up in a table over all 2^24 colours, index ``R << 16 | G << 8 | B``."""
+    wide = image.astype(np.int32)
+    found: Codes = table[(wide[..., 0] << 16) | (wide[..., 1] << 8) | wide[..., 2]]
+    return found
+
+
+def rectified_sum(
+    features: npt.NDArray[np.float32],
+    planes: npt.NDArray[np.float32],
+    bias: npt.NDArray[np.float32],
+    weights: npt.NDArray[np.float32],
+) -> npt.NDArray[np.float32]:
+    """Sum ``sum_k weights[k] max(planes[k] . x + bias[k], 0)`` of every pixel's features x.
+
+    Parameters
+    ----------
+    features
+        ``(F, n)`` float32: a row a feature, a column a pixel.
+    planes, bias, weights
+        ``(K, F)``, ``(K,)`` and ``(K,)`` float32.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(n,)`` float32, added up in the order of the planes.
+    """
+    result = np.zeros(features.shape[1], np.float32)
+    for plane, start, weight in zip(planes, bias, weights, strict=True):
+        side = np.full_like(result, start)
+        for feature, slope in zip(features, plane, strict=True):
+            side += feature * slope
+        result += np.maximum(side, np.float32(0)) * weight
+    return result
+
+
+# --- Masks ----------------------------------------------------------------------------------------
+
+
+def components(mask: Mask, connectivity: int) -> tuple[Labels, Runs, int]:
+    """Label what is connected in an ``(H, W)`` mask, 0 or 1 (Eq. 9).
+
+    Parameters
+    ----------
+    mask
+        ``(H, W)`` uint8.
+    connectivity
+        8, or 4 where pixels that touch by a corner are not connected.
+
+    Returns
+    -------
+    labels, runs, count
+        ``(H, W)`` int32: 0, or the component's number from 1, in the order of their first pixels;
+        ``(n, 4)`` int32: row, first column, column after the last, and label of each of their
+        rows' stretches; and how many components there are.
+    """
+    count, found = cv2.connectedComponents(np.ascontiguousarray(mask), connectivity=connectivity)
+    # The library numbers them by blocks of rows.
+    seen, first = np.unique(found, return_index=True)
+    order = seen[seen > 0][np.argsort(first[seen > 0])]
+    number = np.zeros(count, np.int32)
+    number[order] = np.arange(1, count)
+    labels = number[found]
+    return labels, label_runs(labels), count - 1
+
+
+def label_runs(labels: Labels) -> Runs:
+    """Find the rows' stretches of equal labels of an ``(H, W)`` int32 image, see `components`."""
+    begins = np.ones((labels.shape[0], labels.shape[1] + 1), np.bool_)
+    begins[:, 1:-1] = labels[:, 1:] != labels[:, :-1]
+    y, x = np.nonzero(begins)
+    runs = np.stack([y[:-1], x[:-1], x[1:]], axis=1)[y[:-1] == y[1:]]
+    label = labels[runs[:, 0], runs[:, 1]]
+    found: Runs = np.column_stack([runs, label])[label > 0].astype(np.int32)
+    return found
+
+
+def keep_region(mask: Mask, patch: Mask) -> Mask:
+    """Keep one 8-connected component of an ``(H, W)`` mask, 0 or 1; an empty one stays empty.
+
+    The one with most pixels where ``patch``, ``(H, W)`` or empty, is nonzero; the largest where
+    none has any there. Of equals the first from the top.
+    """
+    count, labels = cv2.connectedComponents(np.ascontiguousarray(mask))
+    if count <= 1:
+        return mask.copy()
+    votes = np.bincount(labels.ravel(), minlength=count)[1:]
+    if patch.size:
+        inside = np.bincount(labels[patch > 0], minlength=count)[1:]
+        votes = inside if inside.any() else votes
+    best = np.flatnonzero(votes == votes.max()) + 1
+    # The library numbers components by blocks of rows: of equals, the first pixel decides.
+    first = best[0] if len(best) == 1 else labels[np.isin(labels, best)][0]
+    kept: Mask = (labels == first).astype(np.uint8)
+    return kept
+
+
+def fill_holes(mask: Mask) -> Mask:
+    """Fill what an ``(H, W)`` mask, 0 or 1, encloses.
+
+    A hole is a 4-connected set of zeros that does not reach the outside of the image.
+    """
+    outside = np.ascontiguousarray(np.pad(mask, 1))
+    cv2.floodFill(outside, None, (0, 0), 2, flags=4)
+    filled: Mask = (outside[1:-1, 1:-1] != 2).astype(np.uint8)
+    return filled
+
+
+def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
+    """Count pixels in a mask, of a class and in a region: the set bits of three words' conjunction.
+
+    ``masks``, ``classes`` and ``regions`` are ``(M, n)``, ``(C, n)`` and ``(R, n)`` uint64; the
+    counts are ``(M, C, R)`` int64.
+    """
+    both = classes[:, None] & regions[None]
+    counts = [np.bitwise_count(both & mask).sum(axis=2, dtype=np.int64) for mask in masks]
+    return np.array(counts, np.int64).reshape(len(masks), *both.shape[:2])
+
+
+def grow(bits: Bits, reach: Sums, width: int) -> Bits:
+    """Dilate a mask by an element that is symmetric in both directions.
+
+    Parameters
+    ----------
+    bits
+        ``(H, words)`` uint64 of a mask of ``width`` pixels a row; the bits beyond are 0.
+    reach
+        ``(r + 1,)`` int64: how many pixels the element extends to either side, in its own row and
+        in each of the r rows above and below.
+    width
+        Of the mask, in pixels.
+    """
+    side = 2 * max(len(reach) - 1, int(reach.max())) + 1
+    rows, columns = np.abs(np.indices((side, side)) - side // 2)
+    near = rows < len(reach)
+    near &= columns <= reach[np.minimum(rows, len(reach) - 1)]
+    mask = np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little", count=width)
+    grown = np.zeros((len(bits), bits.shape[1] * 8), np.uint8)
+    packed = np.packbits(cv2.dilate(mask, near.astype(np.uint8)), axis=1, bitorder="little")
+    grown[:, : packed.shape[1]] = packed
+    return grown.view(np.uint64)

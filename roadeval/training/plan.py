@@ -1,0 +1,42 @@
+"""What a variant's chain is, as training and model files need to know it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from roadeval.pipeline.chain import STAGES
+
+DECIDING: Final[Mapping[str, frozenset[str]]] = {
+    "similarity": frozenset({"quantile", "ridge"}),
+    "svm": frozenset({"threshold"}),
+    "context": frozenset({"memory", "smoothing"}),
+}
+"""By stage: the settings that its decision follows, but nothing that it learns. The threshold of
+``context`` is not among them: it is learnt, or takes the place of what would have been."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A variant's stages, in the order they run, and the settings of each."""
+
+    chain: tuple[str, ...]
+    settings: Mapping[str, Any]
+
+    def learning(self) -> tuple[str, ...]:
+        """Name the stages that learn."""
+        return tuple(name for name in self.chain if STAGES[name].fit is not None)
+
+    def relevant(self) -> dict[str, dict[str, Any]]:
+        """Give the settings that what is learnt depends on, by stage: filters, and `learning`."""
+        learning = self.learning()
+        names = [name for name in self.chain if name in learning or not STAGES[name].yields_mask]
+        return {name: relevant(name, dataclasses.asdict(self.settings[name])) for name in names}
+
+
+def relevant(stage: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Leave the settings out of a stage's that only its decision follows."""
+    deciding = DECIDING.get(stage, frozenset())
+    return {key: value for key, value in settings.items() if key not in deciding}

@@ -1,0 +1,230 @@
+"""The compiled kernels equal their NumPy twins bit for bit, whatever the arrays look like."""
+
+from inspect import isfunction
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from roadeval import kernels
+from roadeval.kernels import compiled as fast
+from roadeval.kernels import plain
+from roadeval.pipeline import shadow
+from tests.pipeline.images import IMAGES, images, noise
+
+RNG = np.random.default_rng(0)
+COLOUR_TABLE = RNG.integers(0, 256, 1 << 24, dtype=np.uint8)
+PRECISION = np.linalg.inv(np.cov(RNG.normal(0, 30, (3, 50))))
+
+
+def segments(image, width):
+    codes, histogram = plain.look_up_sum_min(cv2.split(image), shadow.NDI_CODES)
+    mask = shadow.shadow_mask(codes, shadow.otsu_threshold(histogram), inclusive=False)
+    labels, runs, count = plain.components(mask, 8)
+    return labels, runs, shadow.buffer_ring(mask, width), count + 1
+
+
+def every_kernel(image, width):
+    """Name, and arguments, of each kernel on an image."""
+    labels, runs, ring, count = segments(image, width)
+    source, target = RNG.uniform(-20, 280, (2, count, 3))
+    gain = RNG.uniform(0, 9, (count, 3))
+    planes = cv2.split(image)
+    return {
+        "look_up_sum_min": (planes, shadow.NDI_CODES),
+        "run_sums": (image, runs, count),
+        "ring_sums": (image, labels, ring, count, width),
+        "label_runs": (labels,),
+        "transfer": (image, runs, source, target, gain),
+        "mahalanobis": (planes, np.array([90.5, 101.25, 99.0]), PRECISION, 7.8),
+        "look_up_colours": (image, COLOUR_TABLE),
+    }
+
+
+def assert_same(found, twin, name=""):
+    if isinstance(twin, tuple):
+        for mine, its in zip(found, twin, strict=True):
+            assert_same(mine, its, name)
+    elif isinstance(twin, int):
+        assert found == twin, name
+    else:
+        assert (found.dtype, found.shape) == (twin.dtype, twin.shape), name
+        np.testing.assert_array_equal(found, twin, err_msg=name)
+
+
+def assert_twins(image, width=1):
+    before = image.copy()
+    for name, arguments in every_kernel(image, width).items():
+        compiled = getattr(fast, name)(*arguments)
+        twin = getattr(plain, name)(*arguments)
+        assert_same(compiled, twin, name)
+    np.testing.assert_array_equal(image, before)
+
+
+@pytest.mark.parametrize("width", [1, 3])
+@pytest.mark.parametrize("image", IMAGES.values(), ids=IMAGES)
+def test_twins_agree_on_odd_images(image, width):
+    assert_twins(image, width)
+
+
+@given(images(), st.integers(1, 4))
+@settings(max_examples=50, deadline=None)
+def test_twins_agree_on_random_images(image, width):
+    assert_twins(image, width)
+
+
+def read_only(image):
+    frozen = np.frombuffer(image.tobytes(), np.uint8).reshape(image.shape)
+    assert not frozen.flags.writeable
+    return frozen
+
+
+@pytest.mark.parametrize(
+    "view",
+    [
+        read_only,
+        lambda image: image[..., ::-1],
+        lambda image: image[::2, 1::3],
+        lambda image: image.transpose(1, 0, 2),
+        np.asfortranarray,
+    ],
+    ids=["read-only", "channels reversed", "strided", "transposed", "Fortran order"],
+)
+def test_twins_agree_on_any_layout(view):
+    assert_twins(view(noise(12, 20)))
+
+
+def test_rounding_goes_to_even_and_ends_at_0_and_255():
+    image = np.zeros((1, 4, 3), np.uint8)
+    labels = np.array([[1, 2, 3, 4]], np.int32)
+    target = np.repeat([[0.0], [0.5], [1.5], [300.0], [-4.0]], 3, axis=1)
+    still = np.zeros_like(target), target, np.ones_like(target)
+    for module in (fast, plain):
+        assert module.transfer(image, plain.label_runs(labels), *still)[0, :, 0].tolist() == [
+            0,
+            2,
+            255,
+            0,
+        ]
+
+
+@pytest.mark.parametrize("module", [fast, plain])
+def test_sums_do_not_wrap_at_8_bits(module):
+    white = np.full((3, 4, 3), 255, np.uint8)
+    runs = plain.label_runs(np.ones((3, 4), np.int32))
+    assert module.run_sums(white, runs, 2)[1].tolist() == [12, *[12 * 255] * 3, *[12 * 255**2] * 3]
+
+
+def test_every_kernel_has_a_twin():
+    twins = {name for name, f in vars(plain).items() if isfunction(f) and name[0] != "_"}
+    assert set(fast.__all__) == twins
+    assert all(hasattr(getattr(fast, name), "py_func") for name in fast.__all__)
+
+
+def test_the_twins_can_be_chosen(monkeypatch):
+    monkeypatch.delenv("ROADEVAL_PLAIN", raising=False)
+    assert kernels._pick() is fast
+    monkeypatch.setenv("ROADEVAL_PLAIN", "1")
+    assert kernels._pick() is plain
+
+
+# --- Masks ----------------------------------------------------------------------------------------
+
+
+def masks(most=80):
+    """Random masks: any size, from a few specks to nearly full."""
+    return st.builds(
+        lambda height, width, share, seed: (
+            np.random.default_rng(seed).random((height, width)) < share
+        ).astype(np.uint8),
+        st.integers(1, most),
+        st.integers(1, 2 * most),
+        st.sampled_from([0.0, 0.02, 0.3, 0.5, 0.6, 0.97, 1.0]),
+        st.integers(0, 10**6),
+    )
+
+
+def packed(mask):
+    """One row of words for each of an image, 64 pixels a word."""
+    wide = np.pad(mask, ((0, 0), (0, -mask.shape[1] % 64)))
+    return np.packbits(wide, axis=1, bitorder="little").view(np.uint64)
+
+
+def unpacked(bits, width):
+    return np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little")[:, :width]
+
+
+NO_PATCH = np.zeros((0, 0), np.uint8)
+
+
+@given(masks(), st.integers(0, 9))
+@settings(max_examples=200, deadline=None)
+def test_regions_are_kept_and_holes_filled_alike(mask, seed):
+    patch = (np.random.default_rng(seed).random(mask.shape) < 0.05).astype(np.uint8)
+    for arguments in ((mask, NO_PATCH), (mask, patch)):
+        np.testing.assert_array_equal(fast.keep_region(*arguments), plain.keep_region(*arguments))
+    np.testing.assert_array_equal(fast.fill_holes(mask), plain.fill_holes(mask))
+    for connectivity in (4, 8):
+        assert_same(fast.components(mask, connectivity), plain.components(mask, connectivity))
+
+
+def test_components_are_numbered_by_their_first_pixels_and_touch_by_corners_or_not():
+    mask = np.array([[0, 1, 0, 1], [1, 0, 0, 1]], np.uint8)
+    assert fast.components(mask, 8)[0].tolist() == [[0, 1, 0, 2], [1, 0, 0, 2]]
+    assert fast.components(mask, 4)[0].tolist() == [[0, 1, 0, 2], [3, 0, 0, 2]]
+    assert fast.components(mask, 8)[1].tolist() == [
+        [0, 1, 2, 1],
+        [0, 3, 4, 2],
+        [1, 0, 1, 1],
+        [1, 3, 4, 2],
+    ]
+
+
+@pytest.mark.parametrize("view", [np.asfortranarray, lambda m: m[::-1], lambda m: m[:, ::2]])
+def test_masks_may_have_any_layout(view):
+    mask = view((noise(40, 90)[..., 0] > 120).astype(np.uint8))
+    np.testing.assert_array_equal(
+        fast.keep_region(mask, NO_PATCH), plain.keep_region(mask, NO_PATCH)
+    )
+    np.testing.assert_array_equal(fast.fill_holes(mask), plain.fill_holes(mask))
+
+
+@given(masks(), st.integers(0, 70), st.integers(0, 6))
+@settings(max_examples=200, deadline=None)
+def test_bits_grow_alike_and_stay_in_the_image(mask, least, rows):
+    reach = np.array([least + rows - row for row in range(rows + 1)])
+    grown = fast.grow(packed(mask), reach, mask.shape[1])
+    np.testing.assert_array_equal(grown, plain.grow(packed(mask), reach, mask.shape[1]))
+    np.testing.assert_array_equal(grown, packed(unpacked(grown, mask.shape[1])))
+
+
+def test_bits_grow_by_the_element():
+    mask = np.zeros((9, 130), np.uint8)
+    mask[4, 63] = 1
+    grown = unpacked(fast.grow(packed(mask), np.array([3, 1]), 130), 130)
+    assert np.argwhere(grown).tolist() == [
+        *([3, x] for x in range(62, 65)),
+        *([4, x] for x in range(60, 67)),
+        *([5, x] for x in range(62, 65)),
+    ]
+
+
+@given(st.integers(0, 3), st.integers(1, 3), st.integers(1, 4), st.integers(1, 200))
+@settings(deadline=None)
+def test_bits_are_counted_alike(count, classes, regions, words):
+    rng = np.random.default_rng(words)
+    arguments = [
+        rng.integers(0, 1 << 64, (rows, words), dtype=np.uint64)
+        for rows in (count, classes, regions)
+    ]
+    found, twin = fast.count_bits(*arguments), plain.count_bits(*arguments)
+    assert found.dtype == twin.dtype == np.int64
+    np.testing.assert_array_equal(found, twin)
+    assert found.shape == (count, classes, regions)
+
+
+def test_bits_of_full_words_are_counted():
+    full = np.full((1, 1000), ~np.uint64(0))
+    assert fast.count_bits(full, full, full).item() == 64_000

@@ -1,0 +1,174 @@
+"""Model files that hold what no training gives: refused in one line, whatever array is damaged."""
+
+import json
+import re
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from roadeval.cli.app import main
+from roadeval.config import preset, variants_of
+from roadeval.errors import RoadevalError
+from roadeval.learning import from_file, plans_of
+from roadeval.training import TrainingSettings, fit, save_model
+from tests.e2e.commands import DEMO
+from tests.training.making import frame
+
+EXTRA = {name: preset(name) for name in ("printed", "gated", "robust")}
+VARIANTS = variants_of(preset("paper"), EXTRA)
+
+
+def filled(value):
+    """Damage one number of an array."""
+
+    def damage(array):
+        spoilt = array.copy()
+        spoilt[(0,) * array.ndim] = value
+        return spoilt
+
+    return damage
+
+
+DAMAGES = {
+    "missing": lambda array: None,
+    "an axis more": lambda array: array[None],
+    "an axis less": lambda array: array[0] if array.ndim else array.repeat(2),
+    "empty": lambda array: array[:0] if array.ndim else np.zeros(0),
+    "a column less": lambda array: array[..., :-1] if array.ndim else array.repeat(0),
+    "not a number": filled(np.nan),
+    "without end": filled(-np.inf),
+    "huge": filled(1e30),
+    "text": lambda array: array.astype("U"),
+    "complex": lambda array: array.astype(complex),
+}
+
+HARMLESS = {("huge", "threshold"), ("missing", "prior"), ("a column less", "prior")}
+"""A threshold may be of any size, and a prior too, or there is none."""
+
+
+@pytest.fixture(scope="module")
+def arrays(tmp_path_factory):
+    """The arrays of a sound model file of every stage that learns."""
+    path = tmp_path_factory.mktemp("sound") / "city.model"
+    prior = np.linspace(0, 1, 24 * 32, dtype=np.float32).reshape(24, 32)
+    settings = TrainingSettings()
+    save_model(fit([frame(n) for n in range(3)], plans_of(VARIANTS), settings, prior), path)
+    from_file(path, VARIANTS)
+    with np.load(path) as archive:
+        return dict(archive)
+
+
+def refusal(arrays, folder: Path) -> str:
+    """Write a model file and give the sentence that refuses it."""
+    path = folder / "x.model"
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
+    with pytest.raises(RoadevalError) as caught:
+        from_file(path, VARIANTS)
+    sentence = str(caught.value)
+    assert sentence.startswith(f"{path}: ")
+    assert "\n" not in sentence
+    return sentence
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_no_damaged_array_is_accepted(arrays, tmp_path, damage):
+    for name, array in arrays.items():
+        field = name.rpartition("/")[-1]
+        if field == "header" or (damage, field) in HARMLESS:
+            continue
+        spoilt = DAMAGES[damage](array)
+        rest = {other: arrays[other] for other in arrays if other != name}
+        assert field in refusal(rest if spoilt is None else {**rest, name: spoilt}, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "damage", "why"),
+    [
+        ("filtered/similarity/covariance", np.negative, "no covariance"),
+        ("filtered/similarity/covariance", np.tril, "not symmetric"),
+        ("gated/gated/covariance", np.zeros_like, "no covariance"),
+        ("filtered/svm/scale", np.zeros_like, "scale holds a number outside"),
+        ("filtered/svm/mean", np.negative, "mean holds a number outside 0 to 255"),
+        ("filtered/svm/vectors", lambda a: a[1:], r"weights has the shape .* instead of \(m,\)"),
+        ("robust/context/planes", lambda a: a.astype(np.float64), "instead of float32"),
+        ("prior", lambda a: a + 0.5, "prior holds a number outside 0 to 1"),
+        ("prior", lambda a: a * 255 > 0, "prior is of type bool"),
+    ],
+)
+def test_the_sentence_says_what_is_wrong(arrays, tmp_path, name, damage, why):
+    sentence = refusal({**arrays, name: damage(arrays[name])}, tmp_path)
+    assert re.search(why, sentence)
+
+
+def test_a_machine_without_support_vectors_is_refused(arrays, tmp_path):
+    none = {"filtered/svm/vectors": np.zeros((0, 3)), "filtered/svm/weights": np.zeros(0)}
+    assert "vectors has the shape (0, 3) instead of (m, 3)" in refusal(arrays | none, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "stage", ["filtered/similarity", "filtered/svm", "gated/gated", "robust/context"]
+)
+def test_a_stage_that_learnt_nothing_is_refused(arrays, tmp_path, stage):
+    rest = {name: array for name, array in arrays.items() if not name.startswith(stage)}
+    variant, name = stage.split("/")
+    assert f"{name} of variant {variant} has learnt nothing" in refusal(rest, tmp_path)
+
+
+@pytest.mark.parametrize("name", ["night/svm/mean", "filtered/post/mean", "filtered/x/y", "x", "/"])
+def test_an_array_that_belongs_nowhere_is_refused(arrays, tmp_path, name):
+    assert name.rpartition("/")[0] in refusal({**arrays, name: np.zeros(3)}, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        *({key: None} for key in ("settings", "source", "digests", "pixels", "warnings")),
+        {"settings": {"filtered": ["svm"]}},
+        {"source": "guess"},
+        {"digests": [1, 2]},
+        {"pixels": -1},
+        {"warnings": "none"},
+        {"format": ["roadeval-model"]},
+    ],
+)
+def test_a_damaged_header_is_refused(arrays, tmp_path, wrong):
+    header = json.loads(arrays["header"].tobytes()) | wrong
+    assert "model file" in refusal({**arrays, "header": as_bytes(json.dumps(header))}, tmp_path)
+
+
+@pytest.mark.parametrize("text", ["[]", "1", "{", "[" * 100_000, "\udcff"])
+def test_a_header_that_is_none_is_refused(arrays, tmp_path, text):
+    header = as_bytes(text)
+    assert "not a model file" in refusal({**arrays, "header": header}, tmp_path)
+
+
+def as_bytes(text: str):
+    return np.frombuffer(text.encode(errors="surrogateescape"), np.uint8)
+
+
+def test_no_flipped_byte_is_a_defect_of_the_program(arrays, tmp_path):
+    path = tmp_path / "x.model"
+    save_model(fit([frame(n) for n in range(2)], plans_of(VARIANTS[:2]), TrainingSettings()), path)
+    whole, rng = path.read_bytes(), np.random.default_rng(0)
+    # The directory at the end, and places everywhere.
+    for place in [*rng.integers(0, len(whole), 200), *range(len(whole) - 120, len(whole))]:
+        spoilt = bytearray(whole)
+        spoilt[place] ^= 1 << rng.integers(8)
+        path.write_bytes(spoilt)
+        with suppress(RoadevalError):
+            from_file(path, VARIANTS[:2])
+
+
+def test_the_command_ends_with_one_line_and_code_1(arrays, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    spoilt = {**arrays, "filtered/svm/weights": np.zeros((2, 2))}
+    with Path("x.model").open("wb") as file:
+        np.savez(file, **spoilt)
+    assert main(["replay", str(DEMO), "--model", "x.model"]) == 1
+    assert capsys.readouterr().err.splitlines() == [
+        "roadeval: error: x.model: a damaged model file: filtered/svm: weights has the shape "
+        "(2, 2) instead of (m,); train it again"
+    ]
