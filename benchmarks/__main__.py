@@ -18,13 +18,13 @@ from typing import Any
 from benchmarks import drives, processes
 from benchmarks.drives import Source
 from benchmarks.plainly import PlainWay
-from benchmarks.replaying import Held, floor, hold, loop, whole
+from benchmarks.replaying import Held, Whole, floor, hold, loop, whole
 from benchmarks.timing import Spread, ratios, table, timed
 from roadeval import logs, runner
 from roadeval.data import Frame, Role
 from roadeval.flow import one_thread_each
 from roadeval.options import ReplayOptions
-from roadeval.recording import NullRecorder, Rule, recorder_for
+from roadeval.recording import Rule, recorder_for
 from roadeval.run import Run
 
 Rows = list[dict[str, Any]]
@@ -141,7 +141,7 @@ def _plain(
         frames = [each.decode() for each in log.frames(run_options.select(log))]
         step = max(1, len(frames) // options.plain_frames)
         chosen = range(len(frames))[step // 2 :: step][: options.plain_frames]
-        results = [r for i, (r, _) in enumerate(run.frames(NullRecorder())) if i in chosen]
+        results = [r for i, (_, r) in enumerate(run.frames(Whole())) if i in chosen]
     plain = PlainWay(frames, run_options)
     for name, parameters in run.model.parameters.items():
         plain.require_same_machine(name, parameters["svm"])

@@ -44,16 +44,25 @@ class Held:
             yield number, files, replace(result, frame=frame)
 
 
+class Whole:
+    """Stands where a recorder does, and hands out what it is given, layers and all."""
+
+    def encode(self, result: FrameResult, _position: int) -> FrameResult:
+        """Give the result."""
+        return result
+
+
 def hold(drive: Path, options: ReplayOptions) -> Held:
     """Run the pipeline once, before any clock runs, and keep what the floor needs."""
     with logs.open_log(drive) as log:
         run = Run(log, options, lambda _progress: None)
         results, sizes = [], []
         recorder = recorder_for(drive.with_suffix(".held.rrd"), run.layout(), ALL)
-        for position, (result, kept) in enumerate(run.frames(recorder)):
+        for position, (_, result) in enumerate(run.frames(Whole())):
             if position % max(1, -(-run.total * _bytes(result) // HELD_BYTES)) == 0:
                 results.append(result)
-                sizes.append(_layer_bytes(kept.encoded.payloads))
+                encoded = recorder.encode(result, position).encoded
+                sizes.append(_layer_bytes(encoded.payloads))
         files = [_files(logged) for logged in log.frames(options.select(log), options.span())]
         return Held(files, results, run.layout(), float(np.mean(sizes)))
 

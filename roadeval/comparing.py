@@ -86,7 +86,7 @@ def compare(
         ]
     settings = analysis.settings_of(opened[0].summary)
     content = comparison.compare(sides, settings, across_variants=across)
-    content["conditions"] = judge(content, conditions)
+    content["conditions"] = judge(content, conditions, settings)
     windows = _windows(sides, settings.window) if content["same_drive"] else sides[0].frames[:0]
     return Compared(content, windows)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Final
 
@@ -348,3 +348,14 @@ class FrameResult:
     contours: Mapping[str, float] = field(default_factory=dict)
     oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)
     pictures: Pictures = Pictures.ALL
+
+    def without_layers(self) -> FrameResult:
+        """Give what is left to sum up once the pictures, which take most memory, are encoded."""
+        variants = tuple(
+            VariantResult(
+                variant.variant,
+                tuple(replace(stage, layers=(), regions={}) for stage in variant.stages),
+            )
+            for variant in self.variants
+        )
+        return replace(self, variants=variants)

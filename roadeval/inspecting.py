@@ -70,6 +70,17 @@ def suspects(opened: Opened, count: int = LISTED, variant: str | None = None) ->
     ]
 
 
+def worst(opened: Opened, variant: str | None = None) -> Suspect | None:
+    """Give the worst frame of a variant, the first variant's by default; None if none was scored.
+
+    Raises
+    ------
+    RoadevalError
+        If there is no such variant.
+    """
+    return suspects(opened, 1, variant)[0] if len(opened.frames) or variant else None
+
+
 def view(opened: Opened, frame: int | None, picture: Path | None = None) -> int | None:
     """Open the viewer at a frame, or draw it into a PNG file; return the frame that it drew.
 

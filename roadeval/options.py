@@ -58,6 +58,9 @@ class ReplayOptions:
         Keep messages whose checksum is wrong.
     resize_truth
         Bring a truth of another size to the image's, nearest pixel.
+    scale
+        Reduce frames and truth to this share of their width and height first: a cheaper look at
+        a long log, with other results.
     """
 
     config: Config = field(default_factory=Config)
@@ -82,6 +85,11 @@ class ReplayOptions:
     record: str = "all"
     keep_corrupt: bool = False
     resize_truth: bool = False
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.scale <= 1:
+            raise OptionError(f"--scale {self.scale:g}: must be above 0 and at most 1")
 
     def select(self, log: logs.Log) -> logs.Selection:
         """Settle what of a log is replayed."""
@@ -94,6 +102,7 @@ class ReplayOptions:
             labels=self.labels(),
             sync_tolerance_ns=None if tolerance is None else round(tolerance * 1e6),
             resize_truth=self.resize_truth,
+            scale=self.scale,
         )
 
     def labels(self) -> logs.LabelValues:

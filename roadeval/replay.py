@@ -15,6 +15,7 @@ from roadeval.data import Frame
 from roadeval.evaluation import rates
 from roadeval.evaluation.results import Results, ResultsWriter, summary_text
 from roadeval.evaluation.tables import header, window_lines
+from roadeval.memory import give_back
 from roadeval.options import Outcome, Progress, ReplayOptions, keep_apart
 from roadeval.recording import NullRecorder, Rule, recorder_for
 from roadeval.report.figures import write_figures
@@ -74,6 +75,7 @@ def replay(
                 recorder.write(encoded)
                 results.append(result)
                 sidecar.write(result)
+            give_back()
             tell(Progress(run.done, run.total, "writing"))
             windows, summary = run.board.windows(), run.summary()
             sums = run.board.tables()

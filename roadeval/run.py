@@ -16,6 +16,7 @@ from roadeval.evaluation.results import STREAMED
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.flow import ordered
 from roadeval.gallery import Gallery
+from roadeval.memory import give_back
 from roadeval.options import OptionError, Progress, ReplayOptions
 from roadeval.pipeline.stage import Moment
 from roadeval.recording import Layout
@@ -63,6 +64,7 @@ class Run:
         self.total = len(self._frames)
         self.model, self._schedule = self._learn()
         self._chains = runner.bind(self._variants, self.model)
+        give_back()
         prior = None if self.model.prior is None else BlindPrior(self.model.prior)
         names = [layout.name for layout in self._layouts()]
         self.board = Scoreboard(options.config.evaluation, names, prior)
@@ -87,7 +89,7 @@ class Run:
 
     def layout(self) -> Layout:
         """Describe the recording before its first frame."""
-        width, height = self._selection.image.size or (0, 0)
+        width, height = self._selection.size or (0, 0)
         return Layout(
             self.log.name,
             width,
@@ -121,7 +123,8 @@ class Run:
     def frames(self, recorder: Encoder) -> Iterator[Processed]:
         """Yield every decodable frame in order, scored and encoded for the recorder.
 
-        Decoding, computing, scoring and encoding happen in the worker threads.
+        Decoding, computing, scoring and encoding happen in the worker threads. The layers are
+        the recorder's alone: a yielded result has none.
         """
 
         def work(item: tuple[int, logs.LoggedFrame, Turn]) -> Processed | None:
@@ -159,7 +162,9 @@ class Run:
         ]
         variants += [runner.external_variant(name, mask) for name, mask in frame.external.items()]
         result = self.board.score(frame, role, tuple(variants))
-        return result, recorder.encode(result, position)
+        encoded = recorder.encode(result, position)
+        # Results wait for their turn, and would wait with some 30 bytes a pixel.
+        return result.without_layers(), encoded
 
     def summary(self) -> dict[str, Any]:
         """Give the content of ``summary.json``, but for its format."""
@@ -215,7 +220,7 @@ class Run:
         return (*self.log.losses, *(f"frame {number}: {reason}" for number, reason in frames))
 
     def _drive(self) -> dict[str, Any]:
-        width, height = self._selection.image.size or (0, 0)
+        width, height = self._selection.size or (0, 0)
         return {
             "name": self.log.name,
             "width": width,

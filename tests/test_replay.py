@@ -437,3 +437,24 @@ def test_flicker_is_counted_from_each_evaluated_frame_to_the_next_one_read(once,
 def test_a_broken_frame_is_no_neighbour(tmp_path):
     log = write_log(tmp_path / "hurt.mcap", broken=13)
     assert run(log, tmp_path).summary["beyond"]["filtered"]["pairs"] == 2 + 5 + 4
+
+
+def test_a_scale_reduces_images_truth_and_recording_alike(drive, tmp_path, once):
+    outcome = run(drive, tmp_path, scale=0.5, mask_topics={"net": "/net/road_mask_prediction"})
+    full, small = once[1].summary["drive"], outcome.summary["drive"]
+    assert (small["width"], small["height"]) == (full["width"] // 2, full["height"] // 2)
+    assert outcome.summary["selection"]["scale"] == 0.5
+    frames = frames_of(tmp_path)
+    assert set(frames["N"]) == {small["width"] * small["height"]}
+    # The log's own masks are reduced like the truth that they are copies of.
+    assert set(frames[frames["variant"] == "net"]["ERR"]) == {0.0}
+    recording = roadeval.Recording(outcome.recording)
+    number = int(frames["frame"].iloc[0])
+    assert recording.image(number).shape == (small["height"], small["width"], 3)
+    assert recording.layer("filtered", "post", number).shape == (small["height"], small["width"])
+
+
+@pytest.mark.parametrize("scale", [0, -1, 1.01, float("nan")])
+def test_a_scale_that_is_no_share_is_refused(scale):
+    with pytest.raises(RoadevalError, match="--scale"):
+        ReplayOptions(scale=scale)

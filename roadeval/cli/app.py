@@ -128,6 +128,8 @@ def _with_notes(sentence: str, error: BaseException) -> str:
 
 def _usage(error: typer.TyperException) -> str:
     sentence = error.format_message().replace("Value error, ", "").rstrip(".")
+    # Where options do not go together, no single one's value is the invalid one.
+    sentence = sentence.removeprefix("Invalid value: ")
     context = getattr(error, "ctx", None)
     return f"{sentence}; see '{context.command_path} --help'" if context else sentence
 

@@ -74,7 +74,9 @@ def compare(
     """Compare results of one drive, or the variants of one result.
 
     Frame by frame; those that either trained on are left out. Results of different drives are put
-    side by side without differences. Exit code 4 if a --fail-if condition holds.
+    side by side without differences. Exit code 4 if a --fail-if condition holds; 1 if one cannot be
+    judged, as where two results have fewer than ten frames in common, or fewer than half of those
+    of the shorter one.
     """
     from roadeval import comparing
     from roadeval.cli import changes

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import textwrap
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any, Final, TextIO, cast
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+_PADDING: Final = re.compile(r" +((?:\x1b\[0m)?\n)")
 
 
 def diagnostics() -> Console:
@@ -21,7 +24,21 @@ def results() -> Console:
     """Return a console on stdout, for what the user asked for."""
     from rich.console import Console
 
-    return Console(highlight=False, markup=False, emoji=False)
+    out = cast("IO[str]", _Trimmed(sys.stdout))
+    return Console(file=out, highlight=False, markup=False, emoji=False)
+
+
+class _Trimmed:
+    """A stream without the spaces at the ends of lines that tables and wrapped sentences leave."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        return self._stream.write(_PADDING.sub(r"\1", text))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
 
 def emit(text: str) -> None:

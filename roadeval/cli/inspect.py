@@ -40,7 +40,9 @@ def inspect(
     screenshot: Annotated[
         Path | None,
         options.option(
-            "--screenshot", metavar="FILE.png", help="No window: draw it into a file instead."
+            "--screenshot",
+            metavar="FILE.png",
+            help="No window: draw it into a file instead. Without a frame, the worst.",
         ),
     ] = None,
     json: options.Json = False,
@@ -62,12 +64,15 @@ def inspect(
         wanted = {} if worst is None else {"count": worst}
         _list(inspecting.suspects(opened, variant=variant, **wanted), as_json=json)
         return ExitCode.DONE
+    chosen = ""
     if worst is not None:
         ranked = inspecting.suspects(opened, worst, variant)
         frame = ranked[-1].frame
+    elif frame is None and screenshot is not None and (bad := inspecting.worst(opened, variant)):
+        frame, chosen = bad.frame, ", the worst (--frame N or --worst K takes another)"
     shown = inspecting.view(opened, frame, screenshot)
     if screenshot is not None:
-        console.emit(f"{screenshot}: frame {shown}")
+        console.emit(f"{screenshot}: frame {shown}{chosen}")
     return ExitCode.DONE
 
 

@@ -106,6 +106,11 @@ def _time(text: str) -> None:
     parse_time(text)
 
 
+def _scale(value: float) -> None:
+    if not 0 < value <= 1:
+        raise typer.BadParameter(f"{value:g} is not above 0 and at most 1")
+
+
 def _selection(text: str) -> None:
     if not _SELECTION.fullmatch(text):
         raise typer.BadParameter(f"{text!r} is none of all, masks, worst:K, every:N, none")
@@ -231,6 +236,15 @@ SyncTolerance = Annotated[
 ]
 ResizeTruth = Annotated[
     bool, option("--resize-truth", help="Bring truth of another size to the image's.")
+]
+Scale = Annotated[
+    float,
+    option(
+        "--scale",
+        metavar="F",
+        callback=_checked(_scale),
+        help="Reduce frames and truth to this share of their size first: quicker, and coarser.",
+    ),
 ]
 KeepCorrupt = Annotated[bool, option("--keep-corrupt", help="Use data whose checksum is wrong.")]
 

@@ -40,11 +40,14 @@ def pack(
 
     Foxglove and Rerun open it too: JPEGs as they are, masks as PNG, Foxglove's protobuf schemas.
     """
+    from roadeval.logs import describe
     from roadeval.logs import pack as run
 
     packed = run(images, output, masks=truth, rate_hz=rate)
     _warn_of(packed.without_mask, "images without a mask")
     _warn_of(packed.without_image, "masks without an image")
+    if truth and (problem := describe(packed.path).problem):
+        messages.warning(f"packed, but replay needs to be told more: {problem}")
     if not quiet:
         masks = f", {packed.labelled} with a mask" if truth else ""
         console.emit(f"{packed.path}: {packed.frames} images{masks}; {packed.stamps}")

@@ -46,6 +46,7 @@ def replay(
     mask_topic: options.MaskTopics = None,
     sync_tolerance: options.SyncTolerance = None,
     resize_truth: options.ResizeTruth = False,
+    scale: options.Scale = 1.0,
     keep_corrupt: options.KeepCorrupt = False,
     start: options.Start = None,
     end: options.End = None,
@@ -90,6 +91,7 @@ def replay(
         record=record,
         keep_corrupt=keep_corrupt,
         resize_truth=resize_truth,
+        scale=scale,
     )
     with progress.watched(quiet) as watch:
         found = run(drive, save=save, reports=reports, mcap=mcap, options=chosen, on_progress=watch)

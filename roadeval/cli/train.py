@@ -31,6 +31,7 @@ def train(
     ignore_color: options.IgnoreColors = None,
     sync_tolerance: options.SyncTolerance = None,
     resize_truth: options.ResizeTruth = False,
+    scale: options.Scale = 1.0,
     keep_corrupt: options.KeepCorrupt = False,
     start: options.Start = None,
     end: options.End = None,
@@ -62,6 +63,7 @@ def train(
         train_frames=train_frames,
         keep_corrupt=keep_corrupt,
         resize_truth=resize_truth,
+        scale=scale,
     )
     with progress.watched(quiet) as watch:
         model = run(drives, output, options=chosen, on_progress=watch)

@@ -12,6 +12,11 @@ A condition is a quantity, an operator and a limit::
 ``post.filtered.ERR > +0.5pp`` holds where the error rate of the final mask has risen by more than
 half a percentage point; ``post.filtered.ERR > 20%`` where it is above a fifth. Rates are those of
 the frames that both results evaluated. Nothing is ever executed.
+
+A condition that cannot be judged is an error, and never taken for one that is kept: where a rate
+is undefined, where a change is asked for between different drives, and where too few frames tell.
+Of one drive, the results must have in common at least half of the frames of the shorter one, and
+at least as many as an interval needs (``evaluation.effective_frames``, 10 by default).
 """
 
 from __future__ import annotations
@@ -25,6 +30,7 @@ from typing import Any, Final
 
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.rates import OVERLAP_RATES, RATES
+from roadeval.evaluation.settings import EvaluationSettings
 
 OPERATORS: Final[Mapping[str, Callable[[float, float], bool]]] = {
     ">": operator.gt,
@@ -115,13 +121,18 @@ class Condition:
         return holds, f"{what} {told}: {self.text} {'holds' if holds else 'does not hold'}"
 
 
-def judge(comparison: Mapping[str, Any], conditions: Sequence[Condition]) -> list[dict[str, Any]]:
+def judge(
+    comparison: Mapping[str, Any],
+    conditions: Sequence[Condition],
+    settings: EvaluationSettings,
+) -> list[dict[str, Any]]:
     """Judge conditions on every new result; a row for each: ``text``, ``holds``, ``sentence``.
 
     Raises
     ------
     ConditionError
-        If a condition asks for what is not there, or for a change between different drives.
+        If a condition asks for what is not there, or for a change between different drives, or
+        if the results have too few frames in common.
     """
     rows = []
     for condition in conditions:
@@ -142,6 +153,30 @@ def judge(comparison: Mapping[str, Any], conditions: Sequence[Condition]) -> lis
                 f"{condition.variant}; there are {', '.join(sorted(there))}"
             )
         for change in matching:
+            if comparison["same_drive"]:
+                _must_tell(condition, change, comparison["results"], settings.effective_frames)
             holds, sentence = condition.judge(change)
             rows.append({"text": condition.text, "holds": holds, "sentence": sentence})
     return rows
+
+
+def _must_tell(
+    condition: Condition,
+    change: Mapping[str, Any],
+    results: Sequence[Mapping[str, Any]],
+    least: int,
+) -> None:
+    """Refuse to judge by a handful of frames, or by a corner where two results overlap."""
+    frames = {each["label"]: each["frames"] for each in results}
+    base, new, common = results[0]["label"], change["result"], change["frames"]
+    shorter = min(frames[base], frames[new])
+    if common < least:
+        why = f"and {least} are needed"
+    elif 2 * common < shorter:
+        why = f"fewer than half of the {shorter} of the shorter one"
+    else:
+        return
+    raise ConditionError(
+        f"{condition.text}: not judged, because {base} and {new} have {common} evaluated frames in "
+        f"common, {why}; replay both over the same range"
+    )

@@ -14,11 +14,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Final, Self
 
-from roadeval.data import NAMES, FrameResult
+from roadeval.data import FrameResult
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import tables
-from roadeval.evaluation.rates import RATES
 from roadeval.evaluation.windows import Window
+from roadeval.tabular import read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +32,7 @@ SUMS: Final = ("windows", "changes", "heat")
 PARTS: Final = (
     *("format", "verdict", "drive", "frames", "totals", "beyond", "difference", "oracles"),
     *("windows", "health", "training", "seconds", "warnings", "losses"),
-    *("settings", "versions", "log"),
+    *("selection", "settings", "versions", "log"),
 )
 """The parts of the summary, in the file's order."""
 
@@ -205,31 +205,12 @@ class Results:
         return self.table("regions")
 
     def table(self, name: str) -> pd.DataFrame:
-        """Read a table by its name in `roadeval.evaluation.tables.COLUMNS`, bit by bit.
+        """Read a table by its name in `roadeval.evaluation.tables.COLUMNS`.
 
         One that was not written, there being nothing to count, is empty.
         """
-        from pyarrow import csv
-
-        path, schema = self._folder / f"{name}.csv", _schema(name)
-        if path.exists():
-            types = csv.ConvertOptions(column_types=schema)
-            frame: pd.DataFrame = csv.read_csv(path, convert_options=types).to_pandas()
-        else:
-            frame = schema.empty_table().to_pandas()
-        return frame
-
-
-def _schema(table: str) -> Any:
-    """Give a table's columns with their types, as a PyArrow schema."""
-    import pyarrow as pa
-
-    def kind(column: str) -> Any:
-        if column in NAMES:
-            return pa.string()
-        return pa.float64() if column.removeprefix("pooled_") in RATES else pa.int64()
-
-    return pa.schema([(column, kind(column)) for column in tables.COLUMNS[table]])
+        path = self._folder / f"{name}.csv"
+        return read_table(path if path.exists() else "", tables.COLUMNS[name])
 
 
 def _read_summary(path: Path) -> dict[str, Any]:

@@ -105,13 +105,13 @@ def mean_difference(differences: Series, settings: EvaluationSettings) -> Differ
     known = differences[~np.isnan(differences)]
     n, least = len(known), settings.effective_frames
     mean = float(known.mean()) if n else math.nan
-    if n and np.ptp(known) == 0 and (n >= least or mean == 0):
-        return Difference(
-            mean, mean, mean, settings.confidence, None, n, n, n, "the same on every frame"
-        )
     if n < least:
         reason = f"there are {n} frames, and an interval needs {least}"
         return Difference(mean, None, None, settings.confidence, None, n, None, None, reason)
+    if np.ptp(known) == 0:
+        return Difference(
+            mean, mean, mean, settings.confidence, None, n, n, n, "the same on every frame"
+        )
     error = error_of_mean(known)
     facts = (n, error.frames, error.frames_low)
     if error.frames_low < least:

@@ -25,10 +25,10 @@ def verdict(difference: Difference, rate: str, stage: str) -> str:
     if difference.frames == 0:
         return f"Nothing to compare: {what} is undefined on every frame."
     if difference.low is None or difference.high is None:
-        moved = f"rose by {mean:.1f}" if mean > 0 else f"fell by {-mean:.1f}"
+        moved = f"rose by {mean:.1f} pp" if mean > 0 else f"fell by {-mean:.1f} pp"
         return (
-            f"Cannot tell whether the filter helps on this drive: {what} {moved} pp on average, "
-            f"but {difference.reason}."
+            f"Cannot tell whether the filter helps on this drive: {what} "
+            f"{moved if mean else 'did not change'} on average, but {difference.reason}."
         )
     if difference.low == difference.high == 0:
         return f"On this drive the filter leaves {what} of every frame as it is."

@@ -103,6 +103,7 @@ class FrameStream:
             picture,
             labels,
             resize=self._selection.resize_truth,
+            scale=self._selection.scale,
             report=self.accounting.undecodable.__setitem__,
         )
 

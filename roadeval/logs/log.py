@@ -155,6 +155,7 @@ class Log:
         labels: LabelValues | None = None,
         sync_tolerance_ns: int | None = None,
         resize_truth: bool = False,
+        scale: float = 1.0,
     ) -> Selection:
         """Settle what to replay.
 
@@ -172,6 +173,8 @@ class Log:
             period by default.
         resize_truth
             Whether to scale label images of another size than the camera's.
+        scale
+            Hand out frames reduced to this share of their width and height, with their labels.
 
         Raises
         ------
@@ -181,7 +184,7 @@ class Log:
         """
         asked = Asked(
             image, truth, shadow, masks or {}, labels or LabelValues(), sync_tolerance_ns,
-            resize_truth,
+            resize_truth, scale,
         )  # fmt: skip
         try:
             return settle(self.topics, self._tracks, asked)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -42,7 +42,10 @@ class LoggedFrame:
         Whether the log has truth for it.
     """
 
-    __slots__ = ("_labels", "_picture", "_report", "_resize", "log_time_ns", "number", "stamp_ns")
+    __slots__ = (
+        *("_labels", "_picture", "_report", "_resize", "_scale"),
+        *("log_time_ns", "number", "stamp_ns"),
+    )
 
     def __init__(
         self,
@@ -53,6 +56,7 @@ class LoggedFrame:
         labels: Mapping[str, Label],
         *,
         resize: bool,
+        scale: float = 1.0,
         report: Callable[[int, str], None],
     ) -> None:
         self.number = number
@@ -61,6 +65,7 @@ class LoggedFrame:
         self._picture = picture
         self._labels = labels
         self._resize = resize
+        self._scale = scale
         self._report = report
 
     @property
@@ -77,7 +82,7 @@ class LoggedFrame:
             If the image or a label of it cannot be decoded.
         """
         try:
-            return self._decode()
+            return reduced(self._decode(), self._scale)
         except (BadMessage, FrameError) as error:
             reason = f"frame {self.number}: {error}"
             self._report(self.number, str(error))
@@ -119,6 +124,38 @@ class LoggedFrame:
 
         scaled = cv2.resize(truth, (width, height), interpolation=cv2.INTER_NEAREST_EXACT)
         return np.asarray(scaled, np.uint8)
+
+
+def scaled(size: tuple[int, int], scale: float) -> tuple[int, int]:
+    """Scale a width and height, to whole pixels."""
+    width, height = (max(1, round(length * scale)) for length in size)
+    return width, height
+
+
+def reduced(frame: Frame, scale: float) -> Frame:
+    """Reduce a frame to a share of its width and height, at most 1.
+
+    Colours are averaged over the area of each new pixel; labels are the nearest pixel's. The
+    file that the log holds is no longer this image's, and only stands for its identity.
+    """
+    if scale == 1:
+        return frame
+    import cv2
+
+    size = scaled((frame.image.shape[1], frame.image.shape[0]), scale)
+
+    def nearest(labels: Truth) -> Truth:
+        small: Truth = cv2.resize(labels, size, interpolation=cv2.INTER_NEAREST_EXACT)
+        return small
+
+    return replace(
+        frame,
+        image=cv2.resize(frame.image, size, interpolation=cv2.INTER_AREA),
+        media_type=None,
+        truth=None if frame.truth is None else nearest(frame.truth),
+        shadow_truth=None if frame.shadow_truth is None else nearest(frame.shadow_truth),
+        external={name: nearest(mask) for name, mask in frame.external.items()},
+    )
 
 
 def _readable(picture: Picture | FrameError) -> Picture:

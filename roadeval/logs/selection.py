@@ -14,6 +14,7 @@ import numpy as np
 from roadeval.logs.choose import choose_image, choose_shadow, choose_truth, named
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.labels import LabelMap, LabelValues, seen_in, understand
+from roadeval.logs.logged import scaled
 from roadeval.logs.messages import Picture
 from roadeval.logs.pixels import to_rgb
 from roadeval.logs.topics import TopicInfo, median_period
@@ -57,6 +58,8 @@ class Selection:
         times, else their order.
     resize_truth
         Whether label images of another size are scaled to the image's (nearest neighbour).
+    scale
+        Of the frames that are handed out, relative to the camera's; at most 1.
     notes
         Sentences for a person: every choice that was made, and why.
     """
@@ -69,7 +72,13 @@ class Selection:
     tolerance_ns: int
     clock: Clock = Clock.STAMP
     resize_truth: bool = False
+    scale: float = 1.0
     notes: tuple[str, ...] = field(default=())
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """Width and height of the frames as they are handed out, if the log tells."""
+        return None if self.image.size is None else scaled(self.image.size, self.scale)
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -97,6 +106,7 @@ class Asked:
     labels: LabelValues
     tolerance_ns: int | None
     resize: bool
+    scale: float = 1.0
 
 
 def settle(topics: Sequence[TopicInfo], tracks: Mapping[str, Track], asked: Asked) -> Selection:
@@ -134,6 +144,7 @@ def settle(topics: Sequence[TopicInfo], tracks: Mapping[str, Track], asked: Aske
         tolerance(track, asked.tolerance_ns),
         clock,
         asked.resize,
+        asked.scale,
         _notes(truth, clock),
     )
 

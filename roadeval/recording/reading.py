@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-import io
 import json
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 from rerun.chunk import LazyChunkStream, LazyStore, RrdReader, StoreEntry
 
-from roadeval.data import NAMES, VariantLayout
+from roadeval.data import VariantLayout
 from roadeval.recording import layout as at
 from roadeval.recording.codecs import Codec
 from roadeval.recording.encoding import Encoder
 from roadeval.recording.layout import Layout, RecordingError
+from roadeval.tabular import read_table
 
 if TYPE_CHECKING:
     import pandas as pd
+
+READ_AHEAD: Final = 8 << 20
+"""Bytes of an entity's payloads that are kept, once the whole of it had to be gone through."""
 
 _TEXT = "TextDocument:text"
 _CAMERA = "EncodedImage:blob"
@@ -61,7 +64,8 @@ class Recording:
             raise RecordingError(f"{self.path}: the recording ends before its first frame")
         self.layout = Layout.from_json(text)
         self._codecs: dict[str, Codec] = Encoder(self.layout).codecs
-        self._pages: dict[str, dict[int, Any]] = {}
+        self._held: dict[str, frozenset[int]] = {}
+        self._payloads: dict[str, dict[int, pa.ListScalar]] = {}
 
     # --- What it holds ---------------------------------------------------------------------------
 
@@ -119,10 +123,12 @@ class Recording:
 
     def table(self, name: str) -> pd.DataFrame:
         """Give the rows of a table by its name, as ``oracles``; none if the run counted none."""
-        if name not in self.layout.tables:
-            return _csv(self.result(name) or "")
-        lines = (lines for _, lines in self._rows(at.result_path(name), _TEXT))
-        return _csv("".join((self.layout.tables[name].rstrip(), "\n", *lines)))
+        if name in self.layout.tables:
+            lines = (lines for _, lines in self._rows(at.result_path(name), _TEXT))
+            text = "".join((self.layout.tables[name].rstrip(), "\n", *lines))
+        else:
+            text = self.result(name) or ""
+        return read_table(text, text.partition("\n")[0].split(",") if text else ())
 
     def scalars(self, path: str) -> pd.Series[float]:
         """Give the numbers under an entity path, as ``/timing/filtered/svm``, by frame number."""
@@ -175,19 +181,26 @@ class Recording:
             known = ", ".join(sorted(self._codecs))
             raise RecordingError(f"{self.path}: there is no {path}; there are {known}")
         codec = self._codecs[path]
-        page = self._pages.get(path, {})
-        if frame not in page:
-            page = self._pages[path] = self._page(path, codec.component, frame)
-        return codec.decode(page[frame])
+        if frame not in self._payloads.get(path, {}):
+            self._read_ahead(path, codec.component, frame)
+        return codec.decode(_bytes(self._payloads[path][frame]))
 
-    def _page(self, path: str, component: str, frame: int) -> dict[int, bytes]:
-        """Give the payloads of the chunk that holds this frame."""
-        for batch in self._batches(path, component, static=False):
-            frames = batch.column(at.FRAME).to_pylist()
-            if frame in frames:
-                blobs = batch.column(component).flatten()
-                return {f: _bytes(blob) for f, blob in zip(frames, blobs, strict=True)}
-        raise RecordingError(f"{self.path}: {path} has nothing on frame {frame}")
+    def _read_ahead(self, path: str, component: str, frame: int) -> None:
+        """Take in the payloads of this frame and of those after it, then before, as many as fit.
+
+        Rerun reads all of an entity to give any of it, so that going through the frames one
+        chunk at a time would take the square of their number.
+        """
+        if frame in self._held.get(path, (frame,)):
+            pages = [
+                (batch.column(at.FRAME).to_pylist(), batch.column(component).flatten())
+                for batch in self._batches(path, component, static=False)
+            ]
+            self._held[path] = frozenset(number for numbers, _ in pages for number in numbers)
+            first = next((n for n, (numbers, _) in enumerate(pages) if frame in numbers), 0)
+            self._payloads[path] = _first_of([*pages[first:], *pages[:first]])
+        if frame not in self._held[path]:
+            raise RecordingError(f"{self.path}: {path} has nothing on frame {frame}")
 
     def _rows(self, path: str, component: str) -> Iterator[tuple[int, Any]]:
         for batch in self._batches(path, component, static=False):
@@ -251,16 +264,20 @@ def _bytes(blob: pa.ListScalar) -> bytes:
     return bytes(blob.values.to_numpy())  # noqa: PD011 - Arrow's values, not pandas'
 
 
+def _first_of(pages: Iterable[tuple[list[int], pa.ListArray]]) -> dict[int, pa.ListScalar]:
+    """Take payloads by frame out of pages, the first page whatever its size, until no more fit."""
+    payloads: dict[int, pa.ListScalar] = {}
+    size = 0
+    for numbers, blobs in pages:
+        size += blobs.nbytes
+        if payloads and size > READ_AHEAD:
+            break
+        payloads.update(zip(numbers, blobs, strict=True))
+    return payloads
+
+
 def _store(reader: RrdReader, entry: StoreEntry) -> LazyStore | None:
     try:
         return reader.store(store=entry)
     except RuntimeError:
         return None
-
-
-def _csv(text: str) -> pd.DataFrame:
-    import pandas as pd
-
-    if not text:
-        return pd.DataFrame()
-    return pd.read_csv(io.StringIO(text), dtype=dict.fromkeys(NAMES, str))

@@ -21,9 +21,12 @@ from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.reading import indexed_chunks
 
 PAGE: Final = 8
-"""Frames whose images, notes and table lines share a chunk: what a killed run loses at most."""
+"""Frames whose images, notes and table lines share a chunk: a killed run loses no more of them."""
+PAGE_BYTES: Final = 16 << 20
+"""Of images at which a page is full with fewer frames: while one is packed and written, memory
+holds it several times."""
 SERIES: Final = 64
-"""Frames whose numbers share a chunk."""
+"""Frames whose numbers share a chunk; a killed run may lose that many frames' numbers."""
 
 LEAST_FREE: Final = 64 << 20
 """Bytes that must stay free on the disk, more than a page takes. Checked before each page: the
@@ -50,7 +53,7 @@ class Recorder:
         self._layout = layout
         self._encoder = Encoder(layout)
         self._pages, self._series = tracks.Tracks(), tracks.Tracks()
-        self._frames = self._chunks = 0
+        self._frames = self._chunks = self._waiting = self._bytes = 0
         self._states: dict[str, str] = {}
         self._shown: set[str] = set()
         self._stream: rr.RecordingStream | None = None
@@ -113,11 +116,10 @@ class Recorder:
         self._frames += 1
         if self._frames % SERIES == 0:
             self._send(self._series.take())
-        if self._frames % PAGE == 0:
-            # The file is whole after every page, and memory holds no more than one.
-            self._check_room()
-            self._send(self._pages.take())
-            self._flush()
+        self._waiting += 1
+        self._bytes += sum(map(len, encoded.payloads.values()))
+        if self._waiting == PAGE or self._bytes >= PAGE_BYTES:
+            self._turn_page()
 
     def write_pictures(self, held: Sequence[Encoded]) -> None:
         """Append the pictures of frames whose numbers stand already, in order.
@@ -132,9 +134,7 @@ class Recorder:
                     encoded, number=encoded.number + 1, stamp_ns=encoded.stamp_ns + 1, payloads={}
                 )
                 self._add_images(after)
-            self._check_room()
-            self._send(self._pages.take())
-            self._flush()
+            self._turn_page()
 
     def finish(self, results: Mapping[str, str]) -> None:
         """Add the results, close the file and give it its name.
@@ -176,6 +176,13 @@ class Recorder:
             self._pages.add(at.NOTES, tracks.notes, *when, note)
         for name, lines in encoded.tables.items():
             self._pages.add(at.result_path(name), tracks.texts, *when, lines)
+
+    def _turn_page(self) -> None:
+        """Write what waits: the file is whole after every page, and memory holds one at most."""
+        self._check_room()
+        self._send(self._pages.take())
+        self._flush()
+        self._waiting = self._bytes = 0
 
     def _static(self, records: Iterable[tuple[str, list[Any]]]) -> None:
         stream = self._open_stream()

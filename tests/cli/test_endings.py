@@ -46,7 +46,7 @@ def test_a_signal_has_its_own_exit_code_and_tells_what_is_left(code, name, capsy
 
 def test_wrong_usage_points_to_the_help(capsys):
     assert explain(typer.BadParameter("'x' is no number.")) == 2
-    assert lines(capsys) == ["roadeval: error: Invalid value: 'x' is no number"]
+    assert lines(capsys) == ["roadeval: error: 'x' is no number"]
     assert main(["replay", "--no-such-option"]) == 2
     assert lines(capsys) == [
         "roadeval: error: No such option: --no-such-option; see 'roadeval replay --help'"

@@ -38,3 +38,19 @@ def test_a_folder_without_images_is_one_line(tmp_path, capsys):
 
 def test_the_output_has_to_be_named(folder):
     assert main(["pack", f"{folder}/imgs"]) == 2
+
+
+def test_masks_in_colours_are_packed_with_a_word_on_what_replay_needs(folder, capsys):
+    for number in range(2):
+        colours = np.full((6, 8, 3), (128, 64, 128), np.uint8)
+        cv2.imwrite(str(folder / "masks" / f"{number}.png"), colours)
+    words = ["pack", f"{folder}/imgs", "--truth", f"{folder}/masks", "-o", f"{folder}/d.mcap"]
+    assert main(words) == 0
+    (line,) = (line for line in capsys.readouterr().err.splitlines() if "replay" in line)
+    assert "/truth/road holds the colours 128,64,128" in line
+    assert "--road-color R,G,B" in line
+
+
+def test_masks_that_replay_understands_are_packed_without_a_word(folder, capsys):
+    main(["pack", f"{folder}/imgs", "--truth", f"{folder}/masks", "-o", f"{folder}/d.mcap"])
+    assert "replay" not in capsys.readouterr().err

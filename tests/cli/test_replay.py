@@ -24,6 +24,7 @@ SUMMARY = {
     "seconds": {},
     "warnings": [],
     "losses": [],
+    "selection": {},
     "settings": {},
     "versions": {},
     "log": {},

@@ -36,3 +36,25 @@ def test_wrong_usage_is_one_line_and_exit_code_2(words, capsys):
 def test_a_mistyped_command_is_guessed(capsys):
     assert main(["rplay"]) == 2
     assert "Did you mean 'replay'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["inspect", "a.rrd", "--frame", "1", "--worst", "2"], "give --frame or --worst, not both"),
+        (
+            ["inspect", "a.rrd", "--list", "--frame", "1"],
+            "--list opens nothing; give it without --frame and --screenshot",
+        ),
+        (
+            ["replay", "a.mcap", "--ignore-label", "3"],
+            "--ignore-label without --road-label: say which label is road",
+        ),
+    ],
+)
+def test_options_that_do_not_go_together_are_told_without_calling_a_value_invalid(
+    words, said, capsys
+):
+    assert main(words) == 2
+    told = f"roadeval: error: {said}; see 'roadeval {words[0]} --help'\n"
+    assert capsys.readouterr().err == told

@@ -1,33 +1,65 @@
 """Whole drives are replayed once; several tests look at each."""
 
+import fcntl
+import os
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+
 import pytest
 
-from tests.e2e.commands import DEMO, Replayed, replay
+from tests.e2e.commands import DEMO, Replayed, Run, replay, roadeval
 
 
 @pytest.fixture(scope="session")
-def demo(tmp_path_factory) -> Replayed:
+def once(tmp_path_factory):
+    """Do something in a folder, unless another worker of these tests has done it already."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+    def once(name: str, do: Callable[[Path], Run]) -> Replayed:
+        folder, result = shared / name, shared / f"{name}.pickle"
+        with (shared / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not result.exists():
+                folder.mkdir()
+                result.write_bytes(pickle.dumps(do(folder)))
+        return Replayed(pickle.loads(result.read_bytes()), folder)
+
+    return once
+
+
+@pytest.fixture(scope="session")
+def demo(once) -> Replayed:
     """The synthetic drive that ships with the project."""
-    return replay(tmp_path_factory.mktemp("demo"), DEMO)
+    return once("demo", lambda folder: replay(folder, DEMO).run)
 
 
 @pytest.fixture(scope="session")
-def street(data, tmp_path_factory) -> Replayed:
+def at_home(once):
+    """A replay of 20 frames without a word about outputs, and the folder it ran in."""
+    words = ("--max-frames", 20, "--jobs", 2, "--json")
+    done = once("home", lambda folder: roadeval("replay", DEMO, *words, cwd=folder))
+    return done.run, done.folder
+
+
+@pytest.fixture(scope="session")
+def street(once, data) -> Replayed:
     """A street at 15 Hz whose truth is class ids: 3 is road, 11 is to be ignored."""
     drive = data / "drives" / "camvid_0016E5_15hz.mcap"
     labels = ("--road-label", 3, "--ignore-label", 11)
-    return replay(tmp_path_factory.mktemp("street"), drive, *labels)
+    return once("street", lambda folder: replay(folder, drive, *labels).run)
 
 
 @pytest.fixture(scope="session")
-def car_park(data, tmp_path_factory) -> Replayed:
+def car_park(once, data) -> Replayed:
     """Streets and a car park at 1 Hz whose truth is a mask that needs no explanation."""
     drive = data / "drives" / "camvid_0006R0_1hz.mcap"
-    return replay(tmp_path_factory.mktemp("car_park"), drive)
+    return once("car_park", lambda folder: replay(folder, drive).run)
 
 
 @pytest.fixture(scope="session")
-def unlabelled(data, tmp_path_factory) -> Replayed:
+def unlabelled(once, data) -> Replayed:
     """A city drive without truth."""
     drive = data / "drives" / "ford_shadows_unlabelled_raw.mcap"
-    return replay(tmp_path_factory.mktemp("unlabelled"), drive)
+    return once("unlabelled", lambda folder: replay(folder, drive).run)

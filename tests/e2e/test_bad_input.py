@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
+from roadeval.cli.app import main
 from roadeval.logs import LogWriter
-from tests.e2e.commands import roadeval
 
 SECOND = 1_000_000_000
 
@@ -29,19 +29,19 @@ def write(tmp_path):
 
 
 @pytest.fixture
-def refused(tmp_path):
+def refused(tmp_path, capsys):
     """Replay what cannot be replayed; returns the one line. Nothing may be left behind."""
 
     def refused(*words):
         outputs = ("--save", tmp_path / "out.rrd", "--reports", tmp_path / "reports")
-        run = roadeval("replay", "--quiet", *outputs, *words)
-        assert run.returncode == 1
-        assert run.stdout == ""
-        assert run.stderr.startswith("roadeval: error: ")
-        assert run.stderr.count("\n") == 1
+        assert main(["replay", "--quiet", *map(str, (*outputs, *words))]) == 1
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert said.err.startswith("roadeval: error: ")
+        assert said.err.count("\n") == 1
         assert not list(tmp_path.rglob("*.rrd"))
         assert not list(tmp_path.rglob("*.csv*"))
-        return run.stderr
+        return said.err
 
     return refused
 

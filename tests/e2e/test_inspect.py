@@ -6,6 +6,8 @@ from pathlib import Path
 import cv2
 import pytest
 
+from roadeval import Recording
+from roadeval.cli.app import main
 from tests.e2e.commands import roadeval
 
 DRIVER = Path("/usr/share/vulkan/icd.d")
@@ -49,6 +51,32 @@ def test_the_viewer_is_drawn_without_a_screen_at_the_worst_frame(demo, tmp_path)
     drawn = cv2.imread(str(picture))
     assert drawn.shape == (1080, 1920, 3)
     assert drawn.std() > 20
+
+
+@pytest.fixture
+def told(monkeypatch, tmp_path, capsys):
+    """Ask for a picture by a viewer that draws nothing; returns what is said of it."""
+    monkeypatch.setattr(
+        "roadeval.recording.viewer.screenshot", lambda recording, picture, frame: frame
+    )
+
+    def told(recording, *words):
+        picture = tmp_path / "it.png"
+        assert main(["inspect", str(recording), "--screenshot", str(picture), *words]) == 0
+        return capsys.readouterr().out.removeprefix(f"{picture}: ")
+
+    return told
+
+
+def test_without_a_frame_the_worst_is_drawn_and_named(demo, told):
+    said = f"frame {worst(demo)}, the worst (--frame N or --worst K takes another)\n"
+    assert told(demo.recording) == said
+    assert told(demo.recording, "--frame", "12") == "frame 12\n"
+
+
+def test_where_nothing_was_scored_the_first_frame_is_drawn(unlabelled, told):
+    first = Recording(unlabelled.recording).layout.first_frame
+    assert told(unlabelled.recording) == f"frame {first}\n"
 
 
 @pytest.mark.parametrize(

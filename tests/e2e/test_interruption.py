@@ -15,7 +15,7 @@ ENOUGH = 1_000_000
 """Bytes of a recording that hold some frames, and far from all."""
 
 
-def stopped(folder, number):
+def stop(folder, number):
     """Replay the demo drive until some frames are recorded, then send a signal."""
     words = ["replay", DEMO, "--save", folder / "out.rrd", "--reports", folder / "reports"]
     with subprocess.Popen([ROADEVAL, *words], stderr=subprocess.PIPE, text=True) as run:
@@ -27,20 +27,29 @@ def stopped(folder, number):
     return run.returncode, said
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_leaves_a_readable_partial_recording_whose_name_is_told(number, code, tmp_path):
-    returned, said = stopped(tmp_path, number)
+@pytest.fixture(
+    scope="module", params=[(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["SIGINT", "SIGTERM"]
+)
+def stopped(request, tmp_path_factory):
+    """A stopped run's folder, its exit code, the one it should have, and what it said."""
+    number, code = request.param
+    folder = tmp_path_factory.mktemp("stopped")
+    return folder, *stop(folder, number), code
+
+
+def test_a_signal_leaves_a_readable_partial_recording_whose_name_is_told(stopped):
+    folder, returned, said, code = stopped
     assert returned == code
     assert "Traceback" not in said
     (path,) = re.findall(r"roadeval: interrupted: .*?(\S+\.rrd)", said)
-    assert Path(path).parent == tmp_path
+    assert Path(path).parent == folder
     recording = Recording(Path(path))
     assert not recording.complete
     assert recording.layer("unfiltered", "post", 0).shape == (480, 640)
 
 
-def test_a_signal_leaves_no_output_under_its_final_name(tmp_path):
-    stopped(tmp_path, signal.SIGINT)
-    assert not (tmp_path / "out.rrd").exists()
-    assert not list(tmp_path.rglob("*.csv*"))
-    assert not list(tmp_path.rglob("summary.json"))
+def test_a_signal_leaves_no_output_under_its_final_name(stopped):
+    folder, *_ = stopped
+    assert not (folder / "out.rrd").exists()
+    assert not list(folder.rglob("*.csv*"))
+    assert not list(folder.rglob("summary.json"))

@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from roadeval import Recording
-from tests.e2e.commands import replay
+from tests.e2e.commands import DEMO, replay
 
 RERUN = Path(sys.executable).with_name("rerun")
 STAGES = ("shadow", "similarity", "svm", "post")
@@ -68,25 +68,26 @@ def test_rerun_finds_no_fault_with_the_file(drive, request):
 
 
 @pytest.fixture(scope="module")
-def twice(data, tmp_path_factory):
-    """The same 20 frames replayed by one worker, and by two."""
-    drive = data / "drives" / "camvid_0006R0_1hz.mcap"
+def twice(at_home, tmp_path_factory):
+    """The recordings and the tables of 20 frames, replayed by two workers and by one."""
+    _, home = at_home
+    alone = replay(tmp_path_factory.mktemp("alone"), DEMO, "--max-frames", 20, "--jobs", 1)
     return [
-        replay(tmp_path_factory.mktemp("twice"), drive, "--max-frames", 20, "--jobs", jobs)
-        for jobs in (1, 2)
+        (home / "recordings" / "demo.rrd", home / "reports" / "demo"),
+        (alone.recording, alone.reports),
     ]
 
 
 @pytest.mark.parametrize("table", ["frames", "windows", "regions"])
 def test_two_runs_give_the_same_tables(twice, table):
-    one, two = ((each.reports / f"{table}.csv").read_bytes() for each in twice)
+    two, one = ((reports / f"{table}.csv").read_bytes() for _, reports in twice)
     assert one == two
 
 
 def test_two_runs_give_the_same_recording_but_for_the_clock(twice, tmp_path):
     dropped = [word for path in CLOCKED for word in ("--drop-entity", path)]
-    for number, each in enumerate(twice):
-        code, said = rerun("filter", *dropped, each.recording, "-o", tmp_path / f"{number}.rrd")
+    for number, (recording, _) in enumerate(twice):
+        code, said = rerun("filter", *dropped, recording, "-o", tmp_path / f"{number}.rrd")
         assert code == 0, said
     code, said = rerun("compare", "--unordered", tmp_path / "0.rrd", tmp_path / "1.rrd")
     assert code == 0, said

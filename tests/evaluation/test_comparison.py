@@ -57,7 +57,7 @@ def test_frames_with_the_same_stamp_are_matched_in_their_order():
     sides = [Side(name, "street", "d1", table) for name, table in zip("ab", frozen, strict=True)]
     (change,) = compare(sides, SETTINGS)["changes"]
     assert change["frames"] == 3
-    assert change["difference"]["ERR"]["low"] == 0
+    assert change["difference"]["ERR"]["mean"] == 0
 
 
 def test_different_drives_stand_side_by_side_without_differences():
@@ -117,19 +117,43 @@ def test_chosen_variants_keep_their_order_and_must_be_there():
 
 def test_a_condition_is_judged_on_every_new_result():
     sides = [a_side("base", [10] * 12), a_side("good", [10] * 12), a_side("bad", [12] * 12)]
-    judged = judge(compare(sides, SETTINGS), [Condition.parse("post.filtered.ERR > 1pp")])
+    judged = judge(compare(sides, SETTINGS), [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
     assert [row["holds"] for row in judged] == [False, True]
+
+
+@pytest.mark.parametrize("text", ["post.filtered.ERR > 1pp", "post.filtered.ERR > 1%"])
+def test_a_condition_is_not_judged_by_a_handful_of_frames(text):
+    found = compare([a_side("base", [10] * 40), a_side("new", [90] * 9)], SETTINGS)
+    with pytest.raises(
+        ConditionError, match=r"base and new have 9 .* in common, and 10 are needed"
+    ):
+        judge(found, [Condition.parse(text)], SETTINGS)
+
+
+def test_a_condition_is_not_judged_where_two_ranges_hardly_overlap():
+    base, new = a_side("base", [10] * 50), a_side("new", [90] * 40)
+    late = new.frames.assign(stamp_ns=new.frames["stamp_ns"] + 31 * 10**8)
+    found = compare([base, Side("new", "street", "d1", late)], SETTINGS)
+    assert found["changes"][0]["frames"] == 19
+    with pytest.raises(ConditionError, match="fewer than half of the 40 of the shorter one"):
+        judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
+
+
+def test_a_condition_is_judged_where_one_result_covers_a_part_of_the_other():
+    found = compare([a_side("base", [10] * 50), a_side("new", [90] * 12)], SETTINGS)
+    (row,) = judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
+    assert row["holds"]
 
 
 def test_a_condition_on_what_is_not_there_is_an_error_not_a_pass():
     found = compare([a_side("a", [1] * 12), a_side("b", [1] * 12)], SETTINGS)
     with pytest.raises(ConditionError, match=r"post\.net; there are post\.filtered"):
-        judge(found, [Condition.parse("post.net.ERR > 1pp")])
+        judge(found, [Condition.parse("post.net.ERR > 1pp")], SETTINGS)
 
 
 def test_a_change_between_different_drives_is_not_judged_but_a_level_is():
     found = compare([a_side("a", [1] * 12), a_side("b", [9] * 12, digest="d2")], SETTINGS)
     with pytest.raises(ConditionError, match="different drives"):
-        judge(found, [Condition.parse("post.filtered.ERR > 1pp")])
-    judged = judge(found, [Condition.parse("post.filtered.ERR > 5%")])
+        judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
+    judged = judge(found, [Condition.parse("post.filtered.ERR > 5%")], SETTINGS)
     assert [row["holds"] for row in judged] == [False, True]

@@ -73,10 +73,20 @@ def test_no_frame_at_all_has_no_mean() -> None:
     assert found.low is None
 
 
-def test_no_difference_on_any_frame_is_a_fact_and_needs_no_ten_frames() -> None:
-    found = mean_difference(np.zeros(3), SETTINGS)
-    assert (found.mean, found.low, found.high) == (0, 0, 0)
+@pytest.mark.parametrize("everywhere", [0.0, 0.25])
+def test_the_same_difference_on_ten_frames_has_an_interval_without_width(
+    everywhere: float,
+) -> None:
+    found = mean_difference(np.full(10, everywhere), SETTINGS)
+    assert (found.mean, found.low, found.high) == (everywhere,) * 3
     assert found.reason == "the same on every frame"
+
+
+@pytest.mark.parametrize("everywhere", [0.0, 0.25])
+def test_the_same_difference_on_a_handful_of_frames_has_no_interval(everywhere: float) -> None:
+    found = mean_difference(np.full(9, everywhere), SETTINGS)
+    assert (found.mean, found.low, found.high) == (everywhere, None, None)
+    assert found.reason == "there are 9 frames, and an interval needs 10"
 
 
 def test_frames_mostly_without_a_difference_do_not_upset_the_block_length() -> None:

@@ -37,6 +37,11 @@ def difference(mean: float, low: float | None, high: float | None) -> Difference
             "on average, but 91 frames are worth about 5 independent ones.",
         ),
         (
+            difference(0.0, None, None),
+            "Cannot tell whether the filter helps on this drive: ERR of post did not change "
+            "on average, but 91 frames are worth about 5 independent ones.",
+        ),
+        (
             difference(0.0, 0.0, 0.0),
             "On this drive the filter leaves ERR of post of every frame as it is.",
         ),

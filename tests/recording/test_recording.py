@@ -101,6 +101,27 @@ def test_a_layer_that_a_frame_lacks_is_not_shown_from_the_frame_before(drive, tm
     assert ends == {3: False}
 
 
+@pytest.mark.parametrize("read_ahead", [8 << 20, 0])
+def test_every_frame_comes_back_in_any_order(drive, recording, read_ahead, monkeypatch):
+    monkeypatch.setattr("roadeval.recording.reading.READ_AHEAD", read_ahead)
+    again = Recording(recording.path)
+    for each in (*drive[9:], *reversed(drive)):
+        np.testing.assert_array_equal(again.truth(each.frame.number), each.frame.truth)
+
+
+def test_an_entity_is_gone_through_once_whatever_frames_are_read(drive, recording, monkeypatch):
+    again, passes = Recording(recording.path), []
+    batches = again._batches
+    monkeypatch.setattr(
+        again, "_batches", lambda *given, **words: passes.append(given) or batches(*given, **words)
+    )
+    for each in (drive[-1], *drive):
+        again.layer("filtered", "post", each.frame.number)
+    with pytest.raises(RecordingError, match="nothing on frame 99"):
+        again.layer("filtered", "post", 99)
+    assert len(passes) == 1
+
+
 # --- Numbers and words ------------------------------------------------------------------------
 
 
