@@ -4,6 +4,11 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# A compiled kernel takes seconds where it is compiled: no deadline for a single example.
+settings.register_profile("roadeval", deadline=None)
+settings.load_profile("roadeval")
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -6,9 +6,8 @@ import math
 from collections import Counter, defaultdict
 from typing import Any, Final
 
-import numpy as np
-
-from roadeval.data import IGNORE, FrameResult, Mask, Role, Truth
+from roadeval.data import FrameResult, Mask, Role, Truth
+from roadeval.evaluation.bits import Bits, TruthBits, ones
 
 
 class Flicker:
@@ -26,7 +25,7 @@ class Flicker:
     """
 
     def __init__(self) -> None:
-        self._before: tuple[Truth, dict[str, Mask]] | None = None
+        self._before: tuple[TruthBits, dict[str, Bits]] | None = None
         self._pairs: Final[Counter[str]] = Counter()
         self._labelled: Final[Counter[str]] = Counter()
         self._changed: Final[Counter[str]] = Counter()
@@ -34,19 +33,18 @@ class Flicker:
 
     def add(self, truth: Truth, masks: dict[str, Mask]) -> None:
         """Add the next frame: its truth (0, 1, 255) and the final masks (0, 1), all uint8."""
-        before, self._before = self._before, (truth, masks)
-        if before is None or before[0].shape != truth.shape:
+        now = TruthBits.of(truth)
+        bits = dict(zip(masks, now.pack(*masks.values()), strict=True))
+        before, self._before = self._before, (now, bits)
+        if before is None or before[0].shape != now.shape:
             return
-        labelled = (truth != IGNORE) & (before[0] != IGNORE)
-        count = int(np.count_nonzero(labelled))
-        moved = int(np.count_nonzero((truth != before[0]) & labelled))
+        labelled = now.labelled & before[0].labelled
+        count, moved = ones(labelled), ones((now.road ^ before[0].road) & labelled)
         for name in masks.keys() & before[1].keys():
             self._pairs[name] += 1
             self._labelled[name] += count
             self._true[name] += moved
-            self._changed[name] += int(
-                np.count_nonzero((masks[name] != before[1][name]) & labelled)
-            )
+            self._changed[name] += ones((bits[name] ^ before[1][name]) & labelled)
 
     def interrupt(self) -> None:
         """Say that the next frame does not follow the one before."""

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import ERRORS, Counts, Layer, Mask, Truth
 from roadeval.evaluation.bits import Bits, TruthBits, everywhere, flat
 from roadeval.kernels import KERNELS
+
+IGNORED: Final = 4
+"""The class of `roadeval.data.ERRORS` beside TN, TP, FP and FN, which are 0 to 3."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +44,10 @@ def count(masks: Bits, truth: TruthBits, regions: Mapping[str, Bits]) -> tuple[M
     whole = everywhere(truth.shape)
     inside, classes = flat([whole, *regions.values()]), flat([truth.road, truth.other])
     positives, negatives = KERNELS.count_bits(flat([whole]), classes, inside)[0]
+    tp, fp = KERNELS.count_bits(flat(masks), classes, inside).transpose(1, 0, 2)
     counted = []
-    for tp, fp in KERNELS.count_bits(flat(masks), classes, inside):
-        table = np.stack([tp, negatives - fp, fp, positives - tp], axis=1).tolist()
-        total, *parts = (Counts(*row) for row in table)
+    for rows in np.stack([tp, negatives - fp, fp, positives - tp], axis=2).tolist():
+        total, *parts = (Counts(*row) for row in rows)
         counted.append(MaskCounts(total, dict(zip(regions, parts, strict=True))))
     return tuple(counted)
 
@@ -60,17 +62,4 @@ def error_map(mask: Mask, truth: Truth) -> Layer:
     truth
         ``(H, W)`` uint8: 0, 1, or 255 for ignored.
     """
-    import cv2
-
-    return Layer(ERRORS, cv2.LUT(truth * np.uint8(2) + mask, _OUTCOMES))
-
-
-def _outcomes() -> npt.NDArray[np.uint8]:
-    """Tabulate class by ``2 * truth + mask`` modulo 256, where an ignored pixel has 254 or 255."""
-    value = {label.name: label.value for label in ERRORS.classes}
-    table = np.full(256, value["ignored"], np.uint8)
-    table[:4] = value["TN"], value["FP"], value["FN"], value["TP"]
-    return table
-
-
-_OUTCOMES: Final = _outcomes()
+    return Layer(ERRORS, KERNELS.outcomes(mask, truth, IGNORED))

@@ -11,15 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Change, Layer, Step
-from roadeval.evaluation.bits import Bits, TruthBits, ones
+from roadeval.evaluation.bits import Bits, TruthBits, everywhere, flat, ones
+from roadeval.evaluation.counts import IGNORED
+from roadeval.kernels import KERNELS
 
 Sums = npt.NDArray[np.int64]
 Name = tuple[str, str]
 """A mask's variant and stage."""
-FP: Final = 2
-FN: Final = 3
-IGNORED: Final = 4
-"""Classes of `roadeval.data.ERRORS`."""
 CELLS: Final = 160
 """Cells across the longer side of a heat map, at most."""
 PENDING: Final = 255
@@ -49,10 +47,7 @@ class HeatMap:
         if self.frames % PENDING == 0:
             self._carry()
         self.frames += 1
-        for sums, found in zip(
-            self._bytes, (errors != IGNORED, errors == FP, errors == FN), strict=True
-        ):
-            np.add(sums, found.view(np.uint8), out=sums)
+        KERNELS.add_outcomes(errors, IGNORED, self._bytes)
 
     def sums(self) -> Sums:
         """``(3, H, W)`` int64: frames that label the pixel, that have it FP, and FN."""
@@ -95,11 +90,11 @@ def changes(names: Sequence[Name], masks: Bits, truth: TruthBits) -> dict[Step, 
     """
     labelled = truth.labelled
     whole = ones(labelled)
-    wrong = (masks ^ truth.road) & labelled
+    wrong = flat((masks ^ truth.road) & labelled)
+    both = KERNELS.count_bits(wrong, wrong, flat([everywhere(truth.shape)]))[..., 0].tolist()
     found = {}
     for before, after in _steps(names):
-        spoiled = ones(wrong[after] & ~wrong[before])
-        repaired = ones(wrong[before] & ~wrong[after])
+        repaired, spoiled = (both[each][each] - both[before][after] for each in (before, after))
         found[*names[before], *names[after]] = Change(repaired, spoiled, whole)
     return found
 

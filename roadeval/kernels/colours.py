@@ -274,3 +274,26 @@ def _add_product(
 ) -> None:
     for index in range(len(total)):
         total[index] += values[index] * factor
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def outcomes(mask: Codes, truth: Codes, ignored: int) -> Codes:
+    """See `plain.outcomes`."""
+    height, width = mask.shape
+    result = np.empty((height, width), np.uint8)
+    for y in range(height):
+        for x in range(width):
+            value = np.uint8(truth[y, x] + 2 * (truth[y, x] ^ mask[y, x]))
+            result[y, x] = value if truth[y, x] <= 1 else ignored
+    return result
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def add_outcomes(errors: Codes, ignored: int, sums: Codes) -> None:
+    """See `plain.add_outcomes`."""
+    labelled, false_positives, false_negatives = sums
+    for y in range(errors.shape[0]):
+        for x in range(errors.shape[1]):
+            labelled[y, x] += errors[y, x] != ignored
+            false_positives[y, x] += errors[y, x] == 2
+            false_negatives[y, x] += errors[y, x] == 3

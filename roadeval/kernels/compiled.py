@@ -1,9 +1,11 @@
 """The compiled kernels, by the names of their twins in `plain`."""
 
 from roadeval.kernels.colours import (
+    add_outcomes,
     look_up_colours,
     look_up_sum_min,
     mahalanobis,
+    outcomes,
     rectified_sum,
     ring_sums,
     run_sums,
@@ -19,6 +21,7 @@ from roadeval.kernels.shapes import (
 )
 
 __all__ = [
+    "add_outcomes",
     "components",
     "count_bits",
     "fill_holes",
@@ -28,6 +31,7 @@ __all__ = [
     "look_up_colours",
     "look_up_sum_min",
     "mahalanobis",
+    "outcomes",
     "rectified_sum",
     "ring_sums",
     "run_sums",

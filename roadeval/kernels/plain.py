@@ -273,6 +273,25 @@ def fill_holes(mask: Mask) -> Mask:
     return filled
 
 
+def outcomes(mask: Mask, truth: Mask, ignored: int) -> Mask:
+    """Say how each pixel came out: 0 TN, 1 TP, 2 FP, 3 FN, or ``ignored``.
+
+    ``mask`` is ``(H, W)`` uint8, 0 or 1; ``truth`` likewise, and greater where it is ignored.
+    """
+    value = truth + 2 * (truth ^ mask)
+    found: Mask = np.where(truth <= 1, value, ignored).astype(np.uint8)
+    return found
+
+
+def add_outcomes(errors: Mask, ignored: int, sums: Mask) -> None:
+    """Count, pixel by pixel, how often it was labelled, FP and FN: ``sums``, ``(3, H, W)`` uint8.
+
+    ``errors`` is ``(H, W)`` uint8, as `outcomes` gives it.
+    """
+    for total, found in zip(sums, (errors != ignored, errors == 2, errors == 3), strict=True):
+        np.add(total, found.view(np.uint8), out=total)
+
+
 def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
     """Count pixels in a mask, of a class and in a region: the set bits of three words' conjunction.
 

@@ -25,6 +25,9 @@ SVM: Final = mask_spec("svm", "SVM: road (Eq. 16)")
 UNDECIDED: Final = 2
 """In a table of colours: too near to the threshold for a quick value to tell the side."""
 
+Penalty = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
+"""C of a soft margin. It bounds the machine's weights, which are to stay far below `GREATEST`."""
+
 _BLOCK: Final = 1 << 20
 """Kernel values computed at once: 8 MB of float64, which stays in the cache."""
 
@@ -50,7 +53,7 @@ class SvmSettings:
     """
 
     kernel: Literal["rbf", "linear"] = "rbf"
-    c: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
+    c: Penalty = 1.0
     gamma: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.5
     standardise: bool = True
     threshold: Annotated[float, Field(allow_inf_nan=False)] = 0.0
@@ -226,4 +229,5 @@ STAGE: Final = Stage(
     fit=fit,
     parameters=SupportVectors,
     oracle=perfect_mask,
+    deciding=("threshold",),
 )

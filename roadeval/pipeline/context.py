@@ -28,17 +28,28 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Rgb
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.classify import SVM
+from roadeval.pipeline.classify import SVM, Penalty
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.scale import reduced, stretched
 from roadeval.pipeline.shade import LOGS
-from roadeval.pipeline.stage import Moment, Output, Stage, TrainingSet, View, perfect_mask
+from roadeval.pipeline.stage import (
+    MisfitError,
+    Moment,
+    Output,
+    Stage,
+    TrainingSet,
+    View,
+    perfect_mask,
+)
 
 Values = npt.NDArray[np.float32]
 
 DECISION: Final = LayerSpec(
     "decision", LayerKind.SCALAR, "Decision value (Eq. 16)", value_range=(-2.0, 2.0), exact=False
 )
+
+BARE_FEATURES: Final = 7
+"""Three colours, two log-chromaticities and two coordinates: what is not texture."""
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
@@ -72,7 +83,7 @@ class ContextSettings:
     width: Annotated[int, Field(ge=32, le=4096)] = 320
     windows: tuple[Annotated[int, Field(ge=1, le=255)], ...] = (5, 15)
     planes: Annotated[int, Field(ge=1, le=4096)] = 128
-    c: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
+    c: Penalty = 1.0
     smoothing: Annotated[int, Field(ge=1, le=255)] = 5
     memory: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     threshold: Annotated[float, Field(allow_inf_nan=False)] | None = None
@@ -97,7 +108,8 @@ class RectifiedMachine:
         check_arrays(self, np.float32, planes=("K", "F"), bias=("K",), weights=("K",))
         check_arrays(self, np.float32, offset=(), threshold=())
         check_range("offset", self.offset, -GREATEST, GREATEST)
-        if self.planes.shape[1] < 7 or self.planes.shape[1] % 2 == 0:
+        textures = self.planes.shape[1] - BARE_FEATURES
+        if textures < 0 or textures % 2:
             raise ValueError("planes has not seven columns and two for each window of texture")
 
 
@@ -219,8 +231,25 @@ def threshold(values: Values, road: npt.NDArray[np.bool_]) -> float:
 # --- The stage ------------------------------------------------------------------------------------
 
 
+def check_fit(machine: RectifiedMachine, settings: ContextSettings) -> None:
+    """Raise a `MisfitError` if the machine is for other features than the settings'.
+
+    The compiled sum checks no index: with too few columns it would read beyond the array.
+    """
+    given, wanted = machine.planes.shape[1], BARE_FEATURES + 2 * len(settings.windows)
+    if given != wanted:
+        raise MisfitError(
+            f"the model is damaged: its machine of stage context is for {given} features, and "
+            f"windows = {list(settings.windows)} make {wanted}; train it again"
+        )
+
+
 def decision(image: Rgb, machine: RectifiedMachine, settings: ContextSettings) -> Values:
-    """Decision value (Eq. 16) of each pixel of ``(h, w, 3)`` uint8 RGB, ``(h, w)`` float32."""
+    """Decision value (Eq. 16) of each pixel of ``(h, w, 3)`` uint8 RGB, ``(h, w)`` float32.
+
+    A `MisfitError` if the machine is for other features than the settings'.
+    """
+    check_fit(machine, settings)
     planes = features(image, settings.windows)
     values = KERNELS.rectified_sum(
         planes.reshape(len(planes), -1), machine.planes, machine.bias, machine.weights
@@ -247,7 +276,8 @@ def remembered(values: Values, moment: Moment, memory: float) -> Values:
 
 
 def bind(settings: ContextSettings, machine: RectifiedMachine) -> Callable[[View], Output]:
-    """Return the machine as a pure function of what it sees."""
+    """Return the machine as a pure function of what it sees; a `MisfitError`, see `check_fit`."""
+    check_fit(machine, settings)
 
     def run(view: View) -> Output:
         values = decision(reduced(view.image, settings.width), machine, settings)
@@ -274,5 +304,7 @@ STAGE: Final = Stage(
     fit=fit,
     parameters=RectifiedMachine,
     oracle=perfect_mask,
+    # Not the threshold: it is learnt, or takes the place of what would have been.
+    deciding=("memory", "smoothing"),
     mask=SVM.name,
 )

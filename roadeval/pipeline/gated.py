@@ -15,13 +15,14 @@ Where no component is kept the image passes as it came, bit for bit.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb
+from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb, Truth
 from roadeval.pipeline import shade
 from roadeval.pipeline.gates import (
     ACCEPTED,
@@ -114,6 +115,23 @@ def bind(settings: GatedSettings, road: RoadLight) -> Callable[[View], Output]:
     return run
 
 
+def oracle(settings: GatedSettings, road: RoadLight) -> Callable[[View, Truth], Output]:
+    """Return the filter as it would be if it knew what is shadow.
+
+    True shadow takes the place of candidates and gates. Rings of lit road, gains and soft edges
+    stay; a component without a ring, or too thin for a core to measure, stays as it is.
+    """
+
+    def run(view: View, truth: Truth) -> Output:
+        small = reduced(view.image, settings.width)
+        shadow = enlarged((truth == 1).view(np.uint8), small.shape)
+        found = components(replace(look(small, road, settings), candidates=shadow), settings)
+        gain = gain_map(found, np.full(len(found.area), ACCEPTED, np.uint8), settings)
+        return Output(image=brighten(view.image, gain) if (gain > 1).any() else view.image)
+
+    return run
+
+
 def _maps(
     scene: Scene, found: Components, verdicts: Verdicts, settings: GatedSettings
 ) -> dict[str, Mask]:
@@ -167,4 +185,5 @@ STAGE: Final = Stage(
     fit=fit,
     parameters=RoadLight,
     is_filter=True,
+    oracle=oracle,
 )

@@ -109,7 +109,7 @@ def closing(mask: Mask, element: Mask) -> Mask:
     The dilation may leave the image: cut off there, the erosion would eat road along the edge.
     """
     margin = element.shape[0] // 2
-    wide = np.pad(mask, margin)
+    wide = cv2.copyMakeBorder(mask, margin, margin, margin, margin, cv2.BORDER_CONSTANT, value=0)
     closed = erode(dilate(wide, element), element)
     return closed[margin : closed.shape[0] - margin, margin : closed.shape[1] - margin]
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Final
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 from pydantic import ConfigDict, Field
@@ -14,6 +13,7 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerKind, LayerSpec, mask_spec
 from roadeval.kernels import KERNELS
+from roadeval.pipeline.colour import planes
 from roadeval.pipeline.parameters import check_arrays, check_covariance, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
 
@@ -79,7 +79,7 @@ def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Out
     spec = _distance(settings)
 
     def run(view: View) -> Output:
-        distance, mask = KERNELS.mahalanobis(cv2.split(view.image), road.mean, precision, greatest)
+        distance, mask = KERNELS.mahalanobis(planes(view.image), road.mean, precision, greatest)
         return Output((Layer(spec, distance), Layer(SIMILARITY, mask)), mask=mask)
 
     return run
@@ -105,4 +105,5 @@ STAGE: Final = Stage(
     layers=layers,
     fit=fit,
     parameters=RoadColour,
+    deciding=("quantile", "ridge"),
 )

@@ -15,11 +15,16 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import ROAD, Layer, LayerSpec, Mask, Rgb, Truth
+from roadeval.errors import RoadevalError
 
 S = TypeVar("S")
 """Settings of a stage: a frozen, validated dataclass."""
 P = TypeVar("P")
 """Parameters that a stage learns: a frozen dataclass of floats and arrays, or None."""
+
+
+class MisfitError(RoadevalError, ValueError):
+    """Parameters that do not fit a stage's settings: which, and what to do."""
 
 
 class Baton(Protocol):
@@ -118,7 +123,7 @@ class Stage(Generic[S, P]):
     bind
         ``bind(settings, parameters)`` returns the pure function from `View` to `Output`. What
         depends on settings and parameters alone (tables, structuring elements) is made here,
-        once.
+        once. A `MisfitError` if the parameters do not fit the settings.
     layers
         ``layers(settings)``: the layers it will hand out, in order.
     fit
@@ -134,6 +139,9 @@ class Stage(Generic[S, P]):
         ``oracle(settings, parameters)`` returns the stage as it would be if it were perfect: a
         pure function of `View` and the truth, of shadow for a filter, else of the road. None
         where nobody asks what a perfect one would bring.
+    deciding
+        Settings that only decide: what is learnt does not depend on them, and a model may be used
+        with others than it was trained with.
     mask
         Its mask's layer, and its name in tables and timing, where that is not ``name``: stages
         that do the same in different ways are tabled under one name.
@@ -149,6 +157,7 @@ class Stage(Generic[S, P]):
     is_filter: bool = False
     prepares: bool = False
     oracle: Callable[[S, Any], Callable[[View, Truth], Output]] | None = None
+    deciding: tuple[str, ...] = ()
     mask: str = ""
 
     @property

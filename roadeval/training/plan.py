@@ -5,17 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from roadeval.pipeline.chain import STAGES
-
-DECIDING: Final[Mapping[str, frozenset[str]]] = {
-    "similarity": frozenset({"quantile", "ridge"}),
-    "svm": frozenset({"threshold"}),
-    "context": frozenset({"memory", "smoothing"}),
-}
-"""By stage: the settings that its decision follows, but nothing that it learns. The threshold of
-``context`` is not among them: it is learnt, or takes the place of what would have been."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,5 +30,6 @@ class Plan:
 
 def relevant(stage: str, settings: Mapping[str, Any]) -> dict[str, Any]:
     """Leave the settings out of a stage's that only its decision follows."""
-    deciding = DECIDING.get(stage, frozenset())
+    # A model file may name a stage that there is no more.
+    deciding = STAGES[stage].deciding if stage in STAGES else ()
     return {key: value for key, value in settings.items() if key not in deciding}

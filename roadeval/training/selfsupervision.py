@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Rgb, Truth
 from roadeval.kernels import KERNELS
+from roadeval.pipeline.colour import planes
 from roadeval.pipeline.patch import patch_mask
 from roadeval.pipeline.similarity import limit
 from roadeval.training.settings import TrainingSettings
@@ -24,7 +24,7 @@ def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     colours = image[patch].astype(np.float64)
     precision = np.linalg.inv(np.cov(colours, rowvar=False, ddof=0) + np.eye(3))
     mean, far = colours.mean(axis=0), limit(settings.far)
-    _, near = KERNELS.mahalanobis(cv2.split(image), mean, precision, far)
+    _, near = KERNELS.mahalanobis(planes(image), mean, precision, far)
     truth = np.full((height, width), IGNORE, np.uint8)
     truth[near == 0] = NON_ROAD
     truth[: round(settings.horizon * height)] = NON_ROAD

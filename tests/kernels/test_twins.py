@@ -15,6 +15,7 @@ from roadeval.pipeline import shadow
 from tests.pipeline.images import IMAGES, images, noise
 
 RNG = np.random.default_rng(0)
+TRUTHS = np.array([0, 1, 255], np.uint8)
 COLOUR_TABLE = RNG.integers(0, 256, 1 << 24, dtype=np.uint8)
 PRECISION = np.linalg.inv(np.cov(RNG.normal(0, 30, (3, 50))))
 
@@ -40,6 +41,7 @@ def every_kernel(image, width):
         "transfer": (image, runs, source, target, gain),
         "mahalanobis": (planes, np.array([90.5, 101.25, 99.0]), PRECISION, 7.8),
         "look_up_colours": (image, COLOUR_TABLE),
+        "outcomes": (image[..., 0] & 1, RNG.choice(TRUTHS, labels.shape), 4),
     }
 
 
@@ -70,7 +72,7 @@ def test_twins_agree_on_odd_images(image, width):
 
 
 @given(images(), st.integers(1, 4))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_twins_agree_on_random_images(image, width):
     assert_twins(image, width)
 
@@ -160,7 +162,7 @@ NO_PATCH = np.zeros((0, 0), np.uint8)
 
 
 @given(masks(), st.integers(0, 9))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_regions_are_kept_and_holes_filled_alike(mask, seed):
     patch = (np.random.default_rng(seed).random(mask.shape) < 0.05).astype(np.uint8)
     for arguments in ((mask, NO_PATCH), (mask, patch)):
@@ -192,7 +194,7 @@ def test_masks_may_have_any_layout(view):
 
 
 @given(masks(), st.integers(0, 70), st.integers(0, 6))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_bits_grow_alike_and_stay_in_the_image(mask, least, rows):
     reach = np.array([least + rows - row for row in range(rows + 1)])
     grown = fast.grow(packed(mask), reach, mask.shape[1])
@@ -212,7 +214,6 @@ def test_bits_grow_by_the_element():
 
 
 @given(st.integers(0, 3), st.integers(1, 3), st.integers(1, 4), st.integers(1, 200))
-@settings(deadline=None)
 def test_bits_are_counted_alike(count, classes, regions, words):
     rng = np.random.default_rng(words)
     arguments = [
@@ -223,6 +224,17 @@ def test_bits_are_counted_alike(count, classes, regions, words):
     assert found.dtype == twin.dtype == np.int64
     np.testing.assert_array_equal(found, twin)
     assert found.shape == (count, classes, regions)
+
+
+@given(masks(), st.integers(0, 9))
+def test_outcomes_are_summed_up_alike(mask, seed):
+    rng = np.random.default_rng(seed)
+    outcomes = rng.integers(0, 5, mask.shape, np.uint8)
+    mine = rng.integers(0, 200, (3, *mask.shape), np.uint8)
+    its = mine.copy()
+    fast.add_outcomes(outcomes, 4, mine)
+    plain.add_outcomes(outcomes, 4, its)
+    np.testing.assert_array_equal(mine, its)
 
 
 def test_bits_of_full_words_are_counted():

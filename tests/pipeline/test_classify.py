@@ -75,6 +75,19 @@ def test_the_mask_equals_predict_on_every_pixel_that_is_not_on_the_threshold(cas
     np.testing.assert_array_equal(road(stage, COLOURS)[clear], expected[clear])
 
 
+@pytest.mark.parametrize("kernel", ["rbf", "linear"])
+def test_the_greatest_penalty_that_is_allowed_breaks_no_bound_of_what_is_learnt(kernel):
+    training = sample(10)
+    contradiction = replace(training, road=np.arange(20) % 2 == 0)
+    settings = SvmSettings(kernel=kernel, c=1e6)
+    assert np.abs(classify.fit(contradiction, settings).weights).max() <= 1e6
+
+
+def test_a_penalty_beyond_is_refused():
+    with pytest.raises(ValueError, match="less than or equal to 1000000"):
+        SvmSettings(c=1e16)
+
+
 @pytest.mark.parametrize("red", [0, 110, 255])
 def test_the_mask_equals_the_definition_next_to_the_threshold(case, red):
     settings, machine, stage, _ = case

@@ -144,6 +144,19 @@ def test_the_decision_is_the_linear_machines_on_the_written_out_map():
     np.testing.assert_allclose(found, expected, atol=1e-3)
 
 
+@pytest.mark.parametrize("windows", [(), (5,), (5, 15, 31)])
+def test_a_machine_for_other_features_is_refused_before_it_reads_beyond_its_planes(windows):
+    truth = np.zeros((24, 32), np.uint8)
+    truth[12:] = 1
+    machine = context.fit(every_pixel([grey()], [truth]), PLAIN)
+    other = ContextSettings(planes=32, windows=windows)
+    wanted = f"for 11 features, and windows = .* make {7 + 2 * len(windows)}"
+    with pytest.raises(ValueError, match=wanted):
+        context.bind(other, machine)
+    with pytest.raises(ValueError, match=wanted):
+        context.decision(grey(), machine, other)
+
+
 def test_smoothing_averages_neighbours():
     truth = np.zeros((24, 32), np.uint8)
     truth[12:] = 1
@@ -281,6 +294,19 @@ def test_a_threshold_that_is_set_is_not_learnt():
         truth[12:] = 1
     settings = ContextSettings(planes=32, threshold=0.25)
     assert context.fit(every_pixel([grey(), grey()], truths), settings).threshold == 0.25
+
+
+def test_the_greatest_penalty_that_is_allowed_breaks_no_bound_of_what_is_learnt():
+    truths = [np.random.default_rng(n).integers(0, 2, (24, 32), dtype=np.uint8) for n in range(2)]
+    machine = context.fit(
+        every_pixel([grey(), grey(seed=1)], truths), ContextSettings(planes=8, c=1e6)
+    )
+    assert np.abs(machine.weights).max() < 1e9
+
+
+def test_a_penalty_beyond_is_refused():
+    with pytest.raises(ValueError, match="less than or equal to 1000000"):
+        ContextSettings(c=1e7)
 
 
 # --- The stage ------------------------------------------------------------------------------------

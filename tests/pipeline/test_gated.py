@@ -1,5 +1,6 @@
 """The gated filter, on roads painted by hand: one picture for each gate."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -253,6 +254,96 @@ def test_facts_count_components_by_what_became_of_them():
 def test_the_ratio_must_be_two_shares_in_order():
     with pytest.raises(ValueError, match="lower one first"):
         GatedSettings(ratio=(0.7, 0.2))
+
+
+# --- Its oracle -----------------------------------------------------------------------------------
+
+
+def told(image, shadow, **settings):
+    """What the filter makes of an image once it knows what is shadow."""
+    return gated.oracle(GatedSettings(**settings), GREY)(View(image, image), shadow).image
+
+
+def truth(*spots):
+    shadow = np.zeros((HEIGHT, WIDTH), np.uint8)
+    for spot in spots:
+        shadow[spot] = 1
+    return shadow
+
+
+def by_hand(image):
+    """Brighten `PATCH` by the plain words of the filter: mean of the ring over mean of the core."""
+    core = image[87:103, 62:98].reshape(-1, 3)
+    y, x = np.indices((HEIGHT, WIDTH))
+    away = np.max([85 - y, y - 104, 60 - x, x - 99], axis=0)
+    ring = image[(away > 2) & (away <= 8)]
+    gain = np.ones((HEIGHT, WIDTH, 3), np.float32)
+    gain[86:104, 61:99] = np.clip(ring.mean(axis=0) / core.mean(axis=0), 1, 1 / 0.12)
+    return np.clip(np.rint(image * cv2.blur(gain, (5, 5))), 0, 255)
+
+
+@pytest.mark.parametrize(
+    ("spot", "verdict_without"),
+    [(ROAD * SHADE, "accepted"), (ROAD * SHADE[::-1], "none"), (ROAD * 0.09, "too dark for shade")],
+    ids=["shade", "warm darkness", "near black"],
+)
+def test_true_shadow_gets_the_gain_of_its_ring_whatever_the_gates_say(spot, verdict_without):
+    image = road(spot)
+    assert verdict(image) == verdict_without
+    given = told(image, truth(PATCH))
+    assert (given != image).any()
+    np.testing.assert_allclose(given, by_hand(image), atol=1)
+
+
+def test_what_is_no_true_shadow_is_left_alone_though_the_gates_accept_it():
+    elsewhere = np.s_[70:78, 10:30]
+    image = road(ROAD * SHADE)
+    image[elsewhere] = np.rint(image[elsewhere] * SHADE)
+    assert verdict(image) == "accepted"
+    given = told(image, truth(elsewhere))
+    assert (given[elsewhere] > image[elsewhere]).all()
+    np.testing.assert_array_equal(given[PATCH], image[PATCH])
+
+
+def test_a_filter_that_is_told_what_it_found_gives_what_it_gave():
+    image = road(ROAD * SHADE)
+    output, layers = run(image)
+    assert layers["shadow"].any()
+    np.testing.assert_array_equal(told(image, layers["shadow"]), output.image)
+
+
+@pytest.mark.parametrize("nothing", [0, 255], ids=["no shadow", "nobody knows"])
+def test_a_frame_without_true_shadow_passes_bit_for_bit(nothing):
+    image = road(ROAD * SHADE)
+    assert told(image, np.full((HEIGHT, WIDTH), nothing, np.uint8)) is image
+
+
+def test_true_shadow_without_lit_road_around_it_stays_as_it_is():
+    image = road()
+    image[75:115, 50:110] = [200, 60, 60]
+    image[PATCH] = np.rint(ROAD * SHADE)
+    alone = told(image, truth(PATCH))
+    np.testing.assert_array_equal(alone, image)
+    image[95:105, 10:30] = np.rint(ROAD * SHADE)
+    beside_another = told(image, truth(PATCH, np.s_[95:105, 10:30]))
+    np.testing.assert_array_equal(beside_another[PATCH], image[PATCH])
+    assert (beside_another[95:105, 10:30] > image[95:105, 10:30]).any()
+
+
+@pytest.mark.parametrize("where", [np.s_[:], np.s_[50:53, 20:100]], ids=["all of it", "a line"])
+def test_true_shadow_that_cannot_be_measured_stays_as_it_is(where):
+    image = road(ROAD * SHADE)
+    np.testing.assert_array_equal(told(image, truth(where)), image)
+
+
+def test_true_shadow_of_a_wide_image_is_measured_on_the_reduced_one():
+    small = road(ROAD * SHADE[::-1], noise=0)
+    large, shadow = (
+        np.repeat(np.repeat(array, 3, axis=0), 3, axis=1) for array in (small, truth(PATCH))
+    )
+    given = told(large, shadow, width=WIDTH)
+    np.testing.assert_allclose(given[270:300, 195:285], 120, atol=1)
+    np.testing.assert_array_equal(given[:200], large[:200])
 
 
 # --- What it learns -------------------------------------------------------------------------------

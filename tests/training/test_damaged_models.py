@@ -3,6 +3,7 @@
 import json
 import re
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -160,6 +161,25 @@ def test_no_flipped_byte_is_a_defect_of_the_program(arrays, tmp_path):
         path.write_bytes(spoilt)
         with suppress(RoadevalError):
             from_file(path, VARIANTS[:2])
+
+
+def test_a_machine_without_the_features_of_a_window_ends_with_one_line_and_code_1(
+    tmp_path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    plans = plans_of(variants_of(preset("robust"), {}))
+    sound = fit([frame(n) for n in range(3)], plans, TrainingSettings())
+    machine = sound.parameters["unfiltered"]["context"]
+    narrow = replace(machine, planes=machine.planes[:, :-2])
+    parameters = {"unfiltered": {**sound.parameters["unfiltered"], "context": narrow}}
+    save_model(replace(sound, parameters=parameters), Path("x.model"))
+    words = ["replay", str(DEMO), "--preset", "robust", "--model", "x.model", "--quiet"]
+    assert main([*words, "--save", "x.rrd", "--reports", "x"]) == 1
+    assert capsys.readouterr().err.splitlines() == [
+        "roadeval: error: the model is damaged: its machine of stage context is for 9 features, "
+        "and windows = [5, 15] make 11; train it again"
+    ]
+    assert not list(tmp_path.rglob("*.rrd*"))
 
 
 def test_the_command_ends_with_one_line_and_code_1(arrays, tmp_path, capsys, monkeypatch):
