@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -72,19 +71,30 @@ class Memory:
     frames: int = 0
     taken: int = 0
 
-    def hold(self, frame: Frame) -> Frame:
-        """Give a frame that is going to be held; a `TrainingError` if it is one too many."""
+    def has_room(self, frame: Frame) -> bool:
+        """Count a frame that is going to be held, if there is room for it."""
         masks = [frame.truth, frame.shadow_truth, *frame.external.values()]
         # Two filters in a row leave two more images of each frame while a variant is fitted.
-        self.taken += 3 * frame.image.nbytes + sum(m.nbytes for m in masks if m is not None)
-        self.taken += len(frame.payload)
-        if self.taken > GREATEST_MEMORY:
-            raise TrainingError(
-                f"training holds its frames decoded, and more than {self.frames} of them would "
-                f"take over {GREATEST_MEMORY >> 20} MiB; lower --train-frames"
-            )
+        size = 3 * frame.image.nbytes + sum(m.nbytes for m in masks if m is not None)
+        size += len(frame.payload)
+        if self.taken + size > GREATEST_MEMORY:
+            return False
+        self.taken += size
         self.frames += 1
+        return True
+
+    def hold(self, frame: Frame) -> Frame:
+        """Give a frame that is going to be held; a `TrainingError` if it is one too many."""
+        if not self.has_room(frame):
+            raise TrainingError(f"{self.full()}; lower --train-frames, or --scale the frames")
         return frame
+
+    def full(self) -> str:
+        """Say that no more frames can be held."""
+        return (
+            f"training holds its frames decoded, and more than {self.frames} of them would take "
+            f"over {GREATEST_MEMORY >> 20} MiB"
+        )
 
 
 def plans_of(variants: Sequence[Variant]) -> dict[str, Plan]:
@@ -133,8 +143,15 @@ def from_log(
     wanted, by_truth = _teachers(frames, labelled=labelled)
     chosen: list[Frame] = []
     memory = Memory()
-    for frame in _decoded(wanted):
-        chosen.append(memory.hold(frame))
+    short = ""
+    # The rest begins at the frame after the last that is taken.
+    for readable, frame in _decoded(wanted):
+        if not memory.has_room(frame):
+            wanted, short = chain([readable], wanted), memory.full()
+            if not chosen:
+                raise TrainingError(f"{short}; reduce the frames with --scale")
+            break
+        chosen.append(frame)
         on_frame(len(chosen))
         if len(chosen) == settings.frames:
             break
@@ -149,6 +166,8 @@ def from_log(
     model = train_on(chosen, plans_of(variants), settings)
     if labelled and not by_truth:
         model = _told(model, f"no frame of the range has road truth: {BY_PATCH}")
+    if short:
+        model = _told(model, f"trained on {len(chosen)} of {settings.frames} frames: {short}")
     first = numbers[settings.gap] if len(numbers) > settings.gap else None
     return model, Schedule(model.digests, frozenset(numbers[: settings.gap]), first)
 
@@ -202,11 +221,14 @@ def train_on(
     return fit(frames, plans, settings, prior)
 
 
-def _decoded(frames: Iterator[Readable]) -> Iterator[Frame]:
+def _decoded(frames: Iterator[Readable]) -> Iterator[tuple[Readable, Frame]]:
     """Decode what can be decoded; a frame that cannot is reported when it is replayed."""
     for readable in frames:
-        with suppress(RoadevalError):
-            yield readable.decode()
+        try:
+            frame = readable.decode()
+        except RoadevalError:
+            continue
+        yield readable, frame
 
 
 def spread(
@@ -227,4 +249,5 @@ def spread(
     numbers = [number for number, has_truth in seen.items() if has_truth and labelled] or [*seen]
     taken = min(count, len(numbers))
     chosen = frozenset(numbers[i * len(numbers) // taken] for i in range(taken))
-    yield from _decoded(frame for frame in frames() if frame.number in chosen)
+    for _, frame in _decoded(each for each in frames() if each.number in chosen):
+        yield frame

@@ -91,6 +91,14 @@ class ReplayOptions:
         if not 0 < self.scale <= 1:
             raise OptionError(f"--scale {self.scale:g}: must be above 0 and at most 1")
 
+    def check_sidecar(self, mcap: AnyPath | None) -> None:
+        """Refuse, as an `OptionError`, a log of masks that would not fit the images' own."""
+        if mcap is not None and self.scale != 1:
+            raise OptionError(
+                "--mcap and --scale do not go together: reduced masks would not lie over the "
+                "log's images"
+            )
+
     def select(self, log: logs.Log) -> logs.Selection:
         """Settle what of a log is replayed."""
         tolerance = self.sync_tolerance_ms

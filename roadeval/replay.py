@@ -63,6 +63,7 @@ def replay(
     """
     options, tell = options or ReplayOptions(), on_progress or _silent
     rule = Rule.parse(options.record)
+    options.check_sidecar(mcap)
     with logs.open_log(drive, keep_corrupt=options.keep_corrupt) as log:
         path = Path(save or Path("recordings", f"{log.name}.rrd"))
         folder = Path(reports or Path("reports", log.name))

@@ -189,7 +189,32 @@ class Run:
             if self._selection.truth
             else ("the log has no road truth: there is nothing to score, only masks to look at",)
         )
-        return (*unlabelled, *self._unheeded(), *self._near_training(), *self.model.warnings)
+        return (
+            *unlabelled,
+            *self._sizes(),
+            *self._unheeded(),
+            *self._near_training(),
+            *self.model.warnings,
+        )
+
+    def _sizes(self) -> tuple[str, ...]:
+        """Say whether the frames are not the camera's own, or not of the model's size."""
+        told = []
+        if self._options.scale != 1 and self._selection.image.size:
+            width, height = self._selection.image.size
+            told.append(
+                f"the frames, {width}x{height} in the log, are reduced to "
+                f"{self._options.scale:g} of it: the numbers are not those of full frames"
+            )
+        prior = self.model.prior
+        if self._options.model is not None and prior is not None and self._selection.size:
+            width, height = self._selection.size
+            if prior.shape != (height, width):
+                told.append(
+                    f"the model learnt from frames of {prior.shape[1]}x{prior.shape[0]}, and these "
+                    f"are {width}x{height}: texture and sizes in pixels mean something else there"
+                )
+        return tuple(told)
 
     def _near_training(self) -> tuple[str, ...]:
         """Say whether frames next to those that trained a model file are evaluated."""

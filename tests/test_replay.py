@@ -14,6 +14,7 @@ from roadeval.config import Config, load_config
 from roadeval.evaluation.results import Results, summary_text
 from roadeval.evaluation.tables import COLUMNS
 from roadeval.logs import LogWriter, open_log
+from roadeval.run import Run
 from tests.training.making import frame
 
 FRAMES = 26
@@ -458,3 +459,34 @@ def test_a_scale_reduces_images_truth_and_recording_alike(drive, tmp_path, once)
 def test_a_scale_that_is_no_share_is_refused(scale):
     with pytest.raises(RoadevalError, match="--scale"):
         ReplayOptions(scale=scale)
+
+
+def test_reduced_frames_and_a_model_of_another_size_are_told(drive, tmp_path):
+    roadeval.train([drive], tmp_path / "m.model", options=ReplayOptions(scale=0.5))
+    warnings = " ".join(run(drive, tmp_path, model=tmp_path / "m.model").warnings)
+    assert "the model learnt from frames of" in warnings
+    assert "are reduced to" not in warnings
+    same = run(drive, tmp_path, model=tmp_path / "m.model", scale=0.5)
+    warnings = " ".join(same.summary["warnings"])
+    assert "in the log, are reduced to 0.5 of it" in warnings
+    assert "the model learnt from frames of" not in warnings
+
+
+def test_reduced_masks_do_not_go_beside_the_log(drive, tmp_path):
+    with pytest.raises(RoadevalError, match="--mcap and --scale do not go"):
+        roadeval.replay(drive, mcap=tmp_path / "o.mcap", options=ReplayOptions(scale=0.5))
+
+
+def test_results_that_wait_have_lost_their_layers_but_not_their_masks(drive):
+    class Seen:
+        def encode(self, result, position):
+            return result
+
+    options = ReplayOptions(max_frames=14)
+    with open_log(drive) as log:
+        *_, (lean, whole) = Run(log, options, lambda progress: None).frames(Seen())
+    assert any(list(variant.layers()) for variant in whole.variants)
+    assert not any(list(variant.layers()) for variant in lean.variants)
+    assert lean.tallies == whole.tallies
+    for mine, its in zip(lean.variants, whole.variants, strict=True):
+        assert [name for name, _ in mine.masks()] == [name for name, _ in its.masks()]

@@ -52,7 +52,7 @@ def _checked(check: Callable[[Any], object]) -> Callable[[Any], Any]:
     """Make an option's callback from a check that is made where the option is given."""
 
     def callback(value: Any) -> Any:
-        if value:
+        if value is not None:
             with usage():
                 check(value)
         return value

@@ -93,6 +93,8 @@ def replay(
         resize_truth=resize_truth,
         scale=scale,
     )
+    with options.usage():
+        chosen.check_sidecar(mcap)
     with progress.watched(quiet) as watch:
         found = run(drive, save=save, reports=reports, mcap=mcap, options=chosen, on_progress=watch)
     if json:

@@ -3,19 +3,20 @@
 Each is there twice: compiled (`colours`, `shapes`), and as the NumPy or OpenCV expression that
 defines it (`plain`). Both give the same bits. `KERNELS` are the compiled ones where compilation
 works and the others where it does not (no compiler support, nowhere to keep the cache), so the
-results never depend on the machine.
+results never depend on the machine. Which they are is found out when the first one is asked for:
+whoever only reads results need not wait for a compiler.
 """
 
 from __future__ import annotations
 
 import os
 from types import ModuleType
-from typing import Final
-
-from roadeval.kernels import plain
+from typing import Any, Final
 
 
 def _pick() -> ModuleType:
+    from roadeval.kernels import plain
+
     if os.environ.get("ROADEVAL_PLAIN") == "1":
         return plain
     try:
@@ -25,4 +26,15 @@ def _pick() -> ModuleType:
     return compiled
 
 
-KERNELS: Final = _pick()
+class _Kernels:
+    """Gives the kernels by name."""
+
+    def __getattr__(self, name: str) -> Any:
+        kernels = _pick()
+        for known in vars(kernels):
+            if not known.startswith("__"):
+                setattr(self, known, getattr(kernels, known))
+        return object.__getattribute__(self, name)
+
+
+KERNELS: Final = _Kernels()

@@ -267,7 +267,7 @@ def fill_holes(mask: Mask) -> Mask:
 
     A hole is a 4-connected set of zeros that does not reach the outside of the image.
     """
-    outside = np.ascontiguousarray(np.pad(mask, 1))
+    outside = np.pad(np.ascontiguousarray(mask != 0).view(np.uint8), 1)
     cv2.floodFill(outside, None, (0, 0), 2, flags=4)
     filled: Mask = (outside[1:-1, 1:-1] != 2).astype(np.uint8)
     return filled

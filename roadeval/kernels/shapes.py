@@ -136,7 +136,7 @@ def _runs(mask: Mask, inside: bool) -> tuple[Places, Runs, Runs]:
     for y in range(height):
         # Assigning a slice compiles to something fifteen times as slow.
         for x in range(width):
-            row[x] = mask[y, x] if inside else 1 - mask[y, x]
+            row[x] = (mask[y, x] != 0) == inside
         before, running = np.uint64(0), False
         for word in range(words + 1):
             bits = np.uint64(0)

@@ -82,7 +82,7 @@ class LoggedFrame:
             If the image or a label of it cannot be decoded.
         """
         try:
-            return reduced(self._decode(), self._scale)
+            return at_scale(self._decode(), self._scale)
         except (BadMessage, FrameError) as error:
             reason = f"frame {self.number}: {error}"
             self._report(self.number, str(error))
@@ -120,19 +120,16 @@ class LoggedFrame:
         if not self._resize:
             size = f"{truth.shape[1]}x{truth.shape[0]}"
             raise FrameError(f"{topic} is {size}, its image {width}x{height}: see --resize-truth")
-        import cv2
-
-        scaled = cv2.resize(truth, (width, height), interpolation=cv2.INTER_NEAREST_EXACT)
-        return np.asarray(scaled, np.uint8)
+        return _nearest(truth, (width, height))
 
 
-def scaled(size: tuple[int, int], scale: float) -> tuple[int, int]:
+def scaled_size(size: tuple[int, int], scale: float) -> tuple[int, int]:
     """Scale a width and height, to whole pixels."""
     width, height = (max(1, round(length * scale)) for length in size)
     return width, height
 
 
-def reduced(frame: Frame, scale: float) -> Frame:
+def at_scale(frame: Frame, scale: float) -> Frame:
     """Reduce a frame to a share of its width and height, at most 1.
 
     Colours are averaged over the area of each new pixel; labels are the nearest pixel's. The
@@ -142,20 +139,23 @@ def reduced(frame: Frame, scale: float) -> Frame:
         return frame
     import cv2
 
-    size = scaled((frame.image.shape[1], frame.image.shape[0]), scale)
-
-    def nearest(labels: Truth) -> Truth:
-        small: Truth = cv2.resize(labels, size, interpolation=cv2.INTER_NEAREST_EXACT)
-        return small
-
+    size = scaled_size((frame.image.shape[1], frame.image.shape[0]), scale)
     return replace(
         frame,
         image=cv2.resize(frame.image, size, interpolation=cv2.INTER_AREA),
         media_type=None,
-        truth=None if frame.truth is None else nearest(frame.truth),
-        shadow_truth=None if frame.shadow_truth is None else nearest(frame.shadow_truth),
-        external={name: nearest(mask) for name, mask in frame.external.items()},
+        truth=None if frame.truth is None else _nearest(frame.truth, size),
+        shadow_truth=None if frame.shadow_truth is None else _nearest(frame.shadow_truth, size),
+        external={name: _nearest(mask, size) for name, mask in frame.external.items()},
     )
+
+
+def _nearest(labels: Truth, size: tuple[int, int]) -> Truth:
+    """Bring labels to a width and height, by the nearest pixel."""
+    import cv2
+
+    how = cv2.INTER_NEAREST_EXACT
+    return np.asarray(cv2.resize(labels, size, interpolation=how), np.uint8)
 
 
 def _readable(picture: Picture | FrameError) -> Picture:

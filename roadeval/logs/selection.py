@@ -14,7 +14,7 @@ import numpy as np
 from roadeval.logs.choose import choose_image, choose_shadow, choose_truth, named
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.labels import LabelMap, LabelValues, seen_in, understand
-from roadeval.logs.logged import scaled
+from roadeval.logs.logged import scaled_size
 from roadeval.logs.messages import Picture
 from roadeval.logs.pixels import to_rgb
 from roadeval.logs.topics import TopicInfo, median_period
@@ -78,7 +78,7 @@ class Selection:
     @property
     def size(self) -> tuple[int, int] | None:
         """Width and height of the frames as they are handed out, if the log tells."""
-        return None if self.image.size is None else scaled(self.image.size, self.scale)
+        return None if self.image.size is None else scaled_size(self.image.size, self.scale)
 
     @property
     def reasons(self) -> tuple[str, ...]:

@@ -125,6 +125,8 @@ def keep_region(mask: Mask, patch: Mask | None = None) -> Mask:
     The largest, or, given a ``patch``, the one with most pixels in it where any has some. Of
     equals the first from the top. An empty mask stays empty.
     """
+    if patch is not None and patch.shape != mask.shape:
+        raise ValueError(f"a patch of {patch.shape} does not fit a mask of {mask.shape}")
     kept: Mask = KERNELS.keep_region(mask, np.zeros((0, 0), np.uint8) if patch is None else patch)
     return kept
 

@@ -20,6 +20,10 @@ WRONG = {
     "a time that is none": ["a.mcap", "--start", "noon"],
     "a label that is two things": ["a.mcap", "--road-label", "3", "--ignore-label", "3"],
     "a label to ignore alone": ["a.mcap", "--ignore-label", "11"],
+    "a scale of nothing": ["a.mcap", "--scale", "0"],
+    "a scale that enlarges": ["a.mcap", "--scale", "1.5"],
+    "a scale that is no number": ["a.mcap", "--scale", "nan"],
+    "reduced masks beside the log": ["a.mcap", "--scale", "0.5", "--mcap", "b.mcap"],
     "a negative label": ["a.mcap", "--road-label", "-1"],
 }
 

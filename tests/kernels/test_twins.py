@@ -240,3 +240,20 @@ def test_outcomes_are_summed_up_alike(mask, seed):
 def test_bits_of_full_words_are_counted():
     full = np.full((1, 1000), ~np.uint64(0))
     assert fast.count_bits(full, full, full).item() == 64_000
+
+
+def test_whoever_only_reads_results_waits_for_no_compiler():
+    import subprocess
+    import sys
+
+    code = "import sys, roadeval.comparing, roadeval.reporting; print('numba' in sys.modules)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize("value", [1, 2, 255])
+def test_any_value_but_0_is_inside(value):
+    mask = (noise(30, 70)[..., 0] > 128).astype(np.uint8)
+    for module in (fast, plain):
+        filled = module.fill_holes(mask * np.uint8(value))
+        np.testing.assert_array_equal(filled, module.fill_holes(mask))

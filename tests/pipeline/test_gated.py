@@ -312,10 +312,10 @@ def test_a_filter_that_is_told_what_it_found_gives_what_it_gave():
     np.testing.assert_array_equal(told(image, layers["shadow"]), output.image)
 
 
-@pytest.mark.parametrize("nothing", [0, 255], ids=["no shadow", "nobody knows"])
-def test_a_frame_without_true_shadow_passes_bit_for_bit(nothing):
+@pytest.mark.parametrize("nothing", np.uint8([0, 255]), ids=["no shadow", "nobody knows"])
+def test_without_true_shadow_the_image_passes_bit_for_bit(nothing):
     image = road(ROAD * SHADE)
-    assert told(image, np.full((HEIGHT, WIDTH), nothing, np.uint8)) is image
+    assert told(image, nothing * truth(PATCH)) is image
 
 
 def test_true_shadow_without_lit_road_around_it_stays_as_it_is():
