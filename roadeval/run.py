@@ -152,11 +152,13 @@ class Run:
             return None  # it stands in the log's accounting, with the reason
         role = self._schedule.role(frame)
         known = (frame.truth, frame.shadow_truth) if role is Role.EVALUATED else (None, None)
+        shared: dict[Any, Any] = {}
         variants = [
             runner.run_variant(
                 *(name, chain, frame.image, Moment(frame.stamp_ns, turn.batons[name])),
                 truth=known[0],
                 shadow_truth=known[1],
+                known=shared,
             )
             for name, chain in self._chains.items()
         ]

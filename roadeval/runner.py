@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from time import perf_counter
-from typing import Final
+from typing import Any, Final
 
 from roadeval.config import Config, Variant
 from roadeval.data import (
@@ -35,10 +35,12 @@ def run_variant(
     *,
     truth: Truth | None = None,
     shadow_truth: Truth | None = None,
+    known: dict[Any, dict[str, Mask]] | None = None,
 ) -> VariantResult:
     """Run a chain on an ``(H, W, 3)`` uint8 RGB image and time each of its stages.
 
-    Given the truth, run it also with each stage that has an oracle replaced by that, untimed.
+    Given the truth, run it also with each stage that has an oracle replaced by that, untimed;
+    ``known`` is what the frame's variants share of it, see `Chain.oracles`.
     """
     results, outputs = [], []
     start = perf_counter()
@@ -49,7 +51,10 @@ def run_variant(
         )
         outputs.append(output)
         start = perf_counter()
-    oracles = {} if truth is None else dict(chain.oracles(image, outputs, truth, shadow_truth))
+    oracles = {}
+    if truth is not None:
+        shared = {} if known is None else known
+        oracles = dict(chain.oracles(image, outputs, truth, shadow_truth, shared))
     return VariantResult(name, tuple(results), oracles)
 
 

@@ -16,7 +16,7 @@ from roadeval.pipeline import (
     shadow,
     similarity,
 )
-from roadeval.pipeline.stage import Moment, Output, Stage, View
+from roadeval.pipeline.stage import Moment, Output, Stage, View, perfect_mask
 
 STAGES: Final[Mapping[str, Stage[Any, Any]]] = {
     stage.name: stage
@@ -75,7 +75,12 @@ class Chain:
             yield step.stage.reported, output
 
     def oracles(
-        self, image: Rgb, outputs: Sequence[Output], road: Truth, shadow: Truth | None
+        self,
+        image: Rgb,
+        outputs: Sequence[Output],
+        road: Truth,
+        shadow: Truth | None,
+        known: dict[Any, dict[str, Mask]],
     ) -> Iterator[tuple[str, dict[str, Mask]]]:
         """Yield what the chain makes of an image once one of its stages is replaced by the truth.
 
@@ -87,6 +92,8 @@ class Chain:
             What `run` gave on it.
         road, shadow
             The truths, ``(H, W)`` uint8 (0, 1, 255). Without that of shadow filters have none.
+        known
+            What the frame's other variants gave that is the same for all, filled as it is found.
 
         Yields
         ------
@@ -98,8 +105,13 @@ class Chain:
         for place, (step, output) in enumerate(zip(self.steps, outputs, strict=True)):
             truth = shadow if step.stage.is_filter else road
             if step.oracle is not None and truth is not None:
-                perfect = _after(view, step.oracle(view, truth))
-                yield step.stage.reported, dict(_masks(self.steps[place + 1 :], perfect))
+                rest = self.steps[place + 1 :]
+                key = _shared(step, rest)
+                masks = known.get(key) if key else None
+                if masks is None:
+                    masks = dict(_masks(rest, _after(view, step.oracle(view, truth))))
+                    known[key] = masks
+                yield step.stage.reported, masks
             view = _after(view, output)
 
     def filtered(self, image: Rgb) -> Rgb:
@@ -115,6 +127,13 @@ def _bind(stage: Stage[Any, Any], settings: Any, parameters: Mapping[str, Any]) 
     learnt = parameters.get(stage.name)
     oracle = None if stage.oracle is None else stage.oracle(settings, learnt)
     return Step(stage, settings, stage.bind(settings, learnt), oracle)
+
+
+def _shared(step: Step, rest: Sequence[Step]) -> tuple[tuple[str, Any], ...]:
+    """Give what the masks after a perfect stage depend on beside the truth; empty for the image."""
+    if step.stage.oracle is not perfect_mask or not all(s.stage.sees_mask_alone for s in rest):
+        return ()
+    return tuple((each.stage.name, each.settings) for each in rest)
 
 
 def _after(view: View, output: Output) -> View:

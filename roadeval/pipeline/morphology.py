@@ -178,4 +178,5 @@ STAGE: Final[Stage[MorphologySettings, None]] = Stage(
     settings=MorphologySettings,
     bind=bind,
     layers=layers,
+    sees_mask_alone=True,
 )

@@ -145,6 +145,9 @@ class Stage(Generic[S, P]):
     mask
         Its mask's layer, and its name in tables and timing, where that is not ``name``: stages
         that do the same in different ways are tabled under one name.
+    sees_mask_alone
+        Whether it looks at nothing but the mask before it. After a perfect mask it then makes the
+        same in every variant that has its settings.
     """
 
     name: str
@@ -159,6 +162,7 @@ class Stage(Generic[S, P]):
     oracle: Callable[[S, Any], Callable[[View, Truth], Output]] | None = None
     deciding: tuple[str, ...] = ()
     mask: str = ""
+    sees_mask_alone: bool = False
 
     @property
     def yields_mask(self) -> bool:

@@ -25,7 +25,7 @@ def chain(request):
 
 def oracles(chain, shadow_truth=TRULY_DARK):
     outputs = [output for _, output in chain.run(IMAGE)]
-    return dict(chain.oracles(IMAGE, outputs, ROAD, shadow_truth))
+    return dict(chain.oracles(IMAGE, outputs, ROAD, shadow_truth, {}))
 
 
 def masks(steps_of, image):
@@ -55,7 +55,7 @@ def test_a_perfect_filter_compensates_true_shadow_and_all_stages_follow(chain):
 
 def test_a_filter_that_is_told_what_it_found_gives_what_it_gave(chain):
     outputs = [output for _, output in chain.run(IMAGE)]
-    told = dict(chain.oracles(IMAGE, outputs, ROAD, outputs[0].regions["shadow"]))
+    told = dict(chain.oracles(IMAGE, outputs, ROAD, outputs[0].regions["shadow"], {}))
     for name, mask in masks(chain, IMAGE).items():
         np.testing.assert_array_equal(told["shadow"][name], mask, err_msg=name)
 
@@ -72,7 +72,7 @@ def test_the_replaced_stage_sees_the_image_that_those_before_it_made(chain):
     outputs = [output for _, output in longer.run(IMAGE)]
     assert outputs[0].image is not None
     assert (outputs[0].image != IMAGE).any()
-    told = dict(longer.oracles(IMAGE, outputs, ROAD, outputs[1].regions["shadow"]))
+    told = dict(longer.oracles(IMAGE, outputs, ROAD, outputs[1].regions["shadow"], {}))
     for name, mask in masks(longer, IMAGE).items():
         np.testing.assert_array_equal(told["shadow"][name], mask, err_msg=name)
 
@@ -80,7 +80,7 @@ def test_the_replaced_stage_sees_the_image_that_those_before_it_made(chain):
 def test_running_oracles_changes_no_output(chain):
     outputs = [output for _, output in chain.run(IMAGE)]
     before = [None if o.mask is None else o.mask.copy() for o in outputs]
-    dict(chain.oracles(IMAGE, outputs, ROAD, TRULY_DARK))
+    dict(chain.oracles(IMAGE, outputs, ROAD, TRULY_DARK, {}))
     for mask, output in zip(before, outputs, strict=True):
         if mask is not None:
             np.testing.assert_array_equal(mask, output.mask)
@@ -89,3 +89,17 @@ def test_running_oracles_changes_no_output(chain):
 def test_every_machine_and_every_filter_has_an_oracle():
     named = {name for name, stage in STAGES.items() if stage.oracle}
     assert named == {"shadow", "gated", "svm", "context"}
+
+
+def test_variants_share_what_follows_a_perfect_mask_and_nothing_else(chain):
+    outputs = [output for _, output in chain.run(IMAGE)]
+    known = {}
+    first = dict(chain.oracles(IMAGE, outputs, ROAD, TRULY_DARK, known))
+    again = dict(chain.oracles(IMAGE, outputs, ROAD, TRULY_DARK, known))
+    assert again["svm"] is first["svm"]
+    assert again["shadow"] is not first["shadow"]
+    other = Chain(["svm", "post"], SETTINGS["printed"], fitted(SETTINGS["printed"]))
+    outputs = [output for _, output in other.run(IMAGE)]
+    alone = dict(other.oracles(IMAGE, outputs, ROAD, None, {}))["svm"]
+    shared = dict(other.oracles(IMAGE, outputs, ROAD, None, known))["svm"]
+    np.testing.assert_array_equal(shared["post"], alone["post"])
