@@ -81,7 +81,13 @@ def compare(
     else:
         names = _labels([each.path for each in opened])
         sides = [
-            Side(name, each.name, _digest(each), _chosen(each, variants))
+            Side(
+                name,
+                each.name,
+                _digest(each),
+                _chosen(each, variants),
+                each.summary.get("selection") or {},
+            )
             for name, each in zip(names, opened, strict=True)
         ]
     settings = analysis.settings_of(opened[0].summary)

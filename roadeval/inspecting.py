@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -41,8 +42,16 @@ class Suspect:
     notes: tuple[str, ...]
 
 
-def suspects(opened: Opened, count: int = LISTED, variant: str | None = None) -> list[Suspect]:
+def suspects(
+    opened: Opened,
+    count: int = LISTED,
+    variant: str | None = None,
+    *,
+    among: Collection[int] | None = None,
+) -> list[Suspect]:
     """Rank the worst frames of a variant's final mask, the first variant's by default.
+
+    With ``among``, only these frames are ranked: there may be none.
 
     Raises
     ------
@@ -50,13 +59,14 @@ def suspects(opened: Opened, count: int = LISTED, variant: str | None = None) ->
         If nothing was scored, or there is no such variant.
     """
     frames = opened.frames
-    names = [n for n in frames["variant"].unique() if n != BASELINE] if len(frames) else []
+    names = _scored(opened)
     if not names:
         raise RoadevalError(f"{opened.path}: nothing was scored, so no frame is the worst")
     chosen = variant or names[0]
     if chosen not in names:
         raise RoadevalError(f"{opened.path}: no variant {chosen}; there are {', '.join(names)}")
-    causes, ranked = analysis.causes(frames, chosen), analysis.worst(frames, chosen, count)
+    looked_at = frames if among is None else frames[frames["frame"].isin(among)]
+    causes, ranked = analysis.causes(frames, chosen), analysis.worst(looked_at, chosen, count)
     return [
         Suspect(
             rank,
@@ -71,14 +81,33 @@ def suspects(opened: Opened, count: int = LISTED, variant: str | None = None) ->
 
 
 def worst(opened: Opened, variant: str | None = None) -> Suspect | None:
-    """Give the worst frame of a variant, the first variant's by default; None if none was scored.
+    """Give the worst frame that can be looked at, of a variant or else of the first one.
+
+    A recording may hold the pictures of few frames: the others do not count. None if no frame with
+    pictures was scored.
 
     Raises
     ------
     RoadevalError
-        If there is no such variant.
+        If a variant is asked for that was not scored.
     """
-    return suspects(opened, 1, variant)[0] if len(opened.frames) or variant else None
+    if variant is None and not _scored(opened):
+        return None
+    return next(iter(suspects(opened, 1, variant, among=opened.pictured)), None)
+
+
+def lacks_pictures(opened: Opened, frame: int) -> bool:
+    """Tell whether a recording scored a frame and kept no pictures of it."""
+    if opened.recording is None or frame in opened.pictured or not len(opened.frames):
+        return False
+    return frame in set(opened.frames["frame"])
+
+
+def _scored(opened: Opened) -> list[str]:
+    """Name the variants that were scored, without the baseline."""
+    if not len(opened.frames):
+        return []
+    return [name for name in opened.frames["variant"].unique() if name != BASELINE]
 
 
 def view(opened: Opened, frame: int | None, picture: Path | None = None) -> int | None:

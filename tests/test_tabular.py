@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from roadeval.tabular import read_table
+from roadeval.evaluation import rates
+from roadeval.tabular import RATES, TableError, read_table
 
 COLUMNS = ("frame", "variant", "TP", "ERR", "pooled_FPR")
 HEADER = ",".join(COLUMNS) + "\n"
@@ -46,3 +47,26 @@ def test_a_file_is_read_like_its_text(tmp_path):
     text = f"{HEADER}1,net,2,0.1,0.25\n"
     (tmp_path / "frames.csv").write_text(text)
     assert read_table(tmp_path / "frames.csv", COLUMNS).equals(read_table(text, COLUMNS))
+
+
+def test_the_rates_are_those_of_the_evaluation():
+    assert tuple(rates.RATES) == RATES
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("", "Empty CSV file"),
+        (HEADER[:-10], "Empty CSV file"),
+        (f"{HEADER}1,net,2,0.1,0.25\n2,net", "Expected 5 columns, got 2"),
+        (f"{HEADER}1,net,2,0.1,0.2", "its last line is cut off"),
+        (f"{HEADER}1,net,two,0.1,0.25\n", "two"),
+        ("frame,variant\n1,net\n", "no column ERR, TP, pooled_FPR"),
+    ],
+)
+def test_a_damaged_file_is_named_in_one_line(text, why, tmp_path):
+    (tmp_path / "frames.csv").write_text(text)
+    with pytest.raises(TableError, match=why) as caught:
+        read_table(tmp_path / "frames.csv", COLUMNS)
+    assert str(caught.value).startswith(f"{tmp_path / 'frames.csv'}: damaged (")
+    assert "\n" not in str(caught.value)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roadeval.cli import console, options
+from roadeval.cli import console, messages, options
 from roadeval.cli.exit_codes import ExitCode
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def inspect(
         options.option(
             "--screenshot",
             metavar="FILE.png",
-            help="No window: draw it into a file instead. Without a frame, the worst.",
+            help="No window: draw it into a file instead. Without a frame, the worst pictured.",
         ),
     ] = None,
     json: options.Json = False,
@@ -61,15 +61,20 @@ def inspect(
         raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
     opened = Opened(recording)
     if listed:
-        wanted = {} if worst is None else {"count": worst}
-        _list(inspecting.suspects(opened, variant=variant, **wanted), as_json=json)
+        _list(inspecting.suspects(opened, worst or inspecting.LISTED, variant), as_json=json)
         return ExitCode.DONE
     chosen = ""
     if worst is not None:
         ranked = inspecting.suspects(opened, worst, variant)
         frame = ranked[-1].frame
     elif frame is None and screenshot is not None and (bad := inspecting.worst(opened, variant)):
-        frame, chosen = bad.frame, ", the worst (--frame N or --worst K takes another)"
+        (first,) = inspecting.suspects(opened, 1, variant)
+        which = "the worst" if bad.frame == first.frame else "the worst that has pictures"
+        frame, chosen = bad.frame, f", {which} (--frame N or --worst K takes another)"
+    if frame is not None and inspecting.lacks_pictures(opened, frame):
+        messages.warning(
+            f"the recording has no pictures of frame {frame}: any that show are of an earlier one"
+        )
     shown = inspecting.view(opened, frame, screenshot)
     if screenshot is not None:
         console.emit(f"{screenshot}: frame {shown}{chosen}")

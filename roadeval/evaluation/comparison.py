@@ -7,8 +7,8 @@ a difference between them would mix the scene with the method.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
@@ -27,6 +27,21 @@ COMPARED: Final = ("ERR", "FPR", "FNR")
 """The rates whose differences are given; ACC, TNR and TPR only mirror them."""
 MOVED: Final = 5
 """Frames named of those that changed most, in each direction."""
+TELLING: Final[Mapping[str, str]] = {
+    "image_topic": "--image-topic",
+    "truth_topic": "--truth-topic",
+    "shadow_topic": "--shadow-topic",
+    "mask_topics": "--mask-topic",
+    "road_labels": "--road-label",
+    "ignore_labels": "--ignore-label",
+    "road_colors": "--road-color",
+    "ignore_colors": "--ignore-color",
+    "every": "--every",
+    "sync_tolerance_ms": "--sync-tolerance",
+    "resize_truth": "--resize-truth",
+    "scale": "--scale",
+}
+"""Options of a replay, as typed, that change a frame's numbers or which frames are seen."""
 
 
 class ComparisonError(RoadevalError):
@@ -45,12 +60,15 @@ class Side:
         The log's name and SHA-256, None where the result does not know it.
     frames
         The rows of ``frames.csv``.
+    selection
+        What was asked of the log, by the options' names; empty where the result does not know it.
     """
 
     label: str
     drive: str
     digest: str | None
     frames: pd.DataFrame
+    selection: Mapping[str, Any] = field(default_factory=dict)
 
 
 def variants_as_sides(
@@ -106,8 +124,10 @@ def compare(
     -------
     dict
         The content of the comparison's JSON file: ``format``, ``same_drive``, ``results``,
-        ``changes`` (a row per new result, variant and stage), ``moved`` (the frames that changed
-        most) and ``warnings``.
+        ``changes`` (a row per new result, variant and stage, of the frames that both evaluated),
+        ``levels`` (the same of all of its own frames, whatever the base lacks), ``moved`` (the
+        frames that changed most) and ``warnings``. For different drives ``changes`` and ``levels``
+        have rows of every result.
 
     Raises
     ------
@@ -127,19 +147,23 @@ def compare(
                 "drive": side.drive,
                 "sha256": side.digest,
                 "frames": side.frames["frame"].nunique(),
+                "scale": side.selection.get("scale"),
             }
             for side in sides
         ],
     }
+    levels = [row for side in (sides[1:] if same else sides) for row in _levels(side)]
     if not same:
         return found | {
-            "changes": [row for side in sides for row in _levels(side)],
+            "changes": levels,
+            "levels": levels,
             "moved": [],
             "warnings": [_apart(sides)],
         }
     pairs = [_Pair(sides[0], new, settings, across_variants=across_variants) for new in sides[1:]]
     return found | {
         "changes": [row for pair in pairs for row in pair.changes()],
+        "levels": levels,
         "moved": [row for pair in pairs for row in pair.moved()],
         "warnings": [sentence for pair in pairs for sentence in pair.warnings()],
     }
@@ -218,15 +242,36 @@ class _Pair:
                     f"{rest} frames that {side.label} evaluated are left out against "
                     f"{(new if side is base else base).label}, which lacks them or trained on them"
                 )
+        if options := _differing(base.selection, new.selection):
+            yield (
+                f"{base.label} and {new.label} were replayed with different options "
+                f"({', '.join(options)}): part of the change may be theirs"
+            )
         truths = self._matched[["TP", "FN", "N"]].sum(axis=1) != self._matched[
             ["TP_base", "FN_base", "N_base"]
         ].sum(axis=1)
         if truths.any():
+            guess = "" if options else " (other labels or topics?)"
             yield (
                 f"the truth differs on {self._matched[truths]['stamp'].nunique()} frames between "
-                f"{base.label} and {new.label} (other labels or topics?): part of the change may "
-                "be the truth's"
+                f"{base.label} and {new.label}{guess}: part of the change may be the truth's"
             )
+
+
+def _differing(base: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    """Name the options of `TELLING` that two results know and differ in, with both values."""
+    return [
+        f"{option} {_said(base[name])} and {_said(new[name])}"
+        for name, option in TELLING.items()
+        if name in base and name in new and base[name] != new[name]
+    ]
+
+
+def _said(value: Any) -> str:
+    """Write an option's value for a person."""
+    if value is None or value in ({}, [], ()):
+        return "not given"
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _by_mask(frames: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:

@@ -10,13 +10,14 @@ A condition is a quantity, an operator and a limit::
     RATE      := ACC ERR TPR FNR TNR FPR, each also as pooled_..., IoU F1 precision
 
 ``post.filtered.ERR > +0.5pp`` holds where the error rate of the final mask has risen by more than
-half a percentage point; ``post.filtered.ERR > 20%`` where it is above a fifth. Rates are those of
-the frames that both results evaluated. Nothing is ever executed.
+half a percentage point; ``post.filtered.ERR > 20%`` where it is above a fifth. A change is that of
+the frames that both results evaluated; a level is that of all the frames of the new result, and
+needs no base: between different drives it is judged on every result. Nothing is ever executed.
 
 A condition that cannot be judged is an error, and never taken for one that is kept: where a rate
-is undefined, where a change is asked for between different drives, and where too few frames tell.
-Of one drive, the results must have in common at least half of the frames of the shorter one, and
-at least as many as an interval needs (``evaluation.effective_frames``, 10 by default).
+is undefined, where a change is asked for between different drives or scales, and where too few
+frames tell. They must be at least as many as an interval needs (``evaluation.effective_frames``,
+10 by default), and for a change at least half of the frames of the shorter result.
 """
 
 from __future__ import annotations
@@ -128,11 +129,20 @@ def judge(
 ) -> list[dict[str, Any]]:
     """Judge conditions on every new result; a row for each: ``text``, ``holds``, ``sentence``.
 
+    Parameters
+    ----------
+    comparison
+        See `roadeval.evaluation.comparison.compare`.
+    conditions
+        Each is judged on every result that it names a mask of.
+    settings
+        How many frames it takes.
+
     Raises
     ------
     ConditionError
-        If a condition asks for what is not there, or for a change between different drives, or
-        if the results have too few frames in common.
+        If a condition asks for what is not there, or for a change between different drives or
+        scales, or if too few frames tell.
     """
     rows = []
     for condition in conditions:
@@ -141,42 +151,64 @@ def judge(
                 f"{condition.text}: not judged, because the results are of different drives, whose "
                 "difference mixes the scene with the method; limits in % can be judged"
             )
-        matching = [
-            change
-            for change in comparison["changes"]
-            if (change["stage"], change["variant"]) == (condition.stage, condition.variant)
-        ]
-        if not matching:
-            there = {f"{each['stage']}.{each['variant']}" for each in comparison["changes"]}
-            raise ConditionError(
-                f"{condition.text}: nothing compared is called {condition.stage}."
-                f"{condition.variant}; there are {', '.join(sorted(there))}"
-            )
-        for change in matching:
-            if comparison["same_drive"]:
-                _must_tell(condition, change, comparison["results"], settings.effective_frames)
-            holds, sentence = condition.judge(change)
+        for row in _matching(condition, comparison["changes" if condition.is_change else "levels"]):
+            _must_tell(condition, row, comparison["results"], settings.effective_frames)
+            holds, sentence = condition.judge(row)
             rows.append({"text": condition.text, "holds": holds, "sentence": sentence})
     return rows
 
 
+def _matching(
+    condition: Condition, compared: Sequence[Mapping[str, Any]]
+) -> list[Mapping[str, Any]]:
+    """Give the rows of the mask that a condition names."""
+    named = (condition.stage, condition.variant)
+    matching = [row for row in compared if (row["stage"], row["variant"]) == named]
+    if not matching:
+        there = {f"{row['stage']}.{row['variant']}" for row in compared}
+        raise ConditionError(
+            f"{condition.text}: nothing compared is called {'.'.join(named)}; there are "
+            f"{', '.join(sorted(there))}"
+        )
+    return matching
+
+
 def _must_tell(
     condition: Condition,
-    change: Mapping[str, Any],
+    row: Mapping[str, Any],
     results: Sequence[Mapping[str, Any]],
     least: int,
 ) -> None:
-    """Refuse to judge by a handful of frames, or by a corner where two results overlap."""
-    frames = {each["label"]: each["frames"] for each in results}
-    base, new, common = results[0]["label"], change["result"], change["frames"]
-    shorter = min(frames[base], frames[new])
+    """Refuse to judge by a handful of frames, or a change of what hardly has anything in common."""
+    label, count = row["result"], row["frames"]
+    why = ""
+    if condition.is_change:
+        new = next(each for each in results if each["label"] == label)
+        why = _no_change_tells(results[0], new, count, least)
+    elif count < least:
+        why = f"{label} has {count} evaluated frames, and {least} are needed; replay more of it"
+    if why:
+        raise ConditionError(f"{condition.text}: not judged, because {why}")
+
+
+def _no_change_tells(
+    base: Mapping[str, Any], new: Mapping[str, Any], common: int, least: int
+) -> str:
+    """Say why a change between two results of a drive tells nothing; empty if it does."""
+    names = f"{base['label']} and {new['label']}"
+    scales = base["scale"], new["scale"]
+    if None not in scales and scales[0] != scales[1]:
+        return (
+            f"{names} were replayed at --scale {scales[0]:g} and {scales[1]:g}; replay both at one "
+            "scale, or limit in %"
+        )
+    shorter = min(base["frames"], new["frames"])
     if common < least:
         why = f"and {least} are needed"
     elif 2 * common < shorter:
         why = f"fewer than half of the {shorter} of the shorter one"
     else:
-        return
-    raise ConditionError(
-        f"{condition.text}: not judged, because {base} and {new} have {common} evaluated frames in "
-        f"common, {why}; replay both over the same range"
+        return ""
+    return (
+        f"{names} have {common} evaluated frames in common, {why}; replay both over the same range"
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
+from collections import deque
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 from os import PathLike
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 
 READ_AHEAD: Final = 8 << 20
 """Bytes of an entity's payloads that are kept, once the whole of it had to be gone through."""
+
+_Page = tuple[list[int], pa.ListArray]
+"""Frames, and a payload for each."""
 
 _TEXT = "TextDocument:text"
 _CAMERA = "EncodedImage:blob"
@@ -82,7 +86,8 @@ class Recording:
     @cached_property
     def frame_numbers(self) -> tuple[int, ...]:
         """The frames whose images are there, in order."""
-        return tuple(frame for frame, _ in self._rows(at.CAMERA, _CAMERA))
+        batches = self._batches(at.CAMERA, _CAMERA, static=False)
+        return tuple(frame for batch in batches for frame in batch.column(at.FRAME).to_pylist())
 
     @cached_property
     def roles(self) -> dict[int, str]:
@@ -186,19 +191,18 @@ class Recording:
         return codec.decode(_bytes(self._payloads[path][frame]))
 
     def _read_ahead(self, path: str, component: str, frame: int) -> None:
-        """Take in the payloads of this frame and of those after it, then before, as many as fit.
+        """Take in the payloads of this frame and of those around it, see `_around`.
 
-        Rerun reads all of an entity to give any of it, so that going through the frames one
-        chunk at a time would take the square of their number.
+        Rerun reads all of an entity to give any of it: one pass a frame would take the square of
+        their number, and reading ahead divides that by the number of frames that fit.
         """
         if frame in self._held.get(path, (frame,)):
-            pages = [
+            self._payloads.pop(path, None)
+            pages = (
                 (batch.column(at.FRAME).to_pylist(), batch.column(component).flatten())
                 for batch in self._batches(path, component, static=False)
-            ]
-            self._held[path] = frozenset(number for numbers, _ in pages for number in numbers)
-            first = next((n for n, (numbers, _) in enumerate(pages) if frame in numbers), 0)
-            self._payloads[path] = _first_of([*pages[first:], *pages[:first]])
+            )
+            self._held[path], self._payloads[path] = _around(frame, pages)
         if frame not in self._held[path]:
             raise RecordingError(f"{self.path}: {path} has nothing on frame {frame}")
 
@@ -264,16 +268,34 @@ def _bytes(blob: pa.ListScalar) -> bytes:
     return bytes(blob.values.to_numpy())  # noqa: PD011 - Arrow's values, not pandas'
 
 
-def _first_of(pages: Iterable[tuple[list[int], pa.ListArray]]) -> dict[int, pa.ListScalar]:
-    """Take payloads by frame out of pages, the first page whatever its size, until no more fit."""
-    payloads: dict[int, pa.ListScalar] = {}
-    size = 0
-    for numbers, blobs in pages:
+def _around(frame: int, pages: Iterable[_Page]) -> tuple[frozenset[int], dict[int, pa.ListScalar]]:
+    """Go through pages once and keep those around a frame; no more are ever held.
+
+    Returns
+    -------
+    frozenset of int, dict
+        All frames of the pages; and payloads by frame: those of the page with this frame, whatever
+        its size, of those after it as far as they fit, and of the nearest before it with what is
+        left of `READ_AHEAD`.
+    """
+    there: set[int] = set()
+    near: deque[_Page] = deque()
+    size = ahead = 0
+    for page in pages:
+        numbers, blobs = page
+        there.update(numbers)
+        if ahead and ahead + blobs.nbytes > READ_AHEAD:
+            continue
+        near.append(page)
         size += blobs.nbytes
-        if payloads and size > READ_AHEAD:
-            break
-        payloads.update(zip(numbers, blobs, strict=True))
-    return payloads
+        if ahead or frame in numbers:
+            ahead += blobs.nbytes
+        while size > max(READ_AHEAD, ahead):
+            size -= near.popleft()[1].nbytes
+    payloads = {
+        number: blob for numbers, blobs in near for number, blob in zip(numbers, blobs, strict=True)
+    }
+    return frozenset(there), payloads
 
 
 def _store(reader: RrdReader, entry: StoreEntry) -> LazyStore | None:

@@ -1,6 +1,7 @@
 """``roadeval compare``: what changed, and a guard that fails when it should."""
 
 import json
+import shutil
 
 import pytest
 
@@ -77,6 +78,19 @@ def test_the_variants_of_one_recording_are_compared_with_each_other(demo):
     final = next(change for change in content["changes"] if change["final"])
     difference = demo.summary["difference"]["post"]["ERR"]["mean"]
     assert final["difference"]["ERR"]["mean"] == pytest.approx(difference)
+
+
+@pytest.mark.parametrize("kept", [0, 0.5])
+@pytest.mark.parametrize("command", ["compare", "report"])
+def test_a_damaged_table_is_named_in_one_line(command, kept, worse, tmp_path):
+    folder = shutil.copytree(worse.reports, tmp_path / "reports")
+    whole = (folder / "frames.csv").read_bytes()
+    (folder / "frames.csv").write_bytes(whole[: int(kept * len(whole))])
+    outputs = ("-o", tmp_path / "out.pdf") if command == "report" else ()
+    run = roadeval(command, folder, *outputs)
+    assert run.returncode == 1
+    assert f"{folder / 'frames.csv'}: damaged" in run.stderr
+    assert len(run.stderr.splitlines()) == 1
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,11 @@ from pathlib import Path
 import cv2
 import pytest
 
-from roadeval import Recording
+from roadeval import Recording, inspecting
 from roadeval.cli.app import main
-from tests.e2e.commands import roadeval
+from roadeval.errors import RoadevalError
+from roadeval.opened import Opened
+from tests.e2e.commands import DEMO, replay, roadeval
 
 DRIVER = Path("/usr/share/vulkan/icd.d")
 drawable = pytest.mark.skipif(
@@ -72,6 +74,48 @@ def test_without_a_frame_the_worst_is_drawn_and_named(demo, told):
     said = f"frame {worst(demo)}, the worst (--frame N or --worst K takes another)\n"
     assert told(demo.recording) == said
     assert told(demo.recording, "--frame", "12") == "frame 12\n"
+
+
+@pytest.fixture(scope="module")
+def sparse(tmp_path_factory):
+    """A replay that keeps the pictures of every seventh frame."""
+    words = ("--max-frames", 60, "--record", "every:7")
+    return replay(tmp_path_factory.mktemp("sparse"), DEMO, *words)
+
+
+def test_the_frame_that_is_drawn_is_the_worst_of_those_that_have_pictures(sparse, told):
+    pictured = Opened(sparse.recording).pictured
+    assert worst(sparse) not in pictured
+    rows = [
+        (float(row["ERR"]), int(row["frame"]))
+        for row in sparse.table("frames")
+        if (row["variant"], row["stage"]) == ("filtered", "post") and int(row["frame"]) in pictured
+    ]
+    said = f"frame {max(rows)[1]}, the worst that has pictures (--frame N or --worst K takes"
+    assert told(sparse.recording).startswith(said)
+
+
+@pytest.mark.parametrize("words", [("--worst", "1"), ("--frame",)])
+def test_a_frame_without_pictures_is_drawn_with_a_warning(
+    words, sparse, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr(
+        "roadeval.recording.viewer.screenshot", lambda recording, picture, frame: frame
+    )
+    bad = worst(sparse)
+    words = words if len(words) == 2 else (*words, str(bad))
+    picture = str(tmp_path / "it.png")
+    assert main(["inspect", str(sparse.recording), "--screenshot", picture, *words]) == 0
+    said = capsys.readouterr()
+    assert said.out == f"{picture}: frame {bad}\n"
+    assert f"has no pictures of frame {bad}: any that show are of an earlier one" in said.err
+
+
+def test_the_worst_of_nothing_is_none_unless_a_variant_is_asked_for(unlabelled):
+    opened = Opened(unlabelled.recording)
+    assert inspecting.worst(opened) is None
+    with pytest.raises(RoadevalError, match="nothing was scored"):
+        inspecting.worst(opened, "filtered")
 
 
 def test_where_nothing_was_scored_the_first_frame_is_drawn(unlabelled, told):

@@ -1,5 +1,7 @@
 """Results side by side: which frames are compared, and what is said of them."""
 
+from dataclasses import replace
+
 import pytest
 
 from roadeval.evaluation.comparison import (
@@ -17,8 +19,8 @@ SETTINGS = EvaluationSettings(resamples=200)
 POST = ("filtered", "post")
 
 
-def a_side(label, errors, *, digest="d1", **table):
-    return Side(label, "street", digest, a_table({POST: errors}, **table))
+def a_side(label, errors, *, digest="d1", selection=None, **table):
+    return Side(label, "street", digest, a_table({POST: errors}, **table), selection or {})
 
 
 def test_a_result_against_itself_differs_by_nothing_for_sure():
@@ -82,6 +84,34 @@ def test_another_truth_is_told():
     assert "the truth differs on 2 frames" in found["warnings"][0]
 
 
+def test_options_that_differ_and_change_numbers_are_named():
+    asked = {"scale": 1.0, "every": 1, "road_labels": [], "start": None, "truth_topic": "/a"}
+    other = asked | {"scale": 0.5, "road_labels": [3], "start": "5"}
+    base, new = a_side("base", [10, 20], selection=asked), a_side("new", [10, 20], selection=other)
+    relabelled = replace(new, frames=new.frames.assign(N=new.frames["N"] - 1))
+    assert compare([base, relabelled], SETTINGS)["warnings"] == [
+        "base and new were replayed with different options (--road-label not given and [3], "
+        "--scale 1 and 0.5): part of the change may be theirs",
+        "the truth differs on 2 frames between base and new: part of the change may be the truth's",
+    ]
+
+
+@pytest.mark.parametrize("selection", [None, {"scale": 1.0}])
+def test_a_result_that_does_not_know_its_options_is_compared_without_a_word(selection):
+    sides = [a_side("base", [10] * 12, selection=selection), a_side("new", [12] * 12)]
+    found = compare(sides, SETTINGS)
+    assert found["warnings"] == []
+    assert judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)[0]["holds"]
+
+
+def test_a_change_between_scales_is_not_judged_but_a_level_is():
+    base = a_side("base", [10] * 12, selection={"scale": 1.0})
+    found = compare([base, a_side("new", [12] * 12, selection={"scale": 0.5})], SETTINGS)
+    with pytest.raises(ConditionError, match=r"not judged, because .* at --scale 1 and 0\.5"):
+        judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
+    assert judge(found, [Condition.parse("post.filtered.ERR > 11%")], SETTINGS)[0]["holds"]
+
+
 def test_nothing_in_common_is_an_error():
     late = a_side("new", [10, 20])
     late = Side("new", "street", "d1", late.frames.assign(stamp_ns=late.frames["stamp_ns"] + 5))
@@ -121,13 +151,31 @@ def test_a_condition_is_judged_on_every_new_result():
     assert [row["holds"] for row in judged] == [False, True]
 
 
-@pytest.mark.parametrize("text", ["post.filtered.ERR > 1pp", "post.filtered.ERR > 1%"])
-def test_a_condition_is_not_judged_by_a_handful_of_frames(text):
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("post.filtered.ERR > 1pp", r"base and new have 9 .* in common, and 10 are needed"),
+        ("post.filtered.ERR > 1%", r"new has 9 evaluated frames, and 10 are needed"),
+    ],
+)
+def test_a_condition_is_not_judged_by_a_handful_of_frames(text, why):
     found = compare([a_side("base", [10] * 40), a_side("new", [90] * 9)], SETTINGS)
-    with pytest.raises(
-        ConditionError, match=r"base and new have 9 .* in common, and 10 are needed"
-    ):
+    with pytest.raises(ConditionError, match=why):
         judge(found, [Condition.parse(text)], SETTINGS)
+
+
+def test_a_level_is_not_judged_by_a_handful_of_frames_of_another_drive():
+    found = compare([a_side("a", [10] * 12), a_side("b", [90] * 3, digest="d2")], SETTINGS)
+    with pytest.raises(ConditionError, match="b has 3 evaluated frames, and 10 are needed"):
+        judge(found, [Condition.parse("post.filtered.ERR > 1%")], SETTINGS)
+
+
+def test_a_level_is_that_of_all_frames_of_the_new_result_whatever_the_base_has():
+    base, new = a_side("base", [10] * 3), a_side("new", [0] * 3 + [40] * 17)
+    (row,) = judge(
+        compare([base, new], SETTINGS), [Condition.parse("post.filtered.ERR > 33%")], SETTINGS
+    )
+    assert row["sentence"].startswith("post.filtered.ERR of new is 34.00 %")
 
 
 def test_a_condition_is_not_judged_where_two_ranges_hardly_overlap():

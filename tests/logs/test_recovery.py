@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from roadeval.logs import FrameError, Log, LogError, open_log
+from tests.measuring import PEAK
 
 CAM = "/cam/image/compressed"
 WHOLE = ""
@@ -140,11 +141,12 @@ def test_data_of_a_wrong_checksum_is_kept_on_demand(data: Path) -> None:
         assert "checksum is wrong, used all the same" in log.losses[0]
 
 
-MEASURE = """
-import resource, sys
+MEASURE = f"""
+{PEAK}
+import sys
 from roadeval.logs import FrameError, LogError, open_log
 import cv2, mcap_ros1.decoder, mcap_ros2.decoder, mcap_protobuf.decoder
-baseline = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+baseline = peak()
 for path in sys.argv[1:]:
     try:
         with open_log(path) as log:
@@ -156,7 +158,7 @@ for path in sys.argv[1:]:
                     pass
     except LogError:
         pass
-print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - baseline) / 1024)
+print((peak() - baseline) / 1024)
 """
 
 

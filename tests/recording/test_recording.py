@@ -6,17 +6,20 @@ import signal
 import subprocess
 import sys
 import textwrap
+import weakref
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import cv2
 import numpy as np
+import pyarrow as pa
 import pytest
 import rerun as rr
 
 from roadeval.data import Health, Role
 from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError
+from roadeval.recording.reading import _around
 from tests.recording.making import HEIGHT, WIDTH, frame, layout, result, unscored
 
 SUMMARY = {"verdict": "It helps.", "totals": {}, "seconds": {"filtered": {"post": 0.5}}}
@@ -120,6 +123,49 @@ def test_an_entity_is_gone_through_once_whatever_frames_are_read(drive, recordin
     with pytest.raises(RecordingError, match="nothing on frame 99"):
         again.layer("filtered", "post", 99)
     assert len(passes) == 1
+
+
+def pages_of(sizes):
+    """Pages of one frame each, of these many bytes, and the most of them that lived at once."""
+    made, most = [], [0]
+
+    def pages():
+        for number, size in enumerate(sizes):
+            blobs = pa.array([[0] * size], pa.list_(pa.uint8()))
+            made.append(weakref.ref(blobs))
+            most[0] = max(most[0], sum(each() is not None for each in made))
+            yield [number], blobs
+            del blobs
+
+    return pages(), most
+
+
+def test_no_more_of_an_entity_is_held_than_is_read_ahead(monkeypatch):
+    monkeypatch.setattr("roadeval.recording.reading.READ_AHEAD", 500)
+    pages, most = pages_of([100] * 60)
+    there, payloads = _around(30, pages)
+    assert len(there) == 60
+    assert 30 in payloads
+    assert most[0] <= 7
+
+
+@pytest.mark.parametrize(
+    ("frame", "sizes", "kept"),
+    [
+        (2, [10] * 9, [2, 3, 4, 5]),
+        (8, [10] * 9, [5, 6, 7, 8]),
+        (7, [10] * 9, [5, 6, 7, 8]),
+        (1, [10, 99, 10, 10], [1]),
+        (3, [10, 10, 99, 10], [3]),
+        (99, [10] * 3, [0, 1, 2]),
+    ],
+)
+def test_the_frames_after_one_are_kept_first_then_the_nearest_before(
+    frame, sizes, kept, monkeypatch
+):
+    one = pa.array([[0] * 10], pa.list_(pa.uint8())).nbytes
+    monkeypatch.setattr("roadeval.recording.reading.READ_AHEAD", 4 * one)
+    assert list(_around(frame, pages_of(sizes)[0])[1]) == kept
 
 
 # --- Numbers and words ------------------------------------------------------------------------
