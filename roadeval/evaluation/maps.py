@@ -33,13 +33,14 @@ class HeatMap:
     def __init__(self) -> None:
         self.frames = 0
         self.left_out = 0
-        self._sums: Sums = np.zeros((3, 0, 0), np.int64)
+        # Four bytes a sum are enough: no drive has 2^32 frames.
+        self._sums = np.zeros((3, 0, 0), np.uint32)
         self._bytes = np.zeros((3, 0, 0), np.uint8)
 
     def add(self, errors: npt.NDArray[np.uint8]) -> None:
         """Add a frame's errors, ``(H, W)`` uint8 in the classes of `roadeval.data.ERRORS`."""
         if not self.frames:
-            self._sums = np.zeros((3, *errors.shape), np.int64)
+            self._sums = np.zeros((3, *errors.shape), np.uint32)
             self._bytes = np.zeros((3, *errors.shape), np.uint8)
         if errors.shape != self._bytes.shape[1:]:
             self.left_out += 1
@@ -52,7 +53,7 @@ class HeatMap:
     def sums(self) -> Sums:
         """``(3, H, W)`` int64: frames that label the pixel, that have it FP, and FN."""
         self._carry()
-        return self._sums
+        return self._sums.astype(np.int64)
 
     def cells(self) -> tuple[int, Sums]:
         """Sum up square cells, no more than `CELLS` across the longer side.
