@@ -14,6 +14,7 @@ Labels = npt.NDArray[np.int32]
 Runs = npt.NDArray[np.int32]
 Row = npt.NDArray[np.int32]
 Sums = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float32]
 Planes = tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8], npt.NDArray[np.uint8]]
 
 _NONE = np.int32(0x7FFFFFFF)
@@ -254,26 +255,45 @@ def rectified_sum(
     """See `plain.rectified_sum`."""
     pixels = features.shape[1]
     result = np.zeros(pixels, np.float32)
-    # So many pixels at once stay in the nearest cache with all of their features.
-    sides = np.empty(256, np.float32)
-    for start in range(0, pixels, 256):
-        part = result[start : start + 256]
+    # So many pixels at once stay in a near cache with all of their features.
+    sides = np.empty(1024, np.float32)
+    for start in range(0, pixels, 1024):
+        part = result[start : start + 1024]
         side = sides[: len(part)]
         for plane in range(len(bias)):
-            side[:] = bias[plane]
-            for feature in range(len(features)):
-                _add_product(side, features[feature, start : start + 256], planes[plane, feature])
-            for pixel in range(len(part)):
-                part[pixel] += max(side[pixel], np.float32(0)) * weights[plane]
+            for pixel in range(len(side)):
+                side[pixel] = bias[plane]
+            # Three at once, added in their order: the sums are read and written a third as often.
+            whole = len(features) // 3 * 3
+            for feature in range(0, whole, 3):
+                _add_three(side, features, feature, start, planes[plane])
+            for feature in range(whole, len(features)):
+                _add_one(side, features, feature, start, planes[plane])
+            _add_rectified(part, side, weights[plane])
     return result
 
 
-@_inlined  # type: ignore[untyped-decorator]
-def _add_product(
-    total: npt.NDArray[np.float32], values: npt.NDArray[np.float32], factor: np.float32
-) -> None:
+@_compiled  # type: ignore[untyped-decorator]
+def _add_three(total: Floats, features: Floats, first: int, start: int, slopes: Floats) -> None:
+    a = features[first, start : start + len(total)]
+    b = features[first + 1, start : start + len(total)]
+    c = features[first + 2, start : start + len(total)]
+    s, t, u = slopes[first], slopes[first + 1], slopes[first + 2]
     for index in range(len(total)):
-        total[index] += values[index] * factor
+        total[index] = total[index] + a[index] * s + b[index] * t + c[index] * u
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def _add_one(total: Floats, features: Floats, feature: int, start: int, slopes: Floats) -> None:
+    values, slope = features[feature, start : start + len(total)], slopes[feature]
+    for index in range(len(total)):
+        total[index] += values[index] * slope
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def _add_rectified(total: Floats, side: Floats, weight: np.float32) -> None:
+    for index in range(len(total)):
+        total[index] += max(side[index], np.float32(0)) * weight
 
 
 @_compiled  # type: ignore[untyped-decorator]
