@@ -29,6 +29,7 @@ from pydantic.dataclasses import dataclass as validated
 from roadeval.data import Layer, LayerKind, LayerSpec, Rgb
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.classify import SVM, Penalty
+from roadeval.pipeline.colour import planes as colour_planes
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.scale import reduced, stretched
 from roadeval.pipeline.shade import LOGS
@@ -125,11 +126,16 @@ def features(image: Rgb, windows: tuple[int, ...]) -> Values:
     logs = cv2.LUT(image, LOGS)
     red, green, blue = cv2.split(logs)
     light = (red + green + blue) / np.float32(3)
-    planes = [*cv2.split(image.astype(np.float32)), red - green, blue - green]
-    planes += _places(*image.shape[:2])
     slopes = [np.abs(cv2.Sobel(light, cv2.CV_32F, *order)) for order in ((1, 0), (0, 1))]
-    planes += [np.sqrt(cv2.blur(slope, (side, side))) for side in windows for slope in slopes]
-    return np.stack(planes)
+    found: Values = np.empty((BARE_FEATURES + 2 * len(windows), *image.shape[:2]), np.float32)
+    found[:3] = colour_planes(image)
+    np.subtract(red, green, out=found[3])
+    np.subtract(blue, green, out=found[4])
+    found[5:7] = _places(*image.shape[:2])
+    textures = (cv2.blur(slope, (side, side)) for side in windows for slope in slopes)
+    for plane, texture in zip(found[7:], textures, strict=True):
+        np.sqrt(texture, out=plane)
+    return found
 
 
 @lru_cache(maxsize=8)

@@ -57,7 +57,9 @@ class ExposureSettings:
 def gains(image: Rgb, settings: ExposureSettings) -> npt.NDArray[np.float64]:
     """Gain of each channel, ``(3,)``, that brings the patch of ``(H, W, 3)`` RGB to the level."""
     patch = patch_mask(*image.shape[:2], settings.patch)
-    medians = np.array([_median(image, channel, patch) for channel in range(3)])
+    x, y, width, height = cv2.boundingRect(patch)
+    here = slice(y, y + height), slice(x, x + width)
+    medians = np.array([_median(image[here], channel, patch[here]) for channel in range(3)])
     if settings.channels == "alike":
         medians = np.full(3, medians.mean())
     gain = settings.level / np.maximum(medians, 1.0)
