@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
+from roadeval.asked import TELLING
 from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import analysis
@@ -27,21 +28,6 @@ COMPARED: Final = ("ERR", "FPR", "FNR")
 """The rates whose differences are given; ACC, TNR and TPR only mirror them."""
 MOVED: Final = 5
 """Frames named of those that changed most, in each direction."""
-TELLING: Final[Mapping[str, str]] = {
-    "image_topic": "--image-topic",
-    "truth_topic": "--truth-topic",
-    "shadow_topic": "--shadow-topic",
-    "mask_topics": "--mask-topic",
-    "road_labels": "--road-label",
-    "ignore_labels": "--ignore-label",
-    "road_colors": "--road-color",
-    "ignore_colors": "--ignore-color",
-    "every": "--every",
-    "sync_tolerance_ms": "--sync-tolerance",
-    "resize_truth": "--resize-truth",
-    "scale": "--scale",
-}
-"""Options of a replay, as typed, that change a frame's numbers or which frames are seen."""
 
 
 class ComparisonError(RoadevalError):

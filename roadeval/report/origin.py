@@ -6,6 +6,7 @@ import shlex
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from roadeval.asked import typed
 from roadeval.report.blocks import Block, Columns, Command, Heading, Table, Text, Together
 from roadeval.report.findings import Findings
 
@@ -81,13 +82,12 @@ def _settings(settings: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
 
 def _replay(found: Findings, path: str) -> str:
     words = ["roadeval", "replay", path]
-    for option, name in (
-        ("--preset", "preset"),
-        ("--image-topic", "image_topic"),
-        ("--truth-topic", "truth_topic"),
-    ):
-        if found.properties.get(name):
-            words += [option, str(found.properties[name])]
+    if found.properties.get("preset"):
+        words += ["--preset", str(found.properties["preset"])]
+    # The topics that were picked are named, asked for or not.
+    picked = {name: found.properties.get(name) for name in ("image_topic", "truth_topic")}
+    asked = found.summary.get("selection", {})
+    words += typed(asked | {name: topic for name, topic in picked.items() if topic})
     training = found.summary.get("training", {})
     if training.get("model"):
         words += ["--model", str(training["model"])]
