@@ -105,7 +105,11 @@ class Role(StrEnum):
 
 
 class LayerKind(StrEnum):
-    """How a layer's array is to be read."""
+    """How a layer's array is to be read.
+
+    `MASK`: one class or a few, told apart by their colours alone. `LABELS`: classes whose names a
+    viewer is to show. `SCALAR`: a map of numbers. `RGB`: a colour image.
+    """
 
     RGB = "rgb"
     MASK = "mask"

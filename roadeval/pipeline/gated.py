@@ -57,7 +57,7 @@ COMPONENTS: Final = LayerSpec(
 SHADOW: Final = _mask("shadow", "Accepted shadow", "shadow")
 RINGS: Final = LayerSpec(
     "rings",
-    LayerKind.LABELS,
+    LayerKind.MASK,
     "Accepted shadow, and lit road around components",
     (*SHADOW.classes, LabelClass(2, "ring", RING_COLOUR)),
 )

@@ -43,7 +43,7 @@ SHADOW: Final = LayerSpec(
 )
 RINGS: Final = LayerSpec(
     "rings",
-    LayerKind.LABELS,
+    LayerKind.MASK,
     "Components and buffer rings (Eq. 9-10)",
     (
         LabelClass(0, "none", (0, 0, 0, 0)),

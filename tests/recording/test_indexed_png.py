@@ -1,6 +1,7 @@
 """Small label images as PNG files."""
 
 import io
+import zlib
 
 import numpy as np
 import pytest
@@ -48,3 +49,21 @@ def test_a_png_file_without_a_palette_is_refused():
     Image.fromarray(np.zeros((2, 2), np.uint8)).save(grey, "PNG")
     with pytest.raises(ValueError, match="palette"):
         indexed_png.decode(grey.getvalue())
+
+
+def test_rows_without_a_filter_are_read_as_earlier_recordings_have_them():
+    labels = np.random.default_rng(0).integers(0, 2, (5, 16)).astype(np.uint8)
+    rows = b"".join(b"\0" + np.packbits(row).tobytes() for row in labels)
+    np.testing.assert_array_equal(indexed_png.decode(_with_rows(labels, rows)), labels)
+
+
+def test_rows_with_a_filter_that_is_never_written_are_refused():
+    with pytest.raises(ValueError, match="filters"):
+        indexed_png.decode(_with_rows(np.zeros((2, 8), np.uint8), b"\1\0\4\0"))
+
+
+def _with_rows(labels, rows):
+    """Encode labels, and put other rows in the place of theirs."""
+    png, packed = indexed_png.encode(labels, ROAD), zlib.compress(rows)
+    start, end = png.index(b"IDAT") - 4, png.index(b"IEND") - 8
+    return png[:start] + len(packed).to_bytes(4, "big") + b"IDAT" + packed + png[end:]
