@@ -7,7 +7,8 @@ from collections import Counter, defaultdict
 from typing import Any, Final
 
 from roadeval.data import FrameResult, Mask, Role, Truth
-from roadeval.evaluation.bits import Bits, TruthBits, ones
+from roadeval.evaluation.bits import TruthBits, ones
+from roadeval.kernels.packing import Bits
 
 
 class Flicker:

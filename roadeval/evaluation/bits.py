@@ -8,16 +8,10 @@ from functools import lru_cache
 from math import isqrt
 
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import NON_ROAD, ROAD, Mask, Truth
 from roadeval.kernels import KERNELS
-
-Bits = npt.NDArray[np.uint64]
-"""``(H, words)`` uint64 of an ``(H, W)`` mask, the leftmost pixel in the lowest bit; those beyond
-the width are 0. ``(K, H, words)`` of K masks."""
-Reach = npt.NDArray[np.int64]
-"""``(r + 1,)``: how far a symmetric element extends sideways, by rows from its centre."""
+from roadeval.kernels.packing import Bits, Reach, pack
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +26,7 @@ class TruthBits:
     def of(cls, truth: Truth) -> TruthBits:
         """Pack an ``(H, W)`` uint8 truth (0, 1, 255)."""
         height, width = truth.shape
-        return cls((height, width), _pack(truth == ROAD), _pack(truth == NON_ROAD))
+        return cls((height, width), pack(truth == ROAD), pack(truth == NON_ROAD))
 
     @property
     def labelled(self) -> Bits:
@@ -52,7 +46,7 @@ class TruthBits:
                 raise ValueError(f"shape {mask.shape} differs from the truth's {self.shape}")
         packed = np.zeros((len(masks), *self.road.shape), np.uint64)
         for bits, mask in zip(packed, masks, strict=True):
-            bits[:] = _pack(mask)
+            bits[:] = pack(mask)
         return packed
 
     def grow(self, bits: Bits, reach: Reach) -> Bits:
@@ -69,7 +63,7 @@ def ones(bits: Bits) -> int:
 @lru_cache(maxsize=8)
 def everywhere(shape: tuple[int, int]) -> Bits:
     """Give the mask that holds every pixel of an image of ``shape`` (H, W)."""
-    return _pack(np.ones(shape, np.uint8))
+    return pack(np.ones(shape, np.uint8))
 
 
 @lru_cache(maxsize=8)
@@ -88,10 +82,3 @@ def flat(masks: Bits | Sequence[Bits]) -> Bits:
     """Lay each mask's rows one after the other: ``(K, H * words)``."""
     stacked = np.asarray(masks, np.uint64)
     return stacked.reshape(len(stacked), stacked.shape[1] * stacked.shape[2])
-
-
-def _pack(mask: npt.NDArray[np.uint8] | npt.NDArray[np.bool_]) -> Bits:
-    packed = np.packbits(mask, axis=1, bitorder="little")
-    if packed.shape[1] % 8:
-        packed = np.pad(packed, ((0, 0), (0, -packed.shape[1] % 8)))
-    return packed.view(np.uint64)

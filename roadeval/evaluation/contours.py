@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from roadeval.evaluation.bits import Bits, TruthBits, disk, ones, square
+from roadeval.evaluation.bits import TruthBits, disk, ones, square
+from roadeval.kernels.packing import Bits
 
 
 def boundary_f(masks: Mapping[str, Bits], truth: TruthBits, width: int) -> dict[str, float]:

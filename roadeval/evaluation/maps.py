@@ -11,9 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Change, Layer, Step
-from roadeval.evaluation.bits import Bits, TruthBits, everywhere, flat, ones
+from roadeval.evaluation.bits import TruthBits, everywhere, flat, ones
 from roadeval.evaluation.counts import IGNORED
 from roadeval.kernels import KERNELS
+from roadeval.kernels.packing import Bits
 
 Sums = npt.NDArray[np.int64]
 Name = tuple[str, str]

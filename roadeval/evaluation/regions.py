@@ -8,7 +8,8 @@ from functools import lru_cache
 import numpy as np
 
 from roadeval.data import Frame, Mask, VariantResult
-from roadeval.evaluation.bits import Bits, TruthBits, everywhere, square
+from roadeval.evaluation.bits import TruthBits, everywhere, square
+from roadeval.kernels.packing import Bits
 
 
 def of_frame(

@@ -17,9 +17,10 @@ from roadeval.data import (
 )
 from roadeval.evaluation import contours, counts, health, maps, rates, regions, tables
 from roadeval.evaluation.baselines import BlindPrior
-from roadeval.evaluation.bits import Bits, TruthBits, ones
+from roadeval.evaluation.bits import TruthBits, ones
 from roadeval.evaluation.maps import Name
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.kernels.packing import Bits
 
 
 class CountsNotConservedError(RuntimeError):

@@ -1,10 +1,10 @@
 """The loops over every pixel that no library offers in one pass.
 
-Each is there twice: compiled (`colours`, `shapes`), and as the NumPy or OpenCV expression that
-defines it (`plain`). Both give the same bits. `KERNELS` are the compiled ones where compilation
-works and the others where it does not (no compiler support, nowhere to keep the cache), so the
-results never depend on the machine. Which they are is found out when the first one is asked for:
-whoever only reads results need not wait for a compiler.
+Each is there twice: compiled (`bits`, `colours`, `machine`, `runs`, `shades`), and as the NumPy or
+OpenCV expression that defines it (`plain`). Both give the same bits. `KERNELS` are the compiled
+ones where compilation works and the others where it does not (no compiler support, nowhere to keep
+the cache), so the results never depend on the machine. Which they are is found out when the first
+one is asked for: whoever only reads results need not wait for a compiler.
 """
 
 from __future__ import annotations

@@ -1,24 +1,17 @@
 """The compiled kernels, by the names of their twins in `plain`."""
 
+from roadeval.kernels.bits import count_bits, grow, shrink
 from roadeval.kernels.colours import (
     add_outcomes,
+    look_up_channels,
     look_up_colours,
     look_up_sum_min,
     mahalanobis,
     outcomes,
-    rectified_sum,
-    ring_sums,
-    run_sums,
-    transfer,
 )
-from roadeval.kernels.shapes import (
-    components,
-    count_bits,
-    fill_holes,
-    grow,
-    keep_region,
-    label_runs,
-)
+from roadeval.kernels.machine import rectified_sum
+from roadeval.kernels.runs import components, fill_holes, keep_region, label_runs, paint
+from roadeval.kernels.shades import ring_sums, run_sums, transfer
 
 __all__ = [
     "add_outcomes",
@@ -28,12 +21,15 @@ __all__ = [
     "grow",
     "keep_region",
     "label_runs",
+    "look_up_channels",
     "look_up_colours",
     "look_up_sum_min",
     "mahalanobis",
     "outcomes",
+    "paint",
     "rectified_sum",
     "ring_sums",
     "run_sums",
+    "shrink",
     "transfer",
 ]

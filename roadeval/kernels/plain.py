@@ -8,14 +8,14 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from roadeval.kernels.packing import Bits, Mask, Reach, pack, unpack
+
 Codes = npt.NDArray[np.uint8]
 Labels = npt.NDArray[np.int32]
 Runs = npt.NDArray[np.int32]
 Sums = npt.NDArray[np.int64]
-Mask = npt.NDArray[np.uint8]
+Floats = npt.NDArray[np.float32]
 Planes = Sequence[npt.NDArray[np.uint8]]
-Bits = npt.NDArray[np.uint64]
-"""64 pixels a word, the leftmost in the lowest bit."""
 
 
 # --- Colours --------------------------------------------------------------------------------------
@@ -62,7 +62,7 @@ def run_sums(image: npt.NDArray[np.uint8], runs: Runs, count: int) -> Sums:
 
 
 def ring_sums(
-    image: npt.NDArray[np.uint8], labels: Labels, ring: Codes, count: int, width: int
+    image: npt.NDArray[np.uint8], runs: Runs, ring: Codes, count: int, width: int
 ) -> Sums:
     """Sum the colours of every component's buffer ring (Eq. 10).
 
@@ -70,8 +70,8 @@ def ring_sums(
     ----------
     image
         ``(H, W, 3)`` uint8.
-    labels
-        ``(H, W)`` int32: 0 outside the shadow, else the component.
+    runs
+        ``(n, 4)`` int32, see `components`.
     ring
         ``(H, W)`` uint8: nonzero on pixels outside the shadow that some dilation reaches.
     count
@@ -86,7 +86,7 @@ def ring_sums(
         reaches it.
     """
     y, x = np.nonzero(ring)
-    padded = np.pad(labels, width)
+    padded = np.pad(paint(runs, *ring.shape), width)
     window = np.lib.stride_tricks.sliding_window_view(padded, (2 * width + 1, 2 * width + 1))
     near = window[y, x].reshape(len(y), (2 * width + 1) ** 2)
     pixel = np.repeat(np.arange(len(y)), near.shape[1])
@@ -172,18 +172,21 @@ def look_up_colours(image: npt.NDArray[np.uint8], table: Codes) -> Codes:
     return found
 
 
+def look_up_channels(image: npt.NDArray[np.uint8], table: Codes) -> npt.NDArray[np.uint8]:
+    """Look each channel of ``(H, W, 3)`` uint8 up in its column of a ``(256, 3)`` uint8 table."""
+    found: npt.NDArray[np.uint8] = cv2.LUT(image, table[None])
+    return found
+
+
 def rectified_sum(
-    features: npt.NDArray[np.float32],
-    planes: npt.NDArray[np.float32],
-    bias: npt.NDArray[np.float32],
-    weights: npt.NDArray[np.float32],
-) -> npt.NDArray[np.float32]:
+    features: tuple[Floats, ...], planes: Floats, bias: Floats, weights: Floats
+) -> Floats:
     """Sum ``sum_k weights[k] max(planes[k] . x + bias[k], 0)`` of every pixel's features x.
 
     Parameters
     ----------
     features
-        ``(F, n)`` float32: a row a feature, a column a pixel.
+        F arrays ``(n,)`` float32: one for each feature, with its value at every pixel.
     planes, bias, weights
         ``(K, F)``, ``(K,)`` and ``(K,)`` float32.
 
@@ -192,7 +195,7 @@ def rectified_sum(
     numpy.ndarray
         ``(n,)`` float32, added up in the order of the planes.
     """
-    result = np.zeros(features.shape[1], np.float32)
+    result = np.zeros_like(features[0])
     for plane, start, weight in zip(planes, bias, weights, strict=True):
         side = np.full_like(result, start)
         for feature, slope in zip(features, plane, strict=True):
@@ -204,31 +207,38 @@ def rectified_sum(
 # --- Masks ----------------------------------------------------------------------------------------
 
 
-def components(mask: Mask, connectivity: int) -> tuple[Labels, Runs, int]:
-    """Label what is connected in an ``(H, W)`` mask, 0 or 1 (Eq. 9).
+def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
+    """Find what is connected in a mask (Eq. 9).
 
     Parameters
     ----------
-    mask
-        ``(H, W)`` uint8.
+    bits, width
+        The mask, see `roadeval.kernels.packing`.
     connectivity
         8, or 4 where pixels that touch by a corner are not connected.
 
     Returns
     -------
-    labels, runs, count
-        ``(H, W)`` int32: 0, or the component's number from 1, in the order of their first pixels;
+    runs, count
         ``(n, 4)`` int32: row, first column, column after the last, and label of each of their
-        rows' stretches; and how many components there are.
+        rows' stretches, row after row; and how many components there are. Labels count from 1, in
+        the order of the components' first pixels.
     """
-    count, found = cv2.connectedComponents(np.ascontiguousarray(mask), connectivity=connectivity)
+    count, found = cv2.connectedComponents(unpack(bits, width), connectivity=connectivity)
     # The library numbers them by blocks of rows.
     seen, first = np.unique(found, return_index=True)
     order = seen[seen > 0][np.argsort(first[seen > 0])]
     number = np.zeros(count, np.int32)
     number[order] = np.arange(1, count)
-    labels = number[found]
-    return labels, label_runs(labels), count - 1
+    return label_runs(number[found]), count - 1
+
+
+def paint(runs: Runs, height: int, width: int) -> Labels:
+    """Make the ``(height, width)`` int32 image of `components`' labels, 0 outside."""
+    labels = np.zeros((height, width), np.int32)
+    y, x, label = _pixels(runs)
+    labels[y, x] = label
+    return labels
 
 
 def label_runs(labels: Labels) -> Runs:
@@ -242,15 +252,15 @@ def label_runs(labels: Labels) -> Runs:
     return found
 
 
-def keep_region(mask: Mask, patch: Mask) -> Mask:
-    """Keep one 8-connected component of an ``(H, W)`` mask, 0 or 1; an empty one stays empty.
+def keep_region(bits: Bits, width: int, patch: Mask) -> Bits:
+    """Keep one 8-connected component of a mask; an empty one stays empty.
 
     The one with most pixels where ``patch``, ``(H, W)`` or empty, is nonzero; the largest where
     none has any there. Of equals the first from the top.
     """
-    count, labels = cv2.connectedComponents(np.ascontiguousarray(mask))
+    count, labels = cv2.connectedComponents(unpack(bits, width))
     if count <= 1:
-        return mask.copy()
+        return bits.copy()
     votes = np.bincount(labels.ravel(), minlength=count)[1:]
     if patch.size:
         inside = np.bincount(labels[patch > 0], minlength=count)[1:]
@@ -258,19 +268,17 @@ def keep_region(mask: Mask, patch: Mask) -> Mask:
     best = np.flatnonzero(votes == votes.max()) + 1
     # The library numbers components by blocks of rows: of equals, the first pixel decides.
     first = best[0] if len(best) == 1 else labels[np.isin(labels, best)][0]
-    kept: Mask = (labels == first).astype(np.uint8)
-    return kept
+    return pack(labels == first)
 
 
-def fill_holes(mask: Mask) -> Mask:
-    """Fill what an ``(H, W)`` mask, 0 or 1, encloses.
+def fill_holes(bits: Bits, width: int) -> Bits:
+    """Fill what a mask encloses.
 
     A hole is a 4-connected set of zeros that does not reach the outside of the image.
     """
-    outside = np.pad(np.ascontiguousarray(mask != 0).view(np.uint8), 1)
+    outside = np.pad(unpack(bits, width), 1)
     cv2.floodFill(outside, None, (0, 0), 2, flags=4)
-    filled: Mask = (outside[1:-1, 1:-1] != 2).astype(np.uint8)
-    return filled
+    return pack(outside[1:-1, 1:-1] != 2)
 
 
 def outcomes(mask: Mask, truth: Mask, ignored: int) -> Mask:
@@ -303,25 +311,20 @@ def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
     return np.array(counts, np.int64).reshape(len(masks), *both.shape[:2])
 
 
-def grow(bits: Bits, reach: Sums, width: int) -> Bits:
-    """Dilate a mask by an element that is symmetric in both directions.
+def grow(bits: Bits, reach: Reach, width: int) -> Bits:
+    """Dilate a mask of ``width`` pixels a row by an element."""
+    return pack(cv2.dilate(unpack(bits, width), _element(reach)))
 
-    Parameters
-    ----------
-    bits
-        ``(H, words)`` uint64 of a mask of ``width`` pixels a row; the bits beyond are 0.
-    reach
-        ``(r + 1,)`` int64: how many pixels the element extends to either side, in its own row and
-        in each of the r rows above and below.
-    width
-        Of the mask, in pixels.
-    """
+
+def shrink(bits: Bits, reach: Reach) -> Bits:
+    """Erode a mask by an element; outside the image nothing is set."""
+    wide = unpack(bits, 64 * bits.shape[1])
+    border = {"borderType": cv2.BORDER_CONSTANT, "borderValue": 0}
+    return pack(cv2.erode(wide, _element(reach), **border))
+
+
+def _element(reach: Reach) -> Mask:
     side = 2 * max(len(reach) - 1, int(reach.max())) + 1
     rows, columns = np.abs(np.indices((side, side)) - side // 2)
-    near = rows < len(reach)
-    near &= columns <= reach[np.minimum(rows, len(reach) - 1)]
-    mask = np.unpackbits(bits.view(np.uint8), axis=1, bitorder="little", count=width)
-    grown = np.zeros((len(bits), bits.shape[1] * 8), np.uint8)
-    packed = np.packbits(cv2.dilate(mask, near.astype(np.uint8)), axis=1, bitorder="little")
-    grown[:, : packed.shape[1]] = packed
-    return grown.view(np.uint64)
+    inside: Mask = (rows < len(reach)) & (columns <= reach[np.minimum(rows, len(reach) - 1)])
+    return inside.astype(np.uint8)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -71,7 +72,7 @@ class LabelValues:
                 raise LogError(f"colour {_name(color)} cannot occur: give R,G,B, 0 to 255 each")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class LabelMap:
     """How to read the pictures of a label topic.
 
@@ -89,6 +90,11 @@ class LabelMap:
     table: npt.NDArray[np.uint8]
     colors: dict[int, int]
     words: str
+
+    @cached_property
+    def strict(self) -> bool:
+        """Whether there are values of which nobody said what they mean."""
+        return bool((self.table == UNKNOWN).any())
 
     def read(self, picture: Picture) -> Truth:
         """Decode a label picture to ``(H, W)`` uint8 truth.
@@ -119,7 +125,7 @@ class LabelMap:
             truth: Truth = np.asarray(cv2.LUT(labels, self.table[:256]), np.uint8)
         else:
             truth = self.table[labels]
-        if (truth == UNKNOWN).any():
+        if self.strict and (truth == UNKNOWN).any():
             value = int(labels[truth == UNKNOWN][0])
             raise BadMessage(f"it holds the value {value}, unlike the frames before ({self.words})")
         return truth

@@ -123,12 +123,12 @@ def features(image: Rgb, windows: tuple[int, ...]) -> Values:
     Texture is, for each window, the root of the mean absolute slope of the log brightness across
     and down: kerbs, wheels and house fronts have edges of one direction, leaves of both.
     """
-    logs = cv2.LUT(image, LOGS)
-    red, green, blue = cv2.split(logs)
+    colours = colour_planes(image)
+    red, green, blue = (cv2.LUT(plane, LOGS) for plane in colours)
     light = (red + green + blue) / np.float32(3)
     slopes = [np.abs(cv2.Sobel(light, cv2.CV_32F, *order)) for order in ((1, 0), (0, 1))]
     found: Values = np.empty((BARE_FEATURES + 2 * len(windows), *image.shape[:2]), np.float32)
-    found[:3] = colour_planes(image)
+    found[:3] = colours
     np.subtract(red, green, out=found[3])
     np.subtract(blue, green, out=found[4])
     found[5:7] = _places(*image.shape[:2])
@@ -182,13 +182,12 @@ def draw_planes(values: Values, count: int, seed: int) -> tuple[Values, Values]:
     pixel of the training set, and is scaled so that its largest value there is 1.
     """
     rng = np.random.default_rng(seed)
-    mean, deviation = values.mean(axis=0), values.std(axis=0)
+    deviation = values.std(axis=0)
     planes = rng.normal(size=(count, values.shape[1]))
     planes /= np.linalg.norm(planes, axis=1, keepdims=True) * np.where(deviation > 0, deviation, 1)
     through = values[rng.integers(0, len(values), count)]
     bias = -(planes * through).sum(axis=1)
     largest = np.maximum((values @ planes.T + bias).max(axis=0), 1e-6)
-    del mean
     return (planes / largest[:, None]).astype(np.float32), (bias / largest).astype(np.float32)
 
 
@@ -258,7 +257,7 @@ def decision(image: Rgb, machine: RectifiedMachine, settings: ContextSettings) -
     check_fit(machine, settings)
     planes = features(image, settings.windows)
     values = KERNELS.rectified_sum(
-        planes.reshape(len(planes), -1), machine.planes, machine.bias, machine.weights
+        tuple(planes.reshape(len(planes), -1)), machine.planes, machine.bias, machine.weights
     )
     side = (settings.smoothing, settings.smoothing)
     smooth: Values = cv2.blur(values.reshape(planes.shape[1:]) + np.float32(machine.offset), side)

@@ -7,6 +7,7 @@ the reference patch, which is road in nearly every frame, tells both.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Annotated, Final, Literal
 
 import cv2
@@ -15,7 +16,8 @@ import numpy.typing as npt
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.data import Layer, LayerKind, LayerSpec, Rgb
+from roadeval.data import Layer, LayerKind, LayerSpec, Mask, Rgb
+from roadeval.kernels import KERNELS
 from roadeval.pipeline.patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View
 
@@ -56,17 +58,25 @@ class ExposureSettings:
 
 def gains(image: Rgb, settings: ExposureSettings) -> npt.NDArray[np.float64]:
     """Gain of each channel, ``(3,)``, that brings the patch of ``(H, W, 3)`` RGB to the level."""
-    patch = patch_mask(*image.shape[:2], settings.patch)
-    x, y, width, height = cv2.boundingRect(patch)
-    here = slice(y, y + height), slice(x, x + width)
-    medians = np.array([_median(image[here], channel, patch[here]) for channel in range(3)])
+    rows, columns, patch = _box(*image.shape[:2], settings.patch)
+    around = image[rows, columns]
+    medians = np.array([_median(around, channel, patch) for channel in range(3)])
     if settings.channels == "alike":
         medians = np.full(3, medians.mean())
     gain = settings.level / np.maximum(medians, 1.0)
     return np.asarray(np.clip(gain, settings.least, settings.greatest))
 
 
-def _median(image: Rgb, channel: int, patch: npt.NDArray[np.uint8]) -> float:
+@lru_cache(maxsize=16)
+def _box(height: int, width: int, patch: ReferencePatch) -> tuple[slice, slice, Mask]:
+    """Rows and columns of the smallest box around the patch, and the patch's mask in it."""
+    mask = patch_mask(height, width, patch)
+    x, y, columns, rows = cv2.boundingRect(mask)
+    here = slice(y, y + rows), slice(x, x + columns)
+    return *here, mask[here]
+
+
+def _median(image: Rgb, channel: int, patch: Mask) -> float:
     """Lower median of a channel over the patch."""
     counts = cv2.calcHist([image], [channel], patch, [256], [0, 256]).ravel().cumsum()
     return float(np.searchsorted(counts, counts[-1] / 2))
@@ -75,7 +85,7 @@ def _median(image: Rgb, channel: int, patch: npt.NDArray[np.uint8]) -> float:
 def expose(image: Rgb, gain: npt.NDArray[np.float64]) -> Rgb:
     """Multiply the channels of an ``(H, W, 3)`` uint8 image by ``(3,)`` gains; rounded, clipped."""
     table = np.rint(np.arange(256)[:, None] * gain).clip(0, 255).astype(np.uint8)
-    exposed: Rgb = cv2.LUT(image, table[None])
+    exposed: Rgb = KERNELS.look_up_channels(image, table)
     return exposed
 
 

@@ -1,4 +1,7 @@
-"""Phase 4, post-processing (section 3.4): morphology, the largest region, its holes (Eq. 17-23)."""
+"""Phase 4, post-processing (section 3.4): morphology, the largest region, its holes (Eq. 17-23).
+
+Masks are packed here, 64 pixels a word: see `roadeval.kernels.packing`.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, mask_spec
 from roadeval.kernels import KERNELS
+from roadeval.kernels.packing import Bits, Packed, Reach, pack
 from roadeval.pipeline.patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View
 
@@ -76,80 +80,88 @@ def element_side(width: int) -> int:
     return max(3, 2 * (width // 200) + 1)
 
 
-def structuring_element(side: int, shape: str) -> Mask:
-    """B of Eq. 17-22, ``(side, side)`` uint8."""
+def structuring_element(side: int, shape: str) -> Reach:
+    """B of Eq. 17-22, of ``side`` pixels, odd; see `roadeval.kernels.packing.Reach`."""
     kind = cv2.MORPH_RECT if shape == "square" else cv2.MORPH_ELLIPSE
-    element: Mask = cv2.getStructuringElement(kind, (side, side))
-    return element
+    below = cv2.getStructuringElement(kind, (side, side))[side // 2 :]
+    reach: Reach = (np.count_nonzero(below, axis=1) - 1) // 2
+    return reach
 
 
-# Outside the image is non-road, for erosion too: OpenCV's own default lets erosion ignore it.
+# Outside the image is non-road, for erosion too.
 
 
-def dilate(mask: Mask, element: Mask) -> Mask:
+def dilate(mask: Packed, element: Reach) -> Packed:
     """Dilation (Eq. 17)."""
-    grown: Mask = cv2.dilate(mask, element, borderType=cv2.BORDER_CONSTANT, borderValue=0)
-    return grown
+    return Packed(KERNELS.grow(mask.bits, element, mask.width), mask.width)
 
 
-def erode(mask: Mask, element: Mask) -> Mask:
+def erode(mask: Packed, element: Reach) -> Packed:
     """Erosion (Eq. 18)."""
-    eroded: Mask = cv2.erode(mask, element, borderType=cv2.BORDER_CONSTANT, borderValue=0)
-    return eroded
+    return Packed(KERNELS.shrink(mask.bits, element), mask.width)
 
 
-def opening(mask: Mask, element: Mask) -> Mask:
+def opening(mask: Packed, element: Reach) -> Packed:
     """Open a mask: erosion, then dilation (Eq. 20; the text announces it as 19)."""
     return dilate(erode(mask, element), element)
 
 
-def closing(mask: Mask, element: Mask) -> Mask:
+def closing(mask: Packed, element: Reach) -> Packed:
     """Close a mask: dilation, then erosion (Eq. 21; the text announces it as 20).
 
     The dilation may leave the image: cut off there, the erosion would eat road along the edge.
     """
-    margin = element.shape[0] // 2
-    wide = cv2.copyMakeBorder(mask, margin, margin, margin, margin, cv2.BORDER_CONSTANT, value=0)
-    closed = erode(dilate(wide, element), element)
-    return closed[margin : closed.shape[0] - margin, margin : closed.shape[1] - margin]
+    rows, words = len(element) - 1, -(-int(element.max()) // 64)
+    height, across = mask.bits.shape
+    wide = np.zeros((height + 2 * rows, across + 2 * words), np.uint64)
+    image = np.s_[rows : rows + height, words : words + across]
+    wide[image] = mask.bits
+    closed = erode(dilate(Packed(wide, 64 * wide.shape[1]), element), element).bits
+    return Packed(closed[image] & _inside(mask), mask.width)
 
 
-def boundary(mask: Mask, element: Mask) -> Mask:
+def _inside(mask: Packed) -> Bits:
+    """Give a row of words in which the pixels of the mask's width are set."""
+    return pack(np.ones((1, mask.width), np.uint8))
+
+
+def boundary(mask: Packed, element: Reach) -> Packed:
     """Boundary ``M - (M erode B)`` (Eq. 22)."""
-    return mask - erode(mask, element)
+    return Packed(mask.bits & ~erode(mask, element).bits, mask.width)
 
 
-def keep_region(mask: Mask, patch: Mask | None = None) -> Mask:
+def keep_region(mask: Packed, patch: Mask | None = None) -> Packed:
     """Keep one 8-connected component of a mask ("largest and connected areas", section 3.4).
 
-    The largest, or, given a ``patch``, the one with most pixels in it where any has some. Of
-    equals the first from the top. An empty mask stays empty.
+    The largest, or, given an ``(H, W)`` ``patch``, the one with most pixels in it where any has
+    some. Of equals the first from the top. An empty mask stays empty.
     """
-    if patch is not None and patch.shape != mask.shape:
-        raise ValueError(f"a patch of {patch.shape} does not fit a mask of {mask.shape}")
-    kept: Mask = KERNELS.keep_region(mask, np.zeros((0, 0), np.uint8) if patch is None else patch)
-    return kept
+    shape = len(mask.bits), mask.width
+    if patch is not None and patch.shape != shape:
+        raise ValueError(f"a patch of {patch.shape} does not fit a mask of {shape}")
+    chosen = np.zeros((0, 0), np.uint8) if patch is None else patch
+    return Packed(KERNELS.keep_region(mask.bits, mask.width, chosen), mask.width)
 
 
-def fill_holes(mask: Mask) -> Mask:
+def fill_holes(mask: Packed) -> Packed:
     """Fill what the mask encloses: Eq. 23's fixed point from a seed J in every hole.
 
     A hole is a 4-connected set of non-road that does not reach the outside of the image; B is
     the cross, which cannot slip between diagonal neighbours of an 8-connected boundary.
     """
-    filled: Mask = KERNELS.fill_holes(mask)
-    return filled
+    return Packed(KERNELS.fill_holes(mask.bits, mask.width), mask.width)
 
 
-def post_process(mask: Mask, settings: MorphologySettings) -> Mask:
-    """Section 4.4 on an ``(H, W)`` road mask: open, close, keep one region, fill its holes."""
-    height, width = mask.shape
-    element = structuring_element(settings.element or element_side(width), settings.shape)
+def post_process(mask: Packed, settings: MorphologySettings) -> Packed:
+    """Section 4.4 on a road mask: open, close, keep one region, fill its holes."""
+    side = settings.element or element_side(mask.width)
+    element = structuring_element(side, settings.shape)
     for operation in settings.operations:
         mask = opening(mask, element) if operation == "open" else closing(mask, element)
     if settings.region != "all":
-        patch = patch_mask(height, width, settings.patch) if settings.region == "patch" else None
-        mask = keep_region(mask, patch)
+        patch = settings.region == "patch"
+        shape = len(mask.bits), mask.width
+        mask = keep_region(mask, patch_mask(*shape, settings.patch) if patch else None)
     return fill_holes(mask) if settings.fill else mask
 
 
@@ -160,8 +172,9 @@ def bind(settings: MorphologySettings, _parameters: None) -> Callable[[View], Ou
     def run(view: View) -> Output:
         if view.mask is None:
             raise ValueError("post-processing needs a stage with a road mask before it")
-        mask = post_process(view.mask, settings)
-        layers = (Layer(POST, mask), Layer(BOUNDARY, boundary(mask, edge)))
+        road = post_process(Packed.of(view.mask), settings)
+        mask = road.mask()
+        layers = (Layer(POST, mask), Layer(BOUNDARY, boundary(road, edge).mask()))
         return Output(layers, mask=mask)
 
     return run

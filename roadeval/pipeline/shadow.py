@@ -24,6 +24,7 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb, Truth
 from roadeval.kernels import KERNELS
+from roadeval.kernels.packing import pack
 from roadeval.pipeline import colour
 from roadeval.pipeline.stage import Output, Stage, View
 
@@ -175,20 +176,27 @@ def shadow_mask(codes: Codes, threshold: int | None, *, inclusive: bool) -> Mask
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Components:
-    """Connected components, numbered from 1.
+    """Connected components of an image of ``shape`` (H, W), numbered from 1.
 
-    ``labels`` is ``(H, W)`` int32, 0 outside. ``runs`` is ``(n, 4)`` int32: row, first column,
-    column after the last, and label of each of their rows' stretches. ``count`` is their number.
+    ``runs`` is ``(n, 4)`` int32: row, first column, column after the last, and label of each of
+    their rows' stretches. ``count`` is their number.
     """
 
-    labels: Labels
     runs: npt.NDArray[np.int32]
     count: int
+    shape: tuple[int, int]
+
+    def labels(self) -> Labels:
+        """Make their label image: ``(H, W)`` int32, 0 outside."""
+        labels: Labels = KERNELS.paint(self.runs, *self.shape)
+        return labels
 
 
 def connected_components(shadow: Mask, connectivity: int) -> Components:
     """Eq. 9's fixed point for every seed: the 4- or 8-connected components of a mask."""
-    return Components(*KERNELS.components(shadow, connectivity))
+    height, width = shadow.shape
+    runs, count = KERNELS.components(pack(shadow), width, connectivity)
+    return Components(runs, count, (height, width))
 
 
 def buffer_ring(shadow: Mask, width: int) -> Mask:
@@ -289,7 +297,7 @@ def compensate(
         return _compensate_hsi(image, found, ring, settings)
     count, width = found.count + 1, settings.ring_width
     inside = moments_of_sums(KERNELS.run_sums(image, found.runs, count))
-    around = moments_of_sums(KERNELS.ring_sums(image, found.labels, ring, count, width))
+    around = moments_of_sums(KERNELS.ring_sums(image, found.runs, ring, count, width))
     change = compensation(inside, around, settings)
     return KERNELS.transfer(image, found.runs, change.source, change.target, change.gain), change
 
@@ -309,10 +317,11 @@ def _compensate_hsi(
     image: Rgb, found: Components, ring: Mask, settings: ShadowSettings
 ) -> tuple[Rgb, Compensation]:
     """Compensate saturation and value, keep the hue, and convert back (section 4.2, step 5)."""
-    label, pixel = ring_pairs(found.labels, ring, settings.ring_width)
+    labels = found.labels()
+    label, pixel = ring_pairs(labels, ring, settings.ring_width)
     flat = image.reshape(-1, 3)
-    shadow = np.flatnonzero(found.labels)
-    k = found.labels.ravel()[shadow]
+    shadow = np.flatnonzero(labels)
+    k = labels.ravel()[shadow]
     values = _saturation_value(flat[shadow])
     inside = moments_of_values(k, values, found.count + 1)
     around = moments_of_values(label, _saturation_value(flat[pixel]), found.count + 1)

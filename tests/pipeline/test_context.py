@@ -178,16 +178,26 @@ def test_a_wide_image_is_decided_at_the_working_width():
     np.testing.assert_array_equal(values, expected)
 
 
-@pytest.mark.parametrize("pixels", [1, 255, 256, 700])
-def test_the_compiled_kernel_equals_its_plain_twin(pixels):
+@pytest.mark.parametrize("count", [1, 7, 11, 40])
+@pytest.mark.parametrize("pixels", [1, 511, 512, 1200])
+def test_the_compiled_kernel_equals_its_plain_twin(pixels, count):
     rng = np.random.default_rng(0)
     features, planes, bias, weights = (
-        rng.normal(size=shape).astype(np.float32) for shape in ((5, pixels), (7, 5), 7, 7)
+        rng.normal(size=shape).astype(np.float32) for shape in ((count, pixels), (9, count), 9, 9)
     )
     np.testing.assert_array_equal(
-        compiled.rectified_sum(features, planes, bias, weights),
-        plain.rectified_sum(features, planes, bias, weights),
+        compiled.rectified_sum(tuple(features), planes, bias, weights),
+        plain.rectified_sum(tuple(features), planes, bias, weights),
     )
+
+
+@pytest.mark.parametrize("module", [compiled, plain])
+def test_the_kernel_is_the_sum_over_rectified_planes(module):
+    features = np.array([1, 2], np.float32), np.array([10, 20], np.float32)
+    planes = np.array([[2, 0], [1, -1], [0, 1]], np.float32)
+    bias, weights = np.array([1, 5, -15], np.float32), np.array([1, 100, -2], np.float32)
+    found = module.rectified_sum(features, planes, bias, weights)
+    assert found.tolist() == [3, 5 - 2 * 5]
 
 
 # --- Memory ---------------------------------------------------------------------------------------

@@ -178,7 +178,7 @@ CROSS, SQUARE = ndimage.generate_binary_structure(2, 1), ndimage.generate_binary
 @settings(max_examples=60)
 def test_components_are_the_fixed_points_of_the_iteration(connectivity, b, shadowed):
     found = shadow.connected_components(shadowed, connectivity)
-    labels, count = found.labels, found.count
+    labels, count = found.labels(), found.count
     assert set(np.unique(labels)) - {0} == set(range(1, count + 1))
     assert ((labels > 0) == shadowed).all()
     for seed in zip(*np.nonzero(shadowed), strict=True):
@@ -214,7 +214,7 @@ def literal_rings(shadowed, labels, width):
 @given(shadowed=masks, width=st.integers(1, 3))
 @settings(max_examples=60)
 def test_rings_equal_the_dilation_of_each_component_alone(connectivity, shadowed, width):
-    labels = shadow.connected_components(shadowed, connectivity).labels
+    labels = shadow.connected_components(shadowed, connectivity).labels()
     union = shadow.buffer_ring(shadowed, width)
     label, pixel = shadow.ring_pairs(labels, union, width)
     expected = list(literal_rings(shadowed, labels, width))
@@ -228,14 +228,14 @@ def test_a_pixel_between_two_components_counts_in_both_rings():
     image = noise(1, 7)
     labels = np.array([[0, 1, 0, 0, 2, 0, 0]], np.int32)
     ring = shadow.buffer_ring((labels > 0).astype(np.uint8), 2)
-    outside = shadow.KERNELS.ring_sums(image, labels, ring, 3, 2)
+    outside = shadow.KERNELS.ring_sums(image, plain.label_runs(labels), ring, 3, 2)
     assert outside[1, 1:4].tolist() == image[0, [0, 2, 3]].sum(axis=0).tolist()
     assert outside[2, 1:4].tolist() == image[0, [2, 3, 5, 6]].sum(axis=0).tolist()
 
 
 def one(labels):
     """The component that a hand-made label image holds."""
-    return shadow.Components(labels, plain.label_runs(labels), 1)
+    return shadow.Components(plain.label_runs(labels), 1, labels.shape)
 
 
 # --- Eq. 11 ---------------------------------------------------------------------------------------
@@ -446,7 +446,7 @@ def test_facts_state_threshold_components_and_gains():
     assert facts["shadow_share"] == pytest.approx(3 / 15)
     assert facts["components"] == facts["compensated"] == 2
     found = shadow.connected_components(run(image)[1]["shadow"], 8)
-    ring = shadow.buffer_ring((found.labels > 0).astype(np.uint8), 1)
+    ring = shadow.buffer_ring((found.labels() > 0).astype(np.uint8), 1)
     _, change = shadow.compensate(image, found, ring, ShadowSettings())
     assert facts["max_gain"] == change.gain.max() > 3
     assert facts["gains_above_3"] == (change.gain > 3).any(axis=1).sum() == 1

@@ -1,0 +1,195 @@
+"""Compiled loops over the colours of components and their rings: what Eq. 10 and 11 need.
+
+A component's pixels are given by its runs, in the order of the rows, see `roadeval.kernels.runs`.
+Unsigned indices are not asked whether they count from the end, which in loops as short as these
+takes a third of the time.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from roadeval.kernels.runs import paint_row
+
+_compiled = njit(cache=True, nogil=True)
+_inlined = njit(cache=True, nogil=True, inline="always")
+
+Image = npt.NDArray[np.uint8]
+Mask = npt.NDArray[np.uint8]
+Labels = npt.NDArray[np.int32]
+Runs = npt.NDArray[np.int32]
+Row = npt.NDArray[np.int32]
+Sums = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+
+_NONE = np.int32(0x7FFFFFFF)
+"""Greater than any label."""
+_TABLED = 256
+"""Pixels from which on a table of what becomes of each level is quicker than the sum itself."""
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def run_sums(image: Image, runs: Runs, count: int) -> Sums:
+    """See `plain.run_sums`."""
+    sums = np.zeros((count, 7), np.int64)
+    for run in range(len(runs)):
+        y, label = np.uintp(runs[run, 0]), np.uintp(runs[run, 3])
+        start, end = np.uintp(runs[run, 1]), np.uintp(runs[run, 2])
+        r1 = g1 = b1 = r2 = g2 = b2 = np.int64(0)
+        for x in range(start, end):
+            r, g, b = np.int64(image[y, x, 0]), np.int64(image[y, x, 1]), np.int64(image[y, x, 2])
+            r1, g1, b1 = r1 + r, g1 + g, b1 + b
+            r2, g2, b2 = r2 + r * r, g2 + g * g, b2 + b * b
+        for column, value in enumerate((np.int64(end - start), r1, g1, b1, r2, g2, b2)):
+            sums[label, column] += value
+    return sums
+
+
+# --- Rings ----------------------------------------------------------------------------------------
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def ring_sums(image: Image, runs: Runs, ring: Mask, count: int, width: int) -> Sums:
+    """See `plain.ring_sums`."""
+    rows, columns = ring.shape
+    sums = np.zeros((count, 7), np.int64)
+    # The last pixel that each component counted: one pixel counts once in a ring.
+    last = np.full(count, -1, np.int64)
+    # Labels of the rows within reach, in turn: they stay in a near cache.
+    near = np.zeros((2 * width + 1, columns), np.int32)
+    greatest, least = np.empty(columns, np.int32), np.empty(columns, np.int32)
+    spare = np.zeros(columns + 2 * width, np.int32), np.full(columns + 2 * width, _NONE)
+    places = np.empty(columns, np.int64)
+    run = 0
+    for row in range(rows + width):
+        run = paint_row(near[row % len(near)], runs, run, row)
+        y = row - width
+        if y < 0:
+            continue
+        found = _places(ring[y], places)
+        if not found:
+            continue
+        _bound(near, width, spare, greatest, least)
+        for index in range(found):
+            x = places[index]
+            # Most pixels of a ring are near one component.
+            if least[x] == greatest[x]:
+                _add(sums, least[x], image, y, x)
+            else:
+                _add_each(sums, last, near, image, (y, x, width))
+    return sums
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def _places(ring: Mask, places: Sums) -> int:
+    """Note where a row is nonzero, and how often, without a branch that is hard to foresee."""
+    count = 0
+    for x in range(len(ring)):
+        places[count] = x
+        count += ring[x] != 0
+    return count
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def _bound(near: Labels, width: int, spare: tuple[Row, Row], greatest: Row, least: Row) -> None:
+    """Give the greatest and the least label around each pixel of a row; 0 counts for neither.
+
+    ``near`` are the rows around it, in any order, ``spare`` two rows with ``width`` pixels more on
+    both sides, for the columns' own. Loops as simple as these run in vector instructions.
+    """
+    columns = len(least)
+    high, low = spare
+    above, below = high[width : width + columns], low[width : width + columns]
+    for x in range(columns):
+        above[x], below[x] = 0, _NONE
+    for v in range(len(near)):
+        row = near[v]
+        for x in range(columns):
+            above[x] = max(above[x], row[x])
+        for x in range(columns):
+            below[x] = min(below[x], row[x] if row[x] > 0 else _NONE)
+    for x in range(columns):
+        greatest[x], least[x] = high[x], low[x]
+    for shift in range(1, 2 * width + 1):
+        for x in range(columns):
+            greatest[x] = max(greatest[x], high[x + shift])
+        for x in range(columns):
+            least[x] = min(least[x], low[x + shift])
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def _add_each(
+    sums: Sums, last: Sums, near: Labels, image: Image, place: tuple[int, int, int]
+) -> None:
+    """Add a ring's pixel once to every component within ``width`` of ``place``: (y, x, width)."""
+    y, x, width = place
+    columns = near.shape[1]
+    pixel = y * columns + x
+    for v in range(len(near)):
+        for u in range(max(x - width, 0), min(x + width + 1, columns)):
+            label = near[v, u]
+            if label > 0 and last[label] != pixel:
+                last[label] = pixel
+                _add(sums, label, image, y, x)
+
+
+@_inlined  # type: ignore[untyped-decorator]
+def _add(sums: Sums, label: int, image: Image, y: int, x: int) -> None:
+    # By indices: a view of an array has an owner to be counted, which takes longer than the sum.
+    k, v, u = np.uintp(label), np.uintp(y), np.uintp(x)
+    sums[k, 0] += 1
+    for channel in range(3):
+        value = np.int64(image[v, u, channel])
+        sums[k, 1 + channel] += value
+        sums[k, 4 + channel] += value * value
+
+
+# --- Transfer -------------------------------------------------------------------------------------
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def transfer(image: Image, runs: Runs, source: Floats, target: Floats, gain: Floats) -> Image:
+    """See `plain.transfer`."""
+    result = image.copy()
+    pixels = np.zeros(len(source), np.int64)
+    for run in range(len(runs)):
+        pixels[runs[run, 3]] += runs[run, 2] - runs[run, 1]
+    # What a component makes of a level is the same for all its pixels: a large one is tabulated.
+    large = pixels > _TABLED
+    tables, place = _tables(large, source, target, gain), np.cumsum(large) - 1
+    for run in range(len(runs)):
+        y, k = np.uintp(runs[run, 0]), np.uintp(runs[run, 3])
+        start, end = np.uintp(runs[run, 1]), np.uintp(runs[run, 2])
+        if large[k]:
+            table = np.uintp(place[k])
+            for x in range(start, end):
+                for c in range(3):
+                    result[y, x, c] = tables[table, c, image[y, x, c]]
+        else:
+            for x in range(start, end):
+                for c in range(3):
+                    result[y, x, c] = _moved(image[y, x, c], source[k, c], target[k, c], gain[k, c])
+    return result
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def _tables(
+    large: npt.NDArray[np.bool_], source: Floats, target: Floats, gain: Floats
+) -> npt.NDArray[np.uint8]:
+    """Tabulate what becomes of each level in each channel of the large components, in order."""
+    tables = np.empty((large.sum(), 3, 256), np.uint8)
+    place = 0
+    for k in range(len(large)):
+        if large[k]:
+            for c in range(3):
+                for level in range(256):
+                    tables[place, c, level] = _moved(level, source[k, c], target[k, c], gain[k, c])
+            place += 1
+    return tables
+
+
+@_inlined  # type: ignore[untyped-decorator]
+def _moved(level: int, source: float, target: float, gain: float) -> np.uint8:
+    return np.uint8(min(max(np.rint(target + (level - source) * gain), 0.0), 255.0))
