@@ -56,7 +56,7 @@ def suspects(
     Raises
     ------
     RoadevalError
-        If nothing was scored, or there is no such variant.
+        If nothing was scored, or ERR is undefined on every frame, or there is no such variant.
     """
     frames = opened.frames
     names = _scored(opened)
@@ -66,7 +66,15 @@ def suspects(
     if chosen not in names:
         raise RoadevalError(f"{opened.path}: no variant {chosen}; there are {', '.join(names)}")
     looked_at = frames if among is None else frames[frames["frame"].isin(among)]
-    causes, ranked = analysis.causes(frames, chosen), analysis.worst(looked_at, chosen, count)
+    ranked = analysis.worst(looked_at, chosen, count)
+    if not len(ranked):
+        if among is None:
+            raise RoadevalError(
+                f"{opened.path}: ERR of {chosen} is undefined on every frame, "
+                "so no frame is the worst"
+            )
+        return []
+    causes = analysis.causes(frames, chosen)
     return [
         Suspect(
             rank,
@@ -113,7 +121,7 @@ def _scored(opened: Opened) -> list[str]:
 def view(opened: Opened, frame: int | None, picture: Path | None = None) -> int | None:
     """Open the viewer at a frame, or draw it into a PNG file; return the frame that it drew.
 
-    Without a frame it opens at the first evaluated one.
+    Without a frame it opens at the first evaluated one that has pictures.
 
     Raises
     ------
@@ -132,8 +140,20 @@ def view(opened: Opened, frame: int | None, picture: Path | None = None) -> int 
         held = f"frames {numbers[0]} to {numbers[-1]}" if numbers else "none"
         raise RoadevalError(f"{opened.path}: no frame {frame}; the recording holds {held}")
     if frame is None:
-        frame = recording.layout.first_frame
+        frame = _first(opened, recording.layout.first_frame)
     if picture is None:
         viewer.show(recording.path, frame)
         return frame
     return viewer.screenshot(recording.path, picture, frame)
+
+
+def _first(opened: Opened, begin: int | None) -> int | None:
+    """Choose the frame to open at: the first with pictures that was evaluated.
+
+    Where none was it is the first with pictures of those that could be, from ``begin`` on, or
+    else the first with pictures at all; where none has any, ``begin``.
+    """
+    scored = set(opened.frames["frame"]) if len(opened.frames) else set()
+    evaluated = [number for number in opened.pictured if number in scored]
+    later = [number for number in opened.pictured if number >= (begin or 0)]
+    return next(iter([*evaluated, *later, *opened.pictured]), begin)

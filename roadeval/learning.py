@@ -12,7 +12,9 @@ from roadeval.config import Variant
 from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.baselines import BlindPrior
+from roadeval.pipeline.stage import MisfitError
 from roadeval.training import Model, Plan, TrainingError, TrainingSettings, fit, load_model
+from roadeval.training.model import ModelError
 
 BY_PATCH: Final = (
     "the model learnt from the reference patch in front of the vehicle, which is a guess"
@@ -107,6 +109,11 @@ def from_file(path: Path, variants: Sequence[Variant]) -> tuple[Model, Schedule]
     model = load_model(path)
     for name, plan in plans_of(variants).items():
         model.require(name, plan, path)
+    try:
+        for variant in variants:
+            variant.config.bind(model.parameters[variant.name])
+    except MisfitError as error:
+        raise ModelError(f"{path}: {error}") from error
     return model, Schedule(model.digests)
 
 

@@ -14,9 +14,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Final, Self
 
+from roadeval import folders
 from roadeval.data import FrameResult
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import tables
+from roadeval.evaluation.agreement import disagreement
 from roadeval.evaluation.windows import Window
 from roadeval.tabular import read_table
 
@@ -59,8 +61,8 @@ def summary_text(parts: Mapping[str, Any]) -> str:
 class ResultsWriter:
     """Writes a results folder while frames arrive; to be used as a context.
 
-    Leaving the context without `finish` removes what was begun and leaves earlier results as they
-    were.
+    Leaving the context without `finish` removes what was begun, the folder too if it was made for
+    it, and leaves earlier results as they were.
 
     Parameters
     ----------
@@ -77,8 +79,9 @@ class ResultsWriter:
         self._folder: Final = folder
         self._filled: Final = {SUMMARY}
         self._open: Final[dict[str, IO[str]]] = {}
+        self._made: Final[list[Path]] = []
         with self._explained():
-            folder.mkdir(parents=True, exist_ok=True)
+            self._made.extend(folders.make(folder))
             for table in STREAMED:
                 self._begin(f"{table}.csv", tables.header(table))
 
@@ -155,6 +158,7 @@ class ResultsWriter:
                 file.close()
             self._temporary(name).unlink(missing_ok=True)
         self._open.clear()
+        folders.remove(self._made)
 
     def _temporary(self, name: str) -> Path:
         return self._folder / f".{name}.partial"
@@ -208,9 +212,20 @@ class Results:
         """Read a table by its name in `roadeval.evaluation.tables.COLUMNS`.
 
         One that was not written, there being nothing to count, is empty.
+
+        Raises
+        ------
+        RoadevalError
+            If it is damaged, or lacks rows of which the summary tells.
         """
         path = self._folder / f"{name}.csv"
-        return read_table(path if path.exists() else "", tables.COLUMNS[name])
+        table = read_table(path if path.exists() else "", tables.COLUMNS[name])
+        if difference := disagreement(name, table, self.summary):
+            raise ResultsError(
+                f"{path}: does not agree with {SUMMARY}: it has {difference}; "
+                "make the results anew with roadeval replay"
+            )
+        return table
 
 
 def _read_summary(path: Path) -> dict[str, Any]:

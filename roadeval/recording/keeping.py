@@ -8,6 +8,7 @@ from __future__ import annotations
 import heapq
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -18,6 +19,7 @@ from roadeval.data import BASELINE, FINAL_STAGE, FrameResult, Pictures
 from roadeval.recording.encoding import Encoded
 from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.recorder import NullRecorder, Recorder
+from roadeval.recording.shelf import Shelf
 
 
 class Kind(StrEnum):
@@ -74,6 +76,9 @@ class Kept:
 class Keeper:
     """A recorder that keeps pictures by a rule; a context manager like the `Recorder` it feeds.
 
+    The pictures of ``worst:K`` wait on a `Shelf` beside the recording: which they are is known at
+    the end alone, and memory need not hold them, however large K is.
+
     Parameters
     ----------
     path, layout
@@ -86,7 +91,8 @@ class Keeper:
         self.path = path
         self._recorder = Recorder(path, layout)
         self._rule = rule
-        self._worst: list[tuple[float, int, Encoded]] = []
+        self._shelf = Shelf(path.with_name(f"{path.stem}.partial.pictures"))
+        self._worst: list[tuple[float, int]] = []
 
     @property
     def partial(self) -> Path:
@@ -103,7 +109,13 @@ class Keeper:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._recorder.__exit__(kind, error, trace)
+        try:
+            # A run that is stopped keeps the worst frames so far, if there is room for them.
+            with suppress(RecordingError):
+                self._write_held()
+        finally:
+            self._shelf.close()
+            self._recorder.__exit__(kind, error, trace)
 
     def encode(self, result: FrameResult, position: int) -> Kept:
         """Encode the frame at ``position`` among those read, from 0; in any thread."""
@@ -119,15 +131,21 @@ class Keeper:
         self._recorder.write(replace(kept.encoded, payloads={}))
         if kept.encoded.payloads:
             # Of equals the earlier frame is kept, whatever the order of the threads.
-            heapq.heappush(self._worst, (kept.badness, -kept.encoded.number, kept.encoded))
+            self._recorder.check_room()
+            self._shelf.put(kept.encoded)
+            heapq.heappush(self._worst, (kept.badness, -kept.encoded.number))
             if len(self._worst) > self._rule.number:
-                heapq.heappop(self._worst)
+                self._shelf.drop(-heapq.heappop(self._worst)[1])
 
     def finish(self, results: Mapping[str, str]) -> None:
         """Add the pictures held back and the results, close the file and give it its name."""
-        held = sorted((encoded for _, _, encoded in self._worst), key=lambda e: e.number)
-        self._recorder.write_pictures(held)
+        self._write_held()
         self._recorder.finish(results)
+
+    def _write_held(self) -> None:
+        held, self._worst = self._worst, []
+        numbers = sorted(-number for _, number in held)
+        self._recorder.write_pictures(map(self._shelf.get, numbers))
 
     def _pictures(self, bad: float, position: int) -> Pictures:
         if self._rule.kind is Kind.MASKS:
@@ -140,8 +158,8 @@ class Keeper:
 
     def _bar(self) -> float:
         """Least badness that can still be among the worst; it only ever rises."""
-        full = len(self._worst) == self._rule.number
-        return self._worst[0][0] if full else 0.0
+        worst = self._worst
+        return worst[0][0] if len(worst) == self._rule.number else 0.0
 
 
 def recorder_for(path: Path, layout: Layout, rule: Rule) -> Keeper | NullRecorder:

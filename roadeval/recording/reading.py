@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
+import pyarrow.compute as pc
 from rerun.chunk import LazyChunkStream, LazyStore, RrdReader, StoreEntry
 
 from roadeval.data import VariantLayout
@@ -219,7 +220,11 @@ class Recording:
     def _batches(self, path: str, component: str, *, static: bool) -> Iterator[pa.RecordBatch]:
         chunks = self._stream().filter(content=path, components=component, is_static=static)
         for chunk in chunks:
-            yield chunk.to_record_batch()
+            batch = chunk.to_record_batch()
+            # A row without a value says that from there on nothing is shown.
+            filled = pc.greater(pc.list_value_length(batch.column(component)), 0)
+            if pc.any(filled).as_py():
+                yield batch if pc.all(filled).as_py() else batch.filter(filled)
 
     def _stream(self) -> LazyChunkStream:
         if self._store is not None:

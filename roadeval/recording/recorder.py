@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -13,6 +13,7 @@ from typing import Any, Final, Self
 import rerun as rr
 from rerun.chunk import Chunk
 
+from roadeval import folders
 from roadeval.data import FrameResult
 from roadeval.recording import blueprint, style, tracks
 from roadeval.recording import layout as at
@@ -121,19 +122,21 @@ class Recorder:
         if self._waiting == PAGE or self._bytes >= PAGE_BYTES:
             self._turn_page()
 
-    def write_pictures(self, held: Sequence[Encoded]) -> None:
+    def write_pictures(self, held: Iterable[Encoded]) -> None:
         """Append the pictures of frames whose numbers stand already, in order.
 
         They are cleared right after their frame, so that no later one seems to show them.
         """
-        numbers = {encoded.number for encoded in held}
+        after: Encoded | None = None
         for encoded in held:
-            self._add_images(encoded)
-            if encoded.number + 1 not in numbers:
-                after = replace(
-                    encoded, number=encoded.number + 1, stamp_ns=encoded.stamp_ns + 1, payloads={}
-                )
+            if after is not None and after.number != encoded.number:
                 self._add_images(after)
+            self._add_images(encoded)
+            self._turn_page()
+            number, stamp_ns = encoded.number + 1, encoded.stamp_ns + 1
+            after = replace(encoded, number=number, stamp_ns=stamp_ns, payloads={})
+        if after is not None:
+            self._add_images(after)
             self._turn_page()
 
     def finish(self, results: Mapping[str, str]) -> None:
@@ -156,6 +159,13 @@ class Recorder:
             raise self._incomplete()
         self.partial.replace(self.path)
 
+    def check_room(self) -> None:
+        """Raise a `RecordingError` if the disk is full, or as good as full."""
+        disk = shutil.disk_usage(self.path.parent)
+        # A place that is no disk, as /proc, has no room to tell of.
+        if disk.total and disk.free < LEAST_FREE:
+            raise RecordingError(f"{self.path}: cannot be written: the disk is full")
+
     def _add_images(self, encoded: Encoded) -> None:
         when = encoded.number, encoded.stamp_ns
         for path, payload in encoded.payloads.items():
@@ -163,7 +173,7 @@ class Recorder:
             self._pages.add(path, columns, *when, payload)
         # The viewer goes on showing what it has; an image that this frame lacks must not stand.
         for path in sorted(self._shown - encoded.payloads.keys()):
-            self._pages.add(path, tracks.clears, *when, None)
+            self._pages.add(path, self._encoder.codecs[path].columns, *when, tracks.NOTHING)
         self._shown = set(encoded.payloads)
 
     def _add_words(self, encoded: Encoded) -> None:
@@ -179,7 +189,7 @@ class Recorder:
 
     def _turn_page(self) -> None:
         """Write what waits: the file is whole after every page, and memory holds one at most."""
-        self._check_room()
+        self.check_room()
         self._send(self._pages.take())
         self._flush()
         self._waiting = self._bytes = 0
@@ -201,18 +211,17 @@ class Recorder:
     def _make_room(self) -> None:
         if self.path.is_dir():
             raise RecordingError(f"{self.path}: is a folder; name a file in it, ending in .rrd")
+        made: list[Path] = []
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._check_room()
+            made = folders.make(self.path.parent)
+            self.check_room()
             self.partial.touch()
         except OSError as error:
+            folders.remove(made)
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
-
-    def _check_room(self) -> None:
-        disk = shutil.disk_usage(self.path.parent)
-        # A place that is no disk, as /proc, has no room to tell of.
-        if disk.total and disk.free < LEAST_FREE:
-            raise RecordingError(f"{self.path}: cannot be written: the disk is full")
+        except RecordingError:
+            folders.remove(made)
+            raise
 
     def _flush(self) -> None:
         try:

@@ -7,7 +7,7 @@ A chunk costs about 1.1 kB in the file, 0.5 kB of memory until the end (the file
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import rerun as rr
@@ -17,6 +17,13 @@ from roadeval.recording.layout import COUNTS, FRAME, STAMP
 
 Columns = Callable[[list[Any]], Any]
 """Makes the viewer's component columns of one value a row."""
+
+NOTHING: Final = None
+"""Stands for a row without a value: from there on the viewer shows nothing of the entity.
+
+Rerun has `rerun.Clear` for that, which its viewer overlooks on encoded images:
+https://github.com/rerun-io/rerun/issues/12793.
+"""
 
 
 class Track:
@@ -30,7 +37,7 @@ class Track:
         self._values: list[Any] = []
 
     def add(self, frame: int, stamp_ns: int, value: Any) -> None:
-        """Append a row at this frame number and header stamp."""
+        """Append a row, perhaps with `NOTHING`, at this frame number and header stamp."""
         self._frames.append(frame)
         self._stamps.append(stamp_ns)
         self._values.append(value)
@@ -43,9 +50,16 @@ class Track:
             rr.TimeColumn(FRAME, sequence=self._frames),
             rr.TimeColumn(STAMP, timestamp=np.array(self._stamps, "datetime64[ns]")),
         ]
-        chunk = Chunk.from_columns(self._path, times, self._columns(self._values))
+        chunk = Chunk.from_columns(self._path, times, self._filled())
         self._frames, self._stamps, self._values = [], [], []
         return chunk
+
+    def _filled(self) -> Any:
+        values = [value for value in self._values if value is not NOTHING]
+        columns = self._columns(values)
+        if len(values) == len(self._values):
+            return columns
+        return columns.partition([int(value is not NOTHING) for value in self._values])
 
 
 class Tracks:
@@ -91,8 +105,3 @@ def notes(values: list[tuple[str, str]]) -> Any:
     """Log a sentence and its level a row."""
     sentences, levels = zip(*values, strict=True)
     return rr.TextLog.columns(text=list(sentences), level=list(levels))
-
-
-def clears(values: list[None]) -> Any:
-    """Take away what was shown before, a row."""
-    return rr.Clear.columns(is_recursive=[False] * len(values))

@@ -1,11 +1,14 @@
 """Bad input is one line on stderr that says what, where and what to do, and exit code 1."""
 
+import shutil
+
 import cv2
 import numpy as np
 import pytest
 
 from roadeval.cli.app import main
 from roadeval.logs import LogWriter
+from tests.e2e.commands import roadeval
 
 SECOND = 1_000_000_000
 
@@ -39,8 +42,9 @@ def refused(tmp_path, capsys):
         assert said.out == ""
         assert said.err.startswith("roadeval: error: ")
         assert said.err.count("\n") == 1
-        assert not list(tmp_path.rglob("*.rrd"))
-        assert not list(tmp_path.rglob("*.csv*"))
+        assert not (tmp_path / "out.rrd").exists()
+        assert not (tmp_path / "reports").exists()
+        assert not list(tmp_path.rglob("*partial*"))
         return said.err
 
     return refused
@@ -109,3 +113,24 @@ def test_an_empty_range(refused, data):
 def test_nothing_left_to_evaluate(refused, write):
     line = refused(write("/camera", mask_size=(6, 4)))
     assert "--train-frames" in line
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("compare", "cut"),
+        ("compare", "cut", "cut"),
+        ("inspect", "cut", "--list"),
+        ("report", "cut", "-o", "x.pdf"),
+    ],
+)
+def test_a_table_cut_at_the_end_of_a_line_gives_one_line_and_no_numbers(words, demo, tmp_path):
+    shutil.copytree(demo.reports, tmp_path / "cut")
+    lines = (tmp_path / "cut" / "frames.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "cut" / "frames.csv").write_text("".join(lines[:-7]))
+    run = roadeval(*words, cwd=tmp_path)
+    assert (run.returncode, run.stdout) == (1, "")
+    assert run.stderr == (
+        "roadeval: error: cut/frames.csv: does not agree with summary.json: it has 89 of 90 "
+        "frames of filtered similarity; make the results anew with roadeval replay\n"
+    )

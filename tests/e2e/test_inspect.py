@@ -9,8 +9,11 @@ import pytest
 from roadeval import Recording, inspecting
 from roadeval.cli.app import main
 from roadeval.errors import RoadevalError
+from roadeval.logs import LogWriter
 from roadeval.opened import Opened
+from roadeval.recording import viewer
 from tests.e2e.commands import DEMO, replay, roadeval
+from tests.training.making import frame
 
 DRIVER = Path("/usr/share/vulkan/icd.d")
 drawable = pytest.mark.skipif(
@@ -93,6 +96,58 @@ def test_the_frame_that_is_drawn_is_the_worst_of_those_that_have_pictures(sparse
     ]
     said = f"frame {max(rows)[1]}, the worst that has pictures (--frame N or --worst K takes"
     assert told(sparse.recording).startswith(said)
+
+
+@pytest.mark.parametrize("rule", ["every", "worst"])
+def test_the_window_opens_at_the_first_evaluated_frame_that_has_pictures(
+    rule, sparse, tmp_path, monkeypatch
+):
+    shown = []
+    monkeypatch.setattr("roadeval.recording.viewer.show", lambda path, frame: shown.append(frame))
+    if rule == "worst":
+        sparse = replay(tmp_path, DEMO, "--max-frames", 24, "--record", "worst:3")
+    assert main(["inspect", str(sparse.recording)]) == 0
+    opened = Opened(sparse.recording)
+    assert opened.recording.layout.first_frame not in opened.pictured
+    assert shown == [min(set(opened.pictured) & {int(r["frame"]) for r in sparse.table("frames")})]
+
+
+@drawable
+def test_the_viewer_shows_no_picture_on_a_frame_that_has_none(sparse, tmp_path):
+    """Not even that of an earlier frame: the view of the camera, at the top left, is black."""
+    drawn = {}
+    for number in (14, 15, 20):
+        viewer.screenshot(sparse.recording, tmp_path / "it.png", number)
+        drawn[number] = cv2.imread(str(tmp_path / "it.png"))[100:300, 50:300]
+    assert drawn[14].std() > 20
+    assert drawn[15].std() == drawn[20].std() == 0
+
+
+@pytest.mark.parametrize("words", [("--worst", "1"), ("--worst", "3"), ("--list",)])
+def test_where_err_is_undefined_on_every_frame_none_is_the_worst(words, ignored, capsys):
+    assert main(["inspect", str(ignored), *words]) == 1
+    assert capsys.readouterr().err.splitlines() == [
+        f"roadeval: error: {ignored}: ERR of filtered is undefined on every frame, "
+        "so no frame is the worst"
+    ]
+
+
+def test_where_err_is_undefined_the_first_evaluated_frame_is_drawn(ignored, told):
+    assert told(ignored) == "frame 12\n"
+
+
+@pytest.fixture(scope="module")
+def ignored(tmp_path_factory):
+    """A recording of a drive whose truth ignores every pixel once it has trained."""
+    folder = tmp_path_factory.mktemp("ignored")
+    with LogWriter(folder / "drive.mcap") as log:
+        for number in range(16):
+            made, stamp = frame(number), (number + 1) * 100_000_000
+            _, png = cv2.imencode(".png", made.image[..., ::-1])
+            log.image("/camera/image", stamp, png.tobytes(), "png")
+            log.mask("/truth/road", stamp, made.truth if number < 12 else made.truth * 0 + 11)
+    words = ("--road-label", 1, "--ignore-label", 11, "--train-frames", 12)
+    return replay(folder, folder / "drive.mcap", *words).recording
 
 
 @pytest.mark.parametrize("words", [("--worst", "1"), ("--frame",)])

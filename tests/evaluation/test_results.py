@@ -39,7 +39,7 @@ def scored(board: Scoreboard, role: Role = Role.EVALUATED) -> Iterator[FrameResu
 
 def the_rest(board: Scoreboard) -> dict[str, Any]:
     """A summary: the board's parts, and empty ones for those that it does not know."""
-    known = board.summary()
+    known = board.summary() | {"frames": {"evaluated": board.roles().get(Role.EVALUATED, 0)}}
     return known | {name: {} for name in PARTS if name not in known and name != "format"}
 
 
@@ -97,9 +97,10 @@ def test_numbers_read_back_bit_by_bit(tmp_path: Path) -> None:
 def test_a_variant_named_like_a_number_keeps_its_name(tmp_path: Path) -> None:
     board = Scoreboard(EvaluationSettings(), ["007"], None)
     with ResultsWriter(tmp_path) as writer:
-        writer.append(
-            board.score(a_frame(TRUTHS[0]), Role.EVALUATED, (a_variant("007", {"post": MASK}),))
-        )
+        variant = a_variant("007", {"post": MASK})
+        result = board.score(a_frame(TRUTHS[0]), Role.EVALUATED, (variant,))
+        board.add(result)
+        writer.append(result)
         writer.finish(board.windows(), the_rest(board))
     assert Results(tmp_path).frames["variant"].tolist() == ["007"]
 
@@ -185,6 +186,73 @@ def test_an_interrupted_run_leaves_the_earlier_results(tmp_path: Path) -> None:
         writer.append(next(scored(board)))
         raise KeyboardInterrupt
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("path", ["new", "new/er"])
+def test_a_folder_made_for_a_run_that_came_to_nothing_is_gone(tmp_path: Path, path: str) -> None:
+    with suppress(ResultsError), ResultsWriter(tmp_path / path):
+        raise ResultsError
+    assert names(tmp_path) == set()
+
+
+def test_a_folder_that_was_there_stays(tmp_path: Path) -> None:
+    (tmp_path / "old").mkdir()
+    with suppress(ResultsError), ResultsWriter(tmp_path / "old"):
+        raise ResultsError
+    assert names(tmp_path) == {"old"}
+
+
+def test_a_folder_into_which_something_else_was_put_stays(tmp_path: Path) -> None:
+    with suppress(ResultsError), ResultsWriter(tmp_path / "new" / "er"):
+        (tmp_path / "new" / "other").touch()
+        raise ResultsError
+    assert names(tmp_path / "new") == {"other"}
+
+
+WHAT_IS_MISSING = {
+    "frames": "2 of 3 frames of blind post",
+    "windows": "2 of 3 frames of blind post",
+    "regions": "5 of 6 bands of blind post",
+    "oracles": "2 of 3 frames of filtered svm post",
+    "changes": "0 of 1 rows of blind post filtered post",
+}
+
+
+@pytest.mark.parametrize("table", WHAT_IS_MISSING)
+def test_a_table_that_was_cut_at_the_end_of_a_line_is_refused(tmp_path: Path, table: str) -> None:
+    write(tmp_path)
+    path = tmp_path / f"{table}.csv"
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
+    with pytest.raises(ResultsError, match=WHAT_IS_MISSING[table]) as caught:
+        Results(tmp_path).table(table)
+    assert str(caught.value).startswith(f"{path}: does not agree with summary.json: it has ")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("table", WHAT_IS_MISSING)
+def test_a_table_that_was_taken_away_is_missed(tmp_path: Path, table: str) -> None:
+    write(tmp_path)
+    (tmp_path / f"{table}.csv").unlink()
+    with pytest.raises(ResultsError, match=r"\.csv: does not agree with summary\.json"):
+        Results(tmp_path).table(table)
+
+
+def test_masks_that_are_missing_on_some_frames_agree_with_the_summary(tmp_path: Path) -> None:
+    board = Scoreboard(EvaluationSettings(window=2), ["net", "filtered", "late"], None)
+    with ResultsWriter(tmp_path) as writer:
+        for number, truth in enumerate(TRUTHS):
+            variants = [a_variant("filtered", {"svm": MASK, "post": MASK})]
+            variants += [a_variant("net", {"post": MASK})] if number == 0 else []
+            variants += [a_variant("late", {"post": MASK})] if number == 2 else []
+            result = board.score(a_frame(truth, number), Role.EVALUATED, tuple(variants))
+            board.add(result)
+            writer.append(result)
+        writer.finish(board.windows(), the_rest(board), board.tables())
+    tables = {name: Results(tmp_path).table(name) for name in COLUMNS}
+    assert len(tables["frames"]) == 3 * 2 + 1 + 1
+    assert not {("net", "late"), ("late", "net")} & set(
+        zip(tables["changes"]["from_variant"], tables["changes"]["to_variant"], strict=True)
+    )
 
 
 def test_a_run_that_scored_nothing_writes_no_tables_and_leaves_no_older_ones(

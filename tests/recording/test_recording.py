@@ -17,7 +17,7 @@ import pyarrow as pa
 import pytest
 import rerun as rr
 
-from roadeval.data import Health, Role
+from roadeval.data import Health, Pictures, Role
 from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError
 from roadeval.recording.reading import _around
 from tests.recording.making import HEIGHT, WIDTH, frame, layout, result, unscored
@@ -100,8 +100,42 @@ def test_a_layer_that_a_frame_lacks_is_not_shown_from_the_frame_before(drive, tm
     recording = record(tmp_path / "out.rrd", [drive[2], bare, drive[4]])
     with pytest.raises(RecordingError, match="/filtered/post has nothing on frame 3"):
         recording.layer("filtered", "post", 3)
-    ends = dict(recording._rows("/filtered/post", "Clear:is_recursive"))
-    assert ends == {3: False}
+    assert rows_of(recording, "/filtered/post", "EncodedImage:blob") == {2: 1, 3: 0, 4: 1}
+
+
+def rows_of(recording, path, component):
+    """How many values each frame's row of an entity has: none where nothing is to be shown."""
+    chunks = recording._stream().filter(content=path, components=component, is_static=False)
+    batches = [chunk.to_record_batch() for chunk in chunks]
+    return {
+        frame: len(values)
+        for batch in batches
+        for frame, values in zip(
+            batch.column("frame").to_pylist(), batch.column(component).to_pylist(), strict=True
+        )
+    }
+
+
+def test_frames_without_pictures_end_what_is_shown_and_are_not_among_those_that_have_some(
+    drive, tmp_path
+):
+    pictured = [4, 5, 11]
+    sparse = [
+        each if each.frame.number in pictured else replace(each, pictures=Pictures.NONE)
+        for each in drive
+    ]
+    recording = record(tmp_path / "out.rrd", sparse)
+    assert recording.frame_numbers == tuple(pictured)
+    assert list(recording.roles) == pictured
+    np.testing.assert_array_equal(recording.truth(11), drive[11].frame.truth)
+    with pytest.raises(RecordingError, match="/truth has nothing on frame 6"):
+        recording.truth(6)
+    for path, component in (
+        ("/camera", "EncodedImage:blob"),
+        ("/filtered/ndi", "EncodedDepthImage:blob"),
+        ("/filtered/rings", "SegmentationImage:buffer"),
+    ):
+        assert rows_of(recording, path, component) == {4: 1, 5: 1, 6: 0, 11: 1, 12: 0}
 
 
 @pytest.mark.parametrize("read_ahead", [8 << 20, 0])
@@ -318,8 +352,9 @@ def test_a_killed_run_leaves_all_but_the_last_page(tmp_path):
 
 def test_a_disk_that_is_full_from_the_start_is_told_at_once(tmp_path, monkeypatch):
     leave_free(monkeypatch, 1 << 20)
-    with pytest.raises(RecordingError, match="the disk is full"), _recorder(tmp_path / "out.rrd"):
-        pass
+    for path in (tmp_path / "out.rrd", tmp_path / "new" / "er" / "out.rrd"):
+        with pytest.raises(RecordingError, match="the disk is full"), _recorder(path):
+            pass
     assert not list(tmp_path.iterdir())
 
 

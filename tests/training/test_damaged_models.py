@@ -175,11 +175,10 @@ def test_a_machine_without_the_features_of_a_window_ends_with_one_line_and_code_
     save_model(replace(sound, parameters=parameters), Path("x.model"))
     words = ["replay", str(DEMO), "--preset", "robust", "--model", "x.model", "--quiet"]
     assert main([*words, "--save", "x.rrd", "--reports", "x"]) == 1
-    assert capsys.readouterr().err.splitlines() == [
-        "roadeval: error: the model is damaged: its machine of stage context is for 9 features, "
-        "and windows = [5, 15] make 11; train it again"
-    ]
-    assert not list(tmp_path.rglob("*.rrd*"))
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("roadeval: error: x.model: the model is damaged: ")
+    assert "is for 9 features, and windows = [5, 15] make 11" in line
+    assert [path.name for path in tmp_path.iterdir()] == ["x.model"]
 
 
 def test_the_command_ends_with_one_line_and_code_1(arrays, tmp_path, capsys, monkeypatch):
@@ -192,3 +191,4 @@ def test_the_command_ends_with_one_line_and_code_1(arrays, tmp_path, capsys, mon
         "roadeval: error: x.model: a damaged model file: filtered/svm: weights has the shape "
         "(2, 2) instead of (m,); train it again"
     ]
+    assert [path.name for path in tmp_path.iterdir()] == ["x.model"]

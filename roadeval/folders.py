@@ -1,0 +1,36 @@
+"""Folders for outputs: made where missing, and gone again if nothing came to stand there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+
+def make(folder: Path) -> list[Path]:
+    """Make a folder and those above it.
+
+    Returns
+    -------
+    list of Path
+        Those that were not there before, the innermost first.
+
+    Raises
+    ------
+    OSError
+        If it cannot be made; what was made on the way is gone again.
+    """
+    missing = [each for each in (folder, *folder.parents) if not each.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        remove(missing)
+        raise
+    return missing
+
+
+def remove(made: Iterable[Path]) -> None:
+    """Remove folders that `make` made, but those in which something stands by now."""
+    for folder in made:
+        with suppress(OSError):
+            folder.rmdir()
