@@ -165,10 +165,24 @@ def mahalanobis(
     return np.sqrt(squared.astype(np.float32)), (squared <= greatest).astype(np.uint8)
 
 
-def look_up_colours(image: npt.NDArray[np.uint8], table: Codes) -> Codes:
-    """Look every pixel up in a table over all 2^24 colours, index ``R << 16 | G << 8 | B``."""
-    wide = image.astype(np.int32)
-    found: Codes = table[(wide[..., 0] << 16) | (wide[..., 1] << 8) | wide[..., 2]]
+def look_up_colours(planes: Planes, table: Codes) -> Codes:
+    """Look every pixel up in a table over all colours.
+
+    Parameters
+    ----------
+    planes
+        Red, green and blue, ``(H, W)`` uint8 each.
+    table
+        ``(64, 64, 64, 4, 4, 4)`` uint8 by ``R >> 2, G >> 2, B >> 2, R & 3, G & 3, B & 3``: similar
+        colours, as an image has them side by side, share a line of the processor's cache.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(H, W)`` uint8.
+    """
+    coarse, fine = [plane >> 2 for plane in planes], [plane & 3 for plane in planes]
+    found: Codes = table[(*coarse, *fine)]
     return found
 
 

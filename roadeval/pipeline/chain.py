@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 from roadeval.data import LayerSpec, Mask, Rgb, Truth
@@ -67,11 +67,10 @@ class Chain:
         A stage runs when it is asked for, so that a caller can time it. ``moment`` is the frame's
         place in its drive, for stages that remember.
         """
-        seen, mask = image, None
+        view = View(image, image, moment=moment)
         for step in self.steps:
-            output = step.run(View(image, seen, mask, moment))
-            seen = seen if output.image is None else output.image
-            mask = mask if output.mask is None else output.mask
+            output = step.run(view)
+            view = view.after(output)
             yield step.stage.reported, output
 
     def oracles(
@@ -109,10 +108,10 @@ class Chain:
                 key = _shared(step, rest)
                 masks = known.get(key) if key else None
                 if masks is None:
-                    masks = dict(_masks(rest, _after(view, step.oracle(view, truth))))
+                    masks = dict(_masks(rest, view.after(step.oracle(view, truth))))
                     known[key] = masks
                 yield step.stage.reported, masks
-            view = _after(view, output)
+            view = view.after(output)
 
     def filtered(self, image: Rgb) -> Rgb:
         """Return the image as the chain's filters leave it; itself where there are none."""
@@ -136,16 +135,10 @@ def _shared(step: Step, rest: Sequence[Step]) -> tuple[tuple[str, Any], ...]:
     return tuple((each.stage.name, each.settings) for each in rest)
 
 
-def _after(view: View, output: Output) -> View:
-    """Give what the next stage sees."""
-    image = view.image if output.image is None else output.image
-    return replace(view, image=image, mask=view.mask if output.mask is None else output.mask)
-
-
 def _masks(steps: Sequence[Step], view: View) -> Iterator[tuple[str, Mask]]:
     for step in steps:
         output = step.run(view)
-        view = _after(view, output)
+        view = view.after(output)
         if output.mask is not None:
             yield step.stage.reported, output.mask
 

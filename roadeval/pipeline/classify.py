@@ -138,25 +138,29 @@ def decision(
 
 @lru_cache(maxsize=4)
 def colour_table(machine: SupportVectors, settings: SvmSettings) -> npt.NDArray[np.uint8]:
-    """Eq. 16 for every colour there is: ``(2^24,)`` uint8 by ``R << 16 | G << 8 | B``, 1 for road.
+    """Eq. 16 for every colour there is, 1 for road.
 
     A pixel's features are its three colours alone, so this is all the machine can say. A value
     from the colour `cube` decides where its error bound keeps it off the threshold. The colours
     that are left, `UNDECIDED` here, `decide` fills in when they are seen: mostly some twenty,
     but all of them where the machine has learnt nothing and its value is 0 everywhere.
 
+    The table is ``(64, 64, 64, 4, 4, 4)`` uint8 by the upper six bits of red, green and blue and
+    then their lower two, as `roadeval.kernels.plain.look_up_colours` wants it.
+
     The last tables are remembered, each 16 MiB.
     """
     # Matrices this small gain nothing from threads, and lose all where other work needs a core.
     from threadpoolctl import threadpool_limits
 
-    table = np.empty((256, 256, 256), np.uint8)
+    table = np.empty((64, 64, 64, 4, 4, 4), np.uint8)
     margins = _margins(machine, settings)
     with threadpool_limits(1, "blas"):
         for red, margin in enumerate(margins):
-            table[red] = margin > 0
-            table[red][np.abs(margin) <= margins.error] = UNDECIDED
-    return table.ravel()
+            slab = (margin > 0).view(np.uint8)
+            slab[np.abs(margin) <= margins.error] = UNDECIDED
+            table[red >> 2, :, :, red & 3] = slab.reshape(64, 4, 64, 4).transpose(0, 2, 1, 3)
+    return table
 
 
 def decide(
@@ -171,9 +175,10 @@ def decide(
     """
     wide = colours.astype(np.int64)
     index = np.unique((wide[:, 0] << 16) | (wide[:, 1] << 8) | wide[:, 2])
-    index = index[table[index] == UNDECIDED]
-    seen = np.stack([index >> 16, index >> 8 & 255, index & 255], axis=1).astype(np.uint8)
-    table[index] = decision(seen, machine, settings) > settings.threshold
+    channels = index >> 16, index >> 8 & 255, index & 255
+    place = (*(c >> 2 for c in channels), *(c & 3 for c in channels))
+    seen = np.stack(channels, axis=1).astype(np.uint8)
+    table[place] = decision(seen, machine, settings) > settings.threshold
 
 
 def _margins(machine: SupportVectors, settings: SvmSettings) -> cube.Slabs:
@@ -205,11 +210,12 @@ def bind(settings: SvmSettings, machine: SupportVectors) -> Callable[[View], Out
     table = colour_table(machine, settings)
 
     def run(view: View) -> Output:
-        mask: Mask = KERNELS.look_up_colours(view.image, table)
+        apart = view.planes()
+        mask: Mask = KERNELS.look_up_colours(apart, table)
         undecided = mask == UNDECIDED
         if undecided.any():
             decide(view.image[undecided], table, machine, settings)
-            mask = KERNELS.look_up_colours(view.image, table)
+            mask = KERNELS.look_up_colours(apart, table)
         return Output((Layer(SVM, mask),), mask=mask)
 
     return run

@@ -9,10 +9,11 @@ import numpy.typing as npt
 from roadeval.data import Rgb
 
 Plane = npt.NDArray[np.uint8]
+Planes = tuple[Plane, Plane, Plane]
 Floats = npt.NDArray[np.float64]
 
 
-def planes(image: Rgb) -> tuple[Plane, Plane, Plane]:
+def planes(image: Rgb) -> Planes:
     """Take an ``(H, W, 3)`` uint8 image apart: red, green and blue, ``(H, W)`` each."""
     red, green, blue = apart = [np.empty(image.shape[:2], np.uint8) for _ in range(3)]
     # Left to make the arrays itself, the library takes three times as long.

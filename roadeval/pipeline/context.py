@@ -1,10 +1,11 @@
 """Phase 3 with more than colour: a support vector machine on colour, place and texture.
 
-Two grey pixels of one colour, one of the road and one of a wall, differ in where they are and in
-what surrounds them. The machine is the paper's (Eq. 12-16) on a feature map that is written out:
-instead of a kernel, ``phi_k(x) = max(w_k . x + b_k, 0)``, planes of random direction through random
-pixels of the training set [1]_, and a linear machine on phi. Its decision costs the same for every
-training set, and it is evaluated on a working image.
+Two grey pixels of one colour, one of the road and one of a wall, differ in where they are, in what
+surrounds them, and in what lies between them and the vehicle. The machine is the paper's
+(Eq. 12-16) on a feature map that is written out: instead of a kernel,
+``phi_k(x) = max(w_k . x + b_k, 0)``, planes of random direction through random pixels of the
+training set [1]_, and a linear machine on phi. Its decision costs the same for every training set,
+and it is evaluated on a working image.
 
 References
 ----------
@@ -18,6 +19,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import Annotated, Any, Final
 
 import cv2
@@ -49,8 +51,9 @@ DECISION: Final = LayerSpec(
     "decision", LayerKind.SCALAR, "Decision value (Eq. 16)", value_range=(-2.0, 2.0), exact=False
 )
 
-BARE_FEATURES: Final = 7
-"""Three colours, two log-chromaticities and two coordinates: what is not texture."""
+BARE_FEATURES: Final = 9
+"""Three colours, two log-chromaticities, two coordinates, and two of the column below: what is not
+texture."""
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
@@ -62,8 +65,8 @@ class ContextSettings:
     width
         Of the working image: the machine decides there, and its decision values are interpolated.
     windows
-        Sides of the squares over which texture is averaged, in its pixels: gravel and leaves
-        show in small ones, a facade in large ones.
+        Sides of the squares over which texture is averaged, in its pixels. Gravel and leaves show
+        in a small one; what a larger one tells of a facade, the columns below it tell as well.
     planes
         Random planes that make the feature map.
     c
@@ -73,7 +76,7 @@ class ContextSettings:
         image: neighbours belong together. 1 leaves them as they are.
     memory
         Seconds over which decision values of earlier frames fade, by ``exp(-age / memory)``; 0
-        forgets them. At 15 frames a second 0.2 halves the flicker and leaves ERR as it is; a mask
+        forgets them. At 15 frames a second 0.2 halves the flicker for 0.2 points of ERR; a mask
         that lags is a price not everybody wants to pay, so it is off.
     threshold
         A pixel is road where the decision value is above this. None: learnt, see `threshold`.
@@ -82,7 +85,7 @@ class ContextSettings:
     """
 
     width: Annotated[int, Field(ge=32, le=4096)] = 320
-    windows: tuple[Annotated[int, Field(ge=1, le=255)], ...] = (5, 15)
+    windows: tuple[Annotated[int, Field(ge=1, le=255)], ...] = (5,)
     planes: Annotated[int, Field(ge=1, le=4096)] = 128
     c: Penalty = 1.0
     smoothing: Annotated[int, Field(ge=1, le=255)] = 5
@@ -111,17 +114,18 @@ class RectifiedMachine:
         check_range("offset", self.offset, -GREATEST, GREATEST)
         textures = self.planes.shape[1] - BARE_FEATURES
         if textures < 0 or textures % 2:
-            raise ValueError("planes has not seven columns and two for each window of texture")
+            raise ValueError("planes has not nine columns and two for each window of texture")
 
 
 # --- Features -------------------------------------------------------------------------------------
 
 
 def features(image: Rgb, windows: tuple[int, ...]) -> Values:
-    """Colour, log-chromaticity, place and texture: ``(F, h, w)`` float32 of ``(h, w, 3)`` RGB.
+    """Colour, chromaticity, place, column and texture: ``(F, h, w)`` float32 of ``(h, w, 3)`` RGB.
 
-    Texture is, for each window, the root of the mean absolute slope of the log brightness across
-    and down: kerbs, wheels and house fronts have edges of one direction, leaves of both.
+    The column is what `_columns` finds below a pixel. Texture is, for each window, the root of the
+    mean absolute slope of the log brightness across and down: kerbs, wheels and house fronts have
+    edges of one direction, leaves of both.
     """
     colours = colour_planes(image)
     red, green, blue = (cv2.LUT(plane, LOGS) for plane in colours)
@@ -132,10 +136,28 @@ def features(image: Rgb, windows: tuple[int, ...]) -> Values:
     np.subtract(red, green, out=found[3])
     np.subtract(blue, green, out=found[4])
     found[5:7] = _places(*image.shape[:2])
+    _columns(light, slopes[1], found[7:9])
     textures = (cv2.blur(slope, (side, side)) for side in windows for slope in slopes)
-    for plane, texture in zip(found[7:], textures, strict=True):
+    for plane, texture in zip(found[9:], textures, strict=True):
         np.sqrt(texture, out=plane)
     return found
+
+
+def _columns(light: Values, slope: Values, found: Values) -> None:
+    """Fill ``found``, ``(2, h, w)``, with what lies between each pixel and the image's lower edge.
+
+    The steepest edge across the column, as the root of the mean absolute slope down of a few
+    pixels, and the least log brightness: whoever drives up the column to the pixel meets no kerb
+    and no shadow under a car as long as there is road. ``light`` and ``slope`` are ``(h, w)``
+    float32.
+    """
+    edge, dark = found
+    np.sqrt(cv2.blur(slope, (5, 3)), out=edge)
+    cv2.blur(light, (5, 5), dst=dark)
+    # Row by row from below: NumPy's own running extrema take three times as long down an array.
+    for extremum, plane in ((np.maximum, edge), (np.minimum, dark)):
+        for below, here in pairwise(plane[::-1]):
+            extremum(here, below, out=here)
 
 
 @lru_cache(maxsize=8)

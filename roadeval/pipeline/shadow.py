@@ -369,7 +369,7 @@ def bind(settings: ShadowSettings, _parameters: None) -> Callable[[View], Output
     threshold_of = otsu_threshold if settings.threshold == "otsu" else printed_threshold
 
     def run(view: View) -> Output:
-        codes, histogram = KERNELS.look_up_sum_min(colour.planes(view.image), NDI_CODES)
+        codes, histogram = KERNELS.look_up_sum_min(view.planes(), NDI_CODES)
         threshold = threshold_of(histogram)
         shadow = shadow_mask(codes, threshold, inclusive=settings.inclusive)
         image, ring, count, change = lift(view.image, shadow, settings)

@@ -13,7 +13,6 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerKind, LayerSpec, mask_spec
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.colour import planes
 from roadeval.pipeline.parameters import check_arrays, check_covariance, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
 
@@ -79,7 +78,7 @@ def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Out
     spec = _distance(settings)
 
     def run(view: View) -> Output:
-        distance, mask = KERNELS.mahalanobis(planes(view.image), road.mean, precision, greatest)
+        distance, mask = KERNELS.mahalanobis(view.planes(), road.mean, precision, greatest)
         return Output((Layer(spec, distance), Layer(SIMILARITY, mask)), mask=mask)
 
     return run

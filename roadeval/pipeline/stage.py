@@ -8,7 +8,7 @@ configuration's ``chain``.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from roadeval.data import ROAD, Layer, LayerSpec, Mask, Rgb, Truth
 from roadeval.errors import RoadevalError
+from roadeval.pipeline.colour import Planes, planes
 
 S = TypeVar("S")
 """Settings of a stage: a frozen, validated dataclass."""
@@ -58,6 +59,20 @@ class View:
     image: Rgb
     mask: Mask | None = None
     moment: Moment | None = None
+    _apart: list[Planes] = field(default_factory=list, repr=False)
+
+    def planes(self) -> Planes:
+        """Red, green and blue of the image, ``(H, W)`` uint8 each; taken apart once for all."""
+        if not self._apart:
+            self._apart.append(planes(self.image))
+        return self._apart[0]
+
+    def after(self, output: Output) -> View:
+        """Give what the next stage sees."""
+        mask = self.mask if output.mask is None else output.mask
+        if output.image is None:
+            return replace(self, mask=mask)
+        return replace(self, image=output.image, mask=mask, _apart=[])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

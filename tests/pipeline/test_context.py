@@ -54,8 +54,8 @@ def test_place_is_the_pixels_centre_across_and_down():
 def test_texture_tells_upright_edges_from_level_ones():
     stripes = np.zeros((20, 20, 3), np.uint8)
     stripes[:, ::4] = stripes[:, 1::4] = 200
-    upright = context.features(stripes, (5,))[7:, 10, 10]
-    level = context.features(np.ascontiguousarray(stripes.transpose(1, 0, 2)), (5,))[7:, 10, 10]
+    upright = context.features(stripes, (5,))[9:, 10, 10]
+    level = context.features(np.ascontiguousarray(stripes.transpose(1, 0, 2)), (5,))[9:, 10, 10]
     assert upright[0] > 1
     assert upright[1] == 0
     np.testing.assert_allclose(level, upright[::-1], atol=1e-6)
@@ -65,13 +65,54 @@ def test_texture_is_the_same_at_half_the_light():
     light = np.random.default_rng(0).integers(60, 120, (20, 20, 3), dtype=np.uint8)
     bright, dim = ((light * share - 8).astype(np.uint8) for share in (2, 1))
     np.testing.assert_allclose(
-        context.features(bright, (5,))[7:], context.features(dim, (5,))[7:], rtol=1e-3
+        context.features(bright, (5,))[9:], context.features(dim, (5,))[9:], rtol=1e-3
     )
+
+
+def test_an_edge_is_known_to_all_that_lies_above_it_and_to_nothing_below():
+    image = np.full((40, 12, 3), 90, np.uint8)
+    image[20:22] = 220
+    edge = context.features(image, ())[7, :, 6]
+    assert edge[30:].max() < 1e-3
+    np.testing.assert_array_equal(edge[:18], edge[18])
+    assert edge[18] > 0.5
+
+
+def test_the_steepest_edge_below_counts_wherever_it_lies():
+    image = np.full((40, 12, 3), 90, np.uint8)
+    image[30:32], image[10:12] = 220, 120
+    edge = context.features(image, ())[7, :, 6]
+    np.testing.assert_array_equal(edge[:28], edge[28])
+
+
+def test_the_darkest_place_below_is_kept_up_the_column_alone():
+    image = np.full((40, 24, 3), 90, np.uint8)
+    image[18:25, :8] = 20
+    dark = context.features(image, ())[8]
+    np.testing.assert_allclose(dark[:20, 3], np.log(28), atol=1e-5)
+    np.testing.assert_allclose(dark[30:, 3], np.log(98), atol=1e-5)
+    np.testing.assert_allclose(dark[:, 16], np.log(98), atol=1e-5)
+
+
+def test_a_kerb_tells_a_smooth_pavement_from_the_road_of_the_same_grey():
+    def picture(kerb, seed):
+        image = np.random.default_rng(seed).integers(95, 100, (48, 32, 1))
+        image[kerb : kerb + 2] = 220
+        truth = np.zeros((48, 32), np.uint8)
+        truth[kerb + 2 :] = 1
+        return np.broadcast_to(image, (48, 32, 3)).astype(np.uint8), truth
+
+    images, truths = zip(*(picture(kerb, kerb) for kerb in (6, 14, 22, 30)), strict=True)
+    for kerb in (10, 26):
+        image, truth = picture(kerb, kerb)
+        mask = fit_and_run(list(images), list(truths), image)
+        inner = np.r_[: kerb - 2, kerb + 4 : 48]
+        assert (mask[inner] == truth[inner]).mean() > 0.97
 
 
 def test_there_are_two_textures_a_window():
     image = grey()
-    assert len(context.features(image, (3, 9, 21))) == 7 + 6
+    assert len(context.features(image, (3, 9, 21))) == 9 + 6
 
 
 def test_sampled_features_are_the_images_at_the_sampled_pixels_in_their_order():
@@ -144,13 +185,13 @@ def test_the_decision_is_the_linear_machines_on_the_written_out_map():
     np.testing.assert_allclose(found, expected, atol=1e-3)
 
 
-@pytest.mark.parametrize("windows", [(), (5,), (5, 15, 31)])
+@pytest.mark.parametrize("windows", [(), (5, 15), (5, 15, 31)])
 def test_a_machine_for_other_features_is_refused_before_it_reads_beyond_its_planes(windows):
     truth = np.zeros((24, 32), np.uint8)
     truth[12:] = 1
     machine = context.fit(every_pixel([grey()], [truth]), PLAIN)
     other = ContextSettings(planes=32, windows=windows)
-    wanted = f"for 11 features, and windows = .* make {7 + 2 * len(windows)}"
+    wanted = f"for 11 features, and windows = .* make {9 + 2 * len(windows)}"
     with pytest.raises(ValueError, match=wanted):
         context.bind(other, machine)
     with pytest.raises(ValueError, match=wanted):

@@ -84,6 +84,18 @@ def test_closing_keeps_road_along_the_border():
     assert (closing(road, morphology.structuring_element(3, "square")) == road).all()
 
 
+@pytest.mark.parametrize("reach", [1, 32, 63, 64, 65, 128, 129, 250])
+def test_closing_fills_gaps_no_wider_than_the_element_and_keeps_the_border_as_it_is(reach):
+    gaps = 2 * reach, 2 * reach + 1, reach
+    road = np.concatenate([[1], *([*[0] * gap, 1] for gap in gaps[:2]), [0] * gaps[2]])
+    filled = road.copy()
+    filled[: gaps[0] + 2] = 1
+    element = np.array([reach])
+    for way in (1, -1):
+        found = closing(road[None, ::way].astype(np.uint8), element)
+        assert found.tolist() == [filled[::way].tolist()]
+
+
 def test_the_boundary_is_the_inner_edge_and_runs_along_the_image_border():
     road = mask("....", ".###", ".###", ".###")
     edge = boundary(road, morphology.structuring_element(3, "square"))
@@ -229,8 +241,10 @@ def test_every_step_can_be_left_out():
     nothing = {"operations": (), "region": "all", "fill": False}
     square = morphology.structuring_element(3, "square")
     opened, closed = opening(road, square), closing(road, square)
+    ellipse = morphology.structuring_element(7, "ellipse")
     for step, expected in (
         ({}, road),
+        ({"operations": ("close",), "element": 7, "shape": "ellipse"}, closing(road, ellipse)),
         ({"operations": ("close",)}, closed),
         ({"operations": ("open",)}, opened),
         ({"operations": ("open", "close")}, closing(opened, square)),
@@ -270,3 +284,12 @@ def test_opencvs_own_border_would_differ():
     road = np.ones((4, 4), np.uint8)
     assert cv2.erode(road, np.ones((3, 3), np.uint8)).all()
     assert erode(road, morphology.structuring_element(3, "square")).sum() == 4
+
+
+def test_the_boundarys_width_is_a_setting():
+    road = (np.random.default_rng(2).random((30, 40)) > 0.01).astype(np.uint8)
+    output = morphology.bind(MorphologySettings(boundary_element=7), None)(View(None, None, road))
+    layers = {layer.spec.name: layer.array for layer in output.layers}
+    expected = boundary(layers["post"], morphology.structuring_element(7, "square"))
+    assert expected.sum() > boundary(layers["post"], np.array([1, 1])).sum()
+    np.testing.assert_array_equal(layers["boundary"], expected)
