@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import cv2
@@ -48,7 +49,7 @@ def drive(tmp_path_factory) -> Path:
 def _no_figures(request, monkeypatch):
     """Draw figures only for the run that looks at them: they take most of a small run's time."""
     if "once" not in request.fixturenames:
-        monkeypatch.setattr("roadeval.replay.write_figures", lambda *given: [])
+        monkeypatch.setattr(import_module("roadeval.replay"), "write_figures", lambda *given: [])
 
 
 def run(drive: Path, folder: Path, **options):
@@ -230,6 +231,16 @@ def test_a_mask_in_the_log_is_scored_as_a_variant(drive, tmp_path):
     total = outcome.summary["totals"]["net"]["post"]
     assert (total["ERR"], total["frames"]) == (0, 15)
     assert roadeval.Recording(outcome.recording).layer("net", "post", 12).max() == 1
+
+
+def test_the_folder_of_the_log_is_made_and_gone_again_if_the_run_is_refused(drive, tmp_path):
+    names = {"save": "o.rrd", "reports": "reports", "mcap": "new/m.mcap"}
+    outputs = {option: tmp_path / name for option, name in names.items()}
+    with pytest.raises(RoadevalError, match="--train-frames"):
+        roadeval.replay(drive, **outputs, options=ReplayOptions(max_frames=3))
+    assert list(tmp_path.iterdir()) == []
+    roadeval.replay(drive, **outputs, options=ReplayOptions(max_frames=14))
+    assert (tmp_path / "new" / "m.mcap").exists()
 
 
 def test_results_become_a_log_with_the_images_own_times(drive, tmp_path):

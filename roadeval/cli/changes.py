@@ -29,7 +29,7 @@ def show(content: Mapping[str, Any], out: Console) -> None:
         for change in rows:
             told = change["difference"].get("ERR")
             if change["final"] and told and told["low"] is None:
-                out.print(f"{change['variant']}: no interval, {told['reason']}", soft_wrap=True)
+                out.print(f"{change['variant']}: {_unsure(told)}", soft_wrap=True)
         out.print()
     for condition in content["conditions"]:
         if not condition["holds"]:
@@ -78,6 +78,13 @@ def _levels(changes: Sequence[Change]) -> Table:
         rates = (percent(change["new"][rate]) for rate in ("ERR", "FPR", "FNR"))
         table.add_row(change["variant"], change["stage"], str(change["frames"]), *rates)
     return table
+
+
+def _unsure(told: Mapping[str, Any]) -> str:
+    """Say why there is no interval."""
+    if not defined(told["mean"]):
+        return "ERR is undefined on every frame"
+    return f"no interval, {told['reason']}"
 
 
 def _interval(told: Mapping[str, Any]) -> str:

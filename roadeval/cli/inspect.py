@@ -73,7 +73,7 @@ def inspect(
         frame, chosen = bad.frame, f", {which} (--frame N or --worst K takes another)"
     if frame is not None and inspecting.lacks_pictures(opened, frame):
         messages.warning(
-            f"the recording has no pictures of frame {frame}: any that show are of an earlier one"
+            f"the recording has no pictures of frame {frame}, so the views of them are empty"
         )
     shown = inspecting.view(opened, frame, screenshot)
     if screenshot is not None:

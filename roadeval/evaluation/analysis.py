@@ -216,7 +216,9 @@ def causes(frames: pd.DataFrame, variant: str) -> pd.DataFrame:
 def _errors(rows: pd.DataFrame) -> pd.DataFrame:
     """Spread a variant's ERR: a row a frame, a column a stage, in the order the stages ran."""
     stages = rows["stage"].unique()
-    return rows.pivot_table(index="frame", columns="stage", values="ERR")[[*stages]]
+    # Where ERR is undefined on every frame there are rows and columns all the same.
+    spread = rows.pivot_table(index="frame", columns="stage", values="ERR", dropna=False)
+    return spread[[*stages]]
 
 
 def worst(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
@@ -12,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from mcap.writer import Writer
 
+from roadeval import folders
 from roadeval.logs.errors import LogError
 from roadeval.version import VERSION
 
@@ -22,12 +24,13 @@ class LogWriter:
     """Writes images to an MCAP file with Foxglove's protobuf schemas.
 
     The same calls give the same bytes. The file appears under its name when it is complete:
-    at the end of the ``with`` statement, and never if that ends by an exception.
+    at the end of the ``with`` statement, and never if that ends by an exception. Then its folder
+    goes too if it was made for it.
 
     Parameters
     ----------
     path
-        The file to write; an existing one is replaced.
+        The file to write; an existing one is replaced. Its folder is made if it does not exist.
 
     Raises
     ------
@@ -38,10 +41,16 @@ class LogWriter:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._temporary = self.path.with_name(f".{self.path.stem}.part.mcap")
-        try:
-            self._file = self._temporary.open("wb")
-        except OSError as error:
-            raise LogError(f"{self.path}: cannot be written: {error.strerror}") from error
+        if self.path.is_dir():
+            raise LogError(f"{self.path}: is a folder; name a file in it, ending in .mcap")
+        self._made: list[Path] = []
+        with self._explained():
+            self._made = folders.make(self.path.parent)
+            try:
+                self._file = self._temporary.open("wb")
+            except OSError:
+                folders.remove(self._made)
+                raise
         self._writer = Writer(self._file)
         self._writer.start(library=f"roadeval {VERSION}")
         self._schemas: dict[str, int] = {}
@@ -136,10 +145,8 @@ class LogWriter:
     def _write(self, channel: int, stamp_ns: int, log_time_ns: int | None, data: bytes) -> None:
         sequence = self._counts[channel] = self._counts.get(channel, -1) + 1
         log_time = stamp_ns if log_time_ns is None else log_time_ns
-        try:
+        with self._explained():
             self._writer.add_message(channel, log_time, data, stamp_ns, sequence)
-        except OSError as error:
-            raise LogError(f"{self.path}: cannot be written: {error.strerror}") from error
 
     def _protobuf_channel(self, topic: str, message: Any) -> int:
         from mcap_protobuf.schema import build_file_descriptor_set
@@ -168,11 +175,13 @@ class LogWriter:
             If the disk is full.
         """
         try:
-            self._writer.finish()  # type: ignore[no-untyped-call]
-            self._file.close()
-            self._temporary.replace(self.path)
-        except OSError as error:
-            raise LogError(f"{self.path}: cannot be written: {error.strerror}") from error
+            with self._explained():
+                self._writer.finish()  # type: ignore[no-untyped-call]
+                self._file.close()
+                self._temporary.replace(self.path)
+        except LogError:
+            self._discard()
+            raise
 
     def __enter__(self) -> LogWriter:
         return self
@@ -186,5 +195,19 @@ class LogWriter:
         if kind is None:
             self.close()
         else:
+            self._discard()
+
+    def _discard(self) -> None:
+        """Leave nothing behind."""
+        # On a full disk closing fails as well, and what went wrong first is what counts.
+        with suppress(OSError):
             self._file.close()
-            self._temporary.unlink(missing_ok=True)
+        self._temporary.unlink(missing_ok=True)
+        folders.remove(self._made)
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise LogError(f"{self.path}: cannot be written: {error.strerror}") from error

@@ -15,7 +15,7 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, mask_spec
 from roadeval.kernels import KERNELS
-from roadeval.kernels.packing import Bits, Packed, Reach, pack
+from roadeval.kernels.packing import Packed, Reach
 from roadeval.pipeline.patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View
 
@@ -116,13 +116,9 @@ def closing(mask: Packed, element: Reach) -> Packed:
     wide = np.zeros((height + 2 * rows, across + 2 * words), np.uint64)
     image = np.s_[rows : rows + height, words : words + across]
     wide[image] = mask.bits
-    closed = erode(dilate(Packed(wide, 64 * wide.shape[1]), element), element).bits
-    return Packed(closed[image] & _inside(mask), mask.width)
-
-
-def _inside(mask: Packed) -> Bits:
-    """Give a row of words in which the pixels of the mask's width are set."""
-    return pack(np.ones((1, mask.width), np.uint8))
+    # Nothing is closed beside the image, so that the bits beyond its width stay clear.
+    closed = erode(dilate(Packed(wide, 64 * wide.shape[1]), element), element)
+    return Packed(closed.bits[image], mask.width)
 
 
 def boundary(mask: Packed, element: Reach) -> Packed:

@@ -29,8 +29,12 @@ SMALL: Final = 200
 
 def gallery(found: Findings) -> Iterator[Block]:
     """Show the worst frames with all their layers, then those that the filter moved most."""
+    first = next(iter(found.finals))
+    if not found.worst:
+        yield Heading("The worst frames")
+        yield Text(f"ERR of {first} is undefined on every frame, so no frame is the worst.")
     rule = Text(
-        f"Highest ERR of {next(iter(found.finals))}; of neighbouring frames only the worst. "
+        f"Highest ERR of {first}; of neighbouring frames only the worst. "
         "Below the errors stand each variant's steps, from left to right.",
         "note",
     )

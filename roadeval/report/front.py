@@ -191,7 +191,8 @@ def _beaten(found: Findings) -> Iterator[str]:
 def _undefined(found: Findings) -> Iterator[str]:
     for variant in found.finals:
         total = found.total(variant)
-        many = {rate: count for rate, count in total["undefined"].items() if count}
-        if many:
-            told = listing([f"{rate} on {count}" for rate, count in many.items()])
-            yield f"{variant}: undefined on some of {total['frames']} frames, and left out: {told}."
+        frames, counts = total["frames"], total["undefined"].items()
+        if never := [rate for rate, count in counts if count == frames]:
+            yield f"{variant}: undefined on every frame: {listing(never)}."
+        if many := [f"{rate} on {count}" for rate, count in counts if 0 < count < frames]:
+            yield f"{variant}: undefined on some of {frames} frames, and left out: {listing(many)}."

@@ -13,7 +13,7 @@ from roadeval.report.findings import Findings, Versus
 from roadeval.report.front import PAPERS, SIDE_BY_SIDE, counted, variant_cell
 from roadeval.report.pictures import Shot, asset
 from roadeval.report.rate_figures import error_rate, fp_fn_rate
-from roadeval.report.words import DASH, interval, listing, number, percent, points
+from roadeval.report.words import DASH, defined, interval, listing, number, percent, points
 
 PAPER_ROW: Final = 10
 """Frames in a row of the paper's figures (section 5)."""
@@ -152,11 +152,14 @@ def _paired(found: Findings, each: Versus) -> Iterator[Block]:
             "and percentage points with their interval."
         ),
     )
+    frames, told = each.frames, each.differences["ERR"]
+    if not defined(told["mean"]):
+        yield Text("ERR is undefined on every frame, so nothing tells what the filter does to it.")
+        return
     yield Text(_method(each), "note")
     yield Text(_shares(each))
     if each.pixels is not None:
         yield Text(_pixels(found, each))
-    frames, told = each.frames, each.differences["ERR"]
     yield Figure(
         plots.vector(lambda: plots.difference(frames, each.treated, each.control, told)),
         f"ERR of {each.treated} minus {each.control}, frame by frame. Dashed: the mean; grey band: "
@@ -166,7 +169,7 @@ def _paired(found: Findings, each: Versus) -> Iterator[Block]:
 
 def _flicker(found: Findings) -> Iterator[Block]:
     """Tabulate how much of each final mask changes from frame to frame, beside the truth's own."""
-    told = {name: each for name, each in found.beyond.items() if each["pairs"]}
+    told = {name: each for name, each in found.beyond.items() if defined(each["flicker"])}
     if not told:
         return
     yield Heading("From one frame to the next", 2)

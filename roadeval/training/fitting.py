@@ -57,8 +57,8 @@ def fit(
     if not len(pixels.road):
         numbers = f"{frames[0].number} to {frames[-1].number}"
         raise TrainingError(
-            f"frames {numbers} show only one class, so nothing can be learnt from them; "
-            "choose other frames with --start or --train-frames, or give --model"
+            f"frames {numbers} do not show both road and non-road, so nothing can be learnt from "
+            "them; choose other frames with --start or --train-frames, or give --model"
         )
     images = tuple(frame.image for frame in frames)
     training_set = TrainingSet(

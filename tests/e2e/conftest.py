@@ -6,9 +6,12 @@ import pickle
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import pytest
 
+from roadeval.logs import LogWriter
 from tests.e2e.commands import DEMO, Replayed, Run, replay, roadeval
+from tests.training.making import frame
 
 
 @pytest.fixture(scope="session")
@@ -63,3 +66,20 @@ def unlabelled(once, data) -> Replayed:
     """A city drive without truth."""
     drive = data / "drives" / "ford_shadows_unlabelled_raw.mcap"
     return once("unlabelled", lambda folder: replay(folder, drive).run)
+
+
+@pytest.fixture(scope="session")
+def ignored(once) -> Replayed:
+    """A drive whose truth ignores every pixel once it has trained."""
+
+    def do(folder: Path) -> Run:
+        with LogWriter(folder / "drive.mcap") as log:
+            for number in range(16):
+                made, stamp = frame(number), (number + 1) * 100_000_000
+                _, png = cv2.imencode(".png", made.image[..., ::-1])
+                log.image("/camera/image", stamp, png.tobytes(), "png")
+                log.mask("/truth/road", stamp, made.truth if number < 12 else made.truth * 0 + 11)
+        words = ("--road-label", 1, "--ignore-label", 11, "--train-frames", 12)
+        return replay(folder, folder / "drive.mcap", *words).run
+
+    return once("ignored", do)

@@ -107,3 +107,13 @@ def test_what_cannot_be_done_is_one_line(words, code, said, demo):
     assert run.returncode == code
     assert said in run.stderr
     assert len(run.stderr.splitlines()) == 1
+
+
+def test_where_err_is_undefined_on_every_frame_it_is_said(ignored, tmp_path):
+    names = [tmp_path / f"change.{ending}" for ending in ("pdf", "md", "json")]
+    words = [word for name in names for word in ("-o", name)]
+    run = roadeval("compare", ignored.reports, *words)
+    assert run.returncode == 0, run.stderr
+    assert "filtered: ERR is undefined on every frame\n" in run.stdout
+    assert "no interval" not in run.stdout
+    assert "filtered: ERR undefined" in text(names[0].read_bytes())

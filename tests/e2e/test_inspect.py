@@ -9,11 +9,9 @@ import pytest
 from roadeval import Recording, inspecting
 from roadeval.cli.app import main
 from roadeval.errors import RoadevalError
-from roadeval.logs import LogWriter
 from roadeval.opened import Opened
 from roadeval.recording import viewer
 from tests.e2e.commands import DEMO, replay, roadeval
-from tests.training.making import frame
 
 DRIVER = Path("/usr/share/vulkan/icd.d")
 drawable = pytest.mark.skipif(
@@ -125,29 +123,15 @@ def test_the_viewer_shows_no_picture_on_a_frame_that_has_none(sparse, tmp_path):
 
 @pytest.mark.parametrize("words", [("--worst", "1"), ("--worst", "3"), ("--list",)])
 def test_where_err_is_undefined_on_every_frame_none_is_the_worst(words, ignored, capsys):
-    assert main(["inspect", str(ignored), *words]) == 1
+    assert main(["inspect", str(ignored.recording), *words]) == 1
     assert capsys.readouterr().err.splitlines() == [
-        f"roadeval: error: {ignored}: ERR of filtered is undefined on every frame, "
+        f"roadeval: error: {ignored.recording}: ERR of filtered is undefined on every frame, "
         "so no frame is the worst"
     ]
 
 
 def test_where_err_is_undefined_the_first_evaluated_frame_is_drawn(ignored, told):
-    assert told(ignored) == "frame 12\n"
-
-
-@pytest.fixture(scope="module")
-def ignored(tmp_path_factory):
-    """A recording of a drive whose truth ignores every pixel once it has trained."""
-    folder = tmp_path_factory.mktemp("ignored")
-    with LogWriter(folder / "drive.mcap") as log:
-        for number in range(16):
-            made, stamp = frame(number), (number + 1) * 100_000_000
-            _, png = cv2.imencode(".png", made.image[..., ::-1])
-            log.image("/camera/image", stamp, png.tobytes(), "png")
-            log.mask("/truth/road", stamp, made.truth if number < 12 else made.truth * 0 + 11)
-    words = ("--road-label", 1, "--ignore-label", 11, "--train-frames", 12)
-    return replay(folder, folder / "drive.mcap", *words).recording
+    assert told(ignored.recording) == "frame 12\n"
 
 
 @pytest.mark.parametrize("words", [("--worst", "1"), ("--frame",)])
@@ -163,7 +147,8 @@ def test_a_frame_without_pictures_is_drawn_with_a_warning(
     assert main(["inspect", str(sparse.recording), "--screenshot", picture, *words]) == 0
     said = capsys.readouterr()
     assert said.out == f"{picture}: frame {bad}\n"
-    assert f"has no pictures of frame {bad}: any that show are of an earlier one" in said.err
+    sentence = f"the recording has no pictures of frame {bad}, so the views of them are empty"
+    assert said.err == f"roadeval: warning: {sentence}\n"
 
 
 def test_the_worst_of_nothing_is_none_unless_a_variant_is_asked_for(unlabelled):

@@ -164,6 +164,22 @@ def test_without_truth_the_report_says_what_it_cannot_say(unlabelled, tmp_path):
     assert "ms a frame" in words
 
 
+@pytest.mark.parametrize("of", ["recording", "reports"])
+def test_where_err_is_undefined_on_every_frame_the_report_says_so(of, ignored, tmp_path):
+    run = roadeval("report", getattr(ignored, of), "-o", tmp_path / "report.pdf")
+    assert run.returncode == 0, run.stderr
+    words = text((tmp_path / "report.pdf").read_bytes())
+    for said in (
+        "Nothing to compare: ERR of post is undefined on every frame.",
+        "filtered: undefined on every frame: ACC, ERR, TPR, FNR, TNR and FPR.",
+        "ERR is undefined on every frame, so nothing tells what the filter does to it.",
+        "ERR of filtered is undefined on every frame, so no frame is the worst.",
+    ):
+        assert said in words
+    assert "undefined on some of" not in words
+    assert "Of 0 frames" not in words
+
+
 @pytest.mark.parametrize("name", ["not.rrd", "missing.rrd", "empty"])
 def test_what_is_no_result_is_one_line(name, tmp_path):
     (tmp_path / "not.rrd").write_text("hello")

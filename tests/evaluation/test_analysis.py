@@ -1,6 +1,7 @@
 """What the tables say when they are read again."""
 
 import io
+import math
 
 import pandas as pd
 import pytest
@@ -72,6 +73,14 @@ def test_the_causes_of_an_error_add_up_to_it():
 def test_a_variant_of_one_stage_has_one_cause():
     frames = a_table({("mine", "post"): [7], POST: [1]})
     assert analysis.causes(frames, "mine").loc[0].to_dict() == pytest.approx({"post": 0.07})
+
+
+def test_where_err_is_undefined_on_every_frame_its_causes_are_undefined_too():
+    table = a_table({key: [0, 0] for key in (SVM, POST, CONTROL_SVM, CONTROL_POST)})
+    found = analysis.causes(table.assign(ERR=math.nan), "filtered")
+    assert found.columns.tolist() == ["svm", "filter", "post"]
+    assert found.index.tolist() == [0, 1]
+    assert found.isna().all(axis=None)
 
 
 def test_of_neighbouring_bad_frames_only_the_worst_is_picked():

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from roadeval import kernels
 from roadeval.kernels import compiled as fast
-from roadeval.kernels import plain
+from roadeval.kernels import plain, shades
 from roadeval.kernels.packing import pack, unpack
 from roadeval.pipeline import shadow
 from tests.pipeline.images import IMAGES, images, noise
@@ -117,6 +117,15 @@ def test_rounding_goes_to_even_and_ends_at_0_and_255():
         ]
 
 
+def test_every_component_has_its_own_transfer_whether_it_is_tabulated_or_not():
+    image = noise(20, 50)
+    labels = np.repeat(np.repeat([[1, 2, 3]], [20, 10, 20], axis=1), 20, axis=0).astype(np.int32)
+    assert (np.bincount(labels.ravel())[1:] > shades._TABLED).tolist() == [True, False, True]
+    source, target = RNG.uniform(0, 255, (2, 4, 3))
+    given = image, plain.label_runs(labels), source, target, RNG.uniform(0.5, 2, (4, 3))
+    assert_same(fast.transfer(*given), plain.transfer(*given))
+
+
 @pytest.mark.parametrize("module", [fast, plain])
 def test_sums_do_not_wrap_at_8_bits(module):
     white = np.full((3, 4, 3), 255, np.uint8)
@@ -162,7 +171,7 @@ NO_PATCH = np.zeros((0, 0), np.uint8)
 def test_regions_are_kept_and_holes_filled_alike(mask, seed):
     patch = (np.random.default_rng(seed).random(mask.shape) < 0.05).astype(np.uint8)
     road = pack(mask), mask.shape[1]
-    for chosen in (NO_PATCH, patch):
+    for chosen in (NO_PATCH, patch, patch * np.uint8(255)):
         assert_same(fast.keep_region(*road, chosen), plain.keep_region(*road, chosen))
     assert_same(fast.fill_holes(*road), plain.fill_holes(*road))
     for connectivity in (4, 8):

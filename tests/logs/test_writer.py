@@ -1,10 +1,12 @@
 """Logs that are written can be read, here and elsewhere."""
 
+import errno
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from mcap_protobuf.decoder import DecoderFactory
 
 from roadeval.logs import LogError, LogWriter, open_log
@@ -65,6 +67,39 @@ def test_nothing_is_left_of_a_log_that_failed(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_folder_made_for_a_log_that_failed_is_gone(tmp_path: Path) -> None:
+    log = LogWriter(tmp_path / "new" / "deep" / "a.mcap")
+    log.__exit__(RuntimeError, RuntimeError(), None)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_is_left_of_a_log_that_cannot_be_completed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_writer: Writer) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Writer, "finish", full)
+    path = tmp_path / "new" / "a.mcap"
+    with pytest.raises(LogError, match="cannot be written: No space left"):
+        write(path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_its_folder_is_made(tmp_path: Path) -> None:
+    assert write(tmp_path / "new" / "deep" / "a.mcap").exists()
+
+
+def test_a_folder_in_its_place_is_told_at_once(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="is a folder; name a file in it"):
+        LogWriter(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_an_unwritable_place_is_told_in_one_line(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"cannot be written: No such file"):
-        LogWriter(tmp_path / "missing" / "a.mcap")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(LogError, match=r"file/new/a\.mcap: cannot be written: Not a directory"):
+        LogWriter(tmp_path / "file" / "new" / "a.mcap")
+    with pytest.raises(LogError, match="cannot be written: File name too long"):
+        LogWriter(tmp_path / "new" / f"{250 * 'a'}.mcap")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]

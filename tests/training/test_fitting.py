@@ -61,7 +61,7 @@ def test_no_frames_are_an_error():
 def test_one_class_alone_is_an_error_that_names_the_frames():
     sky = frame(4)
     sky.truth[:] = 0
-    with pytest.raises(TrainingError, match="frames 4 to 4 show only one class"):
+    with pytest.raises(TrainingError, match="frames 4 to 4 do not show both road and non-"):
         fit([sky], plans(), TrainingSettings())
 
 
