@@ -42,7 +42,8 @@ def typed(selection: Mapping[str, Any]) -> Iterator[str]:
     """
     for name, option in _TYPED.items():
         value = selection.get(name)
-        if value == _DEFAULTS.get(name) or value in (None, False, "", [], (), {}):
+        # By identity: 0, which equals False, is asked for.
+        if value is None or value is False or value in (_DEFAULTS.get(name), "", [], (), {}):
             continue
         if value is True:
             yield option

@@ -13,7 +13,7 @@ def make(folder: Path) -> list[Path]:
     Returns
     -------
     list of Path
-        Those that were not there before, the innermost first.
+        Those that it made, the innermost first.
 
     Raises
     ------
@@ -21,12 +21,18 @@ def make(folder: Path) -> list[Path]:
         If it cannot be made; what was made on the way is gone again.
     """
     missing = [each for each in (folder, *folder.parents) if not each.exists()]
+    made: list[Path] = []
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        for each in reversed(missing):
+            # Another process may make one meanwhile, which is its own then.
+            with suppress(FileExistsError):
+                each.mkdir()
+                made.insert(0, each)
+        folder.mkdir(exist_ok=True)
     except OSError:
-        remove(missing)
+        remove(made)
         raise
-    return missing
+    return made
 
 
 def remove(made: Iterable[Path]) -> None:

@@ -104,11 +104,21 @@ def worst(opened: Opened, variant: str | None = None) -> Suspect | None:
     return next(iter(suspects(opened, 1, variant, among=opened.pictured)), None)
 
 
-def lacks_pictures(opened: Opened, frame: int) -> bool:
-    """Tell whether a recording scored a frame and kept no pictures of it."""
+def unpictured(opened: Opened, frame: int) -> str:
+    """Say what is seen of a frame that was scored and whose pictures were not kept.
+
+    Empty for every other frame.
+    """
     if opened.recording is None or frame in opened.pictured or not len(opened.frames):
-        return False
-    return frame in set(opened.frames["frame"])
+        return ""
+    if frame not in set(opened.frames["frame"]):
+        return ""
+    cleared = opened.recording.format > 1
+    return f"the recording has no pictures of frame {frame}, " + (
+        "so the views of them are empty"
+        if cleared
+        else "and its views may show an earlier frame's: an earlier version made it"
+    )
 
 
 def _scored(opened: Opened) -> list[str]:

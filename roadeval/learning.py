@@ -12,9 +12,7 @@ from roadeval.config import Variant
 from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.baselines import BlindPrior
-from roadeval.pipeline.stage import MisfitError
 from roadeval.training import Model, Plan, TrainingError, TrainingSettings, fit, load_model
-from roadeval.training.model import ModelError
 
 BY_PATCH: Final = (
     "the model learnt from the reference patch in front of the vehicle, which is a guess"
@@ -105,15 +103,13 @@ def plans_of(variants: Sequence[Variant]) -> dict[str, Plan]:
 
 
 def from_file(path: Path, variants: Sequence[Variant]) -> tuple[Model, Schedule]:
-    """Read a model file and make sure that it was made for these variants."""
+    """Read a model file and make sure that it was made for these variants.
+
+    Whether what it learnt fits their settings turns out when they are bound.
+    """
     model = load_model(path)
     for name, plan in plans_of(variants).items():
         model.require(name, plan, path)
-    try:
-        for variant in variants:
-            variant.config.bind(model.parameters[variant.name])
-    except MisfitError as error:
-        raise ModelError(f"{path}: {error}") from error
     return model, Schedule(model.digests)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any, Protocol
 
@@ -18,10 +18,12 @@ from roadeval.flow import ordered
 from roadeval.gallery import Gallery
 from roadeval.memory import give_back
 from roadeval.options import OptionError, Progress, ReplayOptions
-from roadeval.pipeline.stage import Moment
+from roadeval.pipeline.chain import Chain
+from roadeval.pipeline.stage import MisfitError, Moment
 from roadeval.recording import Layout
 from roadeval.relay import Relay, Turn
 from roadeval.training import Model
+from roadeval.training.model import ModelError
 
 Tell = Callable[[Progress], None]
 Processed = tuple[FrameResult, Any]
@@ -63,7 +65,7 @@ class Run:
         self._frames = log.frames(self._selection, options.span())
         self.total = len(self._frames)
         self.model, self._schedule = self._learn()
-        self._chains = runner.bind(self._variants, self.model)
+        self._chains = self._bind()
         give_back()
         prior = None if self.model.prior is None else BlindPrior(self.model.prior)
         names = [layout.name for layout in self._layouts()]
@@ -86,6 +88,12 @@ class Run:
             lambda done: self._tell(Progress(done, total, "training")),
             labelled=labelled,
         )
+
+    def _bind(self) -> Mapping[str, Chain]:
+        try:
+            return runner.bind(self._variants, self.model)
+        except MisfitError as error:
+            raise ModelError(f"{self._options.model}: {error}") from error
 
     def layout(self) -> Layout:
         """Describe the recording before its first frame."""

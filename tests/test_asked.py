@@ -43,6 +43,11 @@ def test_every_option_is_typed_as_the_terminal_reads_it(monkeypatch):
     assert asked | {"road_colors", "ignore_colors"} == set(selection(options))
 
 
+def test_0_is_asked_for():
+    asked = selection(ReplayOptions(sync_tolerance_ms=0.0))
+    assert list(typed(asked)) == ["--sync-tolerance", "0.0"]
+
+
 def test_colours_are_typed_with_commas():
     asked = {"road_colors": [[128, 64, 128]], "ignore_colors": [(0, 0, 0)]}
     words = ["--road-color", "128,64,128", "--ignore-color", "0,0,0"]

@@ -6,6 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -15,6 +16,7 @@ from roadeval.config import Config, load_config
 from roadeval.evaluation.results import Results, summary_text
 from roadeval.evaluation.tables import COLUMNS
 from roadeval.logs import LogWriter, open_log
+from roadeval.pipeline import classify
 from roadeval.run import Run
 from tests.training.making import frame
 
@@ -167,6 +169,19 @@ def test_training_frames_of_the_drive_itself_are_warned_of(drive, tmp_path):
     roadeval.train([drive], tmp_path / "m.model", options=ReplayOptions(train_frames=5))
     warnings = run(drive, tmp_path, model=tmp_path / "m.model").summary["warnings"]
     assert any("5 of the model's 5 training frames lie in this drive; their" in w for w in warnings)
+
+
+def test_the_variants_of_a_model_file_are_bound_once(drive, tmp_path, monkeypatch):
+    roadeval.train([drive], tmp_path / "m.model")
+    bound = []
+
+    def table(machine, settings):
+        bound.append(machine)
+        return np.zeros((64, 64, 64, 4, 4, 4), np.uint8)
+
+    monkeypatch.setattr(classify, "colour_table", table)
+    run(drive, tmp_path, model=tmp_path / "m.model", max_frames=3)
+    assert len(bound) == len({id(machine) for machine in bound}) == 2
 
 
 def test_a_model_of_another_drive_is_not_warned_of(drive, tmp_path):

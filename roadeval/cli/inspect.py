@@ -71,10 +71,8 @@ def inspect(
         (first,) = inspecting.suspects(opened, 1, variant)
         which = "the worst" if bad.frame == first.frame else "the worst that has pictures"
         frame, chosen = bad.frame, f", {which} (--frame N or --worst K takes another)"
-    if frame is not None and inspecting.lacks_pictures(opened, frame):
-        messages.warning(
-            f"the recording has no pictures of frame {frame}, so the views of them are empty"
-        )
+    if frame is not None and (said := inspecting.unpictured(opened, frame)):
+        messages.warning(said)
     shown = inspecting.view(opened, frame, screenshot)
     if screenshot is not None:
         console.emit(f"{screenshot}: frame {shown}{chosen}")

@@ -42,7 +42,8 @@ def disagreement(name: str, table: pd.DataFrame, summary: Mapping[str, Any]) -> 
         case "oracles" if "oracles" in summary:
             wanted = _oracles(summary)
             return _first("frames", wanted, _rows(table, "variant", "oracle", "stage"))
-        case "changes":
+        # Summaries of earlier versions tell of neither.
+        case "changes" if "oracles" in summary:
             wanted = _steps(masks, summary)
             found = _rows(table, "from_variant", "from_stage", "to_variant", "to_stage")
             return _first("rows", wanted, {step: found.get(step, 0) for step in wanted})

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from roadeval.data import FrameResult, Mask, Role, Truth
 from roadeval.evaluation.bits import TruthBits, ones
-from roadeval.kernels.packing import Bits
+from roadeval.kernels.arrays import Bits
 
 
 class Flicker:

@@ -11,7 +11,8 @@ import numpy as np
 
 from roadeval.data import NON_ROAD, ROAD, Mask, Truth
 from roadeval.kernels import KERNELS
-from roadeval.kernels.packing import Bits, Reach, pack
+from roadeval.kernels.arrays import Bits, Reach
+from roadeval.kernels.packing import pack
 
 
 @dataclass(frozen=True, slots=True, eq=False)

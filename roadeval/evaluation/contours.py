@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from roadeval.evaluation.bits import TruthBits, disk, ones, square
-from roadeval.kernels.packing import Bits
+from roadeval.kernels.arrays import Bits
 
 
 def boundary_f(masks: Mapping[str, Bits], truth: TruthBits, width: int) -> dict[str, float]:

@@ -11,7 +11,7 @@ import numpy as np
 from roadeval.data import ERRORS, Counts, Layer, Mask, Truth
 from roadeval.evaluation.bits import TruthBits, everywhere, flat
 from roadeval.kernels import KERNELS
-from roadeval.kernels.packing import Bits
+from roadeval.kernels.arrays import Bits
 
 IGNORED: Final = 4
 """The class of `roadeval.data.ERRORS` beside TN, TP, FP and FN, which are 0 to 3."""

@@ -14,7 +14,7 @@ from roadeval.data import Change, Layer, Step
 from roadeval.evaluation.bits import TruthBits, everywhere, flat, ones
 from roadeval.evaluation.counts import IGNORED
 from roadeval.kernels import KERNELS
-from roadeval.kernels.packing import Bits
+from roadeval.kernels.arrays import Bits
 
 Sums = npt.NDArray[np.int64]
 Name = tuple[str, str]

@@ -9,7 +9,7 @@ import numpy as np
 
 from roadeval.data import Frame, Mask, VariantResult
 from roadeval.evaluation.bits import TruthBits, everywhere, square
-from roadeval.kernels.packing import Bits
+from roadeval.kernels.arrays import Bits
 
 
 def of_frame(

@@ -20,7 +20,7 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.bits import TruthBits, ones
 from roadeval.evaluation.maps import Name
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.kernels.packing import Bits
+from roadeval.kernels.arrays import Bits
 
 
 class CountsNotConservedError(RuntimeError):

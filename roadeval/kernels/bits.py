@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit, types
 from numba.extending import intrinsic
 
-from roadeval.kernels.packing import Bits, Reach
+from roadeval.kernels.arrays import Bits, Reach, Sums
 
 _compiled = njit(cache=True, nogil=True)
-
-Counts = npt.NDArray[np.int64]
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -27,7 +24,7 @@ def _ones(_context: Any, _word: Any) -> Any:
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Counts:
+def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
     """See `plain.count_bits`."""
     counts = np.zeros((len(masks), len(classes), len(regions)), np.int64)
     both = np.empty(masks.shape[1], np.uint64)

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
+
+from roadeval.kernels.arrays import Floats, Image, Plane, Planes, Sums, Table, Values
 
 _compiled = njit(cache=True, nogil=True)
 
-Codes = npt.NDArray[np.uint8]
-Planes = tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8], npt.NDArray[np.uint8]]
-
 
 @_compiled  # type: ignore[untyped-decorator]
-def look_up_sum_min(planes: Planes, table: Codes) -> tuple[Codes, npt.NDArray[np.int64]]:
+def look_up_sum_min(planes: Planes, table: Table) -> tuple[Plane, Sums]:
     """See `plain.look_up_sum_min`."""
     reds, greens, blues = planes
     height, width = reds.shape
@@ -36,10 +34,10 @@ def look_up_sum_min(planes: Planes, table: Codes) -> tuple[Codes, npt.NDArray[np
 @_compiled  # type: ignore[untyped-decorator]
 def mahalanobis(
     planes: Planes,
-    mean: npt.NDArray[np.float64],
-    precision: npt.NDArray[np.float64],
+    mean: Floats,
+    precision: Floats,
     greatest: float,
-) -> tuple[npt.NDArray[np.float32], Codes]:
+) -> tuple[Values, Plane]:
     """See `plain.mahalanobis`."""
     reds, greens, blues = planes
     height, width = reds.shape
@@ -65,7 +63,7 @@ def mahalanobis(
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def look_up_colours(planes: Planes, table: Codes) -> Codes:
+def look_up_colours(planes: Planes, table: Table) -> Plane:
     """See `plain.look_up_colours`."""
     reds, greens, blues = planes
     height, width = reds.shape
@@ -84,7 +82,7 @@ def look_up_colours(planes: Planes, table: Codes) -> Codes:
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def look_up_channels(image: npt.NDArray[np.uint8], table: Codes) -> npt.NDArray[np.uint8]:
+def look_up_channels(image: Image, table: Table) -> Image:
     """See `plain.look_up_channels`."""
     height, width, _ = image.shape
     result = np.empty((height, width, 3), np.uint8)
@@ -97,7 +95,7 @@ def look_up_channels(image: npt.NDArray[np.uint8], table: Codes) -> npt.NDArray[
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def outcomes(mask: Codes, truth: Codes, ignored: int) -> Codes:
+def outcomes(mask: Plane, truth: Plane, ignored: int) -> Plane:
     """See `plain.outcomes`."""
     height, width = mask.shape
     result = np.empty((height, width), np.uint8)
@@ -109,7 +107,7 @@ def outcomes(mask: Codes, truth: Codes, ignored: int) -> Codes:
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def add_outcomes(errors: Codes, ignored: int, sums: Codes) -> None:
+def add_outcomes(errors: Plane, ignored: int, sums: Plane) -> None:
     """See `plain.add_outcomes`."""
     labelled, false_positives, false_negatives = sums
     for y in range(errors.shape[0]):

@@ -10,8 +10,8 @@ from roadeval.kernels.colours import (
     outcomes,
 )
 from roadeval.kernels.machine import rectified_sum
-from roadeval.kernels.runs import components, fill_holes, keep_region, label_runs, paint
-from roadeval.kernels.shades import ring_sums, run_sums, transfer
+from roadeval.kernels.runs import components, fill_holes, keep_region, label_runs
+from roadeval.kernels.shades import paint, ring_sums, run_sums, transfer
 
 __all__ = [
     "add_outcomes",

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
-Values = npt.NDArray[np.float32]
+from roadeval.kernels.arrays import Values
 
 _BLOCK = 512
 """Pixels at a time: with a dozen features each, they stay in the nearest cache."""

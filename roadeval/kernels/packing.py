@@ -8,14 +8,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-Mask = npt.NDArray[np.uint8]
-Bits = npt.NDArray[np.uint64]
-"""``(H, words)`` uint64 of an ``(H, W)`` mask, the leftmost pixel in the lowest bit; those beyond
-the width are 0. ``(K, H, words)`` of K masks."""
-Reach = npt.NDArray[np.int64]
-"""A structuring element that is symmetric in both directions, ``(r + 1,)`` int64: how many pixels
-it extends to either side in its own row and in each of the r rows above and below, never more in a
-row further away."""
+from roadeval.kernels.arrays import Bits, Plane
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,11 +19,11 @@ class Packed:
     width: int
 
     @classmethod
-    def of(cls, mask: Mask) -> Self:
+    def of(cls, mask: Plane) -> Self:
         """Pack an ``(H, W)`` mask, nonzero inside."""
         return cls(pack(mask), mask.shape[1])
 
-    def mask(self) -> Mask:
+    def mask(self) -> Plane:
         """Give ``(H, W)`` uint8, 0 or 1."""
         return unpack(self.bits, self.width)
 
@@ -43,6 +36,6 @@ def pack(mask: npt.NDArray[np.uint8] | npt.NDArray[np.bool_]) -> Bits:
     return np.ascontiguousarray(packed).view(np.uint64)
 
 
-def unpack(bits: Bits, width: int) -> Mask:
+def unpack(bits: Bits, width: int) -> Plane:
     """Give the ``(H, width)`` uint8 mask, 0 or 1, that was packed."""
     return np.unpackbits(bits.view(np.uint8), axis=1, count=width, bitorder="little")

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.kernels.packing import Bits, Mask, Reach, pack, unpack
-
-Codes = npt.NDArray[np.uint8]
-Labels = npt.NDArray[np.int32]
-Runs = npt.NDArray[np.int32]
-Sums = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float32]
-Planes = Sequence[npt.NDArray[np.uint8]]
-
+from roadeval.kernels.arrays import (
+    Bits,
+    Floats,
+    Image,
+    Labels,
+    Plane,
+    Planes,
+    Reach,
+    Runs,
+    Sums,
+    Table,
+    Values,
+)
+from roadeval.kernels.packing import pack, unpack
 
 # --- Colours --------------------------------------------------------------------------------------
 
 
-def look_up_sum_min(planes: Planes, table: Codes) -> tuple[Codes, npt.NDArray[np.int64]]:
+def look_up_sum_min(planes: Planes, table: Table) -> tuple[Plane, Sums]:
     """Look every pixel up by the sum and the minimum of its channels.
 
     Parameters
@@ -40,7 +43,7 @@ def look_up_sum_min(planes: Planes, table: Codes) -> tuple[Codes, npt.NDArray[np
     return codes, np.bincount(codes.ravel(), minlength=256)
 
 
-def run_sums(image: npt.NDArray[np.uint8], runs: Runs, count: int) -> Sums:
+def run_sums(image: Image, runs: Runs, count: int) -> Sums:
     """Sum the colours of every label's runs.
 
     Parameters
@@ -61,9 +64,7 @@ def run_sums(image: npt.NDArray[np.uint8], runs: Runs, count: int) -> Sums:
     return _sums(label, image[y, x], count)
 
 
-def ring_sums(
-    image: npt.NDArray[np.uint8], runs: Runs, ring: Codes, count: int, width: int
-) -> Sums:
+def ring_sums(image: Image, runs: Runs, ring: Plane, count: int, width: int) -> Sums:
     """Sum the colours of every component's buffer ring (Eq. 10).
 
     Parameters
@@ -113,12 +114,12 @@ def _sums(labels: npt.NDArray[np.integer], colours: npt.NDArray[np.uint8], count
 
 
 def transfer(
-    image: npt.NDArray[np.uint8],
+    image: Image,
     runs: Runs,
-    source: npt.NDArray[np.float64],
-    target: npt.NDArray[np.float64],
-    gain: npt.NDArray[np.float64],
-) -> npt.NDArray[np.uint8]:
+    source: Floats,
+    target: Floats,
+    gain: Floats,
+) -> Image:
     """Map each component's colours to ``target + (I - source) * gain``, rounded and clipped.
 
     ``runs`` are ``(n, 4)``, see `components`; ``source``, ``target`` and ``gain`` ``(count, 3)``
@@ -133,10 +134,10 @@ def transfer(
 
 def mahalanobis(
     planes: Planes,
-    mean: npt.NDArray[np.float64],
-    precision: npt.NDArray[np.float64],
+    mean: Floats,
+    precision: Floats,
     greatest: float,
-) -> tuple[npt.NDArray[np.float32], Codes]:
+) -> tuple[Values, Plane]:
     """Distance of Eq. 2, the root of ``(x - m)^T P (x - m)``, of every pixel.
 
     Parameters
@@ -154,7 +155,7 @@ def mahalanobis(
         ``(H, W)`` float32, and ``(H, W)`` uint8, decided in float64: 1 near, 0 far.
     """
     r, g, b = (plane - level for plane, level in zip(planes, mean, strict=True))
-    squared: npt.NDArray[np.float64] = (
+    squared: Floats = (
         precision[0, 0] * (r * r)
         + precision[1, 1] * (g * g)
         + precision[2, 2] * (b * b)
@@ -165,7 +166,7 @@ def mahalanobis(
     return np.sqrt(squared.astype(np.float32)), (squared <= greatest).astype(np.uint8)
 
 
-def look_up_colours(planes: Planes, table: Codes) -> Codes:
+def look_up_colours(planes: Planes, table: Table) -> Plane:
     """Look every pixel up in a table over all colours.
 
     Parameters
@@ -182,19 +183,19 @@ def look_up_colours(planes: Planes, table: Codes) -> Codes:
         ``(H, W)`` uint8.
     """
     coarse, fine = [plane >> 2 for plane in planes], [plane & 3 for plane in planes]
-    found: Codes = table[(*coarse, *fine)]
+    found: Plane = table[(*coarse, *fine)]
     return found
 
 
-def look_up_channels(image: npt.NDArray[np.uint8], table: Codes) -> npt.NDArray[np.uint8]:
+def look_up_channels(image: Image, table: Table) -> Image:
     """Look each channel of ``(H, W, 3)`` uint8 up in its column of a ``(256, 3)`` uint8 table."""
-    found: npt.NDArray[np.uint8] = cv2.LUT(image, table[None])
+    found: Image = cv2.LUT(image, table[None])
     return found
 
 
 def rectified_sum(
-    features: tuple[Floats, ...], planes: Floats, bias: Floats, weights: Floats
-) -> Floats:
+    features: tuple[Values, ...], planes: Values, bias: Values, weights: Values
+) -> Values:
     """Sum ``sum_k weights[k] max(planes[k] . x + bias[k], 0)`` of every pixel's features x.
 
     Parameters
@@ -266,7 +267,7 @@ def label_runs(labels: Labels) -> Runs:
     return found
 
 
-def keep_region(bits: Bits, width: int, patch: Mask) -> Bits:
+def keep_region(bits: Bits, width: int, patch: Plane) -> Bits:
     """Keep one 8-connected component of a mask; an empty one stays empty.
 
     The one with most pixels where ``patch``, ``(H, W)`` or empty, is nonzero; the largest where
@@ -295,17 +296,17 @@ def fill_holes(bits: Bits, width: int) -> Bits:
     return pack(outside[1:-1, 1:-1] != 2)
 
 
-def outcomes(mask: Mask, truth: Mask, ignored: int) -> Mask:
+def outcomes(mask: Plane, truth: Plane, ignored: int) -> Plane:
     """Say how each pixel came out: 0 TN, 1 TP, 2 FP, 3 FN, or ``ignored``.
 
     ``mask`` is ``(H, W)`` uint8, 0 or 1; ``truth`` likewise, and greater where it is ignored.
     """
     value = truth + 2 * (truth ^ mask)
-    found: Mask = np.where(truth <= 1, value, ignored).astype(np.uint8)
+    found: Plane = np.where(truth <= 1, value, ignored).astype(np.uint8)
     return found
 
 
-def add_outcomes(errors: Mask, ignored: int, sums: Mask) -> None:
+def add_outcomes(errors: Plane, ignored: int, sums: Plane) -> None:
     """Count, pixel by pixel, how often it was labelled, FP and FN: ``sums``, ``(3, H, W)`` uint8.
 
     ``errors`` is ``(H, W)`` uint8, as `outcomes` gives it.
@@ -337,8 +338,8 @@ def shrink(bits: Bits, reach: Reach) -> Bits:
     return pack(cv2.erode(wide, _element(reach), **border))
 
 
-def _element(reach: Reach) -> Mask:
+def _element(reach: Reach) -> Plane:
     side = 2 * max(len(reach) - 1, int(reach.max())) + 1
     rows, columns = np.abs(np.indices((side, side)) - side // 2)
-    inside: Mask = (rows < len(reach)) & (columns <= reach[np.minimum(rows, len(reach) - 1)])
+    inside: Plane = (rows < len(reach)) & (columns <= reach[np.minimum(rows, len(reach) - 1)])
     return inside.astype(np.uint8)

@@ -10,20 +10,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from roadeval.kernels.packing import Bits, Mask
+from roadeval.kernels.arrays import Bits, Columns, Labels, Places, Plane, Runs
 
 _compiled = njit(cache=True, nogil=True)
 _inlined = njit(cache=True, nogil=True, inline="always")
-
-Labels = npt.NDArray[np.int32]
-Runs = npt.NDArray[np.int32]
-Row = npt.NDArray[np.int32]
-Places = npt.NDArray[np.int64]
 
 
 @_compiled  # type: ignore[untyped-decorator]
@@ -51,29 +45,6 @@ def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def paint(runs: Runs, height: int, width: int) -> Labels:
-    """See `plain.paint`."""
-    labels = np.empty((height, width), np.int32)
-    run = 0
-    for y in range(height):
-        run = paint_row(labels[y], runs, run, y)
-    return labels
-
-
-@_compiled  # type: ignore[untyped-decorator]
-def paint_row(row: Row, runs: Runs, run: int, y: int) -> int:
-    """Give row ``y`` its labels, 0 outside the runs, of which ``run`` is the first not painted."""
-    for x in range(len(row)):
-        row[x] = 0
-    while run < len(runs) and runs[run, 0] == y:
-        label = runs[run, 3]
-        for x in range(np.uintp(runs[run, 1]), np.uintp(runs[run, 2])):
-            row[x] = label
-        run += 1
-    return run
-
-
-@_compiled  # type: ignore[untyped-decorator]
 def label_runs(labels: Labels) -> Runs:
     """See `plain.label_runs`."""
     height, width = labels.shape
@@ -93,7 +64,7 @@ def label_runs(labels: Labels) -> Runs:
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def keep_region(bits: Bits, width: int, patch: Mask) -> Bits:
+def keep_region(bits: Bits, width: int, patch: Plane) -> Bits:
     """See `plain.keep_region`."""
     rows, starts, ends = _runs(bits, width, True)
     parents = _joined(rows, starts, ends, 1)
@@ -149,7 +120,7 @@ def _set(bits: Bits, y: int, start: int, end: int) -> None:
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def _runs(bits: Bits, width: int, inside: bool) -> tuple[Places, Runs, Runs]:
+def _runs(bits: Bits, width: int, inside: bool) -> tuple[Places, Columns, Columns]:
     """Find the runs of ones (or of zeros, if not ``inside``), row after row.
 
     Those of row y are numbered from ``rows[y]`` up to but not including ``rows[y + 1]``.
@@ -195,7 +166,7 @@ def _lowest(_context: Any, _word: Any) -> Any:
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def _joined(rows: Places, starts: Runs, ends: Runs, corner: int) -> Places:
+def _joined(rows: Places, starts: Columns, ends: Columns, corner: int) -> Places:
     """Join runs of neighbouring rows that touch: of each run the first one of its component.
 
     With ``corner`` 1 they may touch by a corner (8-connected), with 0 by a side alone.

@@ -1,4 +1,4 @@
-"""Compiled loops over the colours of components and their rings: what Eq. 10 and 11 need.
+"""Compiled loops over the pixels of components and their rings: what Eq. 10 and 11 need.
 
 A component's pixels are given by its runs, in the order of the rows, see `roadeval.kernels.runs`.
 Unsigned indices are not asked whether they count from the end, which in loops as short as these
@@ -11,18 +11,11 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from roadeval.kernels.runs import paint_row
+from roadeval.kernels.arrays import Columns, Floats, Image, Labels, Places, Plane, Runs, Sums, Table
 
 _compiled = njit(cache=True, nogil=True)
 _inlined = njit(cache=True, nogil=True, inline="always")
 
-Image = npt.NDArray[np.uint8]
-Mask = npt.NDArray[np.uint8]
-Labels = npt.NDArray[np.int32]
-Runs = npt.NDArray[np.int32]
-Row = npt.NDArray[np.int32]
-Sums = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float64]
 
 _NONE = np.int32(0x7FFFFFFF)
 """Greater than any label."""
@@ -47,11 +40,37 @@ def run_sums(image: Image, runs: Runs, count: int) -> Sums:
     return sums
 
 
+# --- Labels ---------------------------------------------------------------------------------------
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def paint(runs: Runs, height: int, width: int) -> Labels:
+    """See `plain.paint`."""
+    labels = np.empty((height, width), np.int32)
+    run = 0
+    for y in range(height):
+        run = _paint_row(labels[y], runs, run, y)
+    return labels
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def _paint_row(row: Columns, runs: Runs, run: int, y: int) -> int:
+    """Give row ``y`` its labels, 0 outside the runs, of which ``run`` is the first not painted."""
+    for x in range(len(row)):
+        row[x] = 0
+    while run < len(runs) and runs[run, 0] == y:
+        label = runs[run, 3]
+        for x in range(np.uintp(runs[run, 1]), np.uintp(runs[run, 2])):
+            row[x] = label
+        run += 1
+    return run
+
+
 # --- Rings ----------------------------------------------------------------------------------------
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def ring_sums(image: Image, runs: Runs, ring: Mask, count: int, width: int) -> Sums:
+def ring_sums(image: Image, runs: Runs, ring: Plane, count: int, width: int) -> Sums:
     """See `plain.ring_sums`."""
     rows, columns = ring.shape
     sums = np.zeros((count, 7), np.int64)
@@ -64,7 +83,7 @@ def ring_sums(image: Image, runs: Runs, ring: Mask, count: int, width: int) -> S
     places = np.empty(columns, np.int64)
     run = 0
     for row in range(rows + width):
-        run = paint_row(near[row % len(near)], runs, run, row)
+        run = _paint_row(near[row % len(near)], runs, run, row)
         y = row - width
         if y < 0:
             continue
@@ -83,7 +102,7 @@ def ring_sums(image: Image, runs: Runs, ring: Mask, count: int, width: int) -> S
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def _places(ring: Mask, places: Sums) -> int:
+def _places(ring: Plane, places: Places) -> int:
     """Note where a row is nonzero, and how often, without a branch that is hard to foresee."""
     count = 0
     for x in range(len(ring)):
@@ -93,7 +112,9 @@ def _places(ring: Mask, places: Sums) -> int:
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def _bound(near: Labels, width: int, spare: tuple[Row, Row], greatest: Row, least: Row) -> None:
+def _bound(
+    near: Labels, width: int, spare: tuple[Columns, Columns], greatest: Columns, least: Columns
+) -> None:
     """Give the greatest and the least label around each pixel of a row; 0 counts for neither.
 
     ``near`` are the rows around it, in any order, ``spare`` two rows with ``width`` pixels more on
@@ -121,7 +142,7 @@ def _bound(near: Labels, width: int, spare: tuple[Row, Row], greatest: Row, leas
 
 @_compiled  # type: ignore[untyped-decorator]
 def _add_each(
-    sums: Sums, last: Sums, near: Labels, image: Image, place: tuple[int, int, int]
+    sums: Sums, last: Places, near: Labels, image: Image, place: tuple[int, int, int]
 ) -> None:
     """Add a ring's pixel once to every component within ``width`` of ``place``: (y, x, width)."""
     y, x, width = place
@@ -175,9 +196,7 @@ def transfer(image: Image, runs: Runs, source: Floats, target: Floats, gain: Flo
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def _tables(
-    large: npt.NDArray[np.bool_], source: Floats, target: Floats, gain: Floats
-) -> npt.NDArray[np.uint8]:
+def _tables(large: npt.NDArray[np.bool_], source: Floats, target: Floats, gain: Floats) -> Table:
     """Tabulate what becomes of each level in each channel of the large components, in order."""
     tables = np.empty((large.sum(), 3, 256), np.uint8)
     place = 0

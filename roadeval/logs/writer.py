@@ -41,10 +41,10 @@ class LogWriter:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._temporary = self.path.with_name(f".{self.path.stem}.part.mcap")
-        if self.path.is_dir():
-            raise LogError(f"{self.path}: is a folder; name a file in it, ending in .mcap")
         self._made: list[Path] = []
         with self._explained():
+            if self.path.is_dir():
+                raise LogError(f"{self.path}: is a folder; name a file in it, ending in .mcap")
             self._made = folders.make(self.path.parent)
             try:
                 self._file = self._temporary.open("wb")
@@ -179,7 +179,7 @@ class LogWriter:
                 self._writer.finish()  # type: ignore[no-untyped-call]
                 self._file.close()
                 self._temporary.replace(self.path)
-        except LogError:
+        except BaseException:
             self._discard()
             raise
 

@@ -1,4 +1,4 @@
-"""Phase 3 with more than colour: a support vector machine on colour, place and texture.
+"""Phase 3 with more than colour: a support vector machine on colour, place, column and texture.
 
 Two grey pixels of one colour, one of the road and one of a wall, differ in where they are, in what
 surrounds them, and in what lies between them and the vehicle. The machine is the paper's
@@ -67,6 +67,7 @@ class ContextSettings:
     windows
         Sides of the squares over which texture is averaged, in its pixels. Gravel and leaves show
         in a small one; what a larger one tells of a facade, the columns below it tell as well.
+        At most 8: for each number of features the machine's sum is compiled anew.
     planes
         Random planes that make the feature map.
     c
@@ -85,7 +86,7 @@ class ContextSettings:
     """
 
     width: Annotated[int, Field(ge=32, le=4096)] = 320
-    windows: tuple[Annotated[int, Field(ge=1, le=255)], ...] = (5,)
+    windows: Annotated[tuple[Annotated[int, Field(ge=1, le=255)], ...], Field(max_length=8)] = (5,)
     planes: Annotated[int, Field(ge=1, le=4096)] = 128
     c: Penalty = 1.0
     smoothing: Annotated[int, Field(ge=1, le=255)] = 5
@@ -324,7 +325,7 @@ def layers(_settings: ContextSettings) -> tuple[LayerSpec, ...]:
 
 STAGE: Final = Stage(
     name="context",
-    title="Phase 3: support vector machine on colour, place and texture",
+    title="Phase 3: support vector machine on colour, place, column and texture",
     settings=ContextSettings,
     bind=bind,
     layers=layers,

@@ -15,7 +15,8 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, mask_spec
 from roadeval.kernels import KERNELS
-from roadeval.kernels.packing import Packed, Reach
+from roadeval.kernels.arrays import Reach
+from roadeval.kernels.packing import Packed
 from roadeval.pipeline.patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View
 
@@ -81,7 +82,7 @@ def element_side(width: int) -> int:
 
 
 def structuring_element(side: int, shape: str) -> Reach:
-    """B of Eq. 17-22, of ``side`` pixels, odd; see `roadeval.kernels.packing.Reach`."""
+    """B of Eq. 17-22, of ``side`` pixels, odd; see `roadeval.kernels.arrays.Reach`."""
     kind = cv2.MORPH_RECT if shape == "square" else cv2.MORPH_ELLIPSE
     below = cv2.getStructuringElement(kind, (side, side))[side // 2 :]
     reach: Reach = (np.count_nonzero(below, axis=1) - 1) // 2
@@ -118,7 +119,7 @@ def closing(mask: Packed, element: Reach) -> Packed:
     wide[image] = mask.bits
     # Nothing is closed beside the image, so that the bits beyond its width stay clear.
     closed = erode(dilate(Packed(wide, 64 * wide.shape[1]), element), element)
-    return Packed(closed.bits[image], mask.width)
+    return Packed(np.ascontiguousarray(closed.bits[image]), mask.width)
 
 
 def boundary(mask: Packed, element: Reach) -> Packed:

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import heapq
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from operator import itemgetter
 from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
@@ -101,6 +102,9 @@ class Keeper:
 
     def __enter__(self) -> Self:
         self._recorder.__enter__()
+        # A killed run may have left some, whatever this one's rule. It is no more than in the way.
+        with suppress(RecordingError):
+            self._shelf.sweep()
         return self
 
     def __exit__(
@@ -114,8 +118,14 @@ class Keeper:
             with suppress(RecordingError):
                 self._write_held()
         finally:
-            self._shelf.close()
-            self._recorder.__exit__(kind, error, trace)
+            try:
+                self._shelf.close()
+            except RecordingError:
+                # What went wrong first is what the user must hear.
+                if error is None:
+                    raise
+            finally:
+                self._recorder.__exit__(kind, error, trace)
 
     def encode(self, result: FrameResult, position: int) -> Kept:
         """Encode the frame at ``position`` among those read, from 0; in any thread."""
@@ -143,9 +153,15 @@ class Keeper:
         self._recorder.finish(results)
 
     def _write_held(self) -> None:
-        held, self._worst = self._worst, []
-        numbers = sorted(-number for _, number in held)
-        self._recorder.write_pictures(map(self._shelf.get, numbers))
+        self._worst = sorted(self._worst, key=itemgetter(1))
+        self._recorder.write_pictures(self._held())
+
+    def _held(self) -> Iterator[Encoded]:
+        """Take out the pictures held back, in order: whoever is interrupted can take the rest."""
+        while self._worst:
+            encoded = self._shelf.get(-self._worst[-1][1])
+            self._worst.pop()
+            yield encoded
 
     def _pictures(self, bad: float, position: int) -> Pictures:
         if self._rule.kind is Kind.MASKS:

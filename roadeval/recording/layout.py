@@ -21,8 +21,11 @@ from roadeval.errors import RoadevalError
 
 APPLICATION: Final = "roadeval"
 """Name under which the files are known to the viewer, and by which our own are told."""
-FORMAT: Final = 1
-"""Version of the arrangement inside the file; raised when an older reader would go wrong."""
+FORMAT: Final = 2
+"""Version of the arrangement inside the file; raised when an older reader would go wrong.
+
+In 2 rows without a value end what is shown, and the rows of masks are filtered. 1 can be read.
+"""
 
 FRAME: Final = "frame"
 STAMP: Final = "stamp"

@@ -35,6 +35,7 @@ _Page = tuple[list[int], pa.ListArray]
 
 _TEXT = "TextDocument:text"
 _CAMERA = "EncodedImage:blob"
+_FORMAT = "format"
 
 
 class Recording:
@@ -51,7 +52,12 @@ class Recording:
     Raises
     ------
     RecordingError
-        If it is none.
+        If it is none, or one by a later version.
+
+    Attributes
+    ----------
+    format
+        Version of the arrangement inside the file, see `roadeval.recording.layout.FORMAT`.
 
     Examples
     --------
@@ -64,6 +70,9 @@ class Recording:
         self.path = Path(path)
         self._reader, self._entry = _open(self.path)
         self._store = _store(self._reader, self._entry)
+        self.format = self._format()
+        if self.format > at.FORMAT:
+            raise RecordingError(f"{self.path}: made by a later version of roadeval: update it")
         text = self._document(at.LAYOUT)
         if text is None:
             raise RecordingError(f"{self.path}: the recording ends before its first frame")
@@ -212,6 +221,11 @@ class Recording:
             values = batch.column(component).flatten()
             yield from zip(batch.column(at.FRAME).to_pylist(), values.to_pylist(), strict=True)
 
+    def _format(self) -> int:
+        for batch in self._batches(at.PROPERTIES, _FORMAT, static=True):
+            return int(batch.column(_FORMAT).flatten()[0].as_py())
+        return 1
+
     def _document(self, path: str) -> str | None:
         for batch in self._batches(path, _TEXT, static=True):
             return str(batch.column(_TEXT).flatten()[0])
@@ -222,7 +236,8 @@ class Recording:
         for chunk in chunks:
             batch = chunk.to_record_batch()
             # A row without a value says that from there on nothing is shown.
-            filled = pc.greater(pc.list_value_length(batch.column(component)), 0)
+            lengths = pc.fill_null(pc.list_value_length(batch.column(component)), 0)
+            filled = pc.greater(lengths, 0)
             if pc.any(filled).as_py():
                 yield batch if pc.all(filled).as_py() else batch.filter(filled)
 

@@ -57,6 +57,7 @@ class Recorder:
         self._frames = self._chunks = self._waiting = self._bytes = 0
         self._states: dict[str, str] = {}
         self._shown: set[str] = set()
+        self._blank: Encoded | None = None
         self._stream: rr.RecordingStream | None = None
 
     def __enter__(self) -> Self:
@@ -125,18 +126,19 @@ class Recorder:
     def write_pictures(self, held: Iterable[Encoded]) -> None:
         """Append the pictures of frames whose numbers stand already, in order.
 
-        They are cleared right after their frame, so that no later one seems to show them.
+        They are cleared right after their frame, so that no later one seems to show them. Whoever
+        is interrupted may call it again with those that are left.
         """
-        after: Encoded | None = None
         for encoded in held:
-            if after is not None and after.number != encoded.number:
-                self._add_images(after)
+            if self._blank is not None and self._blank.number != encoded.number:
+                self._add_images(self._blank)
             self._add_images(encoded)
-            self._turn_page()
             number, stamp_ns = encoded.number + 1, encoded.stamp_ns + 1
-            after = replace(encoded, number=number, stamp_ns=stamp_ns, payloads={})
-        if after is not None:
-            self._add_images(after)
+            self._blank = replace(encoded, number=number, stamp_ns=stamp_ns, payloads={})
+            self._turn_page()
+        if self._blank is not None:
+            self._add_images(self._blank)
+            self._blank = None
             self._turn_page()
 
     def finish(self, results: Mapping[str, str]) -> None:
@@ -209,10 +211,10 @@ class Recorder:
         return self._stream
 
     def _make_room(self) -> None:
-        if self.path.is_dir():
-            raise RecordingError(f"{self.path}: is a folder; name a file in it, ending in .rrd")
         made: list[Path] = []
         try:
+            if self.path.is_dir():
+                raise RecordingError(f"{self.path}: is a folder; name a file in it, ending in .rrd")
             made = folders.make(self.path.parent)
             self.check_room()
             self.partial.touch()

@@ -18,10 +18,12 @@ from pydantic.dataclasses import dataclass as validated
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import STAGES
 from roadeval.pipeline.parameters import check_arrays, check_range
-from roadeval.training.plan import Plan, relevant
+from roadeval.training.plan import Plan
 
 FORMAT: Final = "roadeval-model"
-VERSION: Final = 1
+VERSION: Final = 2
+"""Of the file; raised when what a stage has learnt means something else. In 2 the machine of
+``context`` knows the column below a pixel."""
 
 
 class ModelError(RoadevalError):
@@ -76,8 +78,7 @@ class Model:
                 f"{path}: the model has no variant {variant} (it has {known}); "
                 "train one with the same --config and --variant options"
             )
-        # Earlier versions kept the settings of the decision too.
-        made_for = {name: relevant(name, kept) for name, kept in self.settings[variant].items()}
+        made_for = self.settings[variant]
         # Through JSON, as the file has been: tuples and lists are the same there.
         wanted = json.loads(json.dumps(plan.relevant()))
         for name in sorted({*made_for, *wanted}):
@@ -144,16 +145,18 @@ def load_model(path: Path) -> Model:
     Raises
     ------
     ModelError
-        If the file is missing, no model, damaged, or of a later version, or if it holds what
+        If the file is missing, no model, damaged, or of another version, or if it holds what
         no training gives: arrays of a wrong shape, numbers that are not finite.
     """
     header, arrays = _content(path)
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise ModelError(f"{path}: not a model file; make one with 'roadeval train'")
-    if header.get("version") != VERSION:
+    version = header.get("version")
+    if isinstance(version, int) and version < VERSION:
+        raise ModelError(f"{path}: made by an earlier version of roadeval; train it again")
+    if version != VERSION:
         raise ModelError(
-            f"{path}: model format {header.get('version')}, this version reads {VERSION}; "
-            "train it again"
+            f"{path}: model format {version}, this version reads {VERSION}; train it again"
         )
     try:
         return _model(header, arrays)

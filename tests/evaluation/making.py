@@ -10,7 +10,7 @@ import pandas as pd
 
 from roadeval.data import Counts, Frame, Mask, StageResult, Tally, Truth, VariantResult
 from roadeval.evaluation import rates
-from roadeval.kernels.packing import Bits
+from roadeval.kernels.arrays import Bits
 
 
 def pixels(*rows: str) -> npt.NDArray[np.uint8]:

@@ -237,6 +237,18 @@ def test_a_table_that_was_taken_away_is_missed(tmp_path: Path, table: str) -> No
         Results(tmp_path).table(table)
 
 
+@pytest.mark.parametrize("table", ["oracles", "changes"])
+def test_tables_that_earlier_versions_did_not_write_are_not_missed(
+    tmp_path: Path, table: str
+) -> None:
+    write(tmp_path)
+    (tmp_path / f"{table}.csv").unlink()
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    del summary["oracles"]
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    assert Results(tmp_path).table(table).empty
+
+
 def test_masks_that_are_missing_on_some_frames_agree_with_the_summary(tmp_path: Path) -> None:
     board = Scoreboard(EvaluationSettings(window=2), ["net", "filtered", "late"], None)
     with ResultsWriter(tmp_path) as writer:

@@ -178,6 +178,27 @@ def test_regions_are_kept_and_holes_filled_alike(mask, seed):
         assert_same(fast.components(*road, connectivity), plain.components(*road, connectivity))
 
 
+@pytest.mark.parametrize("width", [63, 64, 65, 128])
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.6, 0.97, 1.0])
+def test_kernels_of_masks_agree_about_the_end_of_a_word(width, share):
+    mask = (np.random.default_rng(width).random((9, width)) < share).astype(np.uint8)
+    packed = pack(mask)
+    patch = np.zeros_like(mask)
+    patch[4:, -2:] = 1
+    for connectivity in (4, 8):
+        given = packed, width, connectivity
+        assert_same(fast.components(*given), plain.components(*given), "components")
+    for chosen in (NO_PATCH, patch):
+        given = packed, width, chosen
+        assert_same(fast.keep_region(*given), plain.keep_region(*given), "keep_region")
+    assert_same(fast.fill_holes(packed, width), plain.fill_holes(packed, width), "fill_holes")
+    for reach in map(np.array, ([0], [1], [3, 1], [64, 63], [65, 2, 0], [130])):
+        grown = fast.grow(packed, reach, width)
+        assert_same(grown, plain.grow(packed, reach, width), "grow")
+        np.testing.assert_array_equal(grown, pack(unpack(grown, width)))
+        assert_same(fast.shrink(packed, reach), plain.shrink(packed, reach), "shrink")
+
+
 def test_components_are_numbered_by_their_first_pixels_and_touch_by_corners_or_not():
     mask = np.array([[0, 1, 0, 1], [1, 0, 0, 1]], np.uint8)
     touching, apart = (fast.components(pack(mask), 4, connectivity)[0] for connectivity in (8, 4))

@@ -2,6 +2,7 @@
 
 import errno
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -86,6 +87,16 @@ def test_nothing_is_left_of_a_log_that_cannot_be_completed(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, MemoryError])
+def test_nothing_is_left_of_a_log_that_is_stopped_while_it_is_completed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop: type[BaseException]
+) -> None:
+    monkeypatch.setattr(Writer, "finish", Mock(side_effect=stop))
+    with pytest.raises(stop):
+        write(tmp_path / "new" / "a.mcap")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_its_folder_is_made(tmp_path: Path) -> None:
     assert write(tmp_path / "new" / "deep" / "a.mcap").exists()
 
@@ -102,4 +113,6 @@ def test_an_unwritable_place_is_told_in_one_line(tmp_path: Path) -> None:
         LogWriter(tmp_path / "file" / "new" / "a.mcap")
     with pytest.raises(LogError, match="cannot be written: File name too long"):
         LogWriter(tmp_path / "new" / f"{250 * 'a'}.mcap")
+    with pytest.raises(LogError, match="cannot be written: File name too long"):
+        LogWriter(tmp_path / f"{300 * 'a'}.mcap")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

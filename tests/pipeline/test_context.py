@@ -1,4 +1,4 @@
-"""The machine on colour, place and texture."""
+"""The machine on colour, place, the column below and texture."""
 
 import cv2
 import numpy as np
@@ -358,6 +358,12 @@ def test_the_greatest_penalty_that_is_allowed_breaks_no_bound_of_what_is_learnt(
 def test_a_penalty_beyond_is_refused():
     with pytest.raises(ValueError, match="less than or equal to 1000000"):
         ContextSettings(c=1e7)
+
+
+def test_there_are_at_most_eight_windows():
+    assert len(ContextSettings(windows=(5,) * 8).windows) == 8
+    with pytest.raises(ValueError, match="at most 8 items"):
+        ContextSettings(windows=(5,) * 9)
 
 
 # --- The stage ------------------------------------------------------------------------------------

@@ -86,3 +86,16 @@ def result(number, *, err=0.25, fnr=0.5, **changes):
 def unscored(number, role=Role.TRAINING):
     """A frame that is recorded, but not counted."""
     return result(number, role=role, errors={}, tallies=(), health={}, tables={})
+
+
+def rows_of(recording, path, component):
+    """How many values each frame's row of an entity has: none where nothing is to be shown."""
+    chunks = recording._stream().filter(content=path, components=component, is_static=False)
+    batches = [chunk.to_record_batch() for chunk in chunks]
+    return {
+        frame: len(values)
+        for batch in batches
+        for frame, values in zip(
+            batch.column("frame").to_pylist(), batch.column(component).to_pylist(), strict=True
+        )
+    }

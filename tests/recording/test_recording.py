@@ -20,7 +20,7 @@ import rerun as rr
 from roadeval.data import Health, Pictures, Role
 from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError
 from roadeval.recording.reading import _around
-from tests.recording.making import HEIGHT, WIDTH, frame, layout, result, unscored
+from tests.recording.making import HEIGHT, WIDTH, frame, layout, result, rows_of, unscored
 
 SUMMARY = {"verdict": "It helps.", "totals": {}, "seconds": {"filtered": {"post": 0.5}}}
 RESULTS = {"summary": json.dumps(SUMMARY), "windows": "window,ERR\n0,0.25\n"}
@@ -101,19 +101,6 @@ def test_a_layer_that_a_frame_lacks_is_not_shown_from_the_frame_before(drive, tm
     with pytest.raises(RecordingError, match="/filtered/post has nothing on frame 3"):
         recording.layer("filtered", "post", 3)
     assert rows_of(recording, "/filtered/post", "EncodedImage:blob") == {2: 1, 3: 0, 4: 1}
-
-
-def rows_of(recording, path, component):
-    """How many values each frame's row of an entity has: none where nothing is to be shown."""
-    chunks = recording._stream().filter(content=path, components=component, is_static=False)
-    batches = [chunk.to_record_batch() for chunk in chunks]
-    return {
-        frame: len(values)
-        for batch in batches
-        for frame, values in zip(
-            batch.column("frame").to_pylist(), batch.column(component).to_pylist(), strict=True
-        )
-    }
 
 
 def test_frames_without_pictures_end_what_is_shown_and_are_not_among_those_that_have_some(
@@ -200,6 +187,19 @@ def test_the_frames_after_one_are_kept_first_then_the_nearest_before(
     one = pa.array([[0] * 10], pa.list_(pa.uint8())).nbytes
     monkeypatch.setattr("roadeval.recording.reading.READ_AHEAD", 4 * one)
     assert list(_around(frame, pages_of(sizes)[0])[1]) == kept
+
+
+def test_rows_that_were_put_together_with_others_may_have_no_list_at_all(recording, monkeypatch):
+    batch = pa.RecordBatch.from_pydict(
+        {"frame": [1, 2, 3, 4], "Scalars:scalars": pa.array([[0.5], None, [], [0.25]])}
+    )
+    chunk = SimpleNamespace(to_record_batch=lambda: batch)
+    stream = SimpleNamespace(filter=lambda **given: [chunk])
+    again = Recording(recording.path)
+    monkeypatch.setattr(again, "_stream", lambda: stream)
+    assert again.scalars("/metrics/filtered/post/ERR").to_dict() == {1: 0.5, 4: 0.25}
+    batch = batch.slice(0, 2)
+    assert again.scalars("/metrics/filtered/post/ERR").to_dict() == {1: 0.5}
 
 
 # --- Numbers and words ------------------------------------------------------------------------
@@ -413,6 +413,10 @@ def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path):
         pass
     with pytest.raises(RecordingError, match="is a folder"), _recorder(tmp_path):
         pass
+    long = tmp_path / f"{300 * 'a'}.rrd"
+    with pytest.raises(RecordingError, match="File name too long"), _recorder(long):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def _recorder(path):
@@ -423,6 +427,37 @@ def test_no_recording_is_made_by_the_recorder_that_does_nothing(drive):
     with NullRecorder() as recorder:
         recorder.write(recorder.encode(drive[0], 0))
         recorder.finish(RESULTS)
+
+
+# --- Versions ---------------------------------------------------------------------------------
+
+
+def recorded_in(version, folder, monkeypatch):
+    """A recording whose arrangement is said to be of this version."""
+    with monkeypatch.context() as patched:
+        patched.setattr("roadeval.recording.layout.FORMAT", version)
+        record(folder / "out.rrd", [unscored(0)])
+    return folder / "out.rrd"
+
+
+def test_the_arrangement_of_a_recording_has_a_version(recording, tmp_path, monkeypatch):
+    assert recording.format == 2
+    earlier = Recording(recorded_in(1, tmp_path, monkeypatch))
+    assert (earlier.format, earlier.frame_numbers) == (1, (0,))
+
+
+def test_a_recording_that_tells_no_version_is_of_the_first(recording, tmp_path):
+    words = ["--drop-entity", "/__properties/roadeval", recording.path, "-o", tmp_path / "out.rrd"]
+    assert rerun("filter", *words) == 0
+    first = Recording(tmp_path / "out.rrd")
+    assert (first.format, len(first.frame_numbers)) == (1, 19)
+
+
+def test_a_recording_of_a_later_version_is_one_line(tmp_path, monkeypatch):
+    path = recorded_in(3, tmp_path, monkeypatch)
+    with pytest.raises(RecordingError) as caught:
+        Recording(path)
+    assert str(caught.value) == f"{path}: made by a later version of roadeval: update it"
 
 
 # --- What cannot be read ----------------------------------------------------------------------

@@ -1,0 +1,34 @@
+"""The kinds of arrays that the kernels take and give."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Image = npt.NDArray[np.uint8]
+"""``(H, W, 3)`` RGB."""
+Plane = npt.NDArray[np.uint8]
+"""``(H, W)``: a channel, codes of any kind, or a mask, nonzero inside."""
+Planes = tuple[Plane, Plane, Plane]
+"""Red, green and blue."""
+Table = npt.NDArray[np.uint8]
+"""What becomes of each level, code or colour."""
+Labels = npt.NDArray[np.int32]
+"""``(H, W)``: a component's number at each of its pixels, 0 outside."""
+Runs = npt.NDArray[np.int32]
+"""``(n, 4)``: row, first column, column after the last, and label, row after row."""
+Columns = npt.NDArray[np.int32]
+"""``(n,)``: columns of runs, or labels along a row."""
+Places = npt.NDArray[np.int64]
+"""``(n,)``: indices of something."""
+Sums = npt.NDArray[np.int64]
+"""``(n, ...)``: whole numbers by label or kind."""
+Values = npt.NDArray[np.float32]
+Floats = npt.NDArray[np.float64]
+Bits = npt.NDArray[np.uint64]
+"""``(H, words)`` of an ``(H, W)`` mask, C-contiguous, 64 pixels a word, the leftmost in the lowest
+bit; those beyond the width are 0. ``(K, H, words)`` of K masks."""
+Reach = npt.NDArray[np.int64]
+"""A structuring element that is symmetric in both directions, ``(r + 1,)``: how many pixels it
+extends to either side in its own row and in each of the r rows above and below, never more in a row
+further away."""
