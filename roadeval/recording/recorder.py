@@ -23,7 +23,7 @@ from roadeval.recording.reading import indexed_chunks
 
 PAGE: Final = 8
 """Frames whose images, notes and table lines share a chunk: a killed run loses no more of them."""
-PAGE_BYTES: Final = 10 << 20
+PAGE_BYTES: Final = 4 << 20
 """Of images at which a page is full with fewer frames: while one is packed and written, memory
 holds it several times."""
 SERIES: Final = 64
