@@ -1,6 +1,6 @@
 """The compiled kernels, by the names of their twins in `plain`."""
 
-from roadeval.kernels.bits import count_bits, grow, shrink
+from roadeval.kernels.bits import count_bits, grow
 from roadeval.kernels.colours import (
     add_outcomes,
     look_up_channels,
@@ -30,6 +30,5 @@ __all__ = [
     "rectified_sum",
     "ring_sums",
     "run_sums",
-    "shrink",
     "transfer",
 ]

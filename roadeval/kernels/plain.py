@@ -331,13 +331,6 @@ def grow(bits: Bits, reach: Reach, width: int) -> Bits:
     return pack(cv2.dilate(unpack(bits, width), _element(reach)))
 
 
-def shrink(bits: Bits, reach: Reach) -> Bits:
-    """Erode a mask by an element; outside the image nothing is set."""
-    wide = unpack(bits, 64 * bits.shape[1])
-    border = {"borderType": cv2.BORDER_CONSTANT, "borderValue": 0}
-    return pack(cv2.erode(wide, _element(reach), **border))
-
-
 def _element(reach: Reach) -> Plane:
     side = 2 * max(len(reach) - 1, int(reach.max())) + 1
     rows, columns = np.abs(np.indices((side, side)) - side // 2)

@@ -15,7 +15,7 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, mask_spec
 from roadeval.kernels import KERNELS
-from roadeval.kernels.arrays import Reach
+from roadeval.kernels.arrays import Bits, Reach
 from roadeval.kernels.packing import Packed
 from roadeval.pipeline.patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View
@@ -98,8 +98,22 @@ def dilate(mask: Packed, element: Reach) -> Packed:
 
 
 def erode(mask: Packed, element: Reach) -> Packed:
-    """Erosion (Eq. 18)."""
-    return Packed(KERNELS.shrink(mask.bits, element), mask.width)
+    """Erosion (Eq. 18): what the dilation of non-road, which is all around the image, leaves."""
+    other, image = _framed(mask, element, ~np.uint64(0))
+    other[image] = ~mask.bits
+    grown = dilate(Packed(other, 64 * other.shape[1]), element)
+    return Packed(~grown.bits[image], mask.width)
+
+
+def _framed(mask: Packed, element: Reach, fill: np.uint64) -> tuple[Bits, tuple[slice, slice]]:
+    """Make words for an image as large as the mask's and the element beyond it on every side.
+
+    Returns them, all ``fill``, and where the mask's own rows and words lie among them.
+    """
+    rows, words = len(element) - 1, -(-int(element.max()) // 64)
+    height, across = mask.bits.shape
+    wide = np.full((height + 2 * rows, across + 2 * words), fill)
+    return wide, np.s_[rows : rows + height, words : words + across]
 
 
 def opening(mask: Packed, element: Reach) -> Packed:
@@ -112,10 +126,7 @@ def closing(mask: Packed, element: Reach) -> Packed:
 
     The dilation may leave the image: cut off there, the erosion would eat road along the edge.
     """
-    rows, words = len(element) - 1, -(-int(element.max()) // 64)
-    height, across = mask.bits.shape
-    wide = np.zeros((height + 2 * rows, across + 2 * words), np.uint64)
-    image = np.s_[rows : rows + height, words : words + across]
+    wide, image = _framed(mask, element, np.uint64(0))
     wide[image] = mask.bits
     # Nothing is closed beside the image, so that the bits beyond its width stay clear.
     closed = erode(dilate(Packed(wide, 64 * wide.shape[1]), element), element)

@@ -196,7 +196,6 @@ def test_kernels_of_masks_agree_about_the_end_of_a_word(width, share):
         grown = fast.grow(packed, reach, width)
         assert_same(grown, plain.grow(packed, reach, width), "grow")
         np.testing.assert_array_equal(grown, pack(unpack(grown, width)))
-        assert_same(fast.shrink(packed, reach), plain.shrink(packed, reach), "shrink")
 
 
 def test_components_are_numbered_by_their_first_pixels_and_touch_by_corners_or_not():
@@ -281,11 +280,3 @@ def test_whoever_only_reads_results_waits_for_no_compiler():
 def test_any_value_but_0_is_inside(value):
     mask = (noise(30, 70)[..., 0] > 128).astype(np.uint8)
     np.testing.assert_array_equal(pack(mask * np.uint8(value)), pack(mask))
-
-
-@given(masks(), st.integers(0, 40), st.integers(0, 6))
-@settings(max_examples=200)
-def test_bits_shrink_alike_from_the_borders_too(mask, least, rows):
-    reach = np.array([least + rows - row for row in range(rows + 1)])
-    for road in (mask, 1 - mask):
-        assert_same(fast.shrink(pack(road), reach), plain.shrink(pack(road), reach))

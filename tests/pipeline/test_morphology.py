@@ -53,8 +53,7 @@ def post_process(road, **options):
 # --- Eq. 17-22 ------------------------------------------------------------------------------------
 
 
-@given(masks, elements)
-def test_dilation_erosion_opening_and_closing_equal_scipys(road, element):
+def assert_as_scipy(road, element):
     for ours, theirs in (
         (dilate, ndimage.binary_dilation),
         (erode, ndimage.binary_erosion),
@@ -64,6 +63,19 @@ def test_dilation_erosion_opening_and_closing_equal_scipys(road, element):
         result = ours(road, element)
         assert result.dtype == np.uint8
         np.testing.assert_array_equal(result, on_a_plane(theirs, road, element))
+
+
+@given(masks, elements)
+def test_dilation_erosion_opening_and_closing_equal_scipys(road, element):
+    assert_as_scipy(road, element)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("width", [63, 64, 65, 127, 128, 129])
+def test_they_equal_scipys_where_a_word_of_pixels_ends(width, share):
+    road = (np.random.default_rng(width).random((20, width)) < share).astype(np.uint8)
+    for shape in ("square", "ellipse"):
+        assert_as_scipy(road, morphology.structuring_element(5, shape))
 
 
 @given(masks)
