@@ -28,7 +28,6 @@ def demo(
     from roadeval.options import Progress
     from roadeval.synth import DriveSettings, write_drive
 
-    output.parent.mkdir(parents=True, exist_ok=True)
     with progress.watched(quiet) as watch:
         write_drive(
             output,

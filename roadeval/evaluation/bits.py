@@ -69,13 +69,13 @@ def everywhere(shape: tuple[int, int]) -> Bits:
 
 @lru_cache(maxsize=8)
 def square(radius: int) -> Reach:
-    """Give the offsets within ``radius``, in chessboard distance."""
+    """Give the element of ``radius`` pixels in chessboard distance, ``(radius + 1,)`` int64."""
     return np.full(radius + 1, radius)
 
 
 @lru_cache(maxsize=8)
 def disk(radius: int) -> Reach:
-    """Give the offsets within ``radius``, in Euclidean distance."""
+    """Give the element of ``radius`` pixels in Euclidean distance, ``(radius + 1,)`` int64."""
     return np.array([isqrt(radius**2 - row**2) for row in range(radius + 1)])
 
 

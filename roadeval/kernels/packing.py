@@ -29,7 +29,7 @@ class Packed:
 
 
 def pack(mask: npt.NDArray[np.uint8] | npt.NDArray[np.bool_]) -> Bits:
-    """Pack an ``(H, W)`` mask, nonzero inside."""
+    """Pack an ``(H, W)`` mask, nonzero inside, into ``(H, ceil(W / 64))`` uint64."""
     packed = np.packbits(mask, axis=1, bitorder="little")
     if packed.shape[1] % 8:
         packed = np.pad(packed, ((0, 0), (0, -packed.shape[1] % 8)))

@@ -89,9 +89,6 @@ def structuring_element(side: int, shape: str) -> Reach:
     return reach
 
 
-# Outside the image is non-road, for erosion too.
-
-
 def dilate(mask: Packed, element: Reach) -> Packed:
     """Dilation (Eq. 17)."""
     return Packed(KERNELS.grow(mask.bits, element, mask.width), mask.width)
@@ -142,7 +139,8 @@ def keep_region(mask: Packed, patch: Mask | None = None) -> Packed:
     """Keep one 8-connected component of a mask ("largest and connected areas", section 3.4).
 
     The largest, or, given an ``(H, W)`` ``patch``, the one with most pixels in it where any has
-    some. Of equals the first from the top. An empty mask stays empty.
+    some. Of equals the first from the top. An empty mask stays empty. A ValueError if the patch
+    has another shape.
     """
     shape = len(mask.bits), mask.width
     if patch is not None and patch.shape != shape:

@@ -53,6 +53,7 @@ class View:
     ``original`` is the image as logged, ``image`` the same after the filters that ran before
     this stage, both ``(H, W, 3)`` uint8 RGB; ``mask`` is the previous stage's road mask.
     ``moment`` is None for an image that stands alone. One stage of a chain may use its baton.
+    Views of one image share what `planes` has found of it, in a list that begins empty.
     """
 
     original: Rgb

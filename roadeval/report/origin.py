@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from roadeval.asked import typed
+from roadeval.data import FILTERED, UNFILTERED
 from roadeval.report.blocks import Block, Columns, Command, Heading, Table, Text, Together
 from roadeval.report.findings import Findings
 
@@ -21,8 +22,9 @@ def origin(found: Findings) -> Iterator[Block]:
         yield Text(f"SHA-256: {log['sha256']}")
         yield Command(_replay(found, log["path"]))
         yield Text(
-            "Settings that differ from the preset's go into a file for --config; the same log, "
-            "settings and versions give the same numbers.",
+            "Settings that differ from the preset's go into a file for --config, and those of a "
+            "variant into the file that --variant names; the same log, settings and versions give "
+            "the same numbers.",
             "note",
         )
     for topic in summary["drive"].get("topics", ()):
@@ -86,11 +88,17 @@ def _replay(found: Findings, path: str) -> str:
         words += ["--preset", str(found.properties["preset"])]
     # The topics that were picked are named, asked for or not.
     picked = {name: found.properties.get(name) for name in ("image_topic", "truth_topic")}
-    asked = found.summary.get("selection", {})
+    asked = found.summary.get("selection") or {}
     words += typed(asked | {name: topic for name, topic in picked.items() if topic})
+    settings = found.summary.get("settings") or {}
+    for name in [name for name in settings if name not in (FILTERED, UNFILTERED)]:
+        words += ["--variant", f"{name}={name}.toml"]
     training = found.summary.get("training", {})
     if training.get("model"):
         words += ["--model", str(training["model"])]
     elif training.get("frames"):
         words += ["--train-frames", str(training["frames"])]
+        # All variants of a run are trained alike.
+        gap = next((each["training"]["gap"] for each in settings.values()), 0)
+        words += ["--train-gap", str(gap)] if gap else []
     return shlex.join(words)

@@ -219,3 +219,20 @@ def test_the_same_result_gives_the_same_file_and_nothing_is_left_beside_nor_fetc
     again = report_of("drive.rrd", "again.pdf")
     assert again.read_bytes() == report.read_bytes()
     assert sorted(file.name for file in tmp_path.iterdir()) == ["again.pdf", "drive.rrd"]
+
+
+def test_the_command_that_makes_the_results_again_names_gap_and_variants():
+    from types import SimpleNamespace
+
+    from roadeval.report.origin import _replay
+
+    plain = {"training": {"gap": 3}}
+    summary = {
+        "settings": {"filtered": plain, "unfiltered": plain, "wide": plain},
+        "training": {"model": None, "frames": 5},
+    }
+    found = SimpleNamespace(properties={"preset": "paper"}, summary=summary)
+    assert _replay(found, "d.mcap") == (
+        "roadeval replay d.mcap --preset paper --variant wide=wide.toml "
+        "--train-frames 5 --train-gap 3"
+    )
