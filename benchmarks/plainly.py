@@ -60,7 +60,9 @@ class PlainWay:
             layers = self._layers(frame.image, result.variant)
             self._log(layers, result.variant)
             for stage, mask in result.masks():
-                np.testing.assert_array_equal(layers[stage], mask, f"{result.variant} {stage}")
+                np.testing.assert_array_equal(
+                    layers[stage], mask.pixels(), f"{result.variant} {stage}"
+                )
 
     def _layers(self, image: np.ndarray, variant: str) -> dict[str, np.ndarray]:
         model, found, clock = self.models[variant], {}, perf_counter()

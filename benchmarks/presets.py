@@ -84,7 +84,7 @@ def score(
 def last(chain: Chain, frame: Frame) -> np.ndarray:
     """Give the chain's final mask."""
     *_, (_, output) = chain.run(frame.image)
-    return output.mask
+    return output.mask.pixels()
 
 
 def err(total: np.ndarray) -> float:
@@ -134,7 +134,8 @@ def main() -> None:
         learnt = [frame for frames in train.values() for frame in frames]
         prior = BlindPrior.of_truths([frame.truth for frame in learnt])
         blind = [
-            sum(counts(prior.mask(f.image.shape[:2]), f) for f in part) for part in test.values()
+            sum(counts(prior.mask(f.image.shape[:2]).pixels(), f) for f in part)
+            for part in test.values()
         ]
         table.setdefault("blind", []).append(np.array(blind))
         for name, config in variants():

@@ -15,6 +15,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from roadeval.kernels.packing import Packed
+
 Rgb = npt.NDArray[np.uint8]
 """``(H, W, 3)`` uint8, channels red, green, blue."""
 Mask = npt.NDArray[np.uint8]
@@ -212,8 +214,8 @@ class StageResult:
 
     stage: str
     layers: tuple[Layer, ...]
-    mask: Mask | None
-    regions: Mapping[str, Mask]
+    mask: Packed | None
+    regions: Mapping[str, Packed]
     facts: Mapping[str, float]
     seconds: float
 
@@ -228,9 +230,9 @@ class VariantResult:
 
     variant: str
     stages: tuple[StageResult, ...]
-    oracles: Mapping[str, Mapping[str, Mask]] = field(default_factory=dict)
+    oracles: Mapping[str, Mapping[str, Packed]] = field(default_factory=dict)
 
-    def masks(self) -> Iterator[tuple[str, Mask]]:
+    def masks(self) -> Iterator[tuple[str, Packed]]:
         """Yield each stage that has a road mask, with the mask."""
         for result in self.stages:
             if result.mask is not None:

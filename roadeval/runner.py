@@ -20,6 +20,7 @@ from roadeval.data import (
     VariantResult,
     mask_spec,
 )
+from roadeval.kernels.packing import Packed
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import Moment
 from roadeval.training import Model
@@ -35,7 +36,7 @@ def run_variant(
     *,
     truth: Truth | None = None,
     shadow_truth: Truth | None = None,
-    known: dict[Any, dict[str, Mask]] | None = None,
+    known: dict[Any, dict[str, Packed]] | None = None,
 ) -> VariantResult:
     """Run a chain on an ``(H, W, 3)`` uint8 RGB image and time each of its stages.
 
@@ -65,7 +66,8 @@ def external_layout(name: str, topic: str) -> VariantLayout:
 
 def external_variant(name: str, mask: Mask) -> VariantResult:
     """Present a mask that the log carries as a variant with the final stage alone."""
-    stage = StageResult(FINAL_STAGE, (Layer(EXTERNAL, mask),), mask, {}, {}, 0.0)
+    layers, road = (Layer(EXTERNAL, mask),), Packed.of(mask)
+    stage = StageResult(FINAL_STAGE, layers, road, {}, {}, 0.0)
     return VariantResult(name, (stage,))
 
 

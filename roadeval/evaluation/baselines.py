@@ -9,7 +9,8 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import IGNORE, ROAD, Mask, Truth
+from roadeval.data import IGNORE, ROAD, Truth
+from roadeval.kernels.packing import Packed
 
 _NEAREST: Final = 0
 _LINEAR: Final = 1
@@ -28,7 +29,7 @@ class BlindPrior:
     """
 
     road: npt.NDArray[np.float32]
-    _masks: dict[tuple[int, int], Mask] = field(default_factory=dict, init=False, repr=False)
+    _masks: dict[tuple[int, int], Packed] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of_truths(cls, truths: Sequence[Truth]) -> BlindPrior:
@@ -51,15 +52,14 @@ class BlindPrior:
             labelled += resized != IGNORE
         return cls(np.divide(road, labelled, out=np.zeros_like(road), where=labelled > 0))
 
-    def mask(self, shape: tuple[int, int]) -> Mask:
+    def mask(self, shape: tuple[int, int]) -> Packed:
         """Give the baseline's mask for a frame of ``shape`` (height, width): road from one half.
 
-        The same array is given again for the same shape; it is not to be written to.
+        The same mask is given again for the same shape; it is not to be written to.
         """
         if shape not in self._masks:
-            share = _resized(self.road, shape, _LINEAR)
-            mask = (share >= 0.5).astype(np.uint8)
-            mask.flags.writeable = False
+            mask = Packed.of(_resized(self.road, shape, _LINEAR) >= 0.5)
+            mask.bits.flags.writeable = False
             self._masks[shape] = mask
         return self._masks[shape]
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
+from collections.abc import Mapping
 from typing import Any, Final
 
-from roadeval.data import FrameResult, Mask, Role, Truth
-from roadeval.evaluation.bits import TruthBits, ones
+from roadeval.data import FrameResult, Role, Truth
+from roadeval.evaluation.bits import TruthBits
 from roadeval.kernels.arrays import Bits
+from roadeval.kernels.packing import Packed, ones
 
 
 class Flicker:
@@ -32,10 +34,10 @@ class Flicker:
         self._changed: Final[Counter[str]] = Counter()
         self._true: Final[Counter[str]] = Counter()
 
-    def add(self, truth: Truth, masks: dict[str, Mask]) -> None:
-        """Add the next frame: its truth (0, 1, 255) and the final masks (0, 1), all uint8."""
+    def add(self, truth: Truth, masks: Mapping[str, Packed]) -> None:
+        """Add the next frame: its ``(H, W)`` uint8 truth (0, 1, 255) and the final masks."""
         now = TruthBits.of(truth)
-        bits = dict(zip(masks, now.pack(*masks.values()), strict=True))
+        bits = dict(zip(masks, now.bits_of(masks.values()), strict=True))
         before, self._before = self._before, (now, bits)
         if before is None or before[0].shape != now.shape:
             return

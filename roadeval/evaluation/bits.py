@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import isqrt
 
 import numpy as np
 
-from roadeval.data import NON_ROAD, ROAD, Mask, Truth
+from roadeval.data import NON_ROAD, ROAD, Truth
 from roadeval.kernels import KERNELS
 from roadeval.kernels.arrays import Bits, Reach
-from roadeval.kernels.packing import pack
+from roadeval.kernels.packing import Packed, pack
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,37 +34,25 @@ class TruthBits:
         """The pixels that are not ignored."""
         return self.road | self.other
 
-    def pack(self, *masks: Mask) -> Bits:
-        """Pack masks of the truth's shape, non-zero inside: ``(K, H, words)``.
+    def bits_of(self, masks: Iterable[Packed]) -> Bits:
+        """Lay the bits of masks of the truth's shape one behind the other: ``(K, H, words)``.
 
         Raises
         ------
         ValueError
             If one has another shape.
         """
+        bits = []
         for mask in masks:
             if mask.shape != self.shape:
                 raise ValueError(f"shape {mask.shape} differs from the truth's {self.shape}")
-        packed = np.zeros((len(masks), *self.road.shape), np.uint64)
-        for bits, mask in zip(packed, masks, strict=True):
-            bits[:] = pack(mask)
-        return packed
+            bits.append(mask.bits)
+        return np.array(bits, np.uint64).reshape(len(bits), *self.road.shape)
 
     def grow(self, bits: Bits, reach: Reach) -> Bits:
         """Dilate a mask of the truth's shape by an element."""
-        grown: Bits = KERNELS.grow(bits, reach, self.shape[1])
+        grown: Bits = KERNELS.grow(bits, reach, self.shape[1], False)
         return grown
-
-
-def ones(bits: Bits) -> int:
-    """Count the set bits."""
-    return int(np.bitwise_count(bits).sum())
-
-
-@lru_cache(maxsize=8)
-def everywhere(shape: tuple[int, int]) -> Bits:
-    """Give the mask that holds every pixel of an image of ``shape`` (H, W)."""
-    return pack(np.ones(shape, np.uint8))
 
 
 @lru_cache(maxsize=8)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from roadeval.evaluation.bits import TruthBits, disk, ones, square
+from roadeval.evaluation.bits import TruthBits, disk, square
 from roadeval.kernels.arrays import Bits
+from roadeval.kernels.packing import ones
 
 
 def boundary_f(masks: Mapping[str, Bits], truth: TruthBits, width: int) -> dict[str, float]:

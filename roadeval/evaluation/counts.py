@@ -9,9 +9,10 @@ from typing import Final
 import numpy as np
 
 from roadeval.data import ERRORS, Counts, Layer, Mask, Truth
-from roadeval.evaluation.bits import TruthBits, everywhere, flat
+from roadeval.evaluation.bits import TruthBits, flat
 from roadeval.kernels import KERNELS
 from roadeval.kernels.arrays import Bits
+from roadeval.kernels.packing import everywhere
 
 IGNORED: Final = 4
 """The class of `roadeval.data.ERRORS` beside TN, TP, FP and FN, which are 0 to 3."""

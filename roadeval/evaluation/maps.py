@@ -11,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Change, Layer, Step
-from roadeval.evaluation.bits import TruthBits, everywhere, flat, ones
+from roadeval.evaluation.bits import TruthBits, flat
 from roadeval.evaluation.counts import IGNORED
 from roadeval.kernels import KERNELS
 from roadeval.kernels.arrays import Bits
+from roadeval.kernels.packing import everywhere, ones
 
 Sums = npt.NDArray[np.int64]
 Name = tuple[str, str]

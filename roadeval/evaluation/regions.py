@@ -7,9 +7,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from roadeval.data import Frame, Mask, VariantResult
-from roadeval.evaluation.bits import TruthBits, everywhere, square
+from roadeval.data import Frame, VariantResult
+from roadeval.evaluation.bits import TruthBits, square
 from roadeval.kernels.arrays import Bits
+from roadeval.kernels.packing import Packed, everywhere
 
 
 def of_frame(
@@ -27,20 +28,20 @@ def of_frame(
     """
     masks = detected(variants)
     if frame.shadow_truth is not None:
-        masks["true_shadow"] = (frame.shadow_truth == 1).view(np.uint8)
-    found = dict(zip(masks, truth.pack(*masks.values()), strict=True))
+        masks["true_shadow"] = Packed.of(frame.shadow_truth == 1)
+    found = dict(zip(masks, truth.bits_of(masks.values()), strict=True))
     found["boundary"] = boundary(truth, boundary_width)
     found["interior"] = found["boundary"] ^ everywhere(truth.shape)
     return found | dict(row_bands(truth.shape, bands))
 
 
-def detected(variants: Iterable[VariantResult]) -> dict[str, Mask]:
+def detected(variants: Iterable[VariantResult]) -> dict[str, Packed]:
     """Collect the regions that stages found (``shadow``, ``shadow_edge``, ``lit``).
 
     The first variant that has a region of a name gives it to all: variants are compared on the
     same pixels.
     """
-    found: dict[str, Mask] = {}
+    found: dict[str, Packed] = {}
     for variant in variants:
         for result in variant.stages:
             for name, mask in result.regions.items():

@@ -10,17 +10,17 @@ from roadeval.data import (
     Counts,
     Frame,
     FrameResult,
-    Mask,
     Role,
     Tally,
     VariantResult,
 )
 from roadeval.evaluation import contours, counts, health, maps, rates, regions, tables
 from roadeval.evaluation.baselines import BlindPrior
-from roadeval.evaluation.bits import TruthBits, ones
+from roadeval.evaluation.bits import TruthBits
 from roadeval.evaluation.maps import Name
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.kernels.arrays import Bits
+from roadeval.kernels.packing import Packed, ones
 
 
 class CountsNotConservedError(RuntimeError):
@@ -55,7 +55,7 @@ def score_frame(
         raise ValueError(f"frame {frame.number} is to be evaluated, but has no truth")
     truth = TruthBits.of(frame.truth)
     masks = _masks(variants, prior, truth.shape)
-    bits = truth.pack(*masks.values())
+    bits = truth.bits_of(masks.values())
     found = regions.of_frame(
         frame, truth, variants, boundary_width=settings.boundary_width, bands=settings.bands
     )
@@ -69,7 +69,9 @@ def score_frame(
         frame,
         role,
         variants,
-        errors={name: counts.error_map(own, frame.truth) for name, own in final_masks.items()},
+        errors={
+            name: counts.error_map(own.pixels(), frame.truth) for name, own in final_masks.items()
+        },
         tallies=tallies,
         health={name: health.judge(own, blind, settings) for name, own in finals.items()},
         notes=health.notes(finals, blind, settings),
@@ -126,20 +128,20 @@ def prove(result: Tally, labelled: int) -> None:
 
 def _oracles(variants: Sequence[VariantResult], truth: TruthBits) -> dict[str, tuple[Tally, ...]]:
     """Count the masks that stages made once one was replaced by the truth, by that one."""
-    named: dict[str, dict[Name, Mask]] = {}
+    named: dict[str, dict[Name, Packed]] = {}
     for variant in variants:
         for oracle, masks in variant.oracles.items():
             own = {(variant.variant, stage): mask for stage, mask in masks.items()}
             named.setdefault(oracle, {}).update(own)
     return {
-        oracle: tally(list(masks), truth.pack(*masks.values()), truth, {})
+        oracle: tally(list(masks), truth.bits_of(masks.values()), truth, {})
         for oracle, masks in named.items()
     }
 
 
 def _masks(
     variants: Sequence[VariantResult], prior: BlindPrior | None, shape: tuple[int, int]
-) -> dict[Name, Mask]:
+) -> dict[Name, Packed]:
     named = {(v.variant, stage): mask for v in variants for stage, mask in v.masks()}
     if prior is not None:
         named[BASELINE, FINAL_STAGE] = prior.mask(shape)

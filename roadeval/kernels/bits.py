@@ -2,25 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import njit, types
-from numba.extending import intrinsic
+from numba import njit
 
 from roadeval.kernels.arrays import Bits, Reach, Sums
+from roadeval.kernels.words import ones
 
 _compiled = njit(cache=True, nogil=True)
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def _ones(_context: Any, _word: Any) -> Any:
-    """Count the set bits of a word, by the processor's own instruction where it has one."""
-
-    def build(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        return builder.ctpop(arguments[0])
-
-    return types.uint64(types.uint64), build
 
 
 @_compiled  # type: ignore[untyped-decorator]
@@ -38,7 +26,7 @@ def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
             for mask in range(len(masks)):
                 total = np.uint64(0)
                 for word in range(first, last):
-                    total += _ones(masks[mask, word] & both[word])
+                    total += ones(masks[mask, word] & both[word])
                 counts[mask, kind, region] = total
     return counts
 
@@ -55,46 +43,67 @@ def _span(bits: Bits, row: int) -> tuple[np.uintp, np.uintp]:
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def grow(bits: Bits, reach: Reach, width: int) -> Bits:
+def grow(bits: Bits, reach: Reach, width: int, outside: bool) -> Bits:
     """See `plain.grow`."""
     height, words = bits.shape
-    grown = np.zeros_like(bits)
-    # With a clear word at both ends, beside which nothing is to be asked.
-    wide, spare = np.zeros(words + 2, np.uint64), np.zeros(words + 2, np.uint64)
-    # Bits beyond the image's width stay clear.
-    rest = np.uint64(width % 64)
-    last = ~np.uint64(0) if rest == 0 else (np.uint64(1) << rest) - np.uint64(1)
-    for y in range(height):
-        some = np.uint64(0)
-        for word in range(words):
-            wide[word + 1] = bits[y, word]
-            some |= bits[y, word]
-        if not some:
-            continue
-        done = 0
-        # The rows furthest away first: what reached there grows on for those that are nearer.
-        for away in range(len(reach) - 1, -1, -1):
-            _widen(wide, spare, done, reach[away])
-            wide[words] &= last
-            done = reach[away]
-            for v in (y - away, y + away):
-                if 0 <= v < height:
-                    for word in range(words):
-                        grown[v, word] |= wide[word + 1]
-    return grown
+    # All rows one behind the other, with a word before and after each, so that every step is one
+    # long loop, which runs in vector instructions.
+    across = words + 1
+    wide = np.zeros(1 + height * across, np.uint64)
+    spare, grown = np.zeros_like(wide), np.zeros_like(wide)
+    wide[1:].reshape(height, across)[:, :words] = bits
+    _surround(wide, across, width, outside)
+    done = 0
+    # The rows furthest away first: what reached there grows on for those that are nearer.
+    for away in range(len(reach) - 1, -1, -1):
+        while done < reach[away]:
+            # Of what is set at the side half is cut off, and the other half must do.
+            step = min(reach[away] - done, done + 1, 63)
+            _widen(wide[:-2], wide[1:-1], wide[2:], spare[1:-1], np.uint64(step))
+            wide, spare = spare, wide
+            _surround(wide, across, width, outside)
+            done += step
+        if away < height:
+            rest = len(wide) - away * across
+            _unite(grown[away * across :], wide[:rest])
+            _unite(grown[:rest], wide[away * across :])
+    result = grown[1:].reshape(height, across)[:, :words].copy()
+    if outside:
+        near = min(len(reach) - 1, height)
+        result[:near] = ~np.uint64(0)
+        result[height - near :] = ~np.uint64(0)
+        result[:, words - 1] &= _inside(width)
+    return result
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def _widen(wide: Bits, spare: Bits, done: int, pixels: int) -> None:
-    """Set every bit within so many pixels of a set one, where that is done up to ``done``."""
-    words = len(wide) - 2
-    while done < pixels:
-        # At the image's side half of what was set is cut off, and the other half must do.
-        step = min(pixels - done, done + 1, 63)
-        shift, back = np.uint64(step), np.uint64(64 - step)
-        for word in range(words + 2):
-            spare[word] = wide[word]
-        for word in range(1, words + 1):
-            up = spare[word] << shift | spare[word - 1] >> back
-            wide[word] |= up | spare[word] >> shift | spare[word + 1] << back
-        done += step
+def _inside(width: int) -> np.uint64:
+    """Give the bits of a row's last word that lie within the width."""
+    rest = np.uint64(width % 64)
+    return ~np.uint64(0) if rest == 0 else (np.uint64(1) << rest) - np.uint64(1)
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def _surround(wide: Bits, across: int, width: int, outside: bool) -> None:
+    """Set, or clear, what lies between rows and beyond their width."""
+    inside = _inside(width)
+    beyond = ~np.uint64(0) if outside else np.uint64(0)
+    wide[0] = beyond
+    for y in range(across, len(wide), across):
+        wide[y] = beyond
+        wide[y - 1] = wide[y - 1] & inside | beyond & ~inside
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def _widen(before: Bits, here: Bits, after: Bits, wide: Bits, step: np.uint64) -> None:
+    """Set every bit of ``wide`` that is so many pixels from one that is set, or nearer."""
+    back = np.uint64(64) - step
+    for word in range(len(here)):
+        left, right = here[word] << step | before[word] >> back, here[word] >> step
+        wide[word] = here[word] | left | right | after[word] << back
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def _unite(grown: Bits, more: Bits) -> None:
+    for word in range(len(more)):
+        grown[word] |= more[word]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -19,13 +20,22 @@ class Packed:
     width: int
 
     @classmethod
-    def of(cls, mask: Plane) -> Self:
+    def of(cls, mask: npt.NDArray[np.uint8] | npt.NDArray[np.bool_]) -> Self:
         """Pack an ``(H, W)`` mask, nonzero inside."""
         return cls(pack(mask), mask.shape[1])
 
-    def mask(self) -> Plane:
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width in pixels."""
+        return len(self.bits), self.width
+
+    def pixels(self) -> Plane:
         """Give ``(H, W)`` uint8, 0 or 1."""
         return unpack(self.bits, self.width)
+
+    def area(self) -> int:
+        """Count the pixels inside."""
+        return ones(self.bits)
 
 
 def pack(mask: npt.NDArray[np.uint8] | npt.NDArray[np.bool_]) -> Bits:
@@ -34,6 +44,17 @@ def pack(mask: npt.NDArray[np.uint8] | npt.NDArray[np.bool_]) -> Bits:
     if packed.shape[1] % 8:
         packed = np.pad(packed, ((0, 0), (0, -packed.shape[1] % 8)))
     return np.ascontiguousarray(packed).view(np.uint64)
+
+
+def ones(bits: Bits) -> int:
+    """Count the set bits."""
+    return int(np.bitwise_count(bits).sum())
+
+
+@lru_cache(maxsize=8)
+def everywhere(shape: tuple[int, int]) -> Bits:
+    """Give the mask that holds every pixel of an image of ``shape`` (H, W)."""
+    return pack(np.ones(shape, np.uint8))
 
 
 def unpack(bits: Bits, width: int) -> Plane:

@@ -64,7 +64,7 @@ def run_sums(image: Image, runs: Runs, count: int) -> Sums:
     return _sums(label, image[y, x], count)
 
 
-def ring_sums(image: Image, runs: Runs, ring: Plane, count: int, width: int) -> Sums:
+def ring_sums(image: Image, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
     """Sum the colours of every component's buffer ring (Eq. 10).
 
     Parameters
@@ -74,7 +74,7 @@ def ring_sums(image: Image, runs: Runs, ring: Plane, count: int, width: int) -> 
     runs
         ``(n, 4)`` int32, see `components`.
     ring
-        ``(H, W)`` uint8: nonzero on pixels outside the shadow that some dilation reaches.
+        ``(H, words)``: the pixels outside the shadow that some dilation reaches.
     count
         Number of labels, background included.
     width
@@ -86,8 +86,9 @@ def ring_sums(image: Image, runs: Runs, ring: Plane, count: int, width: int) -> 
         ``(count, 7)`` int64, as in `run_sums`. A pixel counts once in each component that
         reaches it.
     """
-    y, x = np.nonzero(ring)
-    padded = np.pad(paint(runs, *ring.shape), width)
+    height, columns, _ = image.shape
+    y, x = np.nonzero(unpack(ring, columns))
+    padded = np.pad(paint(runs, height, columns), width)
     window = np.lib.stride_tricks.sliding_window_view(padded, (2 * width + 1, 2 * width + 1))
     near = window[y, x].reshape(len(y), (2 * width + 1) ** 2)
     pixel = np.repeat(np.arange(len(y)), near.shape[1])
@@ -326,9 +327,10 @@ def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
     return np.array(counts, np.int64).reshape(len(masks), *both.shape[:2])
 
 
-def grow(bits: Bits, reach: Reach, width: int) -> Bits:
-    """Dilate a mask of ``width`` pixels a row by an element."""
-    return pack(cv2.dilate(unpack(bits, width), _element(reach)))
+def grow(bits: Bits, reach: Reach, width: int, outside: bool) -> Bits:
+    """Dilate a mask of ``width`` pixels a row by an element; all around it is ``outside``."""
+    border = {"borderType": cv2.BORDER_CONSTANT, "borderValue": int(outside)}
+    return pack(cv2.dilate(unpack(bits, width), _element(reach), **border))
 
 
 def _element(reach: Reach) -> Plane:

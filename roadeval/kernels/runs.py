@@ -7,14 +7,11 @@ is asked of some thousand runs instead of all pixels.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import njit, types
-from numba.core import cgutils
-from numba.extending import intrinsic
+from numba import njit
 
 from roadeval.kernels.arrays import Bits, Columns, Labels, Places, Plane, Runs
+from roadeval.kernels.words import lowest
 
 _compiled = njit(cache=True, nogil=True)
 _inlined = njit(cache=True, nogil=True, inline="always")
@@ -138,7 +135,7 @@ def _runs(bits: Bits, width: int, inside: bool) -> tuple[Places, Columns, Column
             turns = here ^ (here << np.uint64(1) | before)
             before = here >> np.uint64(63)
             while turns:
-                place = 64 * word + _lowest(turns)
+                place = 64 * word + lowest(turns)
                 turns &= turns - np.uint64(1)
                 if place >= width:
                     break
@@ -153,16 +150,6 @@ def _runs(bits: Bits, width: int, inside: bool) -> tuple[Places, Columns, Column
             count += 1
         rows[y + 1] = count
     return rows, starts[:count], ends[:count]
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def _lowest(_context: Any, _word: Any) -> Any:
-    """Find the lowest set bit of a word that has one."""
-
-    def build(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        return builder.cttz(arguments[0], cgutils.true_bit)
-
-    return types.int64(types.uint64), build
 
 
 @_compiled  # type: ignore[untyped-decorator]

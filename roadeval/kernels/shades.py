@@ -11,7 +11,18 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from roadeval.kernels.arrays import Columns, Floats, Image, Labels, Places, Plane, Runs, Sums, Table
+from roadeval.kernels.arrays import (
+    Bits,
+    Columns,
+    Floats,
+    Image,
+    Labels,
+    Places,
+    Runs,
+    Sums,
+    Table,
+)
+from roadeval.kernels.words import lowest
 
 _compiled = njit(cache=True, nogil=True)
 _inlined = njit(cache=True, nogil=True, inline="always")
@@ -70,86 +81,72 @@ def _paint_row(row: Columns, runs: Runs, run: int, y: int) -> int:
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def ring_sums(image: Image, runs: Runs, ring: Plane, count: int, width: int) -> Sums:
+def ring_sums(image: Image, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
     """See `plain.ring_sums`."""
-    rows, columns = ring.shape
+    (rows, columns, _), words = image.shape, ring.shape[1]
     sums = np.zeros((count, 7), np.int64)
     # The last pixel that each component counted: one pixel counts once in a ring.
     last = np.full(count, -1, np.int64)
-    # Labels of the rows within reach, in turn: they stay in a near cache.
-    near = np.zeros((2 * width + 1, columns), np.int32)
-    greatest, least = np.empty(columns, np.int32), np.empty(columns, np.int32)
-    spare = np.zeros(columns + 2 * width, np.int32), np.full(columns + 2 * width, _NONE)
-    places = np.empty(columns, np.int64)
+    # Labels of the rows within reach, in turn, and beside them as many columns: they stay in a
+    # near cache.
+    near = np.zeros((2 * width + 1, 64 * words + 2 * width), np.int32)
+    greatest, least = np.empty(64, np.int32), np.empty(64, np.int32)
+    spare = np.empty(64 + 2 * width, np.int32), np.empty(64 + 2 * width, np.int32)
     run = 0
     for row in range(rows + width):
-        run = _paint_row(near[row % len(near)], runs, run, row)
+        run = _paint_row(near[row % len(near), width : width + columns], runs, run, row)
         y = row - width
         if y < 0:
             continue
-        found = _places(ring[y], places)
-        if not found:
-            continue
-        _bound(near, width, spare, greatest, least)
-        for index in range(found):
-            x = places[index]
-            # Most pixels of a ring are near one component.
-            if least[x] == greatest[x]:
-                _add(sums, least[x], image, y, x)
-            else:
-                _add_each(sums, last, near, image, (y, x, width))
+        for word in range(words):
+            rest = ring[y, word]
+            if rest:
+                _bound(near, 64 * word, spare, greatest, least)
+            while rest:
+                bit = lowest(rest)
+                rest &= rest - np.uint64(1)
+                x = 64 * word + bit
+                # Most pixels of a ring are near one component.
+                if least[bit] == greatest[bit]:
+                    _add(sums, least[bit], image, y, x)
+                else:
+                    _add_each(sums, last, near, image, (y, x))
     return sums
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def _places(ring: Plane, places: Places) -> int:
-    """Note where a row is nonzero, and how often, without a branch that is hard to foresee."""
-    count = 0
-    for x in range(len(ring)):
-        places[count] = x
-        count += ring[x] != 0
-    return count
-
-
-@_compiled  # type: ignore[untyped-decorator]
 def _bound(
-    near: Labels, width: int, spare: tuple[Columns, Columns], greatest: Columns, least: Columns
+    near: Labels, first: int, spare: tuple[Columns, Columns], greatest: Columns, least: Columns
 ) -> None:
-    """Give the greatest and the least label around each pixel of a row; 0 counts for neither.
+    """Give the greatest and the least label around each pixel of a word; 0 counts for neither.
 
-    ``near`` are the rows around it, in any order, ``spare`` two rows with ``width`` pixels more on
-    both sides, for the columns' own. Loops as simple as these run in vector instructions.
+    ``near`` are the rows around it, in any order, where what is around the word begins with column
+    ``first``; ``spare`` is for the columns' own. Loops as simple as these run in vector
+    instructions.
     """
-    columns = len(least)
     high, low = spare
-    above, below = high[width : width + columns], low[width : width + columns]
-    for x in range(columns):
-        above[x], below[x] = 0, _NONE
+    for x in range(len(high)):
+        high[x], low[x] = 0, _NONE
     for v in range(len(near)):
-        row = near[v]
-        for x in range(columns):
-            above[x] = max(above[x], row[x])
-        for x in range(columns):
-            below[x] = min(below[x], row[x] if row[x] > 0 else _NONE)
-    for x in range(columns):
+        for x in range(len(high)):
+            label = near[v, np.uintp(first + x)]
+            high[x] = max(high[x], label)
+            low[x] = min(low[x], label if label > 0 else _NONE)
+    for x in range(64):
         greatest[x], least[x] = high[x], low[x]
-    for shift in range(1, 2 * width + 1):
-        for x in range(columns):
+    for shift in range(1, len(high) - 63):
+        for x in range(64):
             greatest[x] = max(greatest[x], high[x + shift])
-        for x in range(columns):
             least[x] = min(least[x], low[x + shift])
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def _add_each(
-    sums: Sums, last: Places, near: Labels, image: Image, place: tuple[int, int, int]
-) -> None:
-    """Add a ring's pixel once to every component within ``width`` of ``place``: (y, x, width)."""
-    y, x, width = place
-    columns = near.shape[1]
-    pixel = y * columns + x
+def _add_each(sums: Sums, last: Places, near: Labels, image: Image, place: tuple[int, int]) -> None:
+    """Add a ring's pixel, ``place`` (y, x), once to every component that ``near`` has around it."""
+    y, x = place
+    pixel = y * image.shape[1] + x
     for v in range(len(near)):
-        for u in range(max(x - width, 0), min(x + width + 1, columns)):
+        for u in range(x, x + len(near)):
             label = near[v, u]
             if label > 0 and last[label] != pixel:
                 last[label] = pixel

@@ -68,8 +68,7 @@ class SidecarWriter:
         frame = result.frame
         for variant in result.variants:
             for stage, mask in variant.masks():
-                road = np.where(mask > 0, 255, 0).astype(np.uint8)
-                self._png(f"{ROOT}/{variant.variant}/{stage}", frame, road)
+                self._png(f"{ROOT}/{variant.variant}/{stage}", frame, mask.pixels() * np.uint8(255))
         for name, errors in result.errors.items():
             self._png(f"{ROOT}/{name}/{errors.spec.name}", frame, _coloured(errors))
         for tally in result.tallies:

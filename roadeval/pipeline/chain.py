@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from roadeval.data import LayerSpec, Mask, Rgb, Truth
+from roadeval.data import LayerSpec, Rgb, Truth
+from roadeval.kernels.packing import Packed
 from roadeval.pipeline import (
     classify,
     context,
@@ -79,8 +80,8 @@ class Chain:
         outputs: Sequence[Output],
         road: Truth,
         shadow: Truth | None,
-        known: dict[Any, dict[str, Mask]],
-    ) -> Iterator[tuple[str, dict[str, Mask]]]:
+        known: dict[Any, dict[str, Packed]],
+    ) -> Iterator[tuple[str, dict[str, Packed]]]:
         """Yield what the chain makes of an image once one of its stages is replaced by the truth.
 
         Parameters
@@ -135,7 +136,7 @@ def _shared(step: Step, rest: Sequence[Step]) -> tuple[tuple[str, Any], ...]:
     return tuple((each.stage.name, each.settings) for each in rest)
 
 
-def _masks(steps: Sequence[Step], view: View) -> Iterator[tuple[str, Mask]]:
+def _masks(steps: Sequence[Step], view: View) -> Iterator[tuple[str, Packed]]:
     for step in steps:
         output = step.run(view)
         view = view.after(output)

@@ -14,6 +14,7 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerSpec, Mask, mask_spec
 from roadeval.kernels import KERNELS
+from roadeval.kernels.packing import Packed
 from roadeval.pipeline import cube
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask
@@ -211,12 +212,12 @@ def bind(settings: SvmSettings, machine: SupportVectors) -> Callable[[View], Out
 
     def run(view: View) -> Output:
         apart = view.planes()
-        mask: Mask = KERNELS.look_up_colours(apart, table)
-        undecided = mask == UNDECIDED
+        road: Mask = KERNELS.look_up_colours(apart, table)
+        undecided = road == UNDECIDED
         if undecided.any():
             decide(view.image[undecided], table, machine, settings)
-            mask = KERNELS.look_up_colours(apart, table)
-        return Output((Layer(SVM, mask),), mask=mask)
+            road = KERNELS.look_up_colours(apart, table)
+        return Output((Layer(SVM, road),), mask=Packed.of(road))
 
     return run
 

@@ -30,6 +30,7 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Rgb
 from roadeval.kernels import KERNELS
+from roadeval.kernels.packing import Packed
 from roadeval.pipeline.classify import SVM, Penalty
 from roadeval.pipeline.colour import planes as colour_planes
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
@@ -312,8 +313,8 @@ def bind(settings: ContextSettings, machine: RectifiedMachine) -> Callable[[View
         if settings.memory > 0 and view.moment is not None:
             values = remembered(values, view.moment, settings.memory)
         values = stretched(values, view.image.shape)
-        mask = (values > machine.threshold).view(np.uint8)
-        return Output((Layer(DECISION, values), Layer(SVM, mask)), mask=mask)
+        road = (values > machine.threshold).view(np.uint8)
+        return Output((Layer(DECISION, values), Layer(SVM, road)), mask=Packed.of(road))
 
     return run
 

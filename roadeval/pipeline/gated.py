@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb, Truth
+from roadeval.kernels.packing import Packed
 from roadeval.pipeline import shade
 from roadeval.pipeline.gates import (
     ACCEPTED,
@@ -108,7 +109,7 @@ def bind(settings: GatedSettings, road: RoadLight) -> Callable[[View], Output]:
         return Output(
             layers=tuple(Layer(spec, arrays[spec.name]) for spec in layers(settings)),
             image=image,
-            regions={name: large[name] for name in ("shadow", "shadow_edge", "lit")},
+            regions={name: Packed.of(large[name]) for name in ("shadow", "shadow_edge", "lit")},
             facts=_facts(large["shadow"], verdicts, greatest),
         )
 

@@ -15,8 +15,8 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, mask_spec
 from roadeval.kernels import KERNELS
-from roadeval.kernels.arrays import Bits, Reach
-from roadeval.kernels.packing import Packed
+from roadeval.kernels.arrays import Reach
+from roadeval.kernels.packing import Packed, everywhere
 from roadeval.pipeline.patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View
 
@@ -91,26 +91,14 @@ def structuring_element(side: int, shape: str) -> Reach:
 
 def dilate(mask: Packed, element: Reach) -> Packed:
     """Dilation (Eq. 17)."""
-    return Packed(KERNELS.grow(mask.bits, element, mask.width), mask.width)
+    return Packed(KERNELS.grow(mask.bits, element, mask.width, False), mask.width)
 
 
 def erode(mask: Packed, element: Reach) -> Packed:
     """Erosion (Eq. 18): what the dilation of non-road, which is all around the image, leaves."""
-    other, image = _framed(mask, element, ~np.uint64(0))
-    other[image] = ~mask.bits
-    grown = dilate(Packed(other, 64 * other.shape[1]), element)
-    return Packed(~grown.bits[image], mask.width)
-
-
-def _framed(mask: Packed, element: Reach, fill: np.uint64) -> tuple[Bits, tuple[slice, slice]]:
-    """Make words for an image as large as the mask's and the element beyond it on every side.
-
-    Returns them, all ``fill``, and where the mask's own rows and words lie among them.
-    """
-    rows, words = len(element) - 1, -(-int(element.max()) // 64)
-    height, across = mask.bits.shape
-    wide = np.full((height + 2 * rows, across + 2 * words), fill)
-    return wide, np.s_[rows : rows + height, words : words + across]
+    image = everywhere(mask.shape)
+    other = KERNELS.grow(image ^ mask.bits, element, mask.width, True)
+    return Packed(image ^ other, mask.width)
 
 
 def opening(mask: Packed, element: Reach) -> Packed:
@@ -123,7 +111,10 @@ def closing(mask: Packed, element: Reach) -> Packed:
 
     The dilation may leave the image: cut off there, the erosion would eat road along the edge.
     """
-    wide, image = _framed(mask, element, np.uint64(0))
+    rows, words = len(element) - 1, -(-int(element.max()) // 64)
+    height, across = mask.bits.shape
+    wide = np.zeros((height + 2 * rows, across + 2 * words), np.uint64)
+    image = np.s_[rows : rows + height, words : words + across]
     wide[image] = mask.bits
     # Nothing is closed beside the image, so that the bits beyond its width stay clear.
     closed = erode(dilate(Packed(wide, 64 * wide.shape[1]), element), element)
@@ -142,9 +133,8 @@ def keep_region(mask: Packed, patch: Mask | None = None) -> Packed:
     some. Of equals the first from the top. An empty mask stays empty. A ValueError if the patch
     has another shape.
     """
-    shape = len(mask.bits), mask.width
-    if patch is not None and patch.shape != shape:
-        raise ValueError(f"a patch of {patch.shape} does not fit a mask of {shape}")
+    if patch is not None and patch.shape != mask.shape:
+        raise ValueError(f"a patch of {patch.shape} does not fit a mask of {mask.shape}")
     chosen = np.zeros((0, 0), np.uint8) if patch is None else patch
     return Packed(KERNELS.keep_region(mask.bits, mask.width, chosen), mask.width)
 
@@ -166,8 +156,7 @@ def post_process(mask: Packed, settings: MorphologySettings) -> Packed:
         mask = opening(mask, element) if operation == "open" else closing(mask, element)
     if settings.region != "all":
         patch = settings.region == "patch"
-        shape = len(mask.bits), mask.width
-        mask = keep_region(mask, patch_mask(*shape, settings.patch) if patch else None)
+        mask = keep_region(mask, patch_mask(*mask.shape, settings.patch) if patch else None)
     return fill_holes(mask) if settings.fill else mask
 
 
@@ -178,10 +167,9 @@ def bind(settings: MorphologySettings, _parameters: None) -> Callable[[View], Ou
     def run(view: View) -> Output:
         if view.mask is None:
             raise ValueError("post-processing needs a stage with a road mask before it")
-        road = post_process(Packed.of(view.mask), settings)
-        mask = road.mask()
-        layers = (Layer(POST, mask), Layer(BOUNDARY, boundary(road, edge).mask()))
-        return Output(layers, mask=mask)
+        road = post_process(view.mask, settings)
+        line = boundary(road, edge)
+        return Output((Layer(POST, road.pixels()), Layer(BOUNDARY, line.pixels())), mask=road)
 
     return run
 

@@ -12,11 +12,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 from pydantic import ConfigDict, Field
@@ -24,7 +24,7 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb, Truth
 from roadeval.kernels import KERNELS
-from roadeval.kernels.packing import pack
+from roadeval.kernels.packing import Packed, everywhere
 from roadeval.pipeline import colour
 from roadeval.pipeline.stage import Output, Stage, View
 
@@ -168,7 +168,7 @@ def shadow_mask(codes: Codes, threshold: int | None, *, inclusive: bool) -> Mask
     """Eq. 8: ``(H, W)`` uint8, 1 where the code is above ``threshold`` (or equal to it)."""
     if threshold is None:
         return np.zeros(codes.shape, np.uint8)
-    return (codes >= threshold if inclusive else codes > threshold).astype(np.uint8)
+    return (codes >= threshold if inclusive else codes > threshold).view(np.uint8)
 
 
 # --- Regions: Eq. 9-10 ----------------------------------------------------------------------------
@@ -192,18 +192,16 @@ class Components:
         return labels
 
 
-def connected_components(shadow: Mask, connectivity: int) -> Components:
+def connected_components(shadow: Packed, connectivity: int) -> Components:
     """Eq. 9's fixed point for every seed: the 4- or 8-connected components of a mask."""
-    height, width = shadow.shape
-    runs, count = KERNELS.components(pack(shadow), width, connectivity)
-    return Components(runs, count, (height, width))
+    runs, count = KERNELS.components(shadow.bits, shadow.width, connectivity)
+    return Components(runs, count, shadow.shape)
 
 
-def buffer_ring(shadow: Mask, width: int) -> Mask:
+def buffer_ring(shadow: Packed, width: int) -> Packed:
     """Union of all buffer rings (Eq. 10): within ``width`` 3x3 dilations, and not shadow."""
-    square = np.ones((2 * width + 1, 2 * width + 1), np.uint8)
-    reached: Mask = cv2.dilate(shadow, square) & (1 - shadow)
-    return reached
+    reached = KERNELS.grow(shadow.bits, np.full(width + 1, width), shadow.width, False)
+    return Packed(reached & ~shadow.bits, shadow.width)
 
 
 # --- Compensation: Eq. 11 -------------------------------------------------------------------------
@@ -287,7 +285,7 @@ def compensation(inside: Moments, ring: Moments, settings: ShadowSettings) -> Co
 
 
 def compensate(
-    image: Rgb, found: Components, ring: Mask, settings: ShadowSettings
+    image: Rgb, found: Components, ring: Packed, settings: ShadowSettings
 ) -> tuple[Rgb, Compensation]:
     """Apply Eq. 11 to every component of an ``(H, W, 3)`` uint8 RGB image.
 
@@ -297,12 +295,14 @@ def compensate(
         return _compensate_hsi(image, found, ring, settings)
     count, width = found.count + 1, settings.ring_width
     inside = moments_of_sums(KERNELS.run_sums(image, found.runs, count))
-    around = moments_of_sums(KERNELS.ring_sums(image, found.runs, ring, count, width))
+    around = moments_of_sums(KERNELS.ring_sums(image, found.runs, ring.bits, count, width))
     change = compensation(inside, around, settings)
     return KERNELS.transfer(image, found.runs, change.source, change.target, change.gain), change
 
 
-def lift(image: Rgb, shadow: Mask, settings: ShadowSettings) -> tuple[Rgb, Mask, int, Compensation]:
+def lift(
+    image: Rgb, shadow: Packed, settings: ShadowSettings
+) -> tuple[Rgb, Packed, int, Compensation]:
     """Compensate what a mask calls shadow: components, rings, transfer (Eq. 9 to 11).
 
     Returns the image, the rings, the number of components, and what was done to them.
@@ -314,11 +314,11 @@ def lift(image: Rgb, shadow: Mask, settings: ShadowSettings) -> tuple[Rgb, Mask,
 
 
 def _compensate_hsi(
-    image: Rgb, found: Components, ring: Mask, settings: ShadowSettings
+    image: Rgb, found: Components, ring: Packed, settings: ShadowSettings
 ) -> tuple[Rgb, Compensation]:
     """Compensate saturation and value, keep the hue, and convert back (section 4.2, step 5)."""
     labels = found.labels()
-    label, pixel = ring_pairs(labels, ring, settings.ring_width)
+    label, pixel = ring_pairs(labels, ring.pixels(), settings.ring_width)
     flat = image.reshape(-1, 3)
     shadow = np.flatnonzero(labels)
     k = labels.ravel()[shadow]
@@ -371,17 +371,19 @@ def bind(settings: ShadowSettings, _parameters: None) -> Callable[[View], Output
     def run(view: View) -> Output:
         codes, histogram = KERNELS.look_up_sum_min(view.planes(), NDI_CODES)
         threshold = threshold_of(histogram)
-        shadow = shadow_mask(codes, threshold, inclusive=settings.inclusive)
+        mask = shadow_mask(codes, threshold, inclusive=settings.inclusive)
+        shadow = Packed.of(mask)
         image, ring, count, change = lift(view.image, shadow, settings)
+        lit = everywhere(shadow.shape) & ~(shadow.bits | ring.bits)
         return Output(
             layers=(
                 Layer(NDI, codes),
-                Layer(SHADOW, shadow),
-                Layer(RINGS, shadow + 2 * ring),
+                Layer(SHADOW, mask),
+                Layer(RINGS, mask + 2 * ring.pixels()),
                 Layer(COMPENSATED, image),
             ),
             image=image,
-            regions={"shadow": shadow, "shadow_edge": ring, "lit": 1 - (shadow | ring)},
+            regions={"shadow": shadow, "shadow_edge": ring, "lit": Packed(lit, shadow.width)},
             facts=_facts(threshold, shadow, count, change),
         )
 
@@ -392,23 +394,22 @@ def oracle(settings: ShadowSettings, _parameters: None) -> Callable[[View, Truth
     """Return the filter as it would be if it knew what is shadow; its compensation stays."""
 
     def run(view: View, truth: Truth) -> Output:
-        shadow = (truth == 1).view(np.uint8)
-        return Output(image=lift(view.image, shadow, settings)[0])
+        return Output(image=lift(view.image, Packed.of(truth == 1), settings)[0])
 
     return run
 
 
 def _facts(
-    threshold: int | None, shadow: Mask, count: int, change: Compensation
+    threshold: int | None, shadow: Packed, count: int, change: Compensation
 ) -> dict[str, float]:
-    gains = change.gain[change.applied]
+    greatest = change.gain[change.applied].max(axis=1)
     return {
         "threshold": float("nan") if threshold is None else threshold / 127.5 - 1.0,
-        "shadow_share": cv2.countNonZero(shadow) / shadow.size,
+        "shadow_share": shadow.area() / math.prod(shadow.shape),
         "components": float(count),
         "compensated": float(change.applied.sum()),
-        "max_gain": float(gains.max()) if gains.size else 1.0,
-        "gains_above_3": float((gains.max(axis=1) > 3.0).sum()) if gains.size else 0.0,
+        "max_gain": float(greatest.max()) if greatest.size else 1.0,
+        "gains_above_3": float((greatest > 3.0).sum()),
     }
 
 

@@ -13,6 +13,7 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerKind, LayerSpec, mask_spec
 from roadeval.kernels import KERNELS
+from roadeval.kernels.packing import Packed
 from roadeval.pipeline.parameters import check_arrays, check_covariance, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
 
@@ -78,8 +79,8 @@ def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Out
     spec = _distance(settings)
 
     def run(view: View) -> Output:
-        distance, mask = KERNELS.mahalanobis(view.planes(), road.mean, precision, greatest)
-        return Output((Layer(spec, distance), Layer(SIMILARITY, mask)), mask=mask)
+        distance, near = KERNELS.mahalanobis(view.planes(), road.mean, precision, greatest)
+        return Output((Layer(spec, distance), Layer(SIMILARITY, near)), mask=Packed.of(near))
 
     return run
 

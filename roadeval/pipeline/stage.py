@@ -14,8 +14,9 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import ROAD, Layer, LayerSpec, Mask, Rgb, Truth
+from roadeval.data import ROAD, Layer, LayerSpec, Rgb, Truth
 from roadeval.errors import RoadevalError
+from roadeval.kernels.packing import Packed
 from roadeval.pipeline.colour import Planes, planes
 
 S = TypeVar("S")
@@ -58,7 +59,7 @@ class View:
 
     original: Rgb
     image: Rgb
-    mask: Mask | None = None
+    mask: Packed | None = None
     moment: Moment | None = None
     _apart: list[Planes] = field(default_factory=list, repr=False)
 
@@ -80,15 +81,15 @@ class View:
 class Output:
     """What a stage hands out.
 
-    ``image`` replaces the image for the stages after it; ``mask`` is its road mask (which is
-    also among its ``layers``, under the stage's name); ``regions`` are pixel sets to count
+    ``image`` replaces the image for the stages after it; ``mask`` is its road mask (whose pixels
+    are also among its ``layers``, under the stage's name); ``regions`` are pixel sets to count
     apart; ``facts`` are numbers about the frame.
     """
 
     layers: tuple[Layer, ...] = ()
     image: Rgb | None = None
-    mask: Mask | None = None
-    regions: Mapping[str, Mask] = field(default_factory=dict)
+    mask: Packed | None = None
+    regions: Mapping[str, Packed] = field(default_factory=dict)
     facts: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -195,6 +196,6 @@ def perfect_mask(_settings: Any, _parameters: Any) -> Callable[[View, Truth], Ou
     """Return the oracle of a stage that yields a road mask: the truth, ignored pixels non-road."""
 
     def run(_view: View, truth: Truth) -> Output:
-        return Output(mask=(truth == ROAD).view(np.uint8))
+        return Output(mask=Packed.of(truth == ROAD))
 
     return run

@@ -13,6 +13,7 @@ from roadeval.data import BASELINE, FILTERED, NAMES, UNFILTERED
 from roadeval.evaluation import analysis, counts, maps, tables
 from roadeval.evaluation.bits import TruthBits
 from roadeval.evaluation.scoreboard import COMPARED
+from roadeval.kernels.packing import Packed
 from roadeval.opened import Opened
 from roadeval.report.findings import Findings, Heat, Versus
 from roadeval.reporting.looking import Looker, evenly, named, pipelines
@@ -177,7 +178,8 @@ def _sample(opened: Opened, numbers: Sequence[int]) -> maps.Maps:
         finals = {variant: mask for (variant, _), mask in masks.items()}
         errors = {name: counts.error_map(mask, truth) for name, mask in finals.items()}
         packed = TruthBits.of(truth)
-        found.add(errors, maps.changes(list(masks), packed.pack(*masks.values()), packed))
+        stacked = packed.bits_of(map(Packed.of, masks.values()))
+        found.add(errors, maps.changes(list(masks), stacked, packed))
     return found
 
 

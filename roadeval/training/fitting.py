@@ -116,7 +116,7 @@ def _collapsed(
     for image in images:
         for name, output in chain.run(image):
             if output.mask is not None:
-                shares.setdefault(name, []).append(float(output.mask.mean()))
+                shares.setdefault(name, []).append(output.mask.area() / image[..., 0].size)
     return [
         f"{variant}: {name} has collapsed: it calls {share:.1%} of its own training frames road"
         for name, share in ((name, float(np.mean(values))) for name, values in shares.items())

@@ -11,6 +11,7 @@ import pandas as pd
 from roadeval.data import Counts, Frame, Mask, StageResult, Tally, Truth, VariantResult
 from roadeval.evaluation import rates
 from roadeval.kernels.arrays import Bits
+from roadeval.kernels.packing import Packed
 
 
 def pixels(*rows: str) -> npt.NDArray[np.uint8]:
@@ -35,8 +36,9 @@ def a_variant(
     name: str, masks: Mapping[str, Mask], regions: Mapping[str, Mask] | None = None
 ) -> VariantResult:
     """A variant with a mask a stage; its first stage found the regions."""
+    found = {region: Packed.of(mask) for region, mask in (regions or {}).items()}
     stages = [
-        StageResult(stage, (), mask, regions or {} if place == 0 else {}, {}, 0.002)
+        StageResult(stage, (), Packed.of(mask), found if place == 0 else {}, {}, 0.002)
         for place, (stage, mask) in enumerate(masks.items())
     ]
     return VariantResult(name, tuple(stages))

@@ -7,6 +7,7 @@ import pytest
 
 from roadeval.data import IGNORE, FrameResult, Role
 from roadeval.evaluation.beyond import Beyond, Flicker
+from roadeval.kernels.packing import Packed
 
 from .making import a_frame, a_variant, pixels
 
@@ -16,7 +17,7 @@ TRUTH = pixels("##..", "##.?")
 def flicker_of(*frames):
     flicker = Flicker()
     for truth, mask in frames:
-        flicker.add(truth, {"net": mask})
+        flicker.add(truth, {"net": Packed.of(mask)})
     return flicker.totals("net")
 
 
@@ -42,10 +43,10 @@ def test_a_single_frame_has_none():
 
 def test_nothing_is_compared_across_an_interruption_or_a_change_of_size():
     flicker = Flicker()
-    flicker.add(TRUTH, {"net": TRUTH})
+    flicker.add(TRUTH, {"net": Packed.of(TRUTH)})
     flicker.interrupt()
-    flicker.add(TRUTH, {"net": TRUTH})
-    flicker.add(pixels("#"), {"net": pixels("#")})
+    flicker.add(TRUTH, {"net": Packed.of(TRUTH)})
+    flicker.add(pixels("#"), {"net": Packed.of(pixels("#"))})
     assert flicker.totals("net")["pairs"] == 0
 
 

@@ -9,13 +9,14 @@ from scipy.ndimage import distance_transform_edt
 from roadeval.data import IGNORE
 from roadeval.evaluation import contours
 from roadeval.evaluation.bits import TruthBits, disk
+from roadeval.kernels.packing import pack
 
 from .making import pixels, unpacked
 
 
 def one(mask, truth, width=1):
     packed = TruthBits.of(truth)
-    return contours.boundary_f({"net": packed.pack(mask)[0]}, packed, width)["net"]
+    return contours.boundary_f({"net": pack(mask)}, packed, width)["net"]
 
 
 def edge_of(labels):

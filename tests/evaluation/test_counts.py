@@ -11,6 +11,7 @@ from roadeval.data import Counts
 from roadeval.evaluation import counts
 from roadeval.evaluation.bits import TruthBits
 from roadeval.evaluation.counts import error_map
+from roadeval.kernels.packing import Packed
 
 from .making import pixels
 
@@ -20,8 +21,8 @@ TRUTH = pixels("##..", "##.?")
 def count(masks, truth, regions):
     """Count masks and regions that are not packed yet."""
     packed = TruthBits.of(truth)
-    inside = zip(regions, packed.pack(*regions.values()), strict=True)
-    return counts.count(packed.pack(*masks), packed, dict(inside))
+    inside = zip(regions, packed.bits_of(map(Packed.of, regions.values())), strict=True)
+    return counts.count(packed.bits_of(map(Packed.of, masks)), packed, dict(inside))
 
 
 MASK = pixels("#.#.", "####")

@@ -8,6 +8,7 @@ from roadeval.evaluation import maps
 from roadeval.evaluation.bits import TruthBits
 from roadeval.evaluation.counts import error_map
 from roadeval.evaluation.maps import HeatMap, Maps
+from roadeval.kernels.packing import Packed
 
 from .making import pixels
 
@@ -17,7 +18,7 @@ TRUTH = pixels("##..", "##.?")
 def changes(masks, truth):
     """Count the changes between masks that are not packed yet."""
     packed = TruthBits.of(truth)
-    bits = packed.pack(*(mask for _, _, mask in masks))
+    bits = packed.bits_of(Packed.of(mask) for _, _, mask in masks)
     return maps.changes([(variant, stage) for variant, stage, _ in masks], bits, packed)
 
 

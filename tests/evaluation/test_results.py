@@ -16,6 +16,7 @@ from roadeval.evaluation.results import PARTS, Results, ResultsError, ResultsWri
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.tables import COLUMNS
+from roadeval.kernels.packing import Packed
 
 from .making import a_frame, a_variant, pixels
 
@@ -30,7 +31,7 @@ def a_board() -> Scoreboard:
 
 def scored(board: Scoreboard, role: Role = Role.EVALUATED) -> Iterator[FrameResult]:
     variant = a_variant("filtered", {"post": MASK}, {"shadow": MASK})
-    variant = replace(variant, oracles={"svm": {"post": MASK}})
+    variant = replace(variant, oracles={"svm": {"post": Packed.of(MASK)}})
     for number, truth in enumerate(TRUTHS):
         result = board.score(a_frame(truth, number + 5), role, (variant,))
         board.add(result)

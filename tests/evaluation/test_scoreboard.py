@@ -11,6 +11,7 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.score import CountsNotConservedError, prove
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.kernels.packing import Packed
 
 from .making import a_frame, a_variant, pixels
 
@@ -168,7 +169,7 @@ class TestTheSelfCheck:
 
 
 class TestOracles:
-    variant = replace(FILTERED, oracles={"svm": {"post": pixels("##..", "##.#")}})
+    variant = replace(FILTERED, oracles={"svm": {"post": Packed.of(pixels("##..", "##.#"))}})
 
     def test_are_counted_apart_and_named_after_the_stage_that_was_replaced(self) -> None:
         result = a_board().score(a_frame(TRUTH, 4), Role.EVALUATED, (self.variant,))

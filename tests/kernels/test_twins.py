@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from roadeval import kernels
 from roadeval.kernels import compiled as fast
 from roadeval.kernels import plain, shades
-from roadeval.kernels.packing import pack, unpack
+from roadeval.kernels.packing import Packed, pack, unpack
 from roadeval.pipeline import shadow
 from tests.pipeline.images import IMAGES, images, noise
 
@@ -26,13 +26,14 @@ def segments(image, width):
     codes, histogram = plain.look_up_sum_min(cv2.split(image), shadow.NDI_CODES)
     mask = shadow.shadow_mask(codes, shadow.otsu_threshold(histogram), inclusive=False)
     runs, count = plain.components(pack(mask), mask.shape[1], 8)
-    return runs, shadow.buffer_ring(mask, width), count + 1
+    return runs, shadow.buffer_ring(Packed.of(mask), width).bits, count + 1
 
 
 def every_kernel(image, width):
     """Name, and arguments, of each kernel on an image."""
     runs, ring, count = segments(image, width)
-    labels = plain.paint(runs, *ring.shape)
+    shape = image.shape[:2]
+    labels = plain.paint(runs, *shape)
     source, target = RNG.uniform(-20, 280, (2, count, 3))
     gain = RNG.uniform(0, 9, (count, 3))
     planes = cv2.split(image)
@@ -40,7 +41,7 @@ def every_kernel(image, width):
         "look_up_sum_min": (planes, shadow.NDI_CODES),
         "run_sums": (image, runs, count),
         "ring_sums": (image, runs, ring, count, width),
-        "paint": (runs, *ring.shape),
+        "paint": (runs, *shape),
         "label_runs": (labels,),
         "transfer": (image, runs, source, target, gain),
         "mahalanobis": (planes, np.array([90.5, 101.25, 99.0]), PRECISION, 7.8),
@@ -193,9 +194,10 @@ def test_kernels_of_masks_agree_about_the_end_of_a_word(width, share):
         assert_same(fast.keep_region(*given), plain.keep_region(*given), "keep_region")
     assert_same(fast.fill_holes(packed, width), plain.fill_holes(packed, width), "fill_holes")
     for reach in map(np.array, ([0], [1], [3, 1], [64, 63], [65, 2, 0], [130])):
-        grown = fast.grow(packed, reach, width)
-        assert_same(grown, plain.grow(packed, reach, width), "grow")
-        np.testing.assert_array_equal(grown, pack(unpack(grown, width)))
+        for outside in (False, True):
+            grown = fast.grow(packed, reach, width, outside)
+            assert_same(grown, plain.grow(packed, reach, width, outside), "grow")
+            np.testing.assert_array_equal(grown, pack(unpack(grown, width)))
 
 
 def test_components_are_numbered_by_their_first_pixels_and_touch_by_corners_or_not():
@@ -218,19 +220,20 @@ def test_masks_may_have_any_layout(view):
     np.testing.assert_array_equal(unpack(pack(mask), mask.shape[1]), mask)
 
 
-@given(masks(), st.integers(0, 70), st.integers(0, 6))
+@given(masks(), st.integers(0, 70), st.integers(0, 6), st.booleans())
 @settings(max_examples=200)
-def test_bits_grow_alike_and_stay_in_the_image(mask, least, rows):
+def test_bits_grow_alike_and_stay_in_the_image(mask, least, rows, outside):
     reach = np.array([least + rows - row for row in range(rows + 1)])
-    grown = fast.grow(pack(mask), reach, mask.shape[1])
-    np.testing.assert_array_equal(grown, plain.grow(pack(mask), reach, mask.shape[1]))
+    given = pack(mask), reach, mask.shape[1], outside
+    grown = fast.grow(*given)
+    np.testing.assert_array_equal(grown, plain.grow(*given))
     np.testing.assert_array_equal(grown, pack(unpack(grown, mask.shape[1])))
 
 
 def test_bits_grow_by_the_element():
     mask = np.zeros((9, 130), np.uint8)
     mask[4, 63] = 1
-    grown = unpack(fast.grow(pack(mask), np.array([3, 1]), 130), 130)
+    grown = unpack(fast.grow(pack(mask), np.array([3, 1]), 130, False), 130)
     assert np.argwhere(grown).tolist() == [
         *([3, x] for x in range(62, 65)),
         *([4, x] for x in range(60, 67)),

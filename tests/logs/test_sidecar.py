@@ -20,6 +20,7 @@ from roadeval.data import (
     Tally,
     VariantResult,
 )
+from roadeval.kernels.packing import Packed
 from roadeval.logs import SidecarWriter
 
 MASK = np.array([[0, 1]], np.uint8)
@@ -28,7 +29,7 @@ STAMP, LOGGED = 1_700_000_000_000_000_005, 1_700_000_000_007_000_000
 
 def result() -> FrameResult:
     frame = Frame(3, STAMP, LOGGED, np.zeros((1, 2, 3), np.uint8), b"")
-    stage = StageResult("post", (), MASK, {}, {}, 0.0)
+    stage = StageResult("post", (), Packed.of(MASK), {}, {}, 0.0)
     return FrameResult(
         frame,
         Role.EVALUATED,

@@ -54,7 +54,7 @@ def case(request):
 
 def road(stage, colours):
     """What the stage makes of ``(n, 3)`` colours, as an image of one row."""
-    return stage(View(colours[None], colours[None])).mask[0]
+    return stage(View(colours[None], colours[None])).mask.pixels()[0]
 
 
 COLOURS = np.concatenate([noise(1, 8000)[0], sample().colours(), sample(seed=1).colours()])
@@ -198,12 +198,12 @@ def test_the_mask_is_the_machine_at_every_pixel(case):
     settings, machine, stage, _ = case
     for image in IMAGES.values():
         output = stage(View(image, image))
-        assert output.mask.dtype == np.uint8
-        assert output.mask.shape == image.shape[:2]
+        (layer,) = output.layers
+        assert layer.array.dtype == np.uint8
+        assert layer.array.shape == image.shape[:2]
         values = classify.decision(image.reshape(-1, 3), machine, settings)
         clear = np.abs(values - settings.threshold) > ROUNDING
         expected = values > settings.threshold
-        np.testing.assert_array_equal(output.mask.ravel()[clear], expected[clear])
-        (layer,) = output.layers
-        assert layer.array is output.mask
+        np.testing.assert_array_equal(layer.array.ravel()[clear], expected[clear])
+        np.testing.assert_array_equal(layer.array, output.mask.pixels())
         assert layer.spec == classify.SVM

@@ -27,7 +27,7 @@ def every_pixel(images, truths, seed=0):
 
 def fit_and_run(images, truths, image, settings=PLAIN):
     machine = context.fit(every_pixel(images, truths), settings)
-    return context.bind(settings, machine)(View(image, image)).mask
+    return context.bind(settings, machine)(View(image, image)).mask.pixels()
 
 
 # --- Features -------------------------------------------------------------------------------------

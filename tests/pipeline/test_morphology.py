@@ -18,7 +18,7 @@ from tests.pipeline.images import mask, masks
 
 def on_masks(operation):
     """Let an operation on packed masks take and give plain ones."""
-    return lambda road, *rest: operation(Packed.of(road), *rest).mask()
+    return lambda road, *rest: operation(Packed.of(road), *rest).pixels()
 
 
 dilate, erode = on_masks(morphology.dilate), on_masks(morphology.erode)
@@ -279,9 +279,9 @@ def test_an_even_side_is_refused(key):
 
 def test_the_boundary_layer_is_of_the_result():
     road = (np.random.default_rng(2).random((30, 40)) > 0.3).astype(np.uint8)
-    output = morphology.bind(MorphologySettings(), None)(View(None, None, road))
+    output = morphology.bind(MorphologySettings(), None)(View(None, None, Packed.of(road)))
     layers = {layer.spec.name: layer.array for layer in output.layers}
-    assert output.mask is layers["post"]
+    np.testing.assert_array_equal(layers["post"], output.mask.pixels())
     np.testing.assert_array_equal(layers["boundary"], reference.boundary(layers["post"] > 0))
     assert tuple(layer.spec for layer in output.layers) == morphology.layers(MorphologySettings())
 
@@ -300,7 +300,9 @@ def test_opencvs_own_border_would_differ():
 
 def test_the_boundarys_width_is_a_setting():
     road = (np.random.default_rng(2).random((30, 40)) > 0.01).astype(np.uint8)
-    output = morphology.bind(MorphologySettings(boundary_element=7), None)(View(None, None, road))
+    output = morphology.bind(MorphologySettings(boundary_element=7), None)(
+        View(None, None, Packed.of(road))
+    )
     layers = {layer.spec.name: layer.array for layer in output.layers}
     expected = boundary(layers["post"], morphology.structuring_element(7, "square"))
     assert expected.sum() > boundary(layers["post"], np.array([1, 1])).sum()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from roadeval.kernels.packing import Packed
 from roadeval.pipeline import shadow
 from roadeval.pipeline.chain import STAGES, Chain
 from roadeval.pipeline.stage import View
@@ -23,6 +24,10 @@ def chain(request):
     return Chain(NAMES, request.param, fitted(request.param))
 
 
+def assert_same(found, expected, name=""):
+    np.testing.assert_array_equal(found.pixels(), expected.pixels(), err_msg=name)
+
+
 def oracles(chain, shadow_truth=TRULY_DARK):
     outputs = [output for _, output in chain.run(IMAGE)]
     return dict(chain.oracles(IMAGE, outputs, ROAD, shadow_truth, {}))
@@ -33,31 +38,31 @@ def masks(steps_of, image):
 
 
 def test_a_perfect_svm_is_the_truth_with_ignored_pixels_as_non_road_given_to_post(chain):
-    given = (ROAD == 1).astype(np.uint8)
+    given = Packed.of(ROAD == 1)
     post = chain.steps[-1]
     expected = STAGES["post"].bind(post.settings, None)
     told = oracles(chain)["svm"]
     assert list(told) == ["post"]
-    np.testing.assert_array_equal(told["post"], expected(View(IMAGE, IMAGE, given)).mask)
+    assert_same(told["post"], expected(View(IMAGE, IMAGE, given)).mask)
 
 
 def test_a_perfect_filter_compensates_true_shadow_and_all_stages_follow(chain):
     settings = chain.steps[0].settings
-    image, *_ = shadow.lift(IMAGE, (TRULY_DARK == 1).astype(np.uint8), settings)
+    image, *_ = shadow.lift(IMAGE, Packed.of(TRULY_DARK == 1), settings)
     assert (image != IMAGE).any()
     own = {step.stage.name: step.settings for step in chain.steps}
     after = Chain(NAMES[1:], own, fitted(own))
     told = oracles(chain)["shadow"]
     assert list(told) == ["similarity", "svm", "post"]
     for name, mask in masks(after, image).items():
-        np.testing.assert_array_equal(told[name], mask, err_msg=name)
+        assert_same(told[name], mask, name)
 
 
 def test_a_filter_that_is_told_what_it_found_gives_what_it_gave(chain):
     outputs = [output for _, output in chain.run(IMAGE)]
-    told = dict(chain.oracles(IMAGE, outputs, ROAD, outputs[0].regions["shadow"], {}))
+    told = dict(chain.oracles(IMAGE, outputs, ROAD, outputs[0].regions["shadow"].pixels(), {}))
     for name, mask in masks(chain, IMAGE).items():
-        np.testing.assert_array_equal(told["shadow"][name], mask, err_msg=name)
+        assert_same(told["shadow"][name], mask, name)
 
 
 def test_without_true_shadow_no_filter_is_replaced(chain):
@@ -72,18 +77,18 @@ def test_the_replaced_stage_sees_the_image_that_those_before_it_made(chain):
     outputs = [output for _, output in longer.run(IMAGE)]
     assert outputs[0].image is not None
     assert (outputs[0].image != IMAGE).any()
-    told = dict(longer.oracles(IMAGE, outputs, ROAD, outputs[1].regions["shadow"], {}))
+    told = dict(longer.oracles(IMAGE, outputs, ROAD, outputs[1].regions["shadow"].pixels(), {}))
     for name, mask in masks(longer, IMAGE).items():
-        np.testing.assert_array_equal(told["shadow"][name], mask, err_msg=name)
+        assert_same(told["shadow"][name], mask, name)
 
 
 def test_running_oracles_changes_no_output(chain):
     outputs = [output for _, output in chain.run(IMAGE)]
-    before = [None if o.mask is None else o.mask.copy() for o in outputs]
+    before = [None if o.mask is None else o.mask.pixels() for o in outputs]
     dict(chain.oracles(IMAGE, outputs, ROAD, TRULY_DARK, {}))
     for mask, output in zip(before, outputs, strict=True):
         if mask is not None:
-            np.testing.assert_array_equal(mask, output.mask)
+            np.testing.assert_array_equal(mask, output.mask.pixels())
 
 
 def test_every_machine_and_every_filter_has_an_oracle():
@@ -102,4 +107,4 @@ def test_variants_share_what_follows_a_perfect_mask_and_nothing_else(chain):
     outputs = [output for _, output in other.run(IMAGE)]
     alone = dict(other.oracles(IMAGE, outputs, ROAD, None, {}))["svm"]
     shared = dict(other.oracles(IMAGE, outputs, ROAD, None, known))["svm"]
-    np.testing.assert_array_equal(shared["post"], alone["post"])
+    assert_same(shared["post"], alone["post"])

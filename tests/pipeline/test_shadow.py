@@ -11,6 +11,7 @@ from scipy import ndimage
 from skimage.filters import threshold_otsu
 
 from roadeval.kernels import plain
+from roadeval.kernels.packing import Packed
 from roadeval.pipeline import shadow
 from roadeval.pipeline.shadow import ShadowSettings
 from roadeval.pipeline.stage import View
@@ -177,7 +178,7 @@ CROSS, SQUARE = ndimage.generate_binary_structure(2, 1), ndimage.generate_binary
 @given(shadowed=masks)
 @settings(max_examples=60)
 def test_components_are_the_fixed_points_of_the_iteration(connectivity, b, shadowed):
-    found = shadow.connected_components(shadowed, connectivity)
+    found = shadow.connected_components(Packed.of(shadowed), connectivity)
     labels, count = found.labels(), found.count
     assert set(np.unique(labels)) - {0} == set(range(1, count + 1))
     assert ((labels > 0) == shadowed).all()
@@ -199,7 +200,11 @@ def test_a_ring_by_hand():
         "...#..",
         "......",
     )
-    assert (shadow.buffer_ring(shadowed, 1) == mask("####..", "#..##.", "###.#.", "..###.")).all()
+    assert (buffer_ring(shadowed, 1) == mask("####..", "#..##.", "###.#.", "..###.")).all()
+
+
+def buffer_ring(shadowed, width):
+    return shadow.buffer_ring(Packed.of(shadowed), width).pixels()
 
 
 def literal_rings(shadowed, labels, width):
@@ -214,8 +219,8 @@ def literal_rings(shadowed, labels, width):
 @given(shadowed=masks, width=st.integers(1, 3))
 @settings(max_examples=60)
 def test_rings_equal_the_dilation_of_each_component_alone(connectivity, shadowed, width):
-    labels = shadow.connected_components(shadowed, connectivity).labels()
-    union = shadow.buffer_ring(shadowed, width)
+    labels = shadow.connected_components(Packed.of(shadowed), connectivity).labels()
+    union = buffer_ring(shadowed, width)
     label, pixel = shadow.ring_pairs(labels, union, width)
     expected = list(literal_rings(shadowed, labels, width))
     assert (union == sum([ring for *_, ring in expected], np.zeros(shadowed.shape, bool))).all()
@@ -227,7 +232,7 @@ def test_rings_equal_the_dilation_of_each_component_alone(connectivity, shadowed
 def test_a_pixel_between_two_components_counts_in_both_rings():
     image = noise(1, 7)
     labels = np.array([[0, 1, 0, 0, 2, 0, 0]], np.int32)
-    ring = shadow.buffer_ring((labels > 0).astype(np.uint8), 2)
+    ring = shadow.buffer_ring(Packed.of(labels > 0), 2).bits
     outside = shadow.KERNELS.ring_sums(image, plain.label_runs(labels), ring, 3, 2)
     assert outside[1, 1:4].tolist() == image[0, [0, 2, 3]].sum(axis=0).tolist()
     assert outside[2, 1:4].tolist() == image[0, [2, 3, 5, 6]].sum(axis=0).tolist()
@@ -246,7 +251,7 @@ def test_compensation_by_hand():
     grey = np.array([[94, 10, 106], [94, 14, 106]], np.uint8)
     image = np.repeat(grey[..., None], 3, axis=2)
     labels = np.array([[0, 1, 0], [0, 1, 0]], np.int32)
-    ring = (labels == 0).astype(np.uint8)
+    ring = Packed.of(labels == 0)
     result, change = shadow.compensate(image, one(labels), ring, ShadowSettings())
     assert change.gain[1].tolist() == [3.0, 3.0, 3.0]
     assert result[..., 0].tolist() == [[94, 94, 106], [94, 106, 106]]
@@ -297,8 +302,8 @@ options = st.builds(
 
 def check_rgb(image, chosen):
     shadowed = run(image, chosen)[1]["shadow"]
-    found = shadow.connected_components(shadowed, chosen.connectivity)
-    ring = shadow.buffer_ring(shadowed, chosen.ring_width)
+    found = shadow.connected_components(Packed.of(shadowed), chosen.connectivity)
+    ring = shadow.buffer_ring(Packed.of(shadowed), chosen.ring_width)
     result, _ = shadow.compensate(image, found, ring, chosen)
     connectivity = 2 if chosen.connectivity == 8 else 1
     assert_rounded(result, literal_eq_11(image, shadowed, chosen, connectivity))
@@ -336,9 +341,9 @@ def test_a_component_gets_the_mean_and_deviation_of_its_ring():
     image = np.clip(image, 0, 255).astype(np.uint8)
     labels = np.zeros((40, 40), np.int32)
     labels[10:30, 10:30] = 1
-    ring = shadow.buffer_ring(labels.astype(np.uint8), 3)
+    ring = shadow.buffer_ring(Packed.of(labels > 0), 3)
     result, _ = shadow.compensate(image, one(labels), ring, ShadowSettings(ring_width=3))
-    around, inside = image[ring > 0].astype(float), result[labels > 0].astype(float)
+    around, inside = image[ring.pixels() > 0].astype(float), result[labels > 0].astype(float)
     # Rounding moves no pixel, and so neither statistic, by more than half a level.
     np.testing.assert_allclose(inside.mean(axis=0), around.mean(axis=0), rtol=0, atol=0.5)
     np.testing.assert_allclose(inside.std(axis=0), around.std(axis=0), rtol=0, atol=0.5)
@@ -347,16 +352,16 @@ def test_a_component_gets_the_mean_and_deviation_of_its_ring():
 def test_a_constant_component_takes_the_mean_of_its_ring_with_gain_1():
     image = picture("....", ".#..", "....")
     labels = mask("....", ".#..", "....").astype(np.int32)
-    ring = shadow.buffer_ring(labels.astype(np.uint8), 1)
+    ring = shadow.buffer_ring(Packed.of(labels > 0), 1)
     result, change = shadow.compensate(image, one(labels), ring, ShadowSettings())
     assert change.gain[1].tolist() == [1.0, 1.0, 1.0]
-    assert result[1, 1].tolist() == np.rint(image[ring > 0].mean(axis=0)).tolist()
+    assert result[1, 1].tolist() == np.rint(image[ring.pixels() > 0].mean(axis=0)).tolist()
 
 
 @pytest.mark.parametrize("colour_space", ["rgb", "hsi"])
 def test_a_component_without_a_ring_is_left_as_it_is(colour_space):
     image = noise(3, 4)
-    labels, ring = np.ones((3, 4), np.int32), np.zeros((3, 4), np.uint8)
+    labels, ring = np.ones((3, 4), np.int32), Packed.of(np.zeros((3, 4), np.uint8))
     chosen = ShadowSettings(colour_space=colour_space)
     result, change = shadow.compensate(image, one(labels), ring, chosen)
     np.testing.assert_array_equal(result, image)
@@ -366,7 +371,7 @@ def test_a_component_without_a_ring_is_left_as_it_is(colour_space):
 def test_the_gain_may_be_bounded_and_is_not_by_default():
     image = np.repeat(np.array([[[0], [20], [22], [250]]], np.uint8), 3, axis=2)
     labels = np.array([[0, 1, 1, 0]], np.int32)
-    ring = np.array([[1, 0, 0, 1]], np.uint8)
+    ring = Packed.of(np.array([[1, 0, 0, 1]], np.uint8))
     for most, gain in ((None, 125.0), (4.0, 4.0)):
         _, change = shadow.compensate(image, one(labels), ring, ShadowSettings(max_gain=most))
         assert change.gain[1, 0] == gain
@@ -424,9 +429,8 @@ def test_the_filter_equals_the_plain_pipeline(image, chosen):
 @pytest.mark.parametrize("image", IMAGES.values(), ids=IMAGES)
 def test_shadow_edge_and_lit_share_out_the_image(image):
     output, layers = run(image, ShadowSettings(ring_width=2))
-    parts = [output.regions[name] for name in ("shadow", "shadow_edge", "lit")]
+    parts = [output.regions[name].pixels() for name in ("shadow", "shadow_edge", "lit")]
     assert (sum(parts) == 1).all()
-    assert all(part.dtype == np.uint8 for part in parts)
     np.testing.assert_array_equal(layers["rings"], parts[0] + 2 * parts[1])
 
 
@@ -445,8 +449,8 @@ def test_facts_state_threshold_components_and_gains():
     assert facts["threshold"] == pytest.approx(shadow.otsu_threshold(histogram) / 127.5 - 1)
     assert facts["shadow_share"] == pytest.approx(3 / 15)
     assert facts["components"] == facts["compensated"] == 2
-    found = shadow.connected_components(run(image)[1]["shadow"], 8)
-    ring = shadow.buffer_ring((found.labels() > 0).astype(np.uint8), 1)
+    found = shadow.connected_components(Packed.of(run(image)[1]["shadow"]), 8)
+    ring = shadow.buffer_ring(Packed.of(found.labels() > 0), 1)
     _, change = shadow.compensate(image, found, ring, ShadowSettings())
     assert facts["max_gain"] == change.gain.max() > 3
     assert facts["gains_above_3"] == (change.gain > 3).any(axis=1).sum() == 1

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from roadeval.kernels.packing import Packed
 from roadeval.pipeline.stage import Output, View
 from tests.pipeline.images import noise
 
-MASK = np.zeros((6, 8), np.uint8)
+MASK = Packed.of(np.zeros((6, 8), np.uint8))
 
 
 def test_the_channels_are_those_of_the_image():

@@ -21,6 +21,7 @@ from roadeval.data import (
     VariantResult,
     mask_spec,
 )
+from roadeval.kernels.packing import Packed
 from roadeval.recording import Layout
 
 HEIGHT, WIDTH = 6, 8
@@ -69,7 +70,7 @@ def result(number, *, err=0.25, fnr=0.5, **changes):
     filtering = StageResult(
         "shadow", (Layer(NDI, ndi), Layer(RINGS, rings)), None, {}, {"components": 3.0}, 0.004
     )
-    final = StageResult("post", (Layer(POST, mask),), mask, {}, {}, 0.002)
+    final = StageResult("post", (Layer(POST, mask),), Packed.of(mask), {}, {}, 0.002)
     tally = Tally("filtered", "post", Counts(1, 2, 3, 4), rates={"ERR": err, "FNR": fnr})
     plain = FrameResult(
         shown,

@@ -49,7 +49,7 @@ def test_the_worst_frames_pictures_are_kept_and_of_equals_the_earlier(rule, fram
     assert list(recording.frame_numbers) == list(frames)
     assert list(recording.frames.frame) == list(range(7))
     for number in frames:
-        mask = next(result(number).variants[0].masks())[1]
+        mask = next(result(number).variants[0].masks())[1].pixels()
         np.testing.assert_array_equal(recording.layer("filtered", "post", number), mask)
 
 

@@ -18,7 +18,7 @@ def test_a_fitted_variant_finds_the_road_in_a_new_frame():
     model = fit(FRAMES, {"unfiltered": plan}, TrainingSettings())
     chain = Chain(plan.chain, plan.settings, model.parameters["unfiltered"])
     fresh = frame(9)
-    masks = {name: output.mask for name, output in chain.run(fresh.image)}
+    masks = {name: output.mask.pixels() for name, output in chain.run(fresh.image)}
     for name in ("similarity", "svm", "post"):
         wrong = (masks[name] != fresh.truth).mean()
         assert wrong < 0.06, name
