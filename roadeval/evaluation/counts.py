@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
-from roadeval.data import ERRORS, Counts, Layer, Mask, Truth
+from roadeval.data import ERRORS, Layer, Mask, Truth
 from roadeval.evaluation.bits import TruthBits, flat
 from roadeval.kernels import KERNELS
-from roadeval.kernels.arrays import Bits
+from roadeval.kernels.arrays import Bits, Sums
 from roadeval.kernels.packing import everywhere
 
 IGNORED: Final = 4
 """The class of `roadeval.data.ERRORS` beside TN, TP, FP and FN, which are 0 to 3."""
 
 
-@dataclass(frozen=True, slots=True)
-class MaskCounts:
-    """The counts of one mask on one frame, in the whole frame and by region."""
-
-    whole: Counts
-    regions: dict[str, Counts]
-
-
-def count(masks: Bits, truth: TruthBits, regions: Mapping[str, Bits]) -> tuple[MaskCounts, ...]:
+def count(masks: Bits, truth: TruthBits, regions: Sequence[Bits]) -> Sums:
     """Count TP, TN, FP and FN of each mask, in the whole frame and in each region.
 
     Parameters
@@ -36,22 +27,18 @@ def count(masks: Bits, truth: TruthBits, regions: Mapping[str, Bits]) -> tuple[M
     truth
         Ignored pixels are in no count.
     regions
-        ``(H, words)`` each; regions may overlap.
+        R of ``(H, words)``; they may overlap.
 
     Returns
     -------
-    tuple of MaskCounts
-        One for each mask, in their order.
+    numpy.ndarray
+        ``(K, 1 + R, 4)`` int64: of each mask the whole frame's four, then each region's.
     """
-    whole = everywhere(truth.shape)
-    inside, classes = flat([whole, *regions.values()]), flat([truth.road, truth.other])
-    positives, negatives = KERNELS.count_bits(flat([whole]), classes, inside)[0]
+    inside = flat([everywhere(truth.shape), *regions])
+    classes = flat([truth.road, truth.other])
+    positives, negatives = KERNELS.count_bits(inside[:1], classes, inside)[0]
     tp, fp = KERNELS.count_bits(flat(masks), classes, inside).transpose(1, 0, 2)
-    counted = []
-    for rows in np.stack([tp, negatives - fp, fp, positives - tp], axis=2).tolist():
-        total, *parts = (Counts(*row) for row in rows)
-        counted.append(MaskCounts(total, dict(zip(regions, parts, strict=True))))
-    return tuple(counted)
+    return np.stack([tp, negatives - fp, fp, positives - tp], axis=2)
 
 
 def error_map(mask: Mask, truth: Truth) -> Layer:

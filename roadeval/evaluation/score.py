@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from roadeval.data import (
     BASELINE,
     FINAL_STAGE,
@@ -19,7 +21,7 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.bits import TruthBits
 from roadeval.evaluation.maps import Name
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.kernels.arrays import Bits
+from roadeval.kernels.arrays import Bits, Sums
 from roadeval.kernels.packing import Packed, ones
 
 
@@ -97,32 +99,34 @@ def tally(
         If the counts of a mask do not add up to the labelled pixels, or its parts not to the
         whole.
     """
-    counted = counts.count(masks, truth, found)
-    labelled = ones(truth.labelled)
-    tallies = tuple(
-        Tally(*name, result.whole, result.regions, rates.of(result.whole))
-        for name, result in zip(names, counted, strict=True)
-    )
-    for result in tallies:
-        prove(result, labelled)
-    return tallies
+    counted = counts.count(masks, truth, list(found.values()))
+    prove(names, counted, list(found), ones(truth.labelled))
+    tallies = []
+    for (variant, stage), rows in zip(names, counted.tolist(), strict=True):
+        whole, *parts = (Counts(*row) for row in rows)
+        by_region = dict(zip(found, parts, strict=True))
+        tallies.append(Tally(variant, stage, whole, by_region, rates.of(whole)))
+    return tuple(tallies)
 
 
-def prove(result: Tally, labelled: int) -> None:
+def prove(names: Sequence[Name], counted: Sums, found: Sequence[str], labelled: int) -> None:
     """Prove ``TP + TN + FP + FN = N = pixels - ignored``, and that the regions are parts of it.
 
-    The row bands together are the frame, and so are ``boundary`` and ``interior``; wherever a
-    tally has them, their counts must add up to the whole's.
+    The row bands together are the frame, and so are ``boundary`` and ``interior``; where they are
+    among the regions ``found``, their counts must add up to the whole's. ``counted`` is as
+    `roadeval.evaluation.counts.count` gives it.
     """
-    whole, parts = result.counts, result.regions
-    bands = [part for name, part in parts.items() if name.startswith("band_")]
-    halves = [parts[name] for name in ("boundary", "interior") if name in parts]
-    sums = [sum(group, Counts()) for group in (bands, halves) if group]
-    negative = min(whole.tp, whole.tn, whole.fp, whole.fn) < 0
-    if whole.n != labelled or negative or any(total != whole for total in sums):
+    whole = counted[:, 0]
+    lost = (whole.sum(axis=1) != labelled) | (whole < 0).any(axis=1)
+    bands = [place for place, name in enumerate(found, 1) if name.startswith("band_")]
+    halves = [place for place, name in enumerate(found, 1) if name in ("boundary", "interior")]
+    for places in filter(None, (bands, halves)):
+        lost |= (counted[:, places].sum(axis=1) != whole).any(axis=1)
+    if lost.any():
+        first = int(np.argmax(lost))
         raise CountsNotConservedError(
-            f"{result.variant}/{result.stage}: {whole} in parts {sums} of {labelled} labelled "
-            "pixels: please report this as a defect of roadeval"
+            f"{'/'.join(names[first])}: {counted[first].tolist()} in the whole and in {found}, of "
+            f"{labelled} labelled pixels: please report this as a defect of roadeval"
         )
 
 

@@ -28,6 +28,8 @@ Floats = npt.NDArray[np.float64]
 Bits = npt.NDArray[np.uint64]
 """``(H, words)`` of an ``(H, W)`` mask, C-contiguous, 64 pixels a word, the leftmost in the lowest
 bit; those beyond the width are 0. ``(K, H, words)`` of K masks."""
+Words = npt.NDArray[np.uint64]
+"""``(n,)``: a bit for each of something, 64 a word."""
 Reach = npt.NDArray[np.int64]
 """A structuring element that is symmetric in both directions, ``(r + 1,)``: how many pixels it
 extends to either side in its own row and in each of the r rows above and below, never more in a row

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from roadeval.kernels.arrays import Floats, Image, Plane, Planes, Sums, Table, Values
+from roadeval.kernels.arrays import Floats, Image, Plane, Planes, Sums, Table, Values, Words
 
 _compiled = njit(cache=True, nogil=True)
 
@@ -63,21 +63,24 @@ def mahalanobis(
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def look_up_colours(planes: Planes, table: Table) -> Plane:
+def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
     """See `plain.look_up_colours`."""
     reds, greens, blues = planes
     height, width = reds.shape
     result = np.empty((height, width), np.uint8)
     # A row at a time: where its colours stand is found in vector instructions.
-    places = np.empty(width, np.int32)
-    entries = table.ravel()
+    words, bits = np.empty(width, np.int32), np.empty(width, np.uint8)
     for y in range(height):
         for x in range(width):
             r, g, b = np.int32(reds[y, x]), np.int32(greens[y, x]), np.int32(blues[y, x])
-            coarse = (r >> 2) << 18 | (g >> 2) << 12 | (b >> 2) << 6
-            places[x] = coarse | (r & 3) << 4 | (g & 3) << 2 | (b & 3)
+            words[x] = (r >> 2) << 12 | (g >> 2) << 6 | b >> 2
+            bits[x] = (r & 3) << 4 | (g & 3) << 2 | b & 3
         for x in range(width):
-            result[y, x] = entries[np.uintp(places[x])]
+            result[y, x] = road[np.uintp(words[x])] >> np.uint64(bits[x]) & np.uint64(1)
+        if len(left):
+            for x in range(width):
+                still = left[np.uintp(words[x])] >> np.uint64(bits[x]) & np.uint64(1)
+                result[y, x] |= np.uint8(still << np.uint64(1))
     return result
 
 

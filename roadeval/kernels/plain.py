@@ -18,6 +18,7 @@ from roadeval.kernels.arrays import (
     Sums,
     Table,
     Values,
+    Words,
 )
 from roadeval.kernels.packing import pack, unpack
 
@@ -167,24 +168,29 @@ def mahalanobis(
     return np.sqrt(squared.astype(np.float32)), (squared <= greatest).astype(np.uint8)
 
 
-def look_up_colours(planes: Planes, table: Table) -> Plane:
-    """Look every pixel up in a table over all colours.
+def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
+    """Look every pixel up in a table over all colours, a bit each.
 
     Parameters
     ----------
     planes
         Red, green and blue, ``(H, W)`` uint8 each.
-    table
-        ``(64, 64, 64, 4, 4, 4)`` uint8 by ``R >> 2, G >> 2, B >> 2, R & 3, G & 3, B & 3``: similar
-        colours, as an image has them side by side, share a line of the processor's cache.
+    road, left
+        ``(2^18,)`` uint64 by the upper six bits of red, green and blue; of a word's bits the lower
+        two of each tell which: similar colours, as an image has them side by side, share it.
+        ``left`` may be empty.
 
     Returns
     -------
     numpy.ndarray
-        ``(H, W)`` uint8.
+        ``(H, W)`` uint8: the bit in ``road``, and twice that in ``left``.
     """
-    coarse, fine = [plane >> 2 for plane in planes], [plane & 3 for plane in planes]
-    found: Plane = table[(*coarse, *fine)]
+    r, g, b = (plane.astype(np.int64) for plane in planes)
+    word = (r >> 2) << 12 | (g >> 2) << 6 | b >> 2
+    bit = ((r & 3) << 4 | (g & 3) << 2 | b & 3).astype(np.uint64)
+    found: Plane = (road[word] >> bit & np.uint64(1)).astype(np.uint8)
+    if len(left):
+        found |= (left[word] >> bit & np.uint64(1)).astype(np.uint8) << 1
     return found
 
 

@@ -12,19 +12,16 @@ import numpy.typing as npt
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.data import Layer, LayerSpec, Mask, mask_spec
-from roadeval.kernels import KERNELS
+from roadeval.data import Layer, LayerSpec, mask_spec
 from roadeval.kernels.packing import Packed
 from roadeval.pipeline import cube
+from roadeval.pipeline.colour_table import ColourTable
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask
 
 Floats = npt.NDArray[np.float64]
 
 SVM: Final = mask_spec("svm", "SVM: road (Eq. 16)")
-
-UNDECIDED: Final = 2
-"""In a table of colours: too near to the threshold for a quick value to tell the side."""
 
 Penalty = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
 """C of a soft margin. It bounds the machine's weights, which are to stay far below `GREATEST`."""
@@ -138,48 +135,20 @@ def decision(
 
 
 @lru_cache(maxsize=4)
-def colour_table(machine: SupportVectors, settings: SvmSettings) -> npt.NDArray[np.uint8]:
-    """Eq. 16 for every colour there is, 1 for road.
+def colour_table(machine: SupportVectors, settings: SvmSettings) -> ColourTable:
+    """Eq. 16 for every colour there is.
 
-    A pixel's features are its three colours alone, so this is all the machine can say. A value
-    from the colour `cube` decides where its error bound keeps it off the threshold. The colours
-    that are left, `UNDECIDED` here, `decide` fills in when they are seen: mostly some twenty,
-    but all of them where the machine has learnt nothing and its value is 0 everywhere.
-
-    The table is ``(64, 64, 64, 4, 4, 4)`` uint8 by the upper six bits of red, green and blue and
-    then their lower two, as `roadeval.kernels.plain.look_up_colours` wants it.
-
-    The last tables are remembered, each 16 MiB.
+    A pixel's features are its three colours alone, so this is all the machine can say. The last
+    tables are remembered, each 2 MiB.
     """
     # Matrices this small gain nothing from threads, and lose all where other work needs a core.
     from threadpoolctl import threadpool_limits
 
-    table = np.empty((64, 64, 64, 4, 4, 4), np.uint8)
-    margins = _margins(machine, settings)
     with threadpool_limits(1, "blas"):
-        for red, margin in enumerate(margins):
-            slab = (margin > 0).view(np.uint8)
-            slab[np.abs(margin) <= margins.error] = UNDECIDED
-            table[red >> 2, :, :, red & 3] = slab.reshape(64, 4, 64, 4).transpose(0, 2, 1, 3)
-    return table
-
-
-def decide(
-    colours: npt.NDArray[np.uint8],
-    table: npt.NDArray[np.uint8],
-    machine: SupportVectors,
-    settings: SvmSettings,
-) -> None:
-    """Fill in what a `colour_table` leaves open of ``(n, 3)`` colours, by their exact values.
-
-    Whichever thread comes first writes the same.
-    """
-    wide = colours.astype(np.int64)
-    index = np.unique((wide[:, 0] << 16) | (wide[:, 1] << 8) | wide[:, 2])
-    channels = index >> 16, index >> 8 & 255, index & 255
-    place = (*(c >> 2 for c in channels), *(c & 3 for c in channels))
-    seen = np.stack(channels, axis=1).astype(np.uint8)
-    table[place] = decision(seen, machine, settings) > settings.threshold
+        return ColourTable(
+            _margins(machine, settings),
+            lambda colours: decision(colours, machine, settings) > settings.threshold,
+        )
 
 
 def _margins(machine: SupportVectors, settings: SvmSettings) -> cube.Slabs:
@@ -211,12 +180,7 @@ def bind(settings: SvmSettings, machine: SupportVectors) -> Callable[[View], Out
     table = colour_table(machine, settings)
 
     def run(view: View) -> Output:
-        apart = view.planes()
-        road: Mask = KERNELS.look_up_colours(apart, table)
-        undecided = road == UNDECIDED
-        if undecided.any():
-            decide(view.image[undecided], table, machine, settings)
-            road = KERNELS.look_up_colours(apart, table)
+        road = table.look_up(view.planes())
         return Output((Layer(SVM, road),), mask=Packed.of(road))
 
     return run

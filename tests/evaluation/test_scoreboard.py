@@ -1,12 +1,13 @@
 """A drive's score, from its frames to its sums."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from roadeval.data import Counts, Health, Role, Tally
+from roadeval.data import Counts, Health, Role
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.score import CountsNotConservedError, prove
 from roadeval.evaluation.scoreboard import Scoreboard
@@ -20,6 +21,8 @@ FILTERED = a_variant(
     "filtered", {"svm": pixels("#...", "#..."), "post": pixels("##..", "#...")}, {"lit": TRUTH}
 )
 UNFILTERED = a_variant("unfiltered", {"svm": TRUTH, "post": pixels("##..", "##..")})
+
+Counted = tuple[int, int, int, int]
 
 
 def a_board(prior: BlindPrior | None = None, window: int = 10) -> Scoreboard:
@@ -148,24 +151,33 @@ def test_a_frame_that_ignores_every_pixel_has_undefined_rates_and_is_counted_so(
 
 
 class TestTheSelfCheck:
-    whole = Counts(tp=2, tn=2, fp=1, fn=1)
+    names = (("net", "svm"), ("net", "post"))
+    whole = (2, 2, 1, 1)
+
+    def prove(self, labelled: int, second: Sequence[Counted], found: Sequence[str] = ()) -> None:
+        """Prove two masks, of which the first has nothing amiss in it."""
+        first = [self.whole, *[self.whole, (0, 0, 0, 0)][: len(found)]]
+        prove(self.names, np.array([first, second]), found, labelled)
 
     def test_accepts_counts_that_add_up(self) -> None:
-        halves = {"boundary": Counts(tp=1, fp=1), "interior": Counts(tp=1, tn=2, fn=1)}
-        prove(Tally("net", "post", self.whole, halves), 6)
+        halves = [(1, 0, 1, 0), (1, 2, 0, 1)]
+        self.prove(6, [self.whole, *halves], ["boundary", "interior"])
 
     def test_refuses_a_lost_pixel(self) -> None:
         with pytest.raises(CountsNotConservedError, match="net/post"):
-            prove(Tally("net", "post", self.whole), 7)
+            self.prove(6, [(2, 2, 1, 0)])
 
     def test_refuses_a_negative_count(self) -> None:
-        with pytest.raises(CountsNotConservedError):
-            prove(Tally("net", "post", Counts(tp=3, fp=-1)), 2)
+        with pytest.raises(CountsNotConservedError, match="net/post"):
+            self.prove(6, [(7, 0, -1, 0)])
 
-    def test_refuses_parts_that_do_not_make_the_whole(self) -> None:
-        bands = {"band_0": Counts(tp=2), "band_1": Counts(tn=2, fp=2)}
-        with pytest.raises(CountsNotConservedError):
-            prove(Tally("net", "post", self.whole, bands), 6)
+    @pytest.mark.parametrize("found", [["band_0", "band_1"], ["boundary", "interior"]])
+    def test_refuses_parts_that_do_not_make_the_whole(self, found: list[str]) -> None:
+        with pytest.raises(CountsNotConservedError, match="net/post"):
+            self.prove(6, [self.whole, (2, 0, 0, 0), (0, 2, 2, 0)], found)
+
+    def test_regions_that_overlap_need_not_make_the_whole(self) -> None:
+        self.prove(6, [self.whole, (2, 0, 0, 0), (0, 2, 2, 0)], ["shadow", "lit"])
 
 
 class TestOracles:

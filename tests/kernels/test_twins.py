@@ -18,7 +18,7 @@ from tests.pipeline.images import IMAGES, images, noise
 RNG = np.random.default_rng(0)
 TRUTHS = np.array([0, 1, 255], np.uint8)
 CHANNEL_TABLE = RNG.integers(0, 256, (256, 3), dtype=np.uint8)
-COLOUR_TABLE = RNG.integers(0, 256, (64, 64, 64, 4, 4, 4), np.uint8)
+COLOUR_TABLES = RNG.integers(0, 1 << 64, (2, 1 << 18), np.uint64)
 PRECISION = np.linalg.inv(np.cov(RNG.normal(0, 30, (3, 50))))
 
 
@@ -46,7 +46,7 @@ def every_kernel(image, width):
         "transfer": (image, runs, source, target, gain),
         "mahalanobis": (planes, np.array([90.5, 101.25, 99.0]), PRECISION, 7.8),
         "look_up_channels": (image, CHANNEL_TABLE),
-        "look_up_colours": (planes, COLOUR_TABLE),
+        "look_up_colours": (planes, *COLOUR_TABLES),
         "outcomes": (image[..., 0] & 1, RNG.choice(TRUTHS, labels.shape), 4),
     }
 

@@ -1,0 +1,66 @@
+"""A decision for every colour: the margins' where they can tell, else the definition's."""
+
+import numpy as np
+import pytest
+
+from roadeval.pipeline import colour_table
+from roadeval.pipeline.colour_table import FEW, ColourTable
+from roadeval.pipeline.cube import Slabs
+from tests.pipeline.images import noise
+
+LEVELS = np.indices((256, 256, 256), np.int16)
+
+
+def margin(red):
+    """Positive inside a ball around a colour, and nowhere 0."""
+    away = (red - 90) ** 2 + (LEVELS[1, 0] - 140.0) ** 2 + (LEVELS[2, 0] - 120.0) ** 2
+    return 60.0**2 - 0.5 - away
+
+
+def decide(colours):
+    r, g, b = colours.T.astype(np.int64)
+    return (r - 90) ** 2 + (g - 140) ** 2 + (b - 120) ** 2 < 60**2
+
+
+def planes(colours):
+    """``(n, 3)`` colours as an image of one row."""
+    return tuple(np.ascontiguousarray(colours[None, :, c]) for c in range(3))
+
+
+def every_colour(red):
+    g, b = np.indices((256, 256), np.uint8).reshape(2, -1)
+    return np.stack([np.full_like(g, red), g, b], axis=1)
+
+
+@pytest.mark.parametrize("few", [0, FEW], ids=["when looked up", "at once"])
+def test_every_colour_is_decided_as_by_the_definition(few, monkeypatch):
+    monkeypatch.setattr(colour_table, "FEW", few)
+    asked = []
+    table = ColourTable(Slabs(margin, 20.0), lambda c: asked.append(len(c)) or decide(c))
+    assert sum(asked) > 0 or few == 0
+    for red in (0, 29, 30, 31, 90, 147, 150, 255):
+        colours = every_colour(red)
+        np.testing.assert_array_equal(table.look_up(planes(colours))[0], decide(colours))
+    assert 0 < sum(asked) < FEW
+
+
+def test_what_is_certain_is_not_asked_for():
+    def fail(_colours):
+        raise AssertionError
+
+    colours = noise(1, 4000)[0]
+    found = ColourTable(Slabs(margin, 0.0), fail).look_up(planes(colours))
+    np.testing.assert_array_equal(found[0], decide(colours))
+    assert 0 < found.mean() < 1
+
+
+def test_a_colour_is_asked_for_once():
+    asked = []
+    nothing = Slabs(lambda red: np.zeros((256, 256)), 1.0)
+    table = ColourTable(nothing, lambda c: asked.append(len(c)) or decide(c))
+    image = noise(30, 40)
+    apart = tuple(np.ascontiguousarray(image[..., c]) for c in range(3))
+    first = table.look_up(apart)
+    np.testing.assert_array_equal(first.ravel(), decide(image.reshape(-1, 3)))
+    np.testing.assert_array_equal(table.look_up(apart), first)
+    assert asked == [len(np.unique(image.reshape(-1, 3), axis=0))]
