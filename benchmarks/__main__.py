@@ -24,6 +24,7 @@ from roadeval import logs, runner
 from roadeval.data import Frame, Role
 from roadeval.flow import one_thread_each
 from roadeval.options import ReplayOptions
+from roadeval.pipeline.stage import View
 from roadeval.recording import Rule, recorder_for
 from roadeval.run import Run
 
@@ -117,7 +118,7 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
                 frame, seconds = timed(logged.decode)
                 lap("decode", seconds)
                 variants = tuple(
-                    runner.run_variant(n, c, frame.image) for n, c in run._chains.items()
+                    runner.run_variant(n, c, View.of(frame.image)) for n, c in run._chains.items()
                 )
                 for variant in variants:
                     for stage in variant.stages:

@@ -26,6 +26,7 @@ from roadeval.config import Config, preset
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.pipeline.chain import Chain
+from roadeval.pipeline.stage import View
 from roadeval.training import fit
 
 TP, TN, FP, FN, DARK, DARK_MISSED = range(6)
@@ -83,7 +84,7 @@ def score(
 
 def last(chain: Chain, frame: Frame) -> np.ndarray:
     """Give the chain's final mask."""
-    *_, (_, output) = chain.run(frame.image)
+    *_, (_, output) = chain.run(View.of(frame.image))
     return output.mask.pixels()
 
 

@@ -7,7 +7,7 @@ otherwise. Times are integer nanoseconds since the Unix epoch, or whatever epoch
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Final
@@ -15,7 +15,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.kernels.packing import Packed
+from roadeval.kernels.arrays import Bits
+from roadeval.kernels.packing import Packed, pack
 
 Rgb = npt.NDArray[np.uint8]
 """``(H, W, 3)`` uint8, channels red, green, blue."""
@@ -200,6 +201,41 @@ def mask_spec(name: str, title: str) -> LayerSpec:
     return LayerSpec(name, LayerKind.MASK, title, ROAD_CLASSES)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class TruthBits:
+    """A truth as `Bits`: ``shape`` (H, W), the ``road`` and the ``other`` (non-road) pixels."""
+
+    shape: tuple[int, int]
+    road: Bits
+    other: Bits
+
+    @classmethod
+    def of(cls, truth: Truth) -> TruthBits:
+        """Pack an ``(H, W)`` uint8 truth (0, 1, 255)."""
+        height, width = truth.shape
+        return cls((height, width), pack(truth == ROAD), pack(truth == NON_ROAD))
+
+    @property
+    def labelled(self) -> Bits:
+        """The pixels that are not ignored."""
+        return self.road | self.other
+
+    def bits_of(self, masks: Iterable[Packed]) -> Bits:
+        """Lay the bits of masks of the truth's shape one behind the other: ``(K, H, words)``.
+
+        Raises
+        ------
+        ValueError
+            If one has another shape.
+        """
+        bits = []
+        for mask in masks:
+            if mask.shape != self.shape:
+                raise ValueError(f"shape {mask.shape} differs from the truth's {self.shape}")
+            bits.append(mask.bits)
+        return np.array(bits, np.uint64).reshape(len(bits), *self.road.shape)
+
+
 # --- What a variant makes of a frame ------------------------------------------------------------
 
 
@@ -242,6 +278,15 @@ class VariantResult:
         """Yield every layer of every stage, in order."""
         for result in self.stages:
             yield from result.layers
+
+    def final(self) -> Mask:
+        """Give the pixels of the last stage's mask, ``(H, W)`` uint8."""
+        *_, (stage, mask) = self.masks()
+        # Its layer has them already, unless layers were left out.
+        for layer in self.layers():
+            if layer.spec.name == stage:
+                return layer.array.astype(np.uint8, copy=False)
+        return mask.pixels()
 
 
 @dataclass(frozen=True, slots=True)
@@ -336,10 +381,11 @@ class FrameResult:
 
     ``tallies`` is empty unless the frame is evaluated. ``tables`` holds this frame's finished
     lines of the tables that grow frame by frame (keys ``frames``, ``regions``, ``oracles``; no
-    header). ``changes`` are from stage to stage and from final mask to final mask, ``contours``
-    the boundary F of each final mask by variant, and ``oracles`` the counts of what the stages
-    made once one was replaced by the truth, by that one. ``notes`` are sentences for a person,
-    ``pictures`` says what is recorded beside the numbers.
+    header). ``truth`` is the frame's, as the masks were held against it. ``changes`` are from
+    stage to stage and from final mask to final mask, ``contours`` the boundary F of each final
+    mask by variant, and ``oracles`` the counts of what the stages made once one was replaced by
+    the truth, by that one. ``notes`` are sentences for a person, ``pictures`` says what is
+    recorded beside the numbers.
     """
 
     frame: Frame
@@ -350,6 +396,7 @@ class FrameResult:
     health: Mapping[str, Health] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     tables: Mapping[str, str] = field(default_factory=dict)
+    truth: TruthBits | None = None
     changes: Mapping[Step, Change] = field(default_factory=dict)
     contours: Mapping[str, float] = field(default_factory=dict)
     oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)

@@ -25,5 +25,5 @@ class Gallery:
             return
         self._due.pop(0)
         frame = result.frame
-        masks = {v.variant: list(v.masks())[-1][1].pixels() for v in result.variants}
+        masks = {v.variant: v.final() for v in result.variants}
         self.examples.append(Example(frame.number, frame.image, frame.truth, masks))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any, Protocol
 
@@ -19,7 +20,7 @@ from roadeval.gallery import Gallery
 from roadeval.memory import give_back
 from roadeval.options import OptionError, Progress, ReplayOptions
 from roadeval.pipeline.chain import Chain
-from roadeval.pipeline.stage import MisfitError, Moment
+from roadeval.pipeline.stage import MisfitError, Moment, View
 from roadeval.recording import Layout
 from roadeval.relay import Relay, Turn
 from roadeval.training import Model
@@ -161,9 +162,12 @@ class Run:
         role = self._schedule.role(frame)
         known = (frame.truth, frame.shadow_truth) if role is Role.EVALUATED else (None, None)
         shared: dict[Any, Any] = {}
+        seen = View.of(frame.image)
         variants = [
             runner.run_variant(
-                *(name, chain, frame.image, Moment(frame.stamp_ns, turn.batons[name])),
+                name,
+                chain,
+                replace(seen, moment=Moment(frame.stamp_ns, turn.batons[name])),
                 truth=known[0],
                 shadow_truth=known[1],
                 known=shared,

@@ -22,7 +22,7 @@ from roadeval.data import (
 )
 from roadeval.kernels.packing import Packed
 from roadeval.pipeline.chain import Chain
-from roadeval.pipeline.stage import Moment
+from roadeval.pipeline.stage import View
 from roadeval.training import Model
 
 EXTERNAL: Final = mask_spec(FINAL_STAGE, "Road mask in the log")
@@ -31,21 +31,20 @@ EXTERNAL: Final = mask_spec(FINAL_STAGE, "Road mask in the log")
 def run_variant(
     name: str,
     chain: Chain,
-    image: Rgb,
-    moment: Moment | None = None,
+    view: View,
     *,
     truth: Truth | None = None,
     shadow_truth: Truth | None = None,
     known: dict[Any, dict[str, Packed]] | None = None,
 ) -> VariantResult:
-    """Run a chain on an ``(H, W, 3)`` uint8 RGB image and time each of its stages.
+    """Run a chain on a frame and time each of its stages.
 
     Given the truth, run it also with each stage that has an oracle replaced by that, untimed;
     ``known`` is what the frame's variants share of it, see `Chain.oracles`.
     """
     results, outputs = [], []
     start = perf_counter()
-    for stage, output in chain.run(image, moment):
+    for stage, output in chain.run(view):
         seconds = perf_counter() - start
         results.append(
             StageResult(stage, output.layers, output.mask, output.regions, output.facts, seconds)
@@ -55,7 +54,7 @@ def run_variant(
     oracles = {}
     if truth is not None:
         shared = {} if known is None else known
-        oracles = dict(chain.oracles(image, outputs, truth, shadow_truth, shared))
+        oracles = dict(chain.oracles(view, outputs, truth, shadow_truth, shared))
     return VariantResult(name, tuple(results), oracles)
 
 
@@ -106,4 +105,4 @@ def run_frame(
     config = config or Config()
     if variant == UNFILTERED:
         config = config.without_filter()
-    return run_variant(variant, config.bind(model.parameters[variant]), image)
+    return run_variant(variant, config.bind(model.parameters[variant]), View.of(image))

@@ -7,8 +7,7 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping
 from typing import Any, Final
 
-from roadeval.data import FrameResult, Role, Truth
-from roadeval.evaluation.bits import TruthBits
+from roadeval.data import FrameResult, Role, TruthBits
 from roadeval.kernels.arrays import Bits
 from roadeval.kernels.packing import Packed, ones
 
@@ -34,9 +33,8 @@ class Flicker:
         self._changed: Final[Counter[str]] = Counter()
         self._true: Final[Counter[str]] = Counter()
 
-    def add(self, truth: Truth, masks: Mapping[str, Packed]) -> None:
-        """Add the next frame: its ``(H, W)`` uint8 truth (0, 1, 255) and the final masks."""
-        now = TruthBits.of(truth)
+    def add(self, now: TruthBits, masks: Mapping[str, Packed]) -> None:
+        """Add the next frame: its truth and the final masks."""
         bits = dict(zip(masks, now.bits_of(masks.values()), strict=True))
         before, self._before = self._before, (now, bits)
         if before is None or before[0].shape != now.shape:
@@ -79,7 +77,7 @@ class Beyond:
 
     def add(self, result: FrameResult) -> None:
         """Add a frame, in the drive's order. One that is not evaluated interrupts the flicker."""
-        if result.role is not Role.EVALUATED or result.frame.truth is None:
+        if result.role is not Role.EVALUATED or result.truth is None:
             self._flicker.interrupt()
             return
         for name, score in result.contours.items():
@@ -88,7 +86,7 @@ class Beyond:
                 total[0] += score
                 total[1] += 1
         finals = {v.variant: mask for v in result.variants for _, mask in v.masks()}
-        self._flicker.add(result.frame.truth, finals)
+        self._flicker.add(result.truth, finals)
 
     def interrupt(self) -> None:
         """Say that a frame was lost here."""

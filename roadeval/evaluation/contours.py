@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from roadeval.evaluation.bits import TruthBits, disk, square
+from roadeval.data import TruthBits
+from roadeval.evaluation.bits import disk, grow, square
 from roadeval.kernels.arrays import Bits
 from roadeval.kernels.packing import ones
 
@@ -34,11 +35,11 @@ def boundary_f(masks: Mapping[str, Bits], truth: TruthBits, width: int) -> dict[
        Segmentation, CVPR 2016, section 5.
     """
     true_edge, labelled = edge_of(truth), truth.labelled
-    near_truth = truth.grow(true_edge, disk(width))
+    near_truth = grow(true_edge, disk(width), truth)
     scores = {}
     for name, mask in masks.items():
         edge = edge_of(TruthBits(truth.shape, mask & labelled, labelled & ~mask))
-        near = truth.grow(edge, disk(width))
+        near = grow(edge, disk(width), truth)
         scores[name] = _f_measure(edge, near_truth, true_edge, near)
     return scores
 
@@ -48,7 +49,7 @@ def edge_of(labels: TruthBits) -> Bits:
 
     Neither the image's border nor an ignored pixel makes an edge.
     """
-    return labels.road & labels.grow(labels.other, square(1))
+    return labels.road & grow(labels.other, square(1), labels)
 
 
 def _f_measure(edge: Bits, near_truth: Bits, true_edge: Bits, near: Bits) -> float:

@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from roadeval.data import ERRORS, Layer, Mask, Truth
-from roadeval.evaluation.bits import TruthBits, flat
+from roadeval.data import ERRORS, Layer, Mask, Truth, TruthBits
+from roadeval.evaluation.bits import flat
 from roadeval.kernels import KERNELS
 from roadeval.kernels.arrays import Bits, Sums
 from roadeval.kernels.packing import everywhere

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import Change, Layer, Step
-from roadeval.evaluation.bits import TruthBits, flat
+from roadeval.data import Change, Layer, Step, TruthBits
+from roadeval.evaluation.bits import flat
 from roadeval.evaluation.counts import IGNORED
 from roadeval.kernels import KERNELS
 from roadeval.kernels.arrays import Bits

@@ -7,8 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from roadeval.data import Frame, VariantResult
-from roadeval.evaluation.bits import TruthBits, square
+from roadeval.data import Frame, TruthBits, VariantResult
+from roadeval.evaluation.bits import grow, square
 from roadeval.kernels.arrays import Bits
 from roadeval.kernels.packing import Packed, everywhere
 
@@ -57,7 +57,7 @@ def boundary(truth: TruthBits, width: int) -> Bits:
     is no edge. ``width`` is in pixels on either side, in chessboard distance.
     """
     element = square(width)
-    return truth.grow(truth.road, element) & truth.grow(truth.other, element)
+    return grow(truth.road, element, truth) & grow(truth.other, element, truth)
 
 
 @lru_cache(maxsize=8)

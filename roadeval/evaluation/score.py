@@ -14,11 +14,11 @@ from roadeval.data import (
     FrameResult,
     Role,
     Tally,
+    TruthBits,
     VariantResult,
 )
 from roadeval.evaluation import contours, counts, health, maps, rates, regions, tables
 from roadeval.evaluation.baselines import BlindPrior
-from roadeval.evaluation.bits import TruthBits
 from roadeval.evaluation.maps import Name
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.kernels.arrays import Bits, Sums
@@ -65,15 +65,12 @@ def score_frame(
     final_bits = {variant: mask for (variant, _), mask in zip(masks, bits, strict=True)}
     finals = {result.variant: result.rates for result in tallies}
     blind = finals.pop(BASELINE, None)
-    final_masks = {variant: mask for (variant, _), mask in masks.items() if variant != BASELINE}
     oracles = _oracles(variants, truth)
     return FrameResult(
         frame,
         role,
         variants,
-        errors={
-            name: counts.error_map(own.pixels(), frame.truth) for name, own in final_masks.items()
-        },
+        errors={v.variant: counts.error_map(v.final(), frame.truth) for v in variants},
         tallies=tallies,
         health={name: health.judge(own, blind, settings) for name, own in finals.items()},
         notes=health.notes(finals, blind, settings),
@@ -82,6 +79,7 @@ def score_frame(
             "regions": tables.region_lines(frame, tallies),
             **({"oracles": tables.oracle_lines(frame, oracles)} if oracles else {}),
         },
+        truth=truth,
         changes=maps.changes(list(masks), bits, truth),
         contours=contours.boundary_f(final_bits, truth, settings.boundary_width),
         oracles=oracles,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from roadeval.data import LayerSpec, Rgb, Truth
@@ -17,7 +17,7 @@ from roadeval.pipeline import (
     shadow,
     similarity,
 )
-from roadeval.pipeline.stage import Moment, Output, Stage, View, perfect_mask
+from roadeval.pipeline.stage import Output, Stage, View, perfect_mask
 
 STAGES: Final[Mapping[str, Stage[Any, Any]]] = {
     stage.name: stage
@@ -62,13 +62,11 @@ class Chain:
     ) -> None:
         self.steps = tuple(_bind(STAGES[name], settings[name], parameters) for name in names)
 
-    def run(self, image: Rgb, moment: Moment | None = None) -> Iterator[tuple[str, Output]]:
-        """Yield each stage's name and output on an ``(H, W, 3)`` uint8 RGB image.
+    def run(self, view: View) -> Iterator[tuple[str, Output]]:
+        """Yield each stage's name and output on what is seen before the first.
 
-        A stage runs when it is asked for, so that a caller can time it. ``moment`` is the frame's
-        place in its drive, for stages that remember.
+        A stage runs when it is asked for, so that a caller can time it.
         """
-        view = View(image, image, moment=moment)
         for step in self.steps:
             output = step.run(view)
             view = view.after(output)
@@ -76,7 +74,7 @@ class Chain:
 
     def oracles(
         self,
-        image: Rgb,
+        view: View,
         outputs: Sequence[Output],
         road: Truth,
         shadow: Truth | None,
@@ -86,10 +84,8 @@ class Chain:
 
         Parameters
         ----------
-        image
-            ``(H, W, 3)`` uint8 RGB.
-        outputs
-            What `run` gave on it.
+        view, outputs
+            What `run` was given, and gave.
         road, shadow
             The truths, ``(H, W)`` uint8 (0, 1, 255). Without that of shadow filters have none.
         known
@@ -101,7 +97,7 @@ class Chain:
             The stage that was replaced, as it is reported, and the masks of those after it. They
             see an image that stands alone: what a stage remembers of a drive is not for oracles.
         """
-        view = View(image, image)
+        view = replace(view, moment=None)
         for place, (step, output) in enumerate(zip(self.steps, outputs, strict=True)):
             truth = shadow if step.stage.is_filter else road
             if step.oracle is not None and truth is not None:
@@ -118,7 +114,7 @@ class Chain:
         """Return the image as the chain's filters leave it; itself where there are none."""
         for step in self.steps:
             if not step.stage.yields_mask:
-                output = step.run(View(image, image))
+                output = step.run(View.of(image))
                 image = image if output.image is None else output.image
         return image
 

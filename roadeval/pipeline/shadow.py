@@ -215,6 +215,10 @@ class Moments:
     mean: Floats
     deviation: Floats
 
+    def __getitem__(self, labels: slice) -> Moments:
+        """Give those of some labels."""
+        return Moments(self.pixels[labels], self.mean[labels], self.deviation[labels])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compensation:
@@ -294,9 +298,10 @@ def compensate(
     if settings.colour_space == "hsi":
         return _compensate_hsi(image, found, ring, settings)
     count, width = found.count + 1, settings.ring_width
-    inside = moments_of_sums(KERNELS.run_sums(image, found.runs, count))
-    around = moments_of_sums(KERNELS.ring_sums(image, found.runs, ring.bits, count, width))
-    change = compensation(inside, around, settings)
+    inside = KERNELS.run_sums(image, found.runs, count)
+    around = KERNELS.ring_sums(image, found.runs, ring.bits, count, width)
+    both = moments_of_sums(np.concatenate([inside, around]))
+    change = compensation(both[:count], both[count:], settings)
     return KERNELS.transfer(image, found.runs, change.source, change.target, change.gain), change
 
 

@@ -63,6 +63,11 @@ class View:
     moment: Moment | None = None
     _apart: list[Planes] = field(default_factory=list, repr=False)
 
+    @classmethod
+    def of(cls, image: Rgb) -> View:
+        """See an ``(H, W, 3)`` uint8 RGB image as it is before any stage, and alone."""
+        return cls(image, image)
+
     def planes(self) -> Planes:
         """Red, green and blue of the image, ``(H, W)`` uint8 each; taken apart once for all."""
         if not self._apart:

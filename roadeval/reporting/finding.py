@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, FILTERED, NAMES, UNFILTERED
+from roadeval.data import BASELINE, FILTERED, NAMES, UNFILTERED, TruthBits
 from roadeval.evaluation import analysis, counts, maps, tables
-from roadeval.evaluation.bits import TruthBits
 from roadeval.evaluation.scoreboard import COMPARED
 from roadeval.kernels.packing import Packed
 from roadeval.opened import Opened

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from roadeval.data import Frame, Rgb, Truth
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import STAGES, Chain
-from roadeval.pipeline.stage import TrainingSet
+from roadeval.pipeline.stage import TrainingSet, View
 from roadeval.training.model import Model
 from roadeval.training.plan import Plan
 from roadeval.training.sampling import sample
@@ -114,7 +114,7 @@ def _collapsed(
     chain = Chain(plan.chain, plan.settings, parameters)
     shares: dict[str, list[float]] = {}
     for image in images:
-        for name, output in chain.run(image):
+        for name, output in chain.run(View.of(image)):
             if output.mask is not None:
                 shares.setdefault(name, []).append(output.mask.area() / image[..., 0].size)
     return [

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from roadeval.data import IGNORE, FrameResult, Role
+from roadeval.data import IGNORE, FrameResult, Role, TruthBits
 from roadeval.evaluation.beyond import Beyond, Flicker
 from roadeval.kernels.packing import Packed
 
@@ -17,7 +17,7 @@ TRUTH = pixels("##..", "##.?")
 def flicker_of(*frames):
     flicker = Flicker()
     for truth, mask in frames:
-        flicker.add(truth, {"net": Packed.of(mask)})
+        flicker.add(TruthBits.of(truth), {"net": Packed.of(mask)})
     return flicker.totals("net")
 
 
@@ -43,10 +43,10 @@ def test_a_single_frame_has_none():
 
 def test_nothing_is_compared_across_an_interruption_or_a_change_of_size():
     flicker = Flicker()
-    flicker.add(TRUTH, {"net": Packed.of(TRUTH)})
+    flicker.add(TruthBits.of(TRUTH), {"net": Packed.of(TRUTH)})
     flicker.interrupt()
-    flicker.add(TRUTH, {"net": Packed.of(TRUTH)})
-    flicker.add(pixels("#"), {"net": Packed.of(pixels("#"))})
+    flicker.add(TruthBits.of(TRUTH), {"net": Packed.of(TRUTH)})
+    flicker.add(TruthBits.of(pixels("#")), {"net": Packed.of(pixels("#"))})
     assert flicker.totals("net")["pairs"] == 0
 
 
@@ -71,7 +71,8 @@ def test_equals_a_plain_loop():
 
 def a_result(score, number=0, role=Role.EVALUATED):
     variant = a_variant("net", {"svm": 1 - TRUTH % 2, "post": TRUTH % 2})
-    return FrameResult(a_frame(TRUTH, number), role, (variant,), contours={"net": score})
+    frame, truth = a_frame(TRUTH, number), TruthBits.of(TRUTH)
+    return FrameResult(frame, role, (variant,), truth=truth, contours={"net": score})
 
 
 def test_boundary_f_is_averaged_over_the_frames_that_have_one():

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
-from roadeval.data import IGNORE
+from roadeval.data import IGNORE, TruthBits
 from roadeval.evaluation import contours
-from roadeval.evaluation.bits import TruthBits, disk
+from roadeval.evaluation.bits import disk
 from roadeval.kernels.packing import pack
 
 from .making import pixels, unpacked

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from sklearn.metrics import confusion_matrix
 
-from roadeval.data import Counts
+from roadeval.data import Counts, TruthBits
 from roadeval.evaluation import counts
-from roadeval.evaluation.bits import TruthBits
 from roadeval.evaluation.counts import error_map
 from roadeval.kernels.packing import Packed
 

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from roadeval.data import IGNORE, Change
+from roadeval.data import IGNORE, Change, TruthBits
 from roadeval.evaluation import maps
-from roadeval.evaluation.bits import TruthBits
 from roadeval.evaluation.counts import error_map
 from roadeval.evaluation.maps import HeatMap, Maps
 from roadeval.kernels.packing import Packed

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from roadeval.data import TruthBits
 from roadeval.evaluation import regions
-from roadeval.evaluation.bits import TruthBits
 
 from .making import a_frame, a_variant, pixels, unpacked
 

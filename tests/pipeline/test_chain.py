@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from roadeval.pipeline.chain import STAGES, Chain, layers_of, masks_of
-from roadeval.pipeline.stage import TrainingSet
+from roadeval.pipeline.stage import TrainingSet, View
 from tests.pipeline.images import IMAGES, noise
 
 NAMES = ("shadow", "similarity", "svm", "post")
@@ -40,7 +40,7 @@ def chains(request):
 
 
 def arrays(chain, image):
-    outputs = [output for _, output in chain.run(image)]
+    outputs = [output for _, output in chain.run(View.of(image))]
     layers = [(layer.spec.name, layer.array) for o in outputs for layer in o.layers]
     regions = [(name, mask.pixels()) for o in outputs for name, mask in o.regions.items()]
     return layers + regions
@@ -68,7 +68,7 @@ def test_a_chain_without_filters_leaves_the_image_alone(chains):
 
 
 def test_a_stage_runs_when_it_is_asked_for(chains):
-    steps = chains[0].run(noise(20, 30))
+    steps = chains[0].run(View.of(noise(20, 30)))
     assert [next(steps)[0], next(steps)[0]] == ["shadow", "similarity"]
     assert [name for name, _ in steps] == ["svm", "post"]
 
@@ -77,7 +77,7 @@ def test_layers_are_the_ones_announced_in_shape_and_type(chains):
     image = noise(30, 40)
     for names, chain in zip((NAMES, NAMES[1:]), chains, strict=True):
         settings = {step.stage.name: step.settings for step in chain.steps}
-        layers = [layer for _, output in chain.run(image) for layer in output.layers]
+        layers = [layer for _, output in chain.run(View.of(image)) for layer in output.layers]
         assert tuple(layer.spec for layer in layers) == layers_of(names, settings)
         for layer in layers:
             assert layer.array.shape[:2] == image.shape[:2]
@@ -88,7 +88,7 @@ def test_layers_are_the_ones_announced_in_shape_and_type(chains):
 
 
 def test_a_stages_mask_is_the_layer_of_its_name(chains):
-    for name, output in chains[0].run(noise(30, 40)):
+    for name, output in chains[0].run(View.of(noise(30, 40))):
         if output.mask is not None:
             layers = {layer.spec.name: layer.array for layer in output.layers}
             np.testing.assert_array_equal(layers[name], output.mask.pixels())

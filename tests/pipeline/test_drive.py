@@ -7,7 +7,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from roadeval.pipeline.chain import STAGES, Chain
-from roadeval.pipeline.stage import TrainingSet
+from roadeval.pipeline.stage import TrainingSet, View
 from tests.pipeline import reference
 from tests.pipeline.test_chain import SETTINGS
 
@@ -64,7 +64,7 @@ def test_every_layer_equals_the_plain_pipeline(drive, preset, filtered):
         expected = reference.layers(images[number], model, filtered=filtered, printed=printed)
         layers = {
             layer.spec.name: layer.array
-            for _, output in chain.run(images[number])
+            for _, output in chain.run(View.of(images[number]))
             for layer in output.layers
         }
         assert list(layers) == list(expected)

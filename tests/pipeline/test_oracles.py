@@ -11,6 +11,7 @@ from tests.pipeline.images import noise
 from tests.pipeline.test_chain import NAMES, SETTINGS, fitted
 
 IMAGE = noise(40, 60)
+SEEN = View.of(IMAGE)
 ROAD = np.zeros((40, 60), np.uint8)
 ROAD[20:, 10:50] = 1
 ROAD[:, 40:45] = 255
@@ -29,12 +30,16 @@ def assert_same(found, expected, name=""):
 
 
 def oracles(chain, shadow_truth=TRULY_DARK):
-    outputs = [output for _, output in chain.run(IMAGE)]
-    return dict(chain.oracles(IMAGE, outputs, ROAD, shadow_truth, {}))
+    outputs = [output for _, output in chain.run(SEEN)]
+    return dict(chain.oracles(SEEN, outputs, ROAD, shadow_truth, {}))
 
 
 def masks(steps_of, image):
-    return {name: output.mask for name, output in steps_of.run(image) if output.mask is not None}
+    return {
+        name: output.mask
+        for name, output in steps_of.run(View.of(image))
+        if output.mask is not None
+    }
 
 
 def test_a_perfect_svm_is_the_truth_with_ignored_pixels_as_non_road_given_to_post(chain):
@@ -59,8 +64,8 @@ def test_a_perfect_filter_compensates_true_shadow_and_all_stages_follow(chain):
 
 
 def test_a_filter_that_is_told_what_it_found_gives_what_it_gave(chain):
-    outputs = [output for _, output in chain.run(IMAGE)]
-    told = dict(chain.oracles(IMAGE, outputs, ROAD, outputs[0].regions["shadow"].pixels(), {}))
+    outputs = [output for _, output in chain.run(SEEN)]
+    told = dict(chain.oracles(SEEN, outputs, ROAD, outputs[0].regions["shadow"].pixels(), {}))
     for name, mask in masks(chain, IMAGE).items():
         assert_same(told["shadow"][name], mask, name)
 
@@ -74,18 +79,18 @@ def test_the_replaced_stage_sees_the_image_that_those_before_it_made(chain):
     settings = {step.stage.name: step.settings for step in chain.steps}
     settings["exposure"] = STAGES["exposure"].settings()
     longer = Chain(names, settings, fitted(settings))
-    outputs = [output for _, output in longer.run(IMAGE)]
+    outputs = [output for _, output in longer.run(SEEN)]
     assert outputs[0].image is not None
     assert (outputs[0].image != IMAGE).any()
-    told = dict(longer.oracles(IMAGE, outputs, ROAD, outputs[1].regions["shadow"].pixels(), {}))
+    told = dict(longer.oracles(SEEN, outputs, ROAD, outputs[1].regions["shadow"].pixels(), {}))
     for name, mask in masks(longer, IMAGE).items():
         assert_same(told["shadow"][name], mask, name)
 
 
 def test_running_oracles_changes_no_output(chain):
-    outputs = [output for _, output in chain.run(IMAGE)]
+    outputs = [output for _, output in chain.run(SEEN)]
     before = [None if o.mask is None else o.mask.pixels() for o in outputs]
-    dict(chain.oracles(IMAGE, outputs, ROAD, TRULY_DARK, {}))
+    dict(chain.oracles(SEEN, outputs, ROAD, TRULY_DARK, {}))
     for mask, output in zip(before, outputs, strict=True):
         if mask is not None:
             np.testing.assert_array_equal(mask, output.mask.pixels())
@@ -97,14 +102,14 @@ def test_every_machine_and_every_filter_has_an_oracle():
 
 
 def test_variants_share_what_follows_a_perfect_mask_and_nothing_else(chain):
-    outputs = [output for _, output in chain.run(IMAGE)]
+    outputs = [output for _, output in chain.run(SEEN)]
     known = {}
-    first = dict(chain.oracles(IMAGE, outputs, ROAD, TRULY_DARK, known))
-    again = dict(chain.oracles(IMAGE, outputs, ROAD, TRULY_DARK, known))
+    first = dict(chain.oracles(SEEN, outputs, ROAD, TRULY_DARK, known))
+    again = dict(chain.oracles(SEEN, outputs, ROAD, TRULY_DARK, known))
     assert again["svm"] is first["svm"]
     assert again["shadow"] is not first["shadow"]
     other = Chain(["svm", "post"], SETTINGS["printed"], fitted(SETTINGS["printed"]))
-    outputs = [output for _, output in other.run(IMAGE)]
-    alone = dict(other.oracles(IMAGE, outputs, ROAD, None, {}))["svm"]
-    shared = dict(other.oracles(IMAGE, outputs, ROAD, None, known))["svm"]
+    outputs = [output for _, output in other.run(SEEN)]
+    alone = dict(other.oracles(SEEN, outputs, ROAD, None, {}))["svm"]
+    shared = dict(other.oracles(SEEN, outputs, ROAD, None, known))["svm"]
     assert_same(shared["post"], alone["post"])

@@ -35,7 +35,7 @@ def components_and_seconds(shape, runs):
     with one_thread_each():
         for _ in range(runs):
             start = thread_time()
-            ((_, output),) = chain.run(image)
+            ((_, output),) = chain.run(View.of(image))
             post(View(image, image, output.regions["shadow"]))
             seconds.append(thread_time() - start)
     return output.facts["components"], min(seconds)

@@ -6,6 +6,7 @@ import pytest
 from roadeval.config import Config
 from roadeval.data import IGNORE
 from roadeval.pipeline.chain import Chain
+from roadeval.pipeline.stage import View
 from roadeval.training import Plan, TrainingError, TrainingSettings, fit
 from roadeval.training.selfsupervision import patch_truth
 from tests.training.making import frame, plans
@@ -18,7 +19,7 @@ def test_a_fitted_variant_finds_the_road_in_a_new_frame():
     model = fit(FRAMES, {"unfiltered": plan}, TrainingSettings())
     chain = Chain(plan.chain, plan.settings, model.parameters["unfiltered"])
     fresh = frame(9)
-    masks = {name: output.mask.pixels() for name, output in chain.run(fresh.image)}
+    masks = {name: output.mask.pixels() for name, output in chain.run(View.of(fresh.image))}
     for name in ("similarity", "svm", "post"):
         wrong = (masks[name] != fresh.truth).mean()
         assert wrong < 0.06, name
