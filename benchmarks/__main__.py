@@ -29,6 +29,9 @@ from roadeval.recording import Rule, recorder_for
 from roadeval.run import Run
 
 Rows = list[dict[str, Any]]
+PAIRS = 3
+"""Of loop and floor, for each `--repeat`: they take seconds, and a machine slows down for as long.
+"""
 PARTS = ("replay", "stages", "plain", "reading", "process")
 
 
@@ -76,23 +79,27 @@ def _at_size(
 
 
 def _replay(drive: Path, held: Held, folder: Path, jobs: int, options: argparse.Namespace) -> Rows:
-    """Measure loop, floor and whole side by side, so that a busy machine slows all of them."""
+    """Measure loop and floor in turns, so that a busy machine slows both of them, then whole."""
     run, count = ReplayOptions(jobs=jobs), len(held.files)
-    rounds = [
-        (loop(drive, run, folder), floor(held, folder, jobs), whole(drive, run, folder))
-        for _ in range(options.repeat + 1)
+    for work in (loop, whole):
+        work(drive, run, folder)  # warms the caches
+    pairs = [
+        (loop(drive, run, folder), floor(held, folder, jobs)) for _ in range(PAIRS * options.repeat)
     ]
-    loops, floors, wholes = zip(*rounds[1:], strict=True)  # the first warms the caches
-    once = Spread.of([a - b for a, b in zip(wholes, loops, strict=True)])
-    spare = 1.5 * Spread.of(floors).median - Spread.of(loops).median
-    ms = [Spread.of([1e3 * t / count for t in times]) for times in (loops, floors, wholes)]
+    loops = [mine.wall for mine, _ in pairs]
+    floors = [its.wall for _, its in pairs]
+    wholes = [whole(drive, run, folder).wall for _ in range(options.repeat)]
+    loop_s, floor_s = Spread.of(loops).median, Spread.of(floors).median
+    once = Spread.of([seconds - loop_s for seconds in wholes])
+    spare = 1.5 * floor_s - loop_s
     row = {
         "jobs": jobs,
         "frames": count,
-        "floor ms/frame": ms[1],
-        "loop ms/frame": ms[0],
+        "floor ms/frame": Spread.of([1e3 * seconds / count for seconds in floors]),
+        "loop ms/frame": Spread.of([1e3 * seconds / count for seconds in loops]),
         "loop / floor": ratios(loops, floors),
-        "whole / floor": ratios(wholes, floors),
+        "in CPU time": ratios([mine.cpu for mine, _ in pairs], [its.cpu for _, its in pairs]),
+        "whole / floor": Spread.of([seconds / floor_s for seconds in wholes]),
         "once, s": once,
         "whole <= 1.5 floor from": f"{once.median / spare * count:.0f} frames"
         if spare > 0

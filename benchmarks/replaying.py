@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from time import perf_counter
 from typing import Any, Final
 
 import cv2
@@ -13,6 +12,7 @@ import lz4.block
 import numpy as np
 
 import roadeval
+from benchmarks.timing import Cost, Meter
 from roadeval import logs
 from roadeval.data import FrameResult
 from roadeval.evaluation.results import ResultsWriter
@@ -83,8 +83,8 @@ def _bytes(result: FrameResult) -> int:
     return sum(layer.array.nbytes for v in result.variants for layer in v.layers())
 
 
-def floor(held: Held, folder: Path, jobs: int) -> float:
-    """Seconds to decode every file and to encode and write the held layers, and no more."""
+def floor(held: Held, folder: Path, jobs: int) -> Cost:
+    """Decode every file, encode and write the held layers, and no more."""
 
     def work(item: tuple[int, tuple[bytes, ...], FrameResult]) -> Any:
         number, files, result = item
@@ -93,32 +93,32 @@ def floor(held: Held, folder: Path, jobs: int) -> float:
         return recorder.encode(result, number)
 
     recorder = recorder_for(folder / "floor.rrd", held.layout, ALL)
-    start = perf_counter()
+    meter = Meter()
     with recorder:
         for encoded in ordered(work, held.frames(), jobs):
             recorder.write(encoded)
         recorder.finish({})
-    return perf_counter() - start
+    return meter.read()
 
 
-def loop(drive: Path, options: ReplayOptions, folder: Path) -> float:
-    """Seconds of `replay` without its training, its summary and its figures."""
+def loop(drive: Path, options: ReplayOptions, folder: Path) -> Cost:
+    """Do what `replay` does, without its training, its summary and its figures."""
     with logs.open_log(drive) as log:
         run = Run(log, options, lambda _progress: None)
         recorder = recorder_for(folder / "loop.rrd", run.layout(), ALL)
-        start = perf_counter()
+        meter = Meter()
         with recorder, ResultsWriter(folder / "reports") as results:
             for result, encoded in run.frames(recorder):
                 recorder.write(encoded)
                 results.append(result)
             recorder.finish({})
-            seconds = perf_counter() - start
+            cost = meter.read()
             results.finish(run.board.windows(), run.summary())
-        return seconds
+        return cost
 
 
-def whole(drive: Path, options: ReplayOptions, folder: Path) -> float:
-    """Seconds of `replay` as a user calls it: training, tables and figures too."""
-    start = perf_counter()
+def whole(drive: Path, options: ReplayOptions, folder: Path) -> Cost:
+    """Call `replay` as a user does: training, tables and figures too."""
+    meter = Meter()
     roadeval.replay(drive, save=folder / "out.rrd", reports=folder / "reports", options=options)
-    return perf_counter() - start
+    return meter.read()

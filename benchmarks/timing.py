@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -32,6 +32,25 @@ class Spread:
 def ratios(these: Sequence[float], those: Sequence[float]) -> Spread:
     """Divide what was measured side by side, round by round."""
     return Spread.of([a / b for a, b in zip(these, those, strict=True)])
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Seconds by the clock, and of all processor cores together."""
+
+    wall: float
+    cpu: float
+
+
+class Meter:
+    """Measures the process from the moment that it is made."""
+
+    def __init__(self) -> None:
+        self._start = perf_counter(), process_time()
+
+    def read(self) -> Cost:
+        """Give the cost so far."""
+        return Cost(perf_counter() - self._start[0], process_time() - self._start[1])
 
 
 def timed(work: Callable[[], T]) -> tuple[T, float]:
