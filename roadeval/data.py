@@ -161,14 +161,19 @@ class LayerSpec:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """A named array that a stage hands out.
-
-    ``array`` is ``(H, W, 3)`` uint8 for `RGB`, ``(H, W)`` uint8 for `MASK` and `LABELS`, and
-    ``(H, W)`` float32, or uint8 codes 0..255 that span ``spec.value_range``, for `SCALAR`.
-    """
+    """A named array that a stage hands out; a mask of two classes may stay packed."""
 
     spec: LayerSpec
-    array: npt.NDArray[np.uint8] | npt.NDArray[np.float32]
+    content: npt.NDArray[np.uint8] | npt.NDArray[np.float32] | Packed
+
+    @property
+    def array(self) -> npt.NDArray[np.uint8] | npt.NDArray[np.float32]:
+        """The array itself.
+
+        ``(H, W, 3)`` uint8 for `RGB`, ``(H, W)`` uint8 for `MASK` and `LABELS`, and ``(H, W)``
+        float32, or uint8 codes 0..255 that span ``spec.value_range``, for `SCALAR`.
+        """
+        return self.content.pixels() if isinstance(self.content, Packed) else self.content
 
 
 TRANSPARENT: Final = (0, 0, 0, 0)
@@ -281,11 +286,7 @@ class VariantResult:
 
     def final(self) -> Mask:
         """Give the pixels of the last stage's mask, ``(H, W)`` uint8."""
-        *_, (stage, mask) = self.masks()
-        # Its layer has them already, unless layers were left out.
-        for layer in self.layers():
-            if layer.spec.name == stage:
-                return layer.array.astype(np.uint8, copy=False)
+        *_, (_, mask) = self.masks()
         return mask.pixels()
 
 

@@ -65,8 +65,8 @@ def external_layout(name: str, topic: str) -> VariantLayout:
 
 def external_variant(name: str, mask: Mask) -> VariantResult:
     """Present a mask that the log carries as a variant with the final stage alone."""
-    layers, road = (Layer(EXTERNAL, mask),), Packed.of(mask)
-    stage = StageResult(FINAL_STAGE, layers, road, {}, {}, 0.0)
+    road = Packed.of(mask)
+    stage = StageResult(FINAL_STAGE, (Layer(EXTERNAL, road),), road, {}, {}, 0.0)
     return VariantResult(name, (stage,))
 
 

@@ -180,8 +180,8 @@ def bind(settings: SvmSettings, machine: SupportVectors) -> Callable[[View], Out
     table = colour_table(machine, settings)
 
     def run(view: View) -> Output:
-        road = table.look_up(view.planes())
-        return Output((Layer(SVM, road),), mask=Packed.of(road))
+        road = Packed.of(table.look_up(view.planes()))
+        return Output((Layer(SVM, road),), mask=road)
 
     return run
 

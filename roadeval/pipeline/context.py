@@ -313,8 +313,8 @@ def bind(settings: ContextSettings, machine: RectifiedMachine) -> Callable[[View
         if settings.memory > 0 and view.moment is not None:
             values = remembered(values, view.moment, settings.memory)
         values = stretched(values, view.image.shape)
-        road = (values > machine.threshold).view(np.uint8)
-        return Output((Layer(DECISION, values), Layer(SVM, road)), mask=Packed.of(road))
+        road = Packed.of(values > machine.threshold)
+        return Output((Layer(DECISION, values), Layer(SVM, road)), mask=road)
 
     return run
 

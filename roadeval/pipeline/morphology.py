@@ -169,7 +169,7 @@ def bind(settings: MorphologySettings, _parameters: None) -> Callable[[View], Ou
             raise ValueError("post-processing needs a stage with a road mask before it")
         road = post_process(view.mask, settings)
         line = boundary(road, edge)
-        return Output((Layer(POST, road.pixels()), Layer(BOUNDARY, line.pixels())), mask=road)
+        return Output((Layer(POST, road), Layer(BOUNDARY, line)), mask=road)
 
     return run
 

@@ -383,7 +383,7 @@ def bind(settings: ShadowSettings, _parameters: None) -> Callable[[View], Output
         return Output(
             layers=(
                 Layer(NDI, codes),
-                Layer(SHADOW, mask),
+                Layer(SHADOW, shadow),
                 Layer(RINGS, mask + 2 * ring.pixels()),
                 Layer(COMPENSATED, image),
             ),

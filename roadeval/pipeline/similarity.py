@@ -80,7 +80,8 @@ def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Out
 
     def run(view: View) -> Output:
         distance, near = KERNELS.mahalanobis(view.planes(), road.mean, precision, greatest)
-        return Output((Layer(spec, distance), Layer(SIMILARITY, near)), mask=Packed.of(near))
+        mask = Packed.of(near)
+        return Output((Layer(spec, distance), Layer(SIMILARITY, mask)), mask=mask)
 
     return run
 

@@ -27,6 +27,7 @@ import numpy.typing as npt
 import rerun as rr
 
 from roadeval.data import LayerKind, LayerSpec
+from roadeval.kernels.packing import Packed
 from roadeval.recording import indexed_png
 
 Array = npt.NDArray[Any]
@@ -52,8 +53,8 @@ class Codec(Protocol):
     def style(self) -> Sequence[Any]:
         """Archetypes to log once for the entity."""
 
-    def encode(self, array: Array) -> bytes:
-        """Turn a frame's array into its payload."""
+    def encode(self, array: Any) -> bytes:
+        """Turn a frame's array into its payload; a mask may be packed."""
 
     def columns(self, payloads: list[bytes]) -> Any:
         """Make the viewer's columns of the payloads of many frames."""
@@ -86,8 +87,8 @@ class MaskCodec:
         """Draw it above the camera's image."""
         return [rr.EncodedImage.from_fields(media_type="image/png", draw_order=10)]
 
-    def encode(self, array: Array) -> bytes:
-        """Turn ``(H, W)`` uint8 of the classes' values into a PNG file."""
+    def encode(self, array: npt.NDArray[np.uint8] | Packed) -> bytes:
+        """Turn ``(H, W)`` uint8 of the classes' values, or two classes' bits, into a PNG file."""
         return indexed_png.encode(array, [c.rgba for c in self.spec.classes])
 
     def columns(self, payloads: list[bytes]) -> Any:

@@ -87,7 +87,7 @@ class Encoder:
                 if result.pictures is Pictures.MASKS and layer.spec.kind not in FLAT:
                     continue
                 path = at.layer_path(variant.variant, layer.spec.name)
-                yield path, self.codecs[path].encode(layer.array)
+                yield path, self.codecs[path].encode(layer.content)
         for name, layer in result.errors.items():
             path = at.layer_path(name, ERRORS.name)
             yield path, self.codecs[path].encode(layer.array)

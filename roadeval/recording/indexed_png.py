@@ -16,22 +16,33 @@ import zlib
 from collections.abc import Sequence
 from typing import Final
 
+import cv2
 import numpy as np
 import numpy.typing as npt
+
+from roadeval.kernels.packing import Packed
 
 _SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
 _PALETTE: Final = 3
 _NONE, _UP = 0, 2
 """A row's filters, as its first byte names them: the bytes themselves, or less those above."""
 
+_REVERSED: Final = np.packbits(
+    np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little"), axis=1
+).ravel()
+"""Each byte with its bits the other way round."""
+
 Rgba = tuple[int, int, int, int]
 
 
-def encode(labels: npt.NDArray[np.uint8], palette: Sequence[Rgba]) -> bytes:
-    """Encode ``(H, W)`` uint8 labels, each below ``len(palette)``, as a PNG file."""
+def encode(labels: npt.NDArray[np.uint8] | Packed, palette: Sequence[Rgba]) -> bytes:
+    """Encode ``(H, W)`` uint8 labels, each below ``len(palette)``, as a PNG file.
+
+    Labels of two classes may be packed.
+    """
     height, width = labels.shape
     bits = _bits(len(palette))
-    rows = _pack(labels, bits)
+    rows = _reversed(labels) if isinstance(labels, Packed) else _pack(labels, bits)
     # Most of a mask is as the row above it: runs of zeros, a fifth fewer bytes in less time.
     lines = np.empty((height, rows.shape[1] + 1), np.uint8)
     lines[:, 0], lines[:, 1:] = _UP, rows
@@ -74,6 +85,12 @@ def _rows(lines: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
     if (filters == _UP).all():
         return np.cumsum(rows, axis=0, dtype=np.uint8)
     raise ValueError("not a PNG file that was written here: its rows have other filters")
+
+
+def _reversed(mask: Packed) -> npt.NDArray[np.uint8]:
+    """Give the mask's bytes with the leftmost pixel in the highest bit."""
+    used = mask.bits.view(np.uint8)[:, : -(-mask.width // 8)]
+    return np.asarray(cv2.LUT(used, _REVERSED), np.uint8)
 
 
 def _bits(colours: int) -> int:
