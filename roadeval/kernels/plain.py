@@ -44,13 +44,13 @@ def look_up_sum_min(planes: Planes, table: Table) -> tuple[Plane, Sums]:
     return codes, np.bincount(codes.ravel(), minlength=256)
 
 
-def run_sums(image: Image, runs: Runs, count: int) -> Sums:
+def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
     """Sum the colours of every label's runs.
 
     Parameters
     ----------
-    image
-        ``(H, W, 3)`` uint8.
+    planes
+        Red, green and blue, ``(H, W)`` uint8 each.
     runs
         ``(n, 4)`` int32, see `components`.
     count
@@ -62,16 +62,16 @@ def run_sums(image: Image, runs: Runs, count: int) -> Sums:
         ``(count, 7)`` int64: pixels, sums of R, G, B, and sums of their squares.
     """
     y, x, label = _pixels(runs)
-    return _sums(label, image[y, x], count)
+    return _sums(label, np.dstack(planes)[y, x], count)
 
 
-def ring_sums(image: Image, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
+def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
     """Sum the colours of every component's buffer ring (Eq. 10).
 
     Parameters
     ----------
-    image
-        ``(H, W, 3)`` uint8.
+    planes
+        Red, green and blue, ``(H, W)`` uint8 each.
     runs
         ``(n, 4)`` int32, see `components`.
     ring
@@ -87,7 +87,7 @@ def ring_sums(image: Image, runs: Runs, ring: Bits, count: int, width: int) -> S
         ``(count, 7)`` int64, as in `run_sums`. A pixel counts once in each component that
         reaches it.
     """
-    height, columns, _ = image.shape
+    height, columns = planes[0].shape
     y, x = np.nonzero(unpack(ring, columns))
     padded = np.pad(paint(runs, height, columns), width)
     window = np.lib.stride_tricks.sliding_window_view(padded, (2 * width + 1, 2 * width + 1))
@@ -95,7 +95,7 @@ def ring_sums(image: Image, runs: Runs, ring: Bits, count: int, width: int) -> S
     pixel = np.repeat(np.arange(len(y)), near.shape[1])
     pairs = np.unique(pixel * count + near.ravel())
     pairs = pairs[pairs % count > 0]
-    return _sums(pairs % count, image[y, x][pairs // count], count)
+    return _sums(pairs % count, np.dstack(planes)[y, x][pairs // count], count)
 
 
 def _pixels(runs: Runs) -> tuple[npt.NDArray[np.int64], ...]:

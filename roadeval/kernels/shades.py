@@ -18,6 +18,7 @@ from roadeval.kernels.arrays import (
     Image,
     Labels,
     Places,
+    Planes,
     Runs,
     Sums,
     Table,
@@ -35,15 +36,16 @@ _TABLED = 256
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def run_sums(image: Image, runs: Runs, count: int) -> Sums:
+def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
     """See `plain.run_sums`."""
+    reds, greens, blues = planes
     sums = np.zeros((count, 7), np.int64)
     for run in range(len(runs)):
         y, label = np.uintp(runs[run, 0]), np.uintp(runs[run, 3])
         start, end = np.uintp(runs[run, 1]), np.uintp(runs[run, 2])
         r1 = g1 = b1 = r2 = g2 = b2 = np.int64(0)
         for x in range(start, end):
-            r, g, b = np.int64(image[y, x, 0]), np.int64(image[y, x, 1]), np.int64(image[y, x, 2])
+            r, g, b = np.int64(reds[y, x]), np.int64(greens[y, x]), np.int64(blues[y, x])
             r1, g1, b1 = r1 + r, g1 + g, b1 + b
             r2, g2, b2 = r2 + r * r, g2 + g * g, b2 + b * b
         for column, value in enumerate((np.int64(end - start), r1, g1, b1, r2, g2, b2)):
@@ -81,9 +83,9 @@ def _paint_row(row: Columns, runs: Runs, run: int, y: int) -> int:
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def ring_sums(image: Image, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
+def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
     """See `plain.ring_sums`."""
-    (rows, columns, _), words = image.shape, ring.shape[1]
+    (rows, columns), words = planes[0].shape, ring.shape[1]
     sums = np.zeros((count, 7), np.int64)
     # The last pixel that each component counted: one pixel counts once in a ring.
     last = np.full(count, -1, np.int64)
@@ -108,9 +110,9 @@ def ring_sums(image: Image, runs: Runs, ring: Bits, count: int, width: int) -> S
                 x = 64 * word + bit
                 # Most pixels of a ring are near one component.
                 if least[bit] == greatest[bit]:
-                    _add(sums, least[bit], image, y, x)
+                    _add(sums, least[bit], planes, y, x)
                 else:
-                    _add_each(sums, last, near, image, (y, x))
+                    _add_each(sums, last, near, planes, (y, x))
     return sums
 
 
@@ -141,25 +143,27 @@ def _bound(
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def _add_each(sums: Sums, last: Places, near: Labels, image: Image, place: tuple[int, int]) -> None:
+def _add_each(
+    sums: Sums, last: Places, near: Labels, planes: Planes, place: tuple[int, int]
+) -> None:
     """Add a ring's pixel, ``place`` (y, x), once to every component that ``near`` has around it."""
     y, x = place
-    pixel = y * image.shape[1] + x
+    pixel = y * near.shape[1] + x
     for v in range(len(near)):
         for u in range(x, x + len(near)):
             label = near[v, u]
             if label > 0 and last[label] != pixel:
                 last[label] = pixel
-                _add(sums, label, image, y, x)
+                _add(sums, label, planes, y, x)
 
 
 @_inlined  # type: ignore[untyped-decorator]
-def _add(sums: Sums, label: int, image: Image, y: int, x: int) -> None:
+def _add(sums: Sums, label: int, planes: Planes, y: int, x: int) -> None:
     # By indices: a view of an array has an owner to be counted, which takes longer than the sum.
     k, v, u = np.uintp(label), np.uintp(y), np.uintp(x)
     sums[k, 0] += 1
-    for channel in range(3):
-        value = np.int64(image[v, u, channel])
+    for channel, plane in enumerate(planes):
+        value = np.int64(plane[v, u])
         sums[k, 1 + channel] += value
         sums[k, 4 + channel] += value * value
 

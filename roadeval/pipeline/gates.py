@@ -18,6 +18,7 @@ from pydantic.dataclasses import dataclass as validated
 from roadeval.data import LabelClass, Mask, Rgb
 from roadeval.kernels import KERNELS
 from roadeval.pipeline import shade
+from roadeval.pipeline.colour import planes
 from roadeval.pipeline.shade import RoadLight
 from roadeval.pipeline.shadow import RING_COLOUR, SHADOW_COLOUR
 
@@ -230,7 +231,8 @@ def _rings(scene: Scene, labels: Labels, settings: GatedSettings) -> Labels:
 
 def _sums(image: Rgb, labels: Labels, count: int) -> npt.NDArray[np.int64]:
     """Pixels and sums of R, G, B by label, ``(count, 7)``, see `kernels.plain.run_sums`."""
-    sums: npt.NDArray[np.int64] = KERNELS.run_sums(image, KERNELS.label_runs(labels), count)
+    runs = KERNELS.label_runs(labels)
+    sums: npt.NDArray[np.int64] = KERNELS.run_sums(planes(image), runs, count)
     return sums
 
 

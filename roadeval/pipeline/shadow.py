@@ -289,24 +289,25 @@ def compensation(inside: Moments, ring: Moments, settings: ShadowSettings) -> Co
 
 
 def compensate(
-    image: Rgb, found: Components, ring: Packed, settings: ShadowSettings
+    view: View, found: Components, ring: Packed, settings: ShadowSettings
 ) -> tuple[Rgb, Compensation]:
-    """Apply Eq. 11 to every component of an ``(H, W, 3)`` uint8 RGB image.
+    """Apply Eq. 11 to every component of the image that is seen.
 
     ``ring`` is the union of their buffer rings.
     """
     if settings.colour_space == "hsi":
-        return _compensate_hsi(image, found, ring, settings)
+        return _compensate_hsi(view.image, found, ring, settings)
     count, width = found.count + 1, settings.ring_width
-    inside = KERNELS.run_sums(image, found.runs, count)
-    around = KERNELS.ring_sums(image, found.runs, ring.bits, count, width)
+    inside = KERNELS.run_sums(view.planes(), found.runs, count)
+    around = KERNELS.ring_sums(view.planes(), found.runs, ring.bits, count, width)
     both = moments_of_sums(np.concatenate([inside, around]))
     change = compensation(both[:count], both[count:], settings)
-    return KERNELS.transfer(image, found.runs, change.source, change.target, change.gain), change
+    linear = change.source, change.target, change.gain
+    return KERNELS.transfer(view.image, found.runs, *linear), change
 
 
 def lift(
-    image: Rgb, shadow: Packed, settings: ShadowSettings
+    view: View, shadow: Packed, settings: ShadowSettings
 ) -> tuple[Rgb, Packed, int, Compensation]:
     """Compensate what a mask calls shadow: components, rings, transfer (Eq. 9 to 11).
 
@@ -314,7 +315,7 @@ def lift(
     """
     found = connected_components(shadow, settings.connectivity)
     ring = buffer_ring(shadow, settings.ring_width)
-    image, change = compensate(image, found, ring, settings)
+    image, change = compensate(view, found, ring, settings)
     return image, ring, found.count, change
 
 
@@ -378,7 +379,7 @@ def bind(settings: ShadowSettings, _parameters: None) -> Callable[[View], Output
         threshold = threshold_of(histogram)
         mask = shadow_mask(codes, threshold, inclusive=settings.inclusive)
         shadow = Packed.of(mask)
-        image, ring, count, change = lift(view.image, shadow, settings)
+        image, ring, count, change = lift(view, shadow, settings)
         lit = everywhere(shadow.shape) & ~(shadow.bits | ring.bits)
         return Output(
             layers=(
@@ -399,7 +400,7 @@ def oracle(settings: ShadowSettings, _parameters: None) -> Callable[[View, Truth
     """Return the filter as it would be if it knew what is shadow; its compensation stays."""
 
     def run(view: View, truth: Truth) -> Output:
-        return Output(image=lift(view.image, Packed.of(truth == 1), settings)[0])
+        return Output(image=lift(view, Packed.of(truth == 1), settings)[0])
 
     return run
 

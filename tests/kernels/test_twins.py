@@ -39,8 +39,8 @@ def every_kernel(image, width):
     planes = cv2.split(image)
     return {
         "look_up_sum_min": (planes, shadow.NDI_CODES),
-        "run_sums": (image, runs, count),
-        "ring_sums": (image, runs, ring, count, width),
+        "run_sums": (planes, runs, count),
+        "ring_sums": (planes, runs, ring, count, width),
         "paint": (runs, *shape),
         "label_runs": (labels,),
         "transfer": (image, runs, source, target, gain),
@@ -131,7 +131,8 @@ def test_every_component_has_its_own_transfer_whether_it_is_tabulated_or_not():
 def test_sums_do_not_wrap_at_8_bits(module):
     white = np.full((3, 4, 3), 255, np.uint8)
     runs = plain.label_runs(np.ones((3, 4), np.int32))
-    assert module.run_sums(white, runs, 2)[1].tolist() == [12, *[12 * 255] * 3, *[12 * 255**2] * 3]
+    sums = module.run_sums(cv2.split(white), runs, 2)
+    assert sums[1].tolist() == [12, *[12 * 255] * 3, *[12 * 255**2] * 3]
 
 
 def test_every_kernel_has_a_twin():

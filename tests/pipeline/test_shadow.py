@@ -233,7 +233,7 @@ def test_a_pixel_between_two_components_counts_in_both_rings():
     image = noise(1, 7)
     labels = np.array([[0, 1, 0, 0, 2, 0, 0]], np.int32)
     ring = shadow.buffer_ring(Packed.of(labels > 0), 2).bits
-    outside = shadow.KERNELS.ring_sums(image, plain.label_runs(labels), ring, 3, 2)
+    outside = shadow.KERNELS.ring_sums(cv2.split(image), plain.label_runs(labels), ring, 3, 2)
     assert outside[1, 1:4].tolist() == image[0, [0, 2, 3]].sum(axis=0).tolist()
     assert outside[2, 1:4].tolist() == image[0, [2, 3, 5, 6]].sum(axis=0).tolist()
 
@@ -252,12 +252,12 @@ def test_compensation_by_hand():
     image = np.repeat(grey[..., None], 3, axis=2)
     labels = np.array([[0, 1, 0], [0, 1, 0]], np.int32)
     ring = Packed.of(labels == 0)
-    result, change = shadow.compensate(image, one(labels), ring, ShadowSettings())
+    result, change = shadow.compensate(View.of(image), one(labels), ring, ShadowSettings())
     assert change.gain[1].tolist() == [3.0, 3.0, 3.0]
     assert result[..., 0].tolist() == [[94, 94, 106], [94, 106, 106]]
 
     printed = ShadowSettings(statistic="printed")
-    result, change = shadow.compensate(image, one(labels), ring, printed)
+    result, change = shadow.compensate(View.of(image), one(labels), ring, printed)
     assert change.gain[1, 0] == pytest.approx(4 / 36)
     assert result[..., 0].tolist() == [[94, 100, 106], [94, 100, 106]]
 
@@ -304,7 +304,7 @@ def check_rgb(image, chosen):
     shadowed = run(image, chosen)[1]["shadow"]
     found = shadow.connected_components(Packed.of(shadowed), chosen.connectivity)
     ring = shadow.buffer_ring(Packed.of(shadowed), chosen.ring_width)
-    result, _ = shadow.compensate(image, found, ring, chosen)
+    result, _ = shadow.compensate(View.of(image), found, ring, chosen)
     connectivity = 2 if chosen.connectivity == 8 else 1
     assert_rounded(result, literal_eq_11(image, shadowed, chosen, connectivity))
     np.testing.assert_array_equal(result[shadowed == 0], image[shadowed == 0])
@@ -342,7 +342,7 @@ def test_a_component_gets_the_mean_and_deviation_of_its_ring():
     labels = np.zeros((40, 40), np.int32)
     labels[10:30, 10:30] = 1
     ring = shadow.buffer_ring(Packed.of(labels > 0), 3)
-    result, _ = shadow.compensate(image, one(labels), ring, ShadowSettings(ring_width=3))
+    result, _ = shadow.compensate(View.of(image), one(labels), ring, ShadowSettings(ring_width=3))
     around, inside = image[ring.pixels() > 0].astype(float), result[labels > 0].astype(float)
     # Rounding moves no pixel, and so neither statistic, by more than half a level.
     np.testing.assert_allclose(inside.mean(axis=0), around.mean(axis=0), rtol=0, atol=0.5)
@@ -353,7 +353,7 @@ def test_a_constant_component_takes_the_mean_of_its_ring_with_gain_1():
     image = picture("....", ".#..", "....")
     labels = mask("....", ".#..", "....").astype(np.int32)
     ring = shadow.buffer_ring(Packed.of(labels > 0), 1)
-    result, change = shadow.compensate(image, one(labels), ring, ShadowSettings())
+    result, change = shadow.compensate(View.of(image), one(labels), ring, ShadowSettings())
     assert change.gain[1].tolist() == [1.0, 1.0, 1.0]
     assert result[1, 1].tolist() == np.rint(image[ring.pixels() > 0].mean(axis=0)).tolist()
 
@@ -363,7 +363,7 @@ def test_a_component_without_a_ring_is_left_as_it_is(colour_space):
     image = noise(3, 4)
     labels, ring = np.ones((3, 4), np.int32), Packed.of(np.zeros((3, 4), np.uint8))
     chosen = ShadowSettings(colour_space=colour_space)
-    result, change = shadow.compensate(image, one(labels), ring, chosen)
+    result, change = shadow.compensate(View.of(image), one(labels), ring, chosen)
     np.testing.assert_array_equal(result, image)
     assert change.applied.tolist() == [False, False]
 
@@ -373,14 +373,15 @@ def test_the_gain_may_be_bounded_and_is_not_by_default():
     labels = np.array([[0, 1, 1, 0]], np.int32)
     ring = Packed.of(np.array([[1, 0, 0, 1]], np.uint8))
     for most, gain in ((None, 125.0), (4.0, 4.0)):
-        _, change = shadow.compensate(image, one(labels), ring, ShadowSettings(max_gain=most))
+        chosen = ShadowSettings(max_gain=most)
+        _, change = shadow.compensate(View.of(image), one(labels), ring, chosen)
         assert change.gain[1, 0] == gain
 
 
 @given(images())
 def test_moments_equal_numpy_on_the_pixels_themselves(image):
     labels = np.ones(image.shape[:2], np.int32)
-    sums = shadow.KERNELS.run_sums(image, one(labels).runs, 2)
+    sums = shadow.KERNELS.run_sums(cv2.split(image), one(labels).runs, 2)
     moments = shadow.moments_of_sums(sums)
     pixels = image.reshape(-1, 3).astype(float)
     assert moments.pixels[1] == len(pixels)
@@ -451,7 +452,7 @@ def test_facts_state_threshold_components_and_gains():
     assert facts["components"] == facts["compensated"] == 2
     found = shadow.connected_components(Packed.of(run(image)[1]["shadow"]), 8)
     ring = shadow.buffer_ring(Packed.of(found.labels() > 0), 1)
-    _, change = shadow.compensate(image, found, ring, ShadowSettings())
+    _, change = shadow.compensate(View.of(image), found, ring, ShadowSettings())
     assert facts["max_gain"] == change.gain.max() > 3
     assert facts["gains_above_3"] == (change.gain > 3).any(axis=1).sum() == 1
     left = shadow.bind(ShadowSettings(min_area=2), None)(View(image, image)).facts
