@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.kernels.arrays import Bits
+from roadeval.kernels.arrays import FN, FP, IGNORED, TN, TP, Bits
 from roadeval.kernels.packing import Packed, pack
 
 Rgb = npt.NDArray[np.uint8]
@@ -192,11 +192,11 @@ ERRORS: Final = LayerSpec(
     LayerKind.LABELS,
     "Errors of the final mask",
     (
-        LabelClass(0, "TN", TRANSPARENT),
-        LabelClass(1, "TP", (0, 158, 115, 160)),
-        LabelClass(2, "FP", (213, 94, 0, 220)),
-        LabelClass(3, "FN", (204, 121, 167, 220)),
-        LabelClass(4, "ignored", (128, 128, 128, 160)),
+        LabelClass(TN, "TN", TRANSPARENT),
+        LabelClass(TP, "TP", (0, 158, 115, 160)),
+        LabelClass(FP, "FP", (213, 94, 0, 220)),
+        LabelClass(FN, "FN", (204, 121, 167, 220)),
+        LabelClass(IGNORED, "ignored", (128, 128, 128, 160)),
     ),
 )
 

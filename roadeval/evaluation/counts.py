@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 
@@ -12,9 +11,6 @@ from roadeval.evaluation.bits import flat
 from roadeval.kernels import KERNELS
 from roadeval.kernels.arrays import Bits, Sums
 from roadeval.kernels.packing import everywhere
-
-IGNORED: Final = 4
-"""The class of `roadeval.data.ERRORS` beside TN, TP, FP and FN, which are 0 to 3."""
 
 
 def count(masks: Bits, truth: TruthBits, regions: Sequence[Bits]) -> Sums:
@@ -51,4 +47,4 @@ def error_map(mask: Mask, truth: Truth) -> Layer:
     truth
         ``(H, W)`` uint8: 0, 1, or 255 for ignored.
     """
-    return Layer(ERRORS, KERNELS.outcomes(mask, truth, IGNORED))
+    return Layer(ERRORS, KERNELS.outcomes(mask, truth))

@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from roadeval.data import Change, Layer, Step, TruthBits
 from roadeval.evaluation.bits import flat
-from roadeval.evaluation.counts import IGNORED
 from roadeval.kernels import KERNELS
 from roadeval.kernels.arrays import Bits
 from roadeval.kernels.packing import everywhere, ones
@@ -50,7 +49,7 @@ class HeatMap:
         if self.frames % PENDING == 0:
             self._carry()
         self.frames += 1
-        KERNELS.add_outcomes(errors, IGNORED, self._bytes)
+        KERNELS.add_outcomes(errors, self._bytes)
 
     def sums(self) -> Sums:
         """``(3, H, W)`` int64: frames that label the pixel, that have it FP, and FN."""

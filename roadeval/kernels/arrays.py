@@ -1,6 +1,8 @@
-"""The kinds of arrays that the kernels take and give."""
+"""The kinds of arrays that the kernels take and give, and the outcomes that some hold."""
 
 from __future__ import annotations
+
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -34,3 +36,10 @@ Reach = npt.NDArray[np.int64]
 """A structuring element that is symmetric in both directions, ``(r + 1,)``: how many pixels it
 extends to either side in its own row and in each of the r rows above and below, never more in a row
 further away."""
+
+TN: Final = 0
+TP: Final = 1
+FP: Final = 2
+FN: Final = 3
+IGNORED: Final = 4
+"""How a pixel came out, where a plane holds that of each."""

@@ -5,7 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from roadeval.kernels.arrays import Floats, Image, Plane, Planes, Sums, Table, Values, Words
+from roadeval.kernels.arrays import (
+    FN,
+    FP,
+    IGNORED,
+    Floats,
+    Image,
+    Plane,
+    Planes,
+    Sums,
+    Table,
+    Values,
+    Words,
+)
 
 _compiled = njit(cache=True, nogil=True)
 
@@ -98,23 +110,24 @@ def look_up_channels(image: Image, table: Table) -> Image:
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def outcomes(mask: Plane, truth: Plane, ignored: int) -> Plane:
+def outcomes(mask: Plane, truth: Plane) -> Plane:
     """See `plain.outcomes`."""
     height, width = mask.shape
     result = np.empty((height, width), np.uint8)
     for y in range(height):
         for x in range(width):
+            # TN and TP if the two agree, FP and FN if not.
             value = np.uint8(truth[y, x] + 2 * (truth[y, x] ^ mask[y, x]))
-            result[y, x] = value if truth[y, x] <= 1 else ignored
+            result[y, x] = value if truth[y, x] <= 1 else IGNORED
     return result
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def add_outcomes(errors: Plane, ignored: int, sums: Plane) -> None:
+def add_outcomes(errors: Plane, sums: Plane) -> None:
     """See `plain.add_outcomes`."""
     labelled, false_positives, false_negatives = sums
     for y in range(errors.shape[0]):
         for x in range(errors.shape[1]):
-            labelled[y, x] += errors[y, x] != ignored
-            false_positives[y, x] += errors[y, x] == 2
-            false_negatives[y, x] += errors[y, x] == 3
+            labelled[y, x] += errors[y, x] != IGNORED
+            false_positives[y, x] += errors[y, x] == FP
+            false_negatives[y, x] += errors[y, x] == FN

@@ -7,6 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.kernels.arrays import (
+    FN,
+    FP,
+    IGNORED,
     Bits,
     Floats,
     Image,
@@ -303,22 +306,22 @@ def fill_holes(bits: Bits, width: int) -> Bits:
     return pack(outside[1:-1, 1:-1] != 2)
 
 
-def outcomes(mask: Plane, truth: Plane, ignored: int) -> Plane:
-    """Say how each pixel came out: 0 TN, 1 TP, 2 FP, 3 FN, or ``ignored``.
+def outcomes(mask: Plane, truth: Plane) -> Plane:
+    """Say how each pixel came out: TN, TP, FP or FN, or `IGNORED`.
 
     ``mask`` is ``(H, W)`` uint8, 0 or 1; ``truth`` likewise, and greater where it is ignored.
     """
     value = truth + 2 * (truth ^ mask)
-    found: Plane = np.where(truth <= 1, value, ignored).astype(np.uint8)
+    found: Plane = np.where(truth <= 1, value, IGNORED).astype(np.uint8)
     return found
 
 
-def add_outcomes(errors: Plane, ignored: int, sums: Plane) -> None:
+def add_outcomes(errors: Plane, sums: Plane) -> None:
     """Count, pixel by pixel, how often it was labelled, FP and FN: ``sums``, ``(3, H, W)`` uint8.
 
     ``errors`` is ``(H, W)`` uint8, as `outcomes` gives it.
     """
-    for total, found in zip(sums, (errors != ignored, errors == 2, errors == 3), strict=True):
+    for total, found in zip(sums, (errors != IGNORED, errors == FP, errors == FN), strict=True):
         np.add(total, found.view(np.uint8), out=total)
 
 

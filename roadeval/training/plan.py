@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from roadeval.pipeline.chain import STAGES
+from roadeval.pipeline.stage import Stage
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,11 +26,10 @@ class Plan:
         """Give the settings that what is learnt depends on, by stage: filters, and `learning`."""
         learning = self.learning()
         names = [name for name in self.chain if name in learning or not STAGES[name].yields_mask]
-        return {name: relevant(name, dataclasses.asdict(self.settings[name])) for name in names}
+        return {name: _relevant(STAGES[name], self.settings[name]) for name in names}
 
 
-def relevant(stage: str, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Leave the settings out of a stage's that only its decision follows."""
-    # A model file may name a stage that there is no more.
-    deciding = STAGES[stage].deciding if stage in STAGES else ()
-    return {key: value for key, value in settings.items() if key not in deciding}
+def _relevant(stage: Stage[Any, Any], settings: Any) -> dict[str, Any]:
+    """Leave the settings out that only the stage's decision follows."""
+    every = dataclasses.asdict(settings)
+    return {key: value for key, value in every.items() if key not in stage.deciding}

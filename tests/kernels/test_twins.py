@@ -47,7 +47,7 @@ def every_kernel(image, width):
         "mahalanobis": (planes, np.array([90.5, 101.25, 99.0]), PRECISION, 7.8),
         "look_up_channels": (image, CHANNEL_TABLE),
         "look_up_colours": (planes, *COLOUR_TABLES),
-        "outcomes": (image[..., 0] & 1, RNG.choice(TRUTHS, labels.shape), 4),
+        "outcomes": (image[..., 0] & 1, RNG.choice(TRUTHS, labels.shape)),
     }
 
 
@@ -261,8 +261,8 @@ def test_outcomes_are_summed_up_alike(mask, seed):
     outcomes = rng.integers(0, 5, mask.shape, np.uint8)
     mine = rng.integers(0, 200, (3, *mask.shape), np.uint8)
     its = mine.copy()
-    fast.add_outcomes(outcomes, 4, mine)
-    plain.add_outcomes(outcomes, 4, its)
+    fast.add_outcomes(outcomes, mine)
+    plain.add_outcomes(outcomes, its)
     np.testing.assert_array_equal(mine, its)
 
 

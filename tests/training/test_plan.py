@@ -5,18 +5,16 @@ import dataclasses
 import pytest
 
 from roadeval.pipeline.chain import STAGES
-from roadeval.training.plan import relevant
+from roadeval.training.plan import Plan
 
 
 def test_what_a_stage_declares_to_decide_alone_is_left_out(monkeypatch):
     another = dataclasses.replace(STAGES["svm"], name="another", deciding=("gamma", "c"))
     monkeypatch.setitem(STAGES, "another", another)
-    kept = relevant("another", dataclasses.asdict(another.settings()))
-    assert set(kept) == {"kernel", "standardise", "threshold"}
-
-
-def test_settings_of_a_stage_that_there_is_no_more_all_count():
-    assert relevant("gone", {"threshold": 1}) == {"threshold": 1}
+    kept = Plan(("another", "post"), {"another": another.settings()}).relevant()
+    assert {name: set(own) for name, own in kept.items()} == {
+        "another": {"kernel", "standardise", "threshold"}
+    }
 
 
 @pytest.mark.parametrize("stage", STAGES.values(), ids=STAGES)
