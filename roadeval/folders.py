@@ -1,9 +1,9 @@
-"""Folders for outputs: made where missing, and gone again if nothing came to stand there."""
+"""Outputs and their folders: made where missing, and gone again if nothing came to stand there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from contextlib import suppress
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
@@ -40,3 +40,33 @@ def remove(made: Iterable[Path]) -> None:
     for folder in made:
         with suppress(OSError):
             folder.rmdir()
+
+
+@contextmanager
+def made(folder: Path) -> Iterator[list[Path]]:
+    """Make a folder and those above it; if the block fails they are gone again.
+
+    Yields those that it made, as `make` gives them. An OSError if it cannot be made.
+    """
+    new = make(folder)
+    try:
+        yield new
+    except BaseException:
+        remove(new)
+        raise
+
+
+def put(path: Path, content: bytes) -> None:
+    """Write a file, which bears its name only when it is complete, and its folder.
+
+    An OSError if it cannot be written; then nothing is left behind.
+    """
+    temporary = path.with_name(f".{path.name}.partial")
+    with made(path.parent):
+        try:
+            temporary.write_bytes(content)
+            temporary.replace(path)
+        except OSError:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+            raise

@@ -46,3 +46,30 @@ def test_an_empty_folder_that_another_process_made_meanwhile_stays(tmp_path, mon
         assert folders.make(innermost) == [innermost, tmp_path / "a" / "b"]
         folders.remove([innermost, tmp_path / "a" / "b"])
     assert [path.name for path in tmp_path.rglob("*")] == ["a"]
+
+
+def test_a_folder_whose_purpose_failed_is_gone(tmp_path):
+    with pytest.raises(KeyboardInterrupt), folders.made(tmp_path / "a" / "b"):
+        raise KeyboardInterrupt
+    assert list(tmp_path.iterdir()) == []
+    with folders.made(tmp_path / "a" / "b") as made:
+        assert [path.name for path in made] == ["b", "a"]
+    assert (tmp_path / "a" / "b").is_dir()
+
+
+def test_a_file_is_put_whole_or_not_at_all(tmp_path, monkeypatch):
+    path = tmp_path / "new" / "file"
+    folders.put(path, b"first")
+    folders.put(path, b"second")
+    assert [each.name for each in path.parent.iterdir()] == ["file"]
+    assert path.read_bytes() == b"second"
+
+    def full(_self, _content):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    for one in (path, tmp_path / "other" / "file"):
+        with pytest.raises(OSError, match="No space"):
+            folders.put(one, b"third")
+    assert path.read_bytes() == b"second"
+    assert [each.name for each in tmp_path.iterdir()] == ["new"]

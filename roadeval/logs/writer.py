@@ -41,16 +41,11 @@ class LogWriter:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._temporary = self.path.with_name(f".{self.path.stem}.part.mcap")
-        self._made: list[Path] = []
         with self._explained():
             if self.path.is_dir():
                 raise LogError(f"{self.path}: is a folder; name a file in it, ending in .mcap")
-            self._made = folders.make(self.path.parent)
-            try:
+            with folders.made(self.path.parent) as self._made:
                 self._file = self._temporary.open("wb")
-            except OSError:
-                folders.remove(self._made)
-                raise
         self._writer = Writer(self._file)
         self._writer.start(library=f"roadeval {VERSION}")
         self._schemas: dict[str, int] = {}

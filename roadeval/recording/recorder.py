@@ -211,19 +211,14 @@ class Recorder:
         return self._stream
 
     def _make_room(self) -> None:
-        made: list[Path] = []
         try:
             if self.path.is_dir():
                 raise RecordingError(f"{self.path}: is a folder; name a file in it, ending in .rrd")
-            made = folders.make(self.path.parent)
-            self.check_room()
-            self.partial.touch()
+            with folders.made(self.path.parent):
+                self.check_room()
+                self.partial.touch()
         except OSError as error:
-            folders.remove(made)
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
-        except RecordingError:
-            folders.remove(made)
-            raise
 
     def _flush(self) -> None:
         try:

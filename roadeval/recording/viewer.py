@@ -19,6 +19,7 @@ from typing import Final
 import rerun_cli
 from rerun.experimental import ViewerClient
 
+from roadeval import folders
 from roadeval.recording import layout as at
 from roadeval.recording.layout import RecordingError
 
@@ -82,11 +83,8 @@ def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int 
             shown = _go(client, frame)
             time.sleep(_SETTLING_S)
             png = client.take_screenshot()
-    temporary = picture.with_name(f".{picture.name}.partial")
     try:
-        picture.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_bytes(png)
-        temporary.replace(picture)
+        folders.put(picture, png)
     except OSError as error:
         raise RecordingError(f"{picture}: cannot be written: {error.strerror}") from error
     return shown

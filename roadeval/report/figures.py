@@ -6,9 +6,11 @@ Equal results give equal files, byte for byte.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from roadeval import folders
 from roadeval.errors import RoadevalError
 from roadeval.report.mask_figure import Example, road_masks
 from roadeval.report.rate_figures import error_rate, fp_fn_rate
@@ -67,8 +69,8 @@ def write_figures(
         "fig3b_fp_fn_rate": (lambda: fp_fn_rate(drive, windows)) if len(windows) else None,
     }
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        return [path for name, draw in drawings.items() for path in _write(folder / name, draw)]
+        with folders.made(folder):
+            return [path for name, draw in drawings.items() for path in _write(folder / name, draw)]
     except OSError as error:
         raise FiguresError(
             f"{error.filename or folder}: cannot write figures ({error.strerror}); "
@@ -91,6 +93,11 @@ def _write(stem: Path, draw: Callable[[], Figure] | None) -> list[Path]:
         FigureCanvasAgg(figure)
         for path, (kind, saving) in zip(paths, _SAVING.items(), strict=True):
             temporary = path.with_name(f".{path.name}.partial")
-            figure.savefig(temporary, format=kind, dpi=_DPI, **saving)
-            temporary.replace(path)
+            try:
+                figure.savefig(temporary, format=kind, dpi=_DPI, **saving)
+                temporary.replace(path)
+            except OSError:
+                with suppress(OSError):
+                    temporary.unlink(missing_ok=True)
+                raise
     return paths

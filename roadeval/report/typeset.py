@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import json
 import re
-from contextlib import suppress
 from enum import StrEnum
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
+from roadeval import folders
 from roadeval.errors import RoadevalError
 from roadeval.report.blocks import Document
 
@@ -74,14 +74,9 @@ def put(path: Path, content: bytes) -> Path:
     ReportError
         If it cannot be written.
     """
-    temporary = path.with_name(f".{path.name}.partial")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_bytes(content)
-        temporary.replace(path)
+        folders.put(path, content)
     except OSError as error:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
         raise ReportError(
             f"{path}: cannot be written ({error.strerror}); choose another place with -o"
         ) from error
