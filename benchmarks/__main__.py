@@ -98,7 +98,7 @@ def _replay(drive: Path, held: Held, folder: Path, jobs: int, options: argparse.
         "floor ms/frame": Spread.of([1e3 * seconds / count for seconds in floors]),
         "loop ms/frame": Spread.of([1e3 * seconds / count for seconds in loops]),
         "loop / floor": ratios(loops, floors),
-        "in CPU time": ratios([mine.cpu for mine, _ in pairs], [its.cpu for _, its in pairs]),
+        "loop / floor, CPU": ratios([mine.cpu for mine, _ in pairs], [its.cpu for _, its in pairs]),
         "whole / floor": Spread.of([seconds / floor_s for seconds in wholes]),
         "once, s": once,
         "whole <= 1.5 floor from": f"{once.median / spare * count:.0f} frames"
@@ -124,9 +124,8 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
             for position, logged in enumerate(log.frames(options.select(log))):
                 frame, seconds = timed(logged.decode)
                 lap("decode", seconds)
-                variants = tuple(
-                    runner.run_variant(n, c, View.of(frame.image)) for n, c in run._chains.items()
-                )
+                seen = View.of(frame.image)
+                variants = tuple(runner.run_variant(n, c, seen) for n, c in run._chains.items())
                 for variant in variants:
                     for stage in variant.stages:
                         lap(f"{variant.variant} {stage.stage}", stage.seconds)

@@ -17,6 +17,7 @@ from roadeval import logs
 from roadeval.data import FrameResult
 from roadeval.evaluation.results import ResultsWriter
 from roadeval.flow import ordered
+from roadeval.kernels.packing import Packed
 from roadeval.options import ReplayOptions
 from roadeval.recording import Rule, recorder_for
 from roadeval.run import Run
@@ -80,7 +81,8 @@ def _layer_bytes(payloads: dict[str, bytes]) -> int:
 
 
 def _bytes(result: FrameResult) -> int:
-    return sum(layer.array.nbytes for v in result.variants for layer in v.layers())
+    contents = (layer.content for v in result.variants for layer in v.layers())
+    return sum(c.bits.nbytes if isinstance(c, Packed) else c.nbytes for c in contents)
 
 
 def floor(held: Held, folder: Path, jobs: int) -> Cost:

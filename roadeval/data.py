@@ -1,7 +1,8 @@
 """The facts that travel between the rooms: frozen, typed, and free of any library but NumPy.
 
 Images are ``(H, W, 3)`` uint8 RGB, masks ``(H, W)`` uint8 with 1 for road (or shadow) and 0
-otherwise. Times are integer nanoseconds since the Unix epoch, or whatever epoch the log uses.
+otherwise, or `Packed`. Times are integer nanoseconds since the Unix epoch, or whatever epoch the
+log uses.
 """
 
 from __future__ import annotations
@@ -382,7 +383,7 @@ class FrameResult:
 
     ``tallies`` is empty unless the frame is evaluated. ``tables`` holds this frame's finished
     lines of the tables that grow frame by frame (keys ``frames``, ``regions``, ``oracles``; no
-    header). ``truth`` is the frame's, as the masks were held against it. ``changes`` are from
+    header). ``truth_bits`` is what the masks were held against. ``changes`` are from
     stage to stage and from final mask to final mask, ``contours`` the boundary F of each final
     mask by variant, and ``oracles`` the counts of what the stages made once one was replaced by
     the truth, by that one. ``notes`` are sentences for a person, ``pictures`` says what is
@@ -397,7 +398,7 @@ class FrameResult:
     health: Mapping[str, Health] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     tables: Mapping[str, str] = field(default_factory=dict)
-    truth: TruthBits | None = None
+    truth_bits: TruthBits | None = None
     changes: Mapping[Step, Change] = field(default_factory=dict)
     contours: Mapping[str, float] = field(default_factory=dict)
     oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)

@@ -21,23 +21,23 @@ def make(folder: Path) -> list[Path]:
         If it cannot be made; what was made on the way is gone again.
     """
     missing = [each for each in (folder, *folder.parents) if not each.exists()]
-    made: list[Path] = []
+    new: list[Path] = []
     try:
         for each in reversed(missing):
             # Another process may make one meanwhile, which is its own then.
             with suppress(FileExistsError):
                 each.mkdir()
-                made.insert(0, each)
+                new.insert(0, each)
         folder.mkdir(exist_ok=True)
     except OSError:
-        remove(made)
+        remove(new)
         raise
-    return made
+    return new
 
 
-def remove(made: Iterable[Path]) -> None:
+def remove(new: Iterable[Path]) -> None:
     """Remove folders that `make` made, but those in which something stands by now."""
-    for folder in made:
+    for folder in new:
         with suppress(OSError):
             folder.rmdir()
 
@@ -66,7 +66,6 @@ def put(path: Path, content: bytes) -> None:
         try:
             temporary.write_bytes(content)
             temporary.replace(path)
-        except OSError:
+        finally:
             with suppress(OSError):
                 temporary.unlink(missing_ok=True)
-            raise

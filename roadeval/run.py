@@ -177,7 +177,7 @@ class Run:
         variants += [runner.external_variant(name, mask) for name, mask in frame.external.items()]
         result = self.board.score(frame, role, tuple(variants))
         encoded = recorder.encode(result, position)
-        # Results wait for their turn, and would wait with some 30 bytes a pixel.
+        # Results wait for their turn, and would wait with some 15 bytes a pixel.
         return result.without_layers(), encoded
 
     def summary(self) -> dict[str, Any]:

@@ -39,6 +39,9 @@ def run_variant(
 ) -> VariantResult:
     """Run a chain on a frame and time each of its stages.
 
+    To take the image's channels apart is counted to the stage that first asks for them, of all
+    variants that share the view.
+
     Given the truth, run it also with each stage that has an oracle replaced by that, untimed;
     ``known`` is what the frame's variants share of it, see `Chain.oracles`.
     """

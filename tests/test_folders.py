@@ -64,12 +64,15 @@ def test_a_file_is_put_whole_or_not_at_all(tmp_path, monkeypatch):
     assert [each.name for each in path.parent.iterdir()] == ["file"]
     assert path.read_bytes() == b"second"
 
-    def full(_self, _content):
-        raise OSError(28, "No space left on device")
+    def fails(self, _content):
+        self.touch()
+        raise why
 
-    monkeypatch.setattr(Path, "write_bytes", full)
-    for one in (path, tmp_path / "other" / "file"):
-        with pytest.raises(OSError, match="No space"):
-            folders.put(one, b"third")
+    monkeypatch.setattr(Path, "write_bytes", fails)
+    for why in (OSError(28, "No space left on device"), KeyboardInterrupt()):
+        for one in (path, tmp_path / "other" / "file"):
+            with pytest.raises(type(why)):
+                folders.put(one, b"third")
+        assert [each.name for each in path.parent.iterdir()] == ["file"]
     assert path.read_bytes() == b"second"
     assert [each.name for each in tmp_path.iterdir()] == ["new"]

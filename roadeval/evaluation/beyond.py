@@ -77,7 +77,7 @@ class Beyond:
 
     def add(self, result: FrameResult) -> None:
         """Add a frame, in the drive's order. One that is not evaluated interrupts the flicker."""
-        if result.role is not Role.EVALUATED or result.truth is None:
+        if result.role is not Role.EVALUATED or result.truth_bits is None:
             self._flicker.interrupt()
             return
         for name, score in result.contours.items():
@@ -86,7 +86,7 @@ class Beyond:
                 total[0] += score
                 total[1] += 1
         finals = {v.variant: mask for v in result.variants for _, mask in v.masks()}
-        self._flicker.add(result.truth, finals)
+        self._flicker.add(result.truth_bits, finals)
 
     def interrupt(self) -> None:
         """Say that a frame was lost here."""

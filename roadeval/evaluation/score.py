@@ -79,7 +79,7 @@ def score_frame(
             "regions": tables.region_lines(frame, tallies),
             **({"oracles": tables.oracle_lines(frame, oracles)} if oracles else {}),
         },
-        truth=truth,
+        truth_bits=truth,
         changes=maps.changes(list(masks), bits, truth),
         contours=contours.boundary_f(final_bits, truth, settings.boundary_width),
         oracles=oracles,
@@ -123,8 +123,9 @@ def prove(names: Sequence[Name], counted: Sums, found: Sequence[str], labelled: 
     if lost.any():
         first = int(np.argmax(lost))
         raise CountsNotConservedError(
-            f"{'/'.join(names[first])}: {counted[first].tolist()} in the whole and in {found}, of "
-            f"{labelled} labelled pixels: please report this as a defect of roadeval"
+            f"{'/'.join(names[first])}: TP, TN, FP and FN are {counted[first].tolist()} in the "
+            f"whole and in {', '.join(found)}, of {labelled} labelled pixels: please report this "
+            "as a defect of roadeval"
         )
 
 

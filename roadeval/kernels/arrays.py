@@ -42,4 +42,5 @@ TP: Final = 1
 FP: Final = 2
 FN: Final = 3
 IGNORED: Final = 4
-"""How a pixel came out, where a plane holds that of each."""
+"""How a pixel came out, where a plane holds that of each. These stand in recordings and in the
+cached code of loops, and do not change."""

@@ -21,6 +21,9 @@ from roadeval.kernels.arrays import (
 
 _compiled = njit(cache=True, nogil=True)
 
+_FEW = 8
+"""Levels up to which so many comparisons are quicker than one look into a table."""
+
 
 @_compiled  # type: ignore[untyped-decorator]
 def look_up_sum_min(planes: Planes, table: Table) -> tuple[Plane, Sums]:
@@ -93,6 +96,29 @@ def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
             for x in range(width):
                 still = left[np.uintp(words[x])] >> np.uint64(bits[x]) & np.uint64(1)
                 result[y, x] |= np.uint8(still << np.uint64(1))
+    return result
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def look_up_levels(plane: Plane, table: Table) -> Plane:
+    """See `plain.look_up_levels`."""
+    height, width = plane.shape
+    result = np.empty((height, width), np.uint8)
+    common = np.argmax(np.bincount(table))
+    others = np.nonzero(table != common)[0].astype(np.uint8)
+    for y in range(height):
+        if len(others) > _FEW:
+            for x in range(width):
+                result[y, x] = table[plane[y, x]]
+        else:
+            # A comparison runs in vector instructions, and a look into a table does not.
+            for x in range(width):
+                result[y, x] = common
+            for level in others:
+                value = table[level]
+                for x in range(width):
+                    if plane[y, x] == level:
+                        result[y, x] = value
     return result
 
 

@@ -53,8 +53,10 @@ def ones(bits: Bits) -> int:
 
 @lru_cache(maxsize=8)
 def everywhere(shape: tuple[int, int]) -> Bits:
-    """Give the mask that holds every pixel of an image of ``shape`` (H, W)."""
-    return pack(np.ones(shape, np.uint8))
+    """Give the mask that holds every pixel of an image of ``shape`` (H, W): shared, read-only."""
+    bits = pack(np.ones(shape, np.uint8))
+    bits.flags.writeable = False
+    return bits
 
 
 def unpack(bits: Bits, width: int) -> Plane:

@@ -197,6 +197,12 @@ def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
     return found
 
 
+def look_up_levels(plane: Plane, table: Table) -> Plane:
+    """Look each level of an ``(H, W)`` uint8 plane up in a ``(256,)`` uint8 table."""
+    found: Plane = cv2.LUT(plane, table)
+    return found
+
+
 def look_up_channels(image: Image, table: Table) -> Image:
     """Look each channel of ``(H, W, 3)`` uint8 up in its column of a ``(256, 3)`` uint8 table."""
     found: Image = cv2.LUT(image, table[None])

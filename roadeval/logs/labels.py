@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Truth
+from roadeval.kernels import KERNELS
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.messages import Picture
 from roadeval.logs.pixels import to_labels, to_rgb
@@ -120,9 +121,9 @@ class LabelMap:
             If a value is unknown.
         """
         if labels.dtype == np.uint8:
-            import cv2
-
-            truth: Truth = np.asarray(cv2.LUT(labels, self.table[:256]), np.uint8)
+            # A loop is compiled for plain arrays; those of raw pictures are parts of a message.
+            own = np.require(labels, requirements=["C", "W"])
+            truth: Truth = KERNELS.look_up_levels(own, self.table[:256])
         else:
             truth = self.table[labels]
         if self.strict and (truth == UNKNOWN).any():

@@ -139,7 +139,7 @@ def colour_table(machine: SupportVectors, settings: SvmSettings) -> ColourTable:
     """Eq. 16 for every colour there is.
 
     A pixel's features are its three colours alone, so this is all the machine can say. The last
-    tables are remembered, each 2 MiB.
+    tables are remembered, each 2 MiB, or 4 where many colours are open.
     """
     # Matrices this small gain nothing from threads, and lose all where other work needs a core.
     from threadpoolctl import threadpool_limits

@@ -22,6 +22,7 @@ UNDECIDED: Final = 2
 """What the kernel gives for a colour that is still open."""
 FEW: Final = 1 << 16
 """Open colours that are decided at once, so that nobody need look for them again."""
+_NONE: Final = np.zeros(0, np.uint64)
 
 
 class ColourTable:
@@ -39,32 +40,35 @@ class ColourTable:
 
     def __init__(self, margins: Slabs, decide: Decide) -> None:
         self._decide = decide
-        self._words = _table(margins)
-        if 0 < ones(self._words[1]) <= FEW:
-            bits = np.unpackbits(self._words[1].view(np.uint8), bitorder="little")
-            road, _ = self._decided(_colours(np.flatnonzero(bits)))
-            self._words = road, np.zeros(0, np.uint64)
-        elif not self._words[1].any():
-            self._words = self._words[0], np.zeros(0, np.uint64)
+        self._words = road, left = _table(margins)
+        if not left.any():
+            self._words = road.copy(), _NONE
+        elif ones(left) <= FEW:
+            bits = np.unpackbits(left.view(np.uint8), bitorder="little")
+            road, _ = self._decided(self._words, np.flatnonzero(bits))
+            self._words = road, _NONE
 
     def look_up(self, planes: Planes) -> Mask:
         """Give ``(H, W)`` uint8, 1 where a pixel's margin is positive; from any thread."""
-        mask: Mask = KERNELS.look_up_colours(planes, *self._words)
-        if len(self._words[1]):
+        words = self._words
+        mask: Mask = KERNELS.look_up_colours(planes, *words)
+        if len(words[1]):
             seen = mask == UNDECIDED
             if seen.any():
-                colours = np.stack([plane[seen] for plane in planes], axis=1)
+                places = np.unique(_places(*(plane[seen] for plane in planes)))
                 # In new words, for others look up in the ones there are. Of two threads that come
                 # here together the later one's are kept, and the other's colours asked for again.
-                self._words = words = self._decided(np.unique(colours, axis=0))
+                self._words = words = self._decided(words, places)
                 mask = KERNELS.look_up_colours(planes, *words)
         return mask
 
-    def _decided(self, colours: Colours) -> tuple[Words, Words]:
-        """Give the words in which these ``(n, 3)`` colours are decided too."""
-        road, left = (words.copy() for words in self._words)
-        word, bit = _places(colours)
-        np.bitwise_or.at(road, word, np.where(self._decide(colours), bit, np.uint64(0)))
+    def _decided(
+        self, words: tuple[Words, Words], places: npt.NDArray[np.int64]
+    ) -> tuple[Words, Words]:
+        """Give words in which the colours of ``(n,)`` places are decided too."""
+        road, left = (each.copy() for each in words)
+        word, bit = places >> 6, np.uint64(1) << (places & 63).astype(np.uint64)
+        np.bitwise_or.at(road, word, np.where(self._decide(_colours(places)), bit, np.uint64(0)))
         np.bitwise_and.at(left, word, ~bit)
         return road, left
 
@@ -85,17 +89,19 @@ def _table(margins: Slabs) -> tuple[Words, Words]:
     return road, left
 
 
-def _places(colours: Colours) -> tuple[npt.NDArray[np.int64], Words]:
-    """Word, and bit in it, of ``(n, 3)`` colours; see `roadeval.kernels.plain.look_up_colours`."""
-    r, g, b = colours.T.astype(np.int64)
-    bit = (r & 3) << 4 | (g & 3) << 2 | b & 3
-    return (r >> 2) << 12 | (g >> 2) << 6 | b >> 2, np.uint64(1) << bit.astype(np.uint64)
+def _places(*colours: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
+    """Place of ``(n,)`` red, green and blue: the word times 64, and the bit in it.
+
+    See `roadeval.kernels.plain.look_up_colours`.
+    """
+    r, g, b = (channel.astype(np.int64) for channel in colours)
+    coarse = (r >> 2) << 12 | (g >> 2) << 6 | b >> 2
+    return coarse << 6 | (r & 3) << 4 | (g & 3) << 2 | b & 3
 
 
-def _colours(places: npt.NDArray[np.intp]) -> Colours:
-    """Give the ``(n, 3)`` colours of places: word times 64 and bit, the reverse of `_places`."""
+def _colours(places: npt.NDArray[np.int64]) -> Colours:
+    """Give the ``(n, 3)`` colours of ``(n,)`` places."""
     coarse = places >> 18, places >> 12 & 63, places >> 6 & 63
     fine = places >> 4 & 3, places >> 2 & 3, places & 3
-    return np.stack([c << 2 | f for c, f in zip(coarse, fine, strict=True)], axis=1).astype(
-        np.uint8
-    )
+    channels = [c << 2 | f for c, f in zip(coarse, fine, strict=True)]
+    return np.stack(channels, axis=1).astype(np.uint8)

@@ -216,7 +216,7 @@ class Moments:
     deviation: Floats
 
     def __getitem__(self, labels: slice) -> Moments:
-        """Give those of some labels."""
+        """Give those of some of the rows."""
         return Moments(self.pixels[labels], self.mean[labels], self.deviation[labels])
 
 
@@ -240,12 +240,14 @@ def moments_of_sums(sums: npt.NDArray[np.int64]) -> Moments:
     The variance is taken about the grey level next to the mean, in integers: nothing cancels,
     a constant component has a deviation of exactly 0, and no component is too large.
     """
-    n = np.maximum(sums[:, :1], 1)
-    first, second = sums[:, 1:4], sums[:, 4:]
-    level = np.rint(first / n).astype(np.int64)
+    # Whole numbers below 2^53, so that float64 takes their products and differences exactly.
+    exact = sums.astype(np.float64)
+    n, first, second = np.maximum(exact[:, :1], 1.0), exact[:, 1:4], exact[:, 4:]
+    mean = first / n
+    level = np.rint(mean)
     about = (first - n * level) / n
-    variance = (second - 2 * level * first + n * level**2) / n - about**2
-    return Moments(sums[:, 0], first / n, np.sqrt(variance))
+    variance = (second - level * (2.0 * first - n * level)) / n - about**2
+    return Moments(sums[:, 0], mean, np.sqrt(variance))
 
 
 def moments_of_values(labels: npt.NDArray[np.integer], values: Floats, count: int) -> Moments:
@@ -300,6 +302,7 @@ def compensate(
     count, width = found.count + 1, settings.ring_width
     inside = KERNELS.run_sums(view.planes(), found.runs, count)
     around = KERNELS.ring_sums(view.planes(), found.runs, ring.bits, count, width)
+    # In one call: most of its time does not depend on how many they are.
     both = moments_of_sums(np.concatenate([inside, around]))
     change = compensation(both[:count], both[count:], settings)
     linear = change.source, change.target, change.gain

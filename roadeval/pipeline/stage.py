@@ -77,7 +77,7 @@ class View:
     def after(self, output: Output) -> View:
         """Give what the next stage sees."""
         mask = self.mask if output.mask is None else output.mask
-        if output.image is None:
+        if output.image is None or output.image is self.image:
             return replace(self, mask=mask)
         return replace(self, image=output.image, mask=mask, _apart=[])
 

@@ -42,7 +42,10 @@ def encode(labels: npt.NDArray[np.uint8] | Packed, palette: Sequence[Rgba]) -> b
     """
     height, width = labels.shape
     bits = _bits(len(palette))
-    rows = _reversed(labels) if isinstance(labels, Packed) else _pack(labels, bits)
+    if isinstance(labels, Packed):
+        rows = _reversed(labels) if bits == 1 else _pack(labels.pixels(), bits)
+    else:
+        rows = _pack(labels, bits)
     # Most of a mask is as the row above it: runs of zeros, a fifth fewer bytes in less time.
     lines = np.empty((height, rows.shape[1] + 1), np.uint8)
     lines[:, 0], lines[:, 1:] = _UP, rows

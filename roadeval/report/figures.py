@@ -6,7 +6,7 @@ Equal results give equal files, byte for byte.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -92,12 +92,7 @@ def _write(stem: Path, draw: Callable[[], Figure] | None) -> list[Path]:
         figure = draw()
         FigureCanvasAgg(figure)
         for path, (kind, saving) in zip(paths, _SAVING.items(), strict=True):
-            temporary = path.with_name(f".{path.name}.partial")
-            try:
-                figure.savefig(temporary, format=kind, dpi=_DPI, **saving)
-                temporary.replace(path)
-            except OSError:
-                with suppress(OSError):
-                    temporary.unlink(missing_ok=True)
-                raise
+            drawn = BytesIO()
+            figure.savefig(drawn, format=kind, dpi=_DPI, **saving)
+            folders.put(path, drawn.getvalue())
     return paths

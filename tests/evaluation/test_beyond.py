@@ -72,7 +72,7 @@ def test_equals_a_plain_loop():
 def a_result(score, number=0, role=Role.EVALUATED):
     variant = a_variant("net", {"svm": 1 - TRUTH % 2, "post": TRUTH % 2})
     frame, truth = a_frame(TRUTH, number), TruthBits.of(TRUTH)
-    return FrameResult(frame, role, (variant,), truth=truth, contours={"net": score})
+    return FrameResult(frame, role, (variant,), truth_bits=truth, contours={"net": score})
 
 
 def test_boundary_f_is_averaged_over_the_frames_that_have_one():

@@ -155,9 +155,9 @@ class TestTheSelfCheck:
     whole = (2, 2, 1, 1)
 
     def prove(self, labelled: int, second: Sequence[Counted], found: Sequence[str] = ()) -> None:
-        """Prove two masks, of which the first has nothing amiss in it."""
-        first = [self.whole, *[self.whole, (0, 0, 0, 0)][: len(found)]]
-        prove(self.names, np.array([first, second]), found, labelled)
+        """Prove two masks. Nothing is amiss with the first: its first part is the whole of it."""
+        parts = [self.whole, (0, 0, 0, 0)] if found else []
+        prove(self.names, np.array([[self.whole, *parts], second]), found, labelled)
 
     def test_accepts_counts_that_add_up(self) -> None:
         halves = [(1, 0, 1, 0), (1, 2, 0, 1)]

@@ -165,6 +165,15 @@ def masks(most=80):
     )
 
 
+@pytest.mark.parametrize("others", [0, 1, 8, 9, 255])
+@pytest.mark.parametrize("common", [0, 254])
+def test_levels_are_looked_up_alike_however_many_differ(others, common):
+    table = np.full(256, common, np.uint8)
+    table[RNG.permutation(256)[:others]] = RNG.integers(0, 200, others)
+    plane = np.arange(256 * 3, dtype=np.uint8).reshape(3, 256)
+    assert_same(fast.look_up_levels(plane, table), plain.look_up_levels(plane, table))
+
+
 NO_PATCH = np.zeros((0, 0), np.uint8)
 
 
@@ -199,6 +208,20 @@ def test_kernels_of_masks_agree_about_the_end_of_a_word(width, share):
             grown = fast.grow(packed, reach, width, outside)
             assert_same(grown, plain.grow(packed, reach, width, outside), "grow")
             np.testing.assert_array_equal(grown, pack(unpack(grown, width)))
+
+
+@pytest.mark.parametrize("width", [63, 64, 65, 128, 200])
+@pytest.mark.parametrize("reach", [1, 5, 16])
+def test_rings_are_summed_up_alike_across_words(width, reach):
+    image = noise(40, width)
+    mask = (cv2.blur(image[..., 1], (5, 5)) < 110).astype(np.uint8)
+    runs, count = plain.components(pack(mask), width, 8)
+    ring = shadow.buffer_ring(Packed.of(mask), reach).bits
+    given = cv2.split(image), runs, ring, count + 1, reach
+    sums = fast.ring_sums(*given)
+    assert count > 3
+    assert (sums[1:, 0] > 0).all()
+    assert_same(sums, plain.ring_sums(*given), "ring_sums")
 
 
 def test_components_are_numbered_by_their_first_pixels_and_touch_by_corners_or_not():

@@ -8,12 +8,12 @@ from roadeval.pipeline.colour_table import FEW, ColourTable
 from roadeval.pipeline.cube import Slabs
 from tests.pipeline.images import noise
 
-LEVELS = np.indices((256, 256, 256), np.int16)
+GREEN, BLUE = np.indices((256, 256))
 
 
 def margin(red):
     """Positive inside a ball around a colour, and nowhere 0."""
-    away = (red - 90) ** 2 + (LEVELS[1, 0] - 140.0) ** 2 + (LEVELS[2, 0] - 120.0) ** 2
+    away = (red - 90) ** 2 + (GREEN - 140.0) ** 2 + (BLUE - 120.0) ** 2
     return 60.0**2 - 0.5 - away
 
 
@@ -64,3 +64,23 @@ def test_a_colour_is_asked_for_once():
     np.testing.assert_array_equal(first.ravel(), decide(image.reshape(-1, 3)))
     np.testing.assert_array_equal(table.look_up(apart), first)
     assert asked == [len(np.unique(image.reshape(-1, 3), axis=0))]
+
+
+def test_a_thread_that_comes_between_spoils_nothing():
+    """Another image is looked up, by another thread, while the first one's colours are decided."""
+    asked = []
+
+    def between(colours):
+        asked.append(len(colours))
+        if len(asked) == 1:
+            # Not what the first image needs, and published before the first one's words are.
+            table.look_up(planes(noise(1, 50, 1)[0]))
+        return decide(colours)
+
+    table = ColourTable(Slabs(lambda red: np.zeros((256, 256)), 1.0), between)
+    untouched = table._words
+    colours = noise(1, 200)[0]
+    for _ in range(2):
+        np.testing.assert_array_equal(table.look_up(planes(colours))[0], decide(colours))
+        # Another thread, which began before, publishes words that know nothing of these colours.
+        table._words = untouched

@@ -70,7 +70,8 @@ def result(number, *, err=0.25, fnr=0.5, **changes):
     filtering = StageResult(
         "shadow", (Layer(NDI, ndi), Layer(RINGS, rings)), None, {}, {"components": 3.0}, 0.004
     )
-    final = StageResult("post", (Layer(POST, mask),), Packed.of(mask), {}, {}, 0.002)
+    packed = Packed.of(mask)
+    final = StageResult("post", (Layer(POST, packed),), packed, {}, {}, 0.002)
     tally = Tally("filtered", "post", Counts(1, 2, 3, 4), rates={"ERR": err, "FNR": fnr})
     plain = FrameResult(
         shown,

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from roadeval.kernels.packing import Packed
 from roadeval.recording import indexed_png
 
 ROAD = [(0, 0, 0, 0), (0, 158, 115, 160)]
@@ -18,6 +19,15 @@ def test_labels_come_back_whatever_their_number_and_the_width(classes, width):
     labels = np.random.default_rng(0).integers(0, classes, (5, width)).astype(np.uint8)
     png = indexed_png.encode(labels, [(i, 0, 0, 255) for i in range(classes)])
     np.testing.assert_array_equal(indexed_png.decode(png), labels)
+
+
+@pytest.mark.parametrize("classes", [2, 3])
+@pytest.mark.parametrize("width", [1, 7, 8, 13, 63, 64, 65, 130])
+def test_a_packed_mask_gives_the_same_file(classes, width):
+    mask = np.random.default_rng(0).integers(0, 2, (5, width)).astype(np.uint8)
+    palette = [(i, 0, 0, 255) for i in range(classes)]
+    png = indexed_png.encode(mask, palette)
+    assert indexed_png.encode(Packed.of(mask), palette) == png
 
 
 @pytest.mark.parametrize("classes", [2, 3, 5, 17])
