@@ -10,12 +10,13 @@ from roadeval.kernels.colours import (
     mahalanobis,
     outcomes,
 )
-from roadeval.kernels.machine import rectified_sum
+from roadeval.kernels.machine import climb, rectified_sum
 from roadeval.kernels.runs import components, fill_holes, keep_region, label_runs
 from roadeval.kernels.shades import paint, ring_sums, run_sums, transfer
 
 __all__ = [
     "add_outcomes",
+    "climb",
     "components",
     "count_bits",
     "fill_holes",

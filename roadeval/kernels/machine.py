@@ -1,4 +1,4 @@
-"""The compiled loop of the machine on planes of features (`roadeval.pipeline.context`)."""
+"""Compiled loops of the machine on planes of features (`roadeval.pipeline.context`)."""
 
 from __future__ import annotations
 
@@ -27,18 +27,45 @@ def rectified_sum(
     total = np.empty(_BLOCK, np.float32)
     for start in range(0, pixels, _BLOCK):
         size = min(_BLOCK, pixels - start)
-        for feature, values in enumerate(features):
-            for pixel in range(size):
-                block[feature * _BLOCK + pixel] = values[start + pixel]
+        _take(features, start, size, block)
         # The last block may be short. What it has beyond the image is summed but not handed out.
         for pixel in range(_BLOCK):
             total[pixel] = 0
-        for plane in range(len(bias)):
+        # Two planes at a time: a feature that is read serves both.
+        for plane in range(0, len(bias) - 1, 2):
             for pixel in range(_BLOCK):
-                side = bias[plane]
+                side, next_side = bias[plane], bias[plane + 1]
                 for feature in range(len(features)):
-                    side += block[feature * _BLOCK + pixel] * planes[plane, feature]
+                    value = block[feature * _BLOCK + pixel]
+                    side += value * planes[plane, feature]
+                    next_side += value * planes[plane + 1, feature]
                 total[pixel] += max(side, np.float32(0)) * weights[plane]
+                total[pixel] += max(next_side, np.float32(0)) * weights[plane + 1]
+        if len(bias) % 2:
+            for pixel in range(_BLOCK):
+                side = bias[-1]
+                for feature in range(len(features)):
+                    side += block[feature * _BLOCK + pixel] * planes[-1, feature]
+                total[pixel] += max(side, np.float32(0)) * weights[-1]
         for pixel in range(size):
             result[start + pixel] = total[pixel]
     return result
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _take(features: tuple[Values, ...], start: int, size: int, block: Values) -> None:
+    """Lay the features of some pixels side by side."""
+    for feature, values in enumerate(features):
+        for pixel in range(size):
+            block[feature * _BLOCK + pixel] = values[start + pixel]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def climb(greatest: Values, least: Values) -> None:
+    """See `plain.climb`."""
+    height, width = greatest.shape
+    for y in range(height - 2, -1, -1):
+        for x in range(width):
+            greatest[y, x] = max(greatest[y, x], greatest[y + 1, x])
+        for x in range(width):
+            least[y, x] = min(least[y, x], least[y + 1, x])

@@ -235,6 +235,15 @@ def rectified_sum(
     return result
 
 
+def climb(greatest: Values, least: Values) -> None:
+    """Let each pixel of two ``(H, W)`` float32 planes know of those below it in its column.
+
+    In place: the greatest of the one, and the least of the other, of the pixel and all below it.
+    """
+    for plane, extremum in ((greatest, np.maximum), (least, np.minimum)):
+        plane[::-1] = extremum.accumulate(plane[::-1], axis=0)
+
+
 # --- Masks ----------------------------------------------------------------------------------------
 
 

@@ -19,7 +19,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
 from typing import Annotated, Any, Final
 
 import cv2
@@ -156,10 +155,7 @@ def _columns(light: Values, slope: Values, found: Values) -> None:
     edge, dark = found
     np.sqrt(cv2.blur(slope, (5, 3)), out=edge)
     cv2.blur(light, (5, 5), dst=dark)
-    # Row by row from below: NumPy's own running extrema take three times as long down an array.
-    for extremum, plane in ((np.maximum, edge), (np.minimum, dark)):
-        for below, here in pairwise(plane[::-1]):
-            extremum(here, below, out=here)
+    KERNELS.climb(edge, dark)
 
 
 @lru_cache(maxsize=8)

@@ -174,6 +174,17 @@ def test_levels_are_looked_up_alike_however_many_differ(others, common):
     assert_same(fast.look_up_levels(plane, table), plain.look_up_levels(plane, table))
 
 
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1), (40, 70)])
+def test_columns_are_climbed_alike(shape):
+    mine = RNG.normal(size=(2, *shape)).astype(np.float32)
+    its = mine.copy()
+    fast.climb(*mine)
+    plain.climb(*its)
+    np.testing.assert_array_equal(mine, its)
+    assert (np.diff(mine[0], axis=0) <= 0).all()
+    assert (np.diff(mine[1], axis=0) >= 0).all()
+
+
 NO_PATCH = np.zeros((0, 0), np.uint8)
 
 
