@@ -41,3 +41,8 @@ def test_after_an_image_the_channels_are_its_own():
     np.testing.assert_array_equal(np.dstack(view.planes()), image)
     assert later.original is image
     assert later.mask is MASK
+
+
+def test_a_filter_that_gives_the_image_back_leaves_the_channels_too():
+    view = View.of(noise(6, 8))
+    assert view.after(Output(image=view.image)).planes() is view.planes()
