@@ -249,7 +249,7 @@ class TruthBits:
 class StageResult:
     """What one stage of one variant made of one frame.
 
-    ``mask`` is the stage's road mask, or None for a stage that only changes the image.
+    ``mask`` is the stage's road mask, packed, or None for a stage that only changes the image.
     ``regions`` are pixel sets worth counting apart, by name. ``facts`` are numbers about the
     frame (``components``, ``max_gain``); ``seconds`` is wall time.
     """
@@ -275,7 +275,7 @@ class VariantResult:
     oracles: Mapping[str, Mapping[str, Packed]] = field(default_factory=dict)
 
     def masks(self) -> Iterator[tuple[str, Packed]]:
-        """Yield each stage that has a road mask, with the mask."""
+        """Yield each stage that has a road mask, with the mask; `Packed.pixels` gives its array."""
         for result in self.stages:
             if result.mask is not None:
                 yield result.stage, result.mask

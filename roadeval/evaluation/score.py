@@ -123,8 +123,8 @@ def prove(names: Sequence[Name], counted: Sums, found: Sequence[str], labelled: 
     if lost.any():
         first = int(np.argmax(lost))
         raise CountsNotConservedError(
-            f"{'/'.join(names[first])}: TP, TN, FP and FN are {counted[first].tolist()} in the "
-            f"whole and in {', '.join(found)}, of {labelled} labelled pixels: please report this "
+            f"{'/'.join(names[first])}: TP, TN, FP and FN are {counted[first].tolist()} "
+            f"({', '.join(('whole', *found))}), of {labelled} labelled pixels: please report this "
             "as a defect of roadeval"
         )
 

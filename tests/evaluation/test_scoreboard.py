@@ -164,7 +164,7 @@ class TestTheSelfCheck:
         self.prove(6, [self.whole, *halves], ["boundary", "interior"])
 
     def test_refuses_a_lost_pixel(self) -> None:
-        with pytest.raises(CountsNotConservedError, match="net/post"):
+        with pytest.raises(CountsNotConservedError, match=r"net/post: .* \(whole\), of 6 labelled"):
             self.prove(6, [(2, 2, 1, 0)])
 
     def test_refuses_a_negative_count(self) -> None:

@@ -459,6 +459,15 @@ def test_facts_state_threshold_components_and_gains():
     assert (left["components"], left["compensated"]) == (2, 1)
 
 
+def test_a_component_with_one_gain_above_3_is_counted_once_and_one_left_alone_is_not():
+    gain = np.array([[9.0, 9.0, 9.0], [1.0, 3.1, 3.2], [3.0, 3.0, 3.0], [9.0, 9.0, 9.0]])
+    applied = np.array([False, True, True, False])
+    change = shadow.Compensation(gain, gain, gain, applied)
+    facts = shadow._facts(100, Packed.of(np.eye(4, dtype=np.uint8)), 3, change)
+    assert (facts["max_gain"], facts["gains_above_3"]) == (3.2, 1)
+    assert (facts["components"], facts["compensated"], facts["shadow_share"]) == (3, 2, 0.25)
+
+
 def test_facts_of_an_image_without_shadow():
     facts = run(np.full((4, 4, 3), LIT, np.uint8))[0].facts
     assert np.isnan(facts["threshold"])
