@@ -23,6 +23,8 @@ Columns = npt.NDArray[np.int32]
 """``(n,)``: columns of runs, or labels along a row."""
 Places = npt.NDArray[np.int64]
 """``(n,)``: indices of something."""
+Parents = npt.NDArray[np.uintp]
+"""``(n,)``: of each run itself, or one before it that it is connected with."""
 Sums = npt.NDArray[np.int64]
 """``(n, ...)``: whole numbers by label or kind."""
 Values = npt.NDArray[np.float32]

@@ -140,35 +140,43 @@ def transfer(
 def mahalanobis(
     planes: Planes,
     mean: Floats,
-    precision: Floats,
+    whitening: Floats,
     greatest: float,
 ) -> tuple[Values, Plane]:
-    """Distance of Eq. 2, the root of ``(x - m)^T P (x - m)``, of every pixel.
+    """Distance of Eq. 2, ``|W (x - m)|``, of every pixel.
 
     Parameters
     ----------
     planes
         Red, green and blue, ``(H, W)`` uint8 each.
-    mean, precision
-        m, ``(3,)``, and the symmetric inverse covariance P, ``(3, 3)``.
+    mean, whitening
+        m, ``(3,)``, and W, ``(3, 3)`` lower triangular: ``W^T W`` is the inverse covariance.
     greatest
         Of the square, up to which a pixel is near.
 
     Returns
     -------
     distance, near
-        ``(H, W)`` float32, and ``(H, W)`` uint8, decided in float64: 1 near, 0 far.
+        ``(H, W)`` float32, computed in that precision; and ``(H, W)`` uint8, 1 near and 0 far,
+        decided in float64.
     """
-    r, g, b = (plane - level for plane, level in zip(planes, mean, strict=True))
-    squared: Floats = (
-        precision[0, 0] * (r * r)
-        + precision[1, 1] * (g * g)
-        + precision[2, 2] * (b * b)
-        + 2.0 * precision[0, 1] * (r * g)
-        + 2.0 * precision[0, 2] * (r * b)
-        + 2.0 * precision[1, 2] * (g * b)
-    )
-    return np.sqrt(squared.astype(np.float32)), (squared <= greatest).astype(np.uint8)
+    near = _squared(planes, mean, whitening) <= greatest
+    single = mean.astype(np.float32), whitening.astype(np.float32)
+    distance: Values = np.sqrt(_squared(planes, *single))
+    return distance, near.astype(np.uint8)
+
+
+def _squared(
+    planes: Planes, mean: npt.NDArray[np.floating], whitening: npt.NDArray[np.floating]
+) -> npt.NDArray[np.floating]:
+    """Give ``|W (x - m)|^2`` in the precision of m and W."""
+    r, g, b = (plane.astype(mean.dtype) - level for plane, level in zip(planes, mean, strict=True))
+    first, second, third = whitening
+    u = first[0] * r
+    v = second[0] * r + second[1] * g
+    w = third[0] * r + third[1] * g + third[2] * b
+    squared: npt.NDArray[np.floating] = u * u + v * v + w * w
+    return squared
 
 
 def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:

@@ -10,11 +10,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from roadeval.kernels.arrays import Bits, Columns, Labels, Places, Plane, Runs
+from roadeval.kernels.arrays import Bits, Columns, Labels, Parents, Places, Plane, Runs
 from roadeval.kernels.words import lowest
 
 _compiled = njit(cache=True, nogil=True)
 _inlined = njit(cache=True, nogil=True, inline="always")
+
+_ONE = np.uintp(1)
+"""Indices are unsigned where loops are short: nobody asks then whether they count from the end."""
 
 
 @_compiled  # type: ignore[untyped-decorator]
@@ -25,7 +28,7 @@ def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
     runs = np.empty((len(starts), 4), np.int32)
     count = 0
     for y in range(len(bits)):
-        for run in range(rows[y], rows[y + 1]):
+        for run in range(np.uintp(rows[y]), np.uintp(rows[y + 1])):
             # A component's number is its first run's, which comes before the others.
             if parents[run] == run:
                 count += 1
@@ -77,7 +80,7 @@ def keep_region(bits: Bits, width: int, patch: Plane) -> Bits:
                 for x in range(starts[run], ends[run]):
                     inside[parents[run]] += patch[y, x] > 0
     # A component's own number is its first run's: of equals the first from the top is found.
-    best = np.argmax(inside) if inside.any() else np.argmax(areas)
+    best = np.uintp(np.argmax(inside) if inside.any() else np.argmax(areas))
     for y in range(len(bits)):
         for run in range(rows[y], rows[y + 1]):
             if parents[run] == best:
@@ -153,22 +156,22 @@ def _runs(bits: Bits, width: int, inside: bool) -> tuple[Places, Columns, Column
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def _joined(rows: Places, starts: Columns, ends: Columns, corner: int) -> Places:
+def _joined(rows: Places, starts: Columns, ends: Columns, corner: int) -> Parents:
     """Join runs of neighbouring rows that touch: of each run the first one of its component.
 
     With ``corner`` 1 they may touch by a corner (8-connected), with 0 by a side alone.
     """
-    parents = np.arange(len(starts))
+    parents = np.arange(len(starts)).astype(np.uintp)
     for y in range(1, len(rows) - 1):
-        above, here = rows[y - 1], rows[y]
-        while above < rows[y] and here < rows[y + 1]:
+        above, here = np.uintp(rows[y - 1]), np.uintp(rows[y])
+        last_above, last_here = np.uintp(rows[y]), np.uintp(rows[y + 1])
+        while above < last_above and here < last_here:
             if starts[above] < ends[here] + corner and starts[here] < ends[above] + corner:
                 a, b = _first(parents, above), _first(parents, here)
-                parents[max(a, b)] = min(a, b)
-            if ends[above] < ends[here]:
-                above += 1
-            else:
-                here += 1
+                parents[a] = parents[b] = parents[here] = min(a, b)
+            # Whichever ends first is done with. Not a branch, which no processor could foresee.
+            done = np.uintp(ends[above] < ends[here])
+            above, here = above + done, here + (_ONE - done)
     for run in range(len(parents)):
         # A parent comes before its child, and is settled already.
         parents[run] = parents[parents[run]]
@@ -176,8 +179,10 @@ def _joined(rows: Places, starts: Columns, ends: Columns, corner: int) -> Places
 
 
 @_inlined  # type: ignore[untyped-decorator]
-def _first(parents: Places, run: int) -> int:
-    while parents[run] != run:
-        parents[run] = parents[parents[run]]
+def _first(parents: Parents, run: np.uintp) -> np.uintp:
+    parent = parents[run]
+    while parent != run:
+        parents[run] = parents[parent]
         run = parents[run]
+        parent = parents[run]
     return run

@@ -240,8 +240,9 @@ def moments_of_sums(sums: npt.NDArray[np.int64]) -> Moments:
     The variance is taken about the grey level next to the mean, in integers: nothing cancels,
     a constant component has a deviation of exactly 0, and no component is too large.
     """
-    # Whole numbers below 2^53, so that float64 takes their products and differences exactly.
-    exact = sums.astype(np.float64)
+    # Whole numbers below 2^53, so that float64 takes their products and differences exactly. A
+    # column's lie side by side, so that NumPy takes many at once.
+    exact = sums.astype(np.float64, order="F")
     n, first, second = np.maximum(exact[:, :1], 1.0), exact[:, 1:4], exact[:, 4:]
     mean = first / n
     level = np.rint(mean)
@@ -305,7 +306,8 @@ def compensate(
     # In one call: most of its time does not depend on how many they are.
     both = moments_of_sums(np.concatenate([inside, around]))
     change = compensation(both[:count], both[count:], settings)
-    linear = change.source, change.target, change.gain
+    # A loop is compiled anew for each order of values in memory.
+    linear = map(np.ascontiguousarray, (change.source, change.target, change.gain))
     return KERNELS.transfer(view.image, found.runs, *linear), change
 
 

@@ -68,18 +68,27 @@ def limit(quantile: float) -> float:
     return float(chdtri(3, 1.0 - quantile))
 
 
+def whitening(covariance: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """W, ``(3, 3)`` lower triangular, of a positive covariance S: ``W^T W = S^-1``.
+
+    So the distance of Eq. 2 is ``|W (x - m)|``, a sum of squares in which nothing cancels.
+    """
+    factors: npt.NDArray[np.float64] = np.linalg.inv(np.linalg.cholesky(covariance))
+    return factors
+
+
 def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Output]:
     """Return phase 1 as a pure function of what it sees.
 
     ``d = sqrt((x - m)^T S^-1 (x - m))`` with S regularised. The printed Eq. 2 is no distance
     (its brackets are misplaced).
     """
-    precision = np.linalg.inv(road.covariance + settings.ridge * np.eye(3))
+    factors = whitening(road.covariance + settings.ridge * np.eye(3))
     greatest = limit(settings.quantile)
     spec = _distance(settings)
 
     def run(view: View) -> Output:
-        distance, near = KERNELS.mahalanobis(view.planes(), road.mean, precision, greatest)
+        distance, near = KERNELS.mahalanobis(view.planes(), road.mean, factors, greatest)
         mask = Packed.of(near)
         return Output((Layer(spec, distance), Layer(SIMILARITY, mask)), mask=mask)
 

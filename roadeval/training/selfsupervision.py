@@ -8,7 +8,7 @@ from roadeval.data import IGNORE, NON_ROAD, ROAD, Rgb, Truth
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.colour import planes
 from roadeval.pipeline.patch import patch_mask
-from roadeval.pipeline.similarity import limit
+from roadeval.pipeline.similarity import limit, whitening
 from roadeval.training.settings import TrainingSettings
 
 
@@ -22,9 +22,9 @@ def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     height, width = image.shape[:2]
     patch = patch_mask(height, width, settings.patch) > 0
     colours = image[patch].astype(np.float64)
-    precision = np.linalg.inv(np.cov(colours, rowvar=False, ddof=0) + np.eye(3))
+    factors = whitening(np.cov(colours, rowvar=False, ddof=0) + np.eye(3))
     mean, far = colours.mean(axis=0), limit(settings.far)
-    _, near = KERNELS.mahalanobis(planes(image), mean, precision, far)
+    _, near = KERNELS.mahalanobis(planes(image), mean, factors, far)
     truth = np.full((height, width), IGNORE, np.uint8)
     truth[near == 0] = NON_ROAD
     truth[: round(settings.horizon * height)] = NON_ROAD

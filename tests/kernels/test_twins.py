@@ -12,14 +12,14 @@ from roadeval import kernels
 from roadeval.kernels import compiled as fast
 from roadeval.kernels import plain, shades
 from roadeval.kernels.packing import Packed, pack, unpack
-from roadeval.pipeline import shadow
+from roadeval.pipeline import shadow, similarity
 from tests.pipeline.images import IMAGES, images, noise
 
 RNG = np.random.default_rng(0)
 TRUTHS = np.array([0, 1, 255], np.uint8)
 CHANNEL_TABLE = RNG.integers(0, 256, (256, 3), dtype=np.uint8)
 COLOUR_TABLES = RNG.integers(0, 1 << 64, (2, 1 << 18), np.uint64)
-PRECISION = np.linalg.inv(np.cov(RNG.normal(0, 30, (3, 50))))
+WHITENING = similarity.whitening(np.cov(RNG.normal(0, 30, (3, 50))))
 
 
 def segments(image, width):
@@ -44,7 +44,7 @@ def every_kernel(image, width):
         "paint": (runs, *shape),
         "label_runs": (labels,),
         "transfer": (image, runs, source, target, gain),
-        "mahalanobis": (planes, np.array([90.5, 101.25, 99.0]), PRECISION, 7.8),
+        "mahalanobis": (planes, np.array([90.5, 101.25, 99.0]), WHITENING, 7.8),
         "look_up_channels": (image, CHANNEL_TABLE),
         "look_up_colours": (planes, *COLOUR_TABLES),
         "outcomes": (image[..., 0] & 1, RNG.choice(TRUTHS, labels.shape)),

@@ -22,9 +22,9 @@ def sample(colours, road):
     return TrainingSet((colours[None],), where, where, np.arange(n), np.asarray(road))
 
 
-def grey_road(n=300, seed=0):
+def grey_road(n=300, seed=0, spread=4.0):
     rng = np.random.default_rng(seed)
-    grey = rng.normal(110, 25, (n, 1)) + rng.normal(0, 4, (n, 3))
+    grey = rng.normal(110, 25, (n, 1)) + rng.normal(0, spread, (n, 3))
     return np.clip(grey, 0, 255).astype(np.uint8)
 
 
@@ -60,7 +60,7 @@ def test_distance_equals_scikit_learns():
     model = EmpiricalCovariance().fit(grey_road())
     expected = model.mahalanobis(noise(20, 20).reshape(-1, 3))
     distance, _ = similarity.KERNELS.mahalanobis(
-        cv2.split(noise(20, 20)), model.location_, model.precision_, 7.8
+        cv2.split(noise(20, 20)), model.location_, similarity.whitening(model.covariance_), 7.8
     )
     np.testing.assert_allclose(distance.ravel(), np.sqrt(expected), rtol=1e-6)
 
@@ -74,6 +74,18 @@ def test_a_pixel_on_the_limit_is_road(quantile):
     for spread, road in ((25 / limit * (1 + 1e-9), 1), (25 / limit * (1 - 1e-9), 0)):
         colour = RoadColour(np.full(3, 100.0), (spread - RIDGE) * np.eye(3))
         assert run(pixel, colour, settings)[1].item() == road
+
+
+@pytest.mark.parametrize("ridge", [1e-3, 1.0])
+def test_a_pixel_is_decided_in_double_precision_however_close_to_the_limit(ridge):
+    colours, road = noise(20, 20), grey_road(spread=0.1 if ridge < 1 else 4)
+    mean = road.mean(axis=0)
+    factors = similarity.whitening(np.cov(road, rowvar=False) + ridge * np.eye(3))
+    squares = np.sum(np.square((colours - mean) @ factors.T), axis=2)
+    for pixel, square in zip(colours.reshape(-1, 1, 1, 3), squares.ravel(), strict=True):
+        for limit, near in ((square * (1 + 1e-12), 1), (square * (1 - 1e-12), 0)):
+            _, found = similarity.KERNELS.mahalanobis(cv2.split(pixel), mean, factors, limit)
+            assert found.item() == near
 
 
 def test_the_quantile_is_the_share_of_normal_road_colours_kept():
