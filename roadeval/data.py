@@ -261,6 +261,10 @@ class StageResult:
     facts: Mapping[str, float]
     seconds: float
 
+    def without_layers(self) -> StageResult:
+        """Give what is left to sum up once the pictures are encoded."""
+        return StageResult(self.stage, (), self.mask, {}, self.facts, self.seconds)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VariantResult:
@@ -407,10 +411,7 @@ class FrameResult:
     def without_layers(self) -> FrameResult:
         """Give what is left to sum up once the pictures, which take most memory, are encoded."""
         variants = tuple(
-            VariantResult(
-                variant.variant,
-                tuple(replace(stage, layers=(), regions={}) for stage in variant.stages),
-            )
-            for variant in self.variants
+            VariantResult(v.variant, tuple(stage.without_layers() for stage in v.stages))
+            for v in self.variants
         )
         return replace(self, variants=variants)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Any, Protocol
 
@@ -167,7 +166,7 @@ class Run:
             runner.run_variant(
                 name,
                 chain,
-                replace(seen, moment=Moment(frame.stamp_ns, turn.batons[name])),
+                seen.at(Moment(frame.stamp_ns, turn.batons[name])),
                 truth=known[0],
                 shadow_truth=known[1],
                 known=shared,

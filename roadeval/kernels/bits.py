@@ -5,10 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from roadeval.kernels.arrays import Bits, Reach, Sums
+from roadeval.kernels.arrays import Bits, Reach, Sums, Words
 from roadeval.kernels.words import ones
 
 _compiled = njit(cache=True, nogil=True)
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def area(words: Words) -> int:
+    """See `plain.area`."""
+    total = np.uint64(0)
+    for word in words:
+        total += ones(word)
+    return int(total)
 
 
 @_compiled  # type: ignore[untyped-decorator]

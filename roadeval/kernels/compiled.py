@@ -1,6 +1,6 @@
 """The compiled kernels, by the names of their twins in `plain`."""
 
-from roadeval.kernels.bits import count_bits, grow
+from roadeval.kernels.bits import area, count_bits, grow
 from roadeval.kernels.colours import (
     add_outcomes,
     look_up_channels,
@@ -16,6 +16,7 @@ from roadeval.kernels.shades import paint, ring_sums, run_sums, transfer
 
 __all__ = [
     "add_outcomes",
+    "area",
     "climb",
     "components",
     "count_bits",

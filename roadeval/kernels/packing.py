@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
+from roadeval.kernels import KERNELS
 from roadeval.kernels.arrays import Bits, Plane
 
 
@@ -48,7 +49,7 @@ def pack(mask: npt.NDArray[np.uint8] | npt.NDArray[np.bool_]) -> Bits:
 
 def ones(bits: Bits) -> int:
     """Count the set bits."""
-    return int(np.bitwise_count(bits).sum())
+    return int(KERNELS.area(bits.ravel()))
 
 
 @lru_cache(maxsize=8)

@@ -348,6 +348,11 @@ def add_outcomes(errors: Plane, sums: Plane) -> None:
         np.add(total, found.view(np.uint8), out=total)
 
 
+def area(words: Words) -> int:
+    """Count the set bits of ``(n,)`` words."""
+    return int(np.bitwise_count(words).sum())
+
+
 def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
     """Count pixels in a mask, of a class and in a region: the set bits of three words' conjunction.
 

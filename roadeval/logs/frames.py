@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 from roadeval.logs.label_track import LabelTrack, read_or_error
 from roadeval.logs.logged import SHADOW, TRUTH, LoggedFrame
 from roadeval.logs.messages import Kind
+from roadeval.logs.pairing import UNREADABLE
 from roadeval.logs.selection import Clock, Selection
 from roadeval.logs.span import Span
-from roadeval.logs.track import UNREADABLE, Track
+from roadeval.logs.track import Track
 from roadeval.logs.video import Pictures, Video
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Final, Protocol
 
 UNREADABLE: Final = -(2**63) + 1
+"""A stamp that cannot be read."""
 REACH: Final = 4
 """Messages to look at on either side: topics are logged nearly, not always, in stamp order."""
 

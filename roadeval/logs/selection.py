@@ -16,9 +16,10 @@ from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.labels import LabelMap, LabelValues, seen_in, understand
 from roadeval.logs.logged import scaled_size
 from roadeval.logs.messages import Picture
+from roadeval.logs.pairing import UNREADABLE
 from roadeval.logs.pixels import to_rgb
 from roadeval.logs.topics import TopicInfo, median_period
-from roadeval.logs.track import UNREADABLE, Track
+from roadeval.logs.track import Track
 
 LOOKED_AT: Final = 10
 """Label images at the log's start, and as many spread over it, that settle what values mean."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -12,12 +14,11 @@ from roadeval.logs.container import OUTSIDE, Container
 from roadeval.logs.decoders import Decoder, decoder_for
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError
 from roadeval.logs.messages import Picture
+from roadeval.logs.pairing import UNREADABLE
 from roadeval.logs.records import Message
 
-UNREAD = np.iinfo(np.int64).min
+UNREAD: Final = UNREADABLE - 1
 """A stamp not read yet."""
-UNREADABLE = UNREAD + 1
-"""A stamp that cannot be read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +58,8 @@ class Track:
         self._offsets = table[:, 1]
         self._numbers = table[:, 2].astype(np.int16)
         self._chunks = table[:, 3].astype(np.int32)
-        self._stamps = np.full(len(table), UNREAD, np.int64)
+        # An array of Python's own: each image asks for some thirty stamps, one by one.
+        self._stamps = array("q", [UNREAD]) * len(table)
 
     def __len__(self) -> int:
         return len(self.log_times)
@@ -120,13 +122,15 @@ class Track:
 
     def stamp(self, position: int) -> int:
         """Header stamp of a message in nanoseconds, or `UNREADABLE`."""
-        if self._stamps[position] == UNREAD:
+        stamp = self._stamps[position]
+        if stamp == UNREAD:
             try:
                 data = self.message(position).data
-                self._stamps[position] = self._decoder(position).stamp(data)
+                stamp = self._decoder(position).stamp(data)
             except (FrameError, BadMessage):
-                self._stamps[position] = UNREADABLE
-        return int(self._stamps[position])
+                stamp = UNREADABLE
+            self._stamps[position] = stamp
+        return stamp
 
     def expected(self) -> int:
         """How many messages there should be, by the files' own statistics."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 from roadeval.data import LayerSpec, Rgb, Truth
@@ -97,7 +97,7 @@ class Chain:
             The stage that was replaced, as it is reported, and the masks of those after it. They
             see an image that stands alone: what a stage remembers of a drive is not for oracles.
         """
-        view = replace(view, moment=None)
+        view = view.at(None)
         for place, (step, output) in enumerate(zip(self.steps, outputs, strict=True)):
             truth = shadow if step.stage.is_filter else road
             if step.oracle is not None and truth is not None:

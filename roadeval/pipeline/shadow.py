@@ -413,14 +413,14 @@ def oracle(settings: ShadowSettings, _parameters: None) -> Callable[[View, Truth
 def _facts(
     threshold: int | None, shadow: Packed, count: int, change: Compensation
 ) -> dict[str, float]:
-    greatest = change.gain[change.applied].max(axis=1)
+    greatest = change.gain.max(axis=1)[change.applied]
     return {
         "threshold": float("nan") if threshold is None else threshold / 127.5 - 1.0,
         "shadow_share": shadow.area() / math.prod(shadow.shape),
         "components": float(count),
-        "compensated": float(change.applied.sum()),
+        "compensated": float(greatest.size),
         "max_gain": float(greatest.max()) if greatest.size else 1.0,
-        "gains_above_3": float((greatest > 3.0).sum()),
+        "gains_above_3": float(np.count_nonzero(greatest > 3.0)),
     }
 
 

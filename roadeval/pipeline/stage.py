@@ -8,7 +8,7 @@ configuration's ``chain``.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -78,8 +78,12 @@ class View:
         """Give what the next stage sees."""
         mask = self.mask if output.mask is None else output.mask
         if output.image is None or output.image is self.image:
-            return replace(self, mask=mask)
-        return replace(self, image=output.image, mask=mask, _apart=[])
+            return View(self.original, self.image, mask, self.moment, self._apart)
+        return View(self.original, output.image, mask, self.moment)
+
+    def at(self, moment: Moment | None) -> View:
+        """Give the same at a moment of a drive, or alone."""
+        return View(self.original, self.image, self.mask, moment, self._apart)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -41,6 +41,7 @@ def every_kernel(image, width):
         "look_up_sum_min": (planes, shadow.NDI_CODES),
         "run_sums": (planes, runs, count),
         "ring_sums": (planes, runs, ring, count, width),
+        "area": (ring.ravel(),),
         "paint": (runs, *shape),
         "label_runs": (labels,),
         "transfer": (image, runs, source, target, gain),
