@@ -13,7 +13,6 @@ from numba import njit
 
 from roadeval.kernels.arrays import (
     Bits,
-    Columns,
     Floats,
     Image,
     Labels,
@@ -29,9 +28,8 @@ _compiled = njit(cache=True, nogil=True)
 _inlined = njit(cache=True, nogil=True, inline="always")
 
 
-_NONE = np.int32(0x7FFFFFFF)
-"""Greater than any label."""
 _ONE, _TWO, _THREE = np.uintp(1), np.uintp(2), np.uintp(3)
+_WORD = np.uintp(64)
 _TABLED = 256
 """Pixels from which on a table of what becomes of each level is quicker than the sum itself."""
 
@@ -60,24 +58,12 @@ def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
 @_compiled  # type: ignore[untyped-decorator]
 def paint(runs: Runs, height: int, width: int) -> Labels:
     """See `plain.paint`."""
-    labels = np.empty((height, width), np.int32)
-    run = 0
-    for y in range(height):
-        run = _paint_row(labels[y], runs, run, y)
-    return labels
-
-
-@_compiled  # type: ignore[untyped-decorator]
-def _paint_row(row: Columns, runs: Runs, run: int, y: int) -> int:
-    """Give row ``y`` its labels, 0 outside the runs, of which ``run`` is the first not painted."""
-    for x in range(len(row)):
-        row[x] = 0
-    while run < len(runs) and runs[run, 0] == y:
-        label = runs[run, 3]
+    labels = np.zeros((height, width), np.int32)
+    for run in range(len(runs)):
+        y, label = np.uintp(runs[run, 0]), runs[run, 3]
         for x in range(np.uintp(runs[run, 1]), np.uintp(runs[run, 2])):
-            row[x] = label
-        run += 1
-    return run
+            labels[y, x] = label
+    return labels
 
 
 # --- Rings ----------------------------------------------------------------------------------------
@@ -85,88 +71,81 @@ def _paint_row(row: Columns, runs: Runs, run: int, y: int) -> int:
 
 @_compiled  # type: ignore[untyped-decorator]
 def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
-    """See `plain.ring_sums`."""
-    (rows, columns), words = planes[0].shape, ring.shape[1]
+    """See `plain.ring_sums`.
+
+    A component reaches a row wherever it has runs in the rows within ``width``, each as much wider
+    on either side. They are taken from left to right, out of all those rows: what is new of one
+    then lies right of where its component got to.
+    """
+    rows, columns = planes[0].shape
     sums = np.zeros((count, 7), np.int64)
-    # The last pixel that each component counted: one pixel counts once in a ring.
-    last = np.full(count, -1, np.int64)
-    # Labels of the rows within reach, in turn, and beside them as many columns: they stay in a
-    # near cache.
-    near = np.zeros((2 * width + 1, 64 * words + 2 * width), np.int32)
-    greatest, least = np.empty(64, np.int32), np.empty(64, np.int32)
-    spare = np.empty(64 + 2 * width, np.int32), np.empty(64 + 2 * width, np.int32)
-    run = 0
-    for row in range(rows + width):
-        run = _paint_row(near[row % len(near), width : width + columns], runs, run, row)
-        y = row - width
-        if y < 0:
-            continue
-        for word in range(words):
-            rest = ring[y, word]
-            if rest:
-                _bound(near, 64 * word, spare, greatest, least)
-            while rest:
-                bit = lowest(rest)
-                rest &= rest - np.uint64(1)
-                x = 64 * word + bit
-                # Most pixels of a ring are near one component.
-                if least[bit] == greatest[bit]:
-                    _add(sums, least[bit], planes, y, x)
-                else:
-                    _add_each(sums, last, near, planes, (y, x))
+    first = _first_runs(runs, rows, width)
+    reached = np.zeros(count, np.int64)
+    # Of each row within reach: its next run, where that starts, and the run after its last.
+    upcoming, ends = np.empty(2 * width + 1, np.uintp), np.empty(2 * width + 1, np.uintp)
+    starts = np.empty(2 * width + 1, np.int64)
+    for y in range(rows):
+        for v in range(len(starts)):
+            upcoming[v], ends[v] = first[y + v], first[y + v + 1]
+            starts[v] = runs[upcoming[v], 1] if upcoming[v] < ends[v] else columns
+        while True:
+            v = _least(starts)
+            if starts[v] == columns:
+                break
+            run, following = upcoming[v], upcoming[v] + _ONE
+            upcoming[v] = following
+            starts[v] = runs[following, 1] if following < ends[v] else columns
+            label = np.uintp(runs[run, 3])
+            start = max(runs[run, 1] - width, 0, reached[label] - y * columns)
+            end = min(runs[run, 2] + width, columns)
+            if start < end:
+                reached[label] = y * columns + end
+                _add(sums, label, planes, ring, (y, start, end))
     return sums
 
 
 @_compiled  # type: ignore[untyped-decorator]
-def _bound(
-    near: Labels, first: int, spare: tuple[Columns, Columns], greatest: Columns, least: Columns
-) -> None:
-    """Give the greatest and the least label around each pixel of a word; 0 counts for neither.
-
-    ``near`` are the rows around it, in any order, where what is around the word begins with column
-    ``first``; ``spare`` is for the columns' own. Loops as simple as these run in vector
-    instructions.
-    """
-    high, low = spare
-    for x in range(len(high)):
-        high[x], low[x] = 0, _NONE
-    for v in range(len(near)):
-        for x in range(len(high)):
-            label = near[v, np.uintp(first + x)]
-            high[x] = max(high[x], label)
-            low[x] = min(low[x], label if label > 0 else _NONE)
-    for x in range(64):
-        greatest[x], least[x] = high[x], low[x]
-    for shift in range(1, len(high) - 63):
-        for x in range(64):
-            greatest[x] = max(greatest[x], high[x + shift])
-            least[x] = min(least[x], low[x + shift])
-
-
-@_compiled  # type: ignore[untyped-decorator]
-def _add_each(
-    sums: Sums, last: Places, near: Labels, planes: Planes, place: tuple[int, int]
-) -> None:
-    """Add a ring's pixel, ``place`` (y, x), once to every component that ``near`` has around it."""
-    y, x = place
-    pixel = y * near.shape[1] + x
-    for v in range(len(near)):
-        for u in range(x, x + len(near)):
-            label = near[v, u]
-            if label > 0 and last[label] != pixel:
-                last[label] = pixel
-                _add(sums, label, planes, y, x)
+def _first_runs(runs: Runs, rows: int, width: int) -> Places:
+    """Find each row's first run, and those of ``width`` empty rows above and below the image."""
+    first = np.zeros(rows + 2 * width + 1, np.int64)
+    for run in range(len(runs)):
+        first[runs[run, 0] + width + 1] += 1
+    return np.cumsum(first)
 
 
 @_inlined  # type: ignore[untyped-decorator]
-def _add(sums: Sums, label: int, planes: Planes, y: int, x: int) -> None:
-    # By indices: a view of an array has an owner to be counted, which takes longer than the sum.
-    k, v, u = np.uintp(label), np.uintp(y), np.uintp(x)
-    sums[k, 0] += 1
-    for channel, plane in enumerate(planes):
-        value = np.int64(plane[v, u])
-        sums[k, 1 + channel] += value
-        sums[k, 4 + channel] += value * value
+def _least(values: Places) -> np.uintp:
+    """Find the place of the least value, the first of equals."""
+    best = np.uintp(0)
+    for each in range(1, len(values)):
+        place = np.uintp(each)
+        if values[place] < values[best]:
+            best = place
+    return best
+
+
+@_compiled  # type: ignore[untyped-decorator]
+def _add(
+    sums: Sums, label: np.uintp, planes: Planes, ring: Bits, stretch: tuple[int, int, int]
+) -> None:
+    """Add the ring's pixels in a stretch (row, start, end) to a component."""
+    row, start, end = stretch
+    y, word, last = np.uintp(row), np.uintp(start // 64), np.uintp((end - 1) // 64)
+    part = ~np.uint64(0) << np.uint64(start % 64)
+    while word <= last:
+        rest = ring[y, word] & part
+        part = ~np.uint64(0)
+        if word == last:
+            rest &= part >> np.uint64(63 - (end - 1) % 64)
+        while rest:
+            x = _WORD * word + np.uintp(lowest(rest))
+            rest &= rest - _ONE
+            sums[label, 0] += 1
+            for channel, plane in enumerate(planes):
+                value = np.int64(plane[y, x])
+                sums[label, 1 + channel] += value
+                sums[label, 4 + channel] += value * value
+        word += _ONE
 
 
 # --- Transfer -------------------------------------------------------------------------------------
