@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from roadeval.data import FrameResult, Role, TruthBits
-from roadeval.kernels.arrays import Bits
 from roadeval.kernels.packing import Packed, ones
 
 
@@ -27,7 +26,7 @@ class Flicker:
     """
 
     def __init__(self) -> None:
-        self._before: tuple[TruthBits, dict[str, Bits]] | None = None
+        self._before: tuple[TruthBits, Mapping[str, Packed]] | None = None
         self._pairs: Final[Counter[str]] = Counter()
         self._labelled: Final[Counter[str]] = Counter()
         self._changed: Final[Counter[str]] = Counter()
@@ -35,8 +34,7 @@ class Flicker:
 
     def add(self, now: TruthBits, masks: Mapping[str, Packed]) -> None:
         """Add the next frame: its truth and the final masks."""
-        bits = dict(zip(masks, now.bits_of(masks.values()), strict=True))
-        before, self._before = self._before, (now, bits)
+        before, self._before = self._before, (now, masks)
         if before is None or before[0].shape != now.shape:
             return
         labelled = now.labelled & before[0].labelled
@@ -45,7 +43,7 @@ class Flicker:
             self._pairs[name] += 1
             self._labelled[name] += count
             self._true[name] += moved
-            self._changed[name] += ones((bits[name] ^ before[1][name]) & labelled)
+            self._changed[name] += ones((masks[name].bits ^ before[1][name].bits) & labelled)
 
     def interrupt(self) -> None:
         """Say that the next frame does not follow the one before."""

@@ -110,6 +110,10 @@ def ndi(saturation: Floats, value: Floats) -> Floats:
     return np.where(total > 0, (saturation - value) / np.where(total > 0, total, 1.0), -1.0)
 
 
+CODES: Final = np.arange(256)
+"""The codes of NDI, j of Eq. 7."""
+
+
 def ndi_code(index: Floats) -> Codes:
     """Quantise NDI in -1..1 to the codes 0..255, ``rint((NDI + 1) * 127.5)``, uint8."""
     return np.rint((index + 1.0) * 127.5).astype(np.uint8)
@@ -135,8 +139,8 @@ def otsu_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
     ``w(T)`` and the first moment ``mu(T) = sum_{j<=T} j p_j`` of the lower class. The printed
     text defines ``mu(T)`` as the upper class's weight. None with a single occupied code.
     """
-    lower, total = np.cumsum(histogram), histogram.sum()
-    moment = np.cumsum(histogram * np.arange(256))
+    lower, moment = histogram.cumsum(), (histogram * CODES).cumsum()
+    total = lower[-1]
     return _first_maximum(moment[-1] * lower - moment * total, lower * (total - lower))
 
 
@@ -146,9 +150,9 @@ def printed_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
     The lowest T that maximises ``(mu_T w(T) - mu(T))^2 / (w(T) mu(T))``, where it is defined.
     None with a single occupied code.
     """
-    lower, total = np.cumsum(histogram), histogram.sum()
+    lower, mean = histogram.cumsum(), (histogram * CODES).sum()
+    total = lower[-1]
     upper = total - lower
-    mean = (histogram * np.arange(256)).sum()
     return _first_maximum(mean * lower - upper * total, lower * upper)
 
 

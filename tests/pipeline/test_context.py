@@ -10,7 +10,7 @@ from roadeval.pipeline.chain import STAGES, layers_of, masks_of
 from roadeval.pipeline.context import ContextSettings
 from roadeval.pipeline.stage import Moment, TrainingSet, View
 
-PLAIN = ContextSettings(planes=32, smoothing=1)
+PLAIN = ContextSettings(planes=32, spare=0, smoothing=1)
 
 
 def grey(height=24, width=32, seed=0):
@@ -165,6 +165,25 @@ def test_every_plane_passes_through_a_training_pixel_and_reaches_one():
     np.testing.assert_allclose(sides.max(axis=0), 1, rtol=1e-4)
 
 
+def test_the_planes_that_move_decisions_most_are_kept():
+    mapped = np.random.default_rng(0).random((400, 6))
+    road = mapped[:, 1] + mapped[:, 4] > 1
+    # Not those of the greatest weight: a plane that hardly varies has much and moves little.
+    for scale in (np.ones(6), np.array([0.01, 0.1, 1, 1, 10, 100])):
+        given = (mapped * scale).astype(np.float32), road
+        assert context.heaviest(*given, ContextSettings(planes=2, c=1e4)).tolist() == [1, 4]
+
+
+def test_spare_planes_are_drawn_but_not_kept():
+    truth = np.zeros((24, 32), np.uint8)
+    truth[12:] = 1
+    sample = every_pixel([grey(), grey(seed=1)], [truth, truth])
+    machine = context.fit(sample, ContextSettings(planes=16, spare=16))
+    drawn, _ = context.draw_planes(context.sampled(sample, ContextSettings()), 32, sample.seed)
+    assert machine.planes.shape == (16, drawn.shape[1])
+    assert all((drawn == plane).all(axis=1).any() for plane in machine.planes)
+
+
 def test_the_same_seed_gives_the_same_machine():
     truth = np.zeros((24, 32), np.uint8)
     truth[12:] = 1
@@ -190,7 +209,7 @@ def test_a_machine_for_other_features_is_refused_before_it_reads_beyond_its_plan
     truth = np.zeros((24, 32), np.uint8)
     truth[12:] = 1
     machine = context.fit(every_pixel([grey()], [truth]), PLAIN)
-    other = ContextSettings(planes=32, windows=windows)
+    other = ContextSettings(planes=32, spare=0, windows=windows)
     wanted = f"for 11 features, and windows = .* make {9 + 2 * len(windows)}"
     with pytest.raises(ValueError, match=wanted):
         context.bind(other, machine)
@@ -203,7 +222,9 @@ def test_smoothing_averages_neighbours():
     truth[12:] = 1
     machine = context.fit(every_pixel([grey()], [truth]), PLAIN)
     rough = context.decision(grey(seed=2), machine, PLAIN)
-    smooth = context.decision(grey(seed=2), machine, ContextSettings(planes=32, smoothing=3))
+    smooth = context.decision(
+        grey(seed=2), machine, ContextSettings(planes=32, spare=0, smoothing=3)
+    )
     np.testing.assert_allclose(smooth[1:-1, 1:-1], cv2.blur(rough, (3, 3))[1:-1, 1:-1], atol=1e-5)
 
 
@@ -212,7 +233,7 @@ def test_a_wide_image_is_decided_at_the_working_width():
     truth[12:] = 1
     machine = context.fit(every_pixel([grey()], [truth]), PLAIN)
     large = cv2.resize(grey(seed=2), (128, 96))
-    settings = ContextSettings(width=32, planes=32, smoothing=1)
+    settings = ContextSettings(width=32, planes=32, spare=0, smoothing=1)
     small = cv2.resize(large, (32, 24), interpolation=cv2.INTER_AREA)
     expected = cv2.resize(context.decision(small, machine, PLAIN), (128, 96))
     values = context.bind(settings, machine)(View(large, large)).layers[0].array
@@ -295,7 +316,7 @@ def test_memory_is_off_unless_asked_for():
     image, hand = grey(seed=2), Hand()
     context.bind(PLAIN, machine)(View(image, image, moment=Moment(0, hand)))
     assert hand.value is None
-    context.bind(ContextSettings(planes=32, memory=0.5), machine)(
+    context.bind(ContextSettings(planes=32, spare=0, memory=0.5), machine)(
         View(image, image, moment=Moment(0, hand))
     )
     assert hand.value[0] == 0
@@ -323,7 +344,7 @@ def test_left_out_values_come_from_machines_that_have_not_seen_the_frame():
         truth[12:] = 1
     truths[3][:12] = 1  # the last frame contradicts the others
     images = [grey(seed=seed) for seed in range(4)]
-    settings = ContextSettings(planes=32, folds=4)
+    settings = ContextSettings(planes=32, spare=0, folds=4)
     sample = every_pixel(images, truths)
     values = context.sampled(sample, settings)
     planes, bias = context.draw_planes(values, 32, 0)
@@ -343,7 +364,7 @@ def test_a_threshold_that_is_set_is_not_learnt():
     truths = [np.zeros((24, 32), np.uint8) for _ in range(2)]
     for truth in truths:
         truth[12:] = 1
-    settings = ContextSettings(planes=32, threshold=0.25)
+    settings = ContextSettings(planes=32, spare=0, threshold=0.25)
     assert context.fit(every_pixel([grey(), grey()], truths), settings).threshold == 0.25
 
 
