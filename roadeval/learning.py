@@ -49,15 +49,20 @@ class Schedule:
         Numbers of the frames after them that are left out as well.
     first
         Number of the first frame to evaluate, where it is known beforehand.
+    sizes
+        Bytes that the training frames take as logged, where they are known: a frame of another
+        size is none of them, and need not be hashed.
     """
 
     digests: frozenset[str]
     gap: frozenset[int] = frozenset()
     first: int | None = None
+    sizes: frozenset[int] | None = None
 
     def role(self, frame: Frame) -> Role:
         """Say what a decoded frame is used for."""
-        if frame.digest() in self.digests:
+        may_be = self.sizes is None or len(frame.payload) in self.sizes
+        if may_be and frame.digest() in self.digests:
             return Role.TRAINING
         if frame.number in self.gap:
             return Role.GAP
@@ -172,7 +177,8 @@ def from_log(
     if short:
         model = _told(model, f"trained on {len(chosen)} of {settings.frames} frames: {short}")
     first = numbers[settings.gap] if len(numbers) > settings.gap else None
-    return model, Schedule(model.digests, frozenset(numbers[: settings.gap]), first)
+    gap, sizes = frozenset(numbers[: settings.gap]), frozenset(len(f.payload) for f in chosen)
+    return model, Schedule(model.digests, gap, first, sizes)
 
 
 def _teachers(

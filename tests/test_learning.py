@@ -179,3 +179,14 @@ def test_who_asks_for_the_patch_gets_it_without_a_word():
 def test_a_drive_without_truth_among_others_is_named(source, frames):
     with pytest.raises(TrainingError, match=r"^b: no road truth to train on in the range"):
         of_drives(source, **frames)
+
+
+def test_a_frame_of_another_size_than_the_training_frames_is_not_hashed(monkeypatch):
+    mine = frame(3)
+    digests = frozenset([mine.digest()])
+    known, unknown = Schedule(digests, sizes=frozenset([len(mine.payload)])), Schedule(digests)
+    assert known.role(mine) is unknown.role(mine) is Role.TRAINING
+    other = replace(mine, payload=bytes(mine.payload) + b"x")
+    assert unknown.role(other) is Role.EVALUATED
+    monkeypatch.setattr(Frame, "digest", lambda _frame: pytest.fail("it was hashed"))
+    assert known.role(other) is Role.EVALUATED

@@ -58,8 +58,8 @@ def grow(bits: Bits, reach: Reach, width: int, outside: bool) -> Bits:
     # All rows one behind the other, with a word before and after each, so that every step is one
     # long loop, which runs in vector instructions.
     across = words + 1
-    wide = np.zeros(1 + height * across, np.uint64)
-    spare, grown = np.zeros_like(wide), np.zeros_like(wide)
+    wide = np.empty(1 + height * across, np.uint64)
+    spare, grown = np.empty_like(wide), np.zeros_like(wide)
     wide[1:].reshape(height, across)[:, :words] = bits
     _surround(wide, across, width, outside)
     done = 0
@@ -75,7 +75,8 @@ def grow(bits: Bits, reach: Reach, width: int, outside: bool) -> Bits:
         if away < height:
             rest = len(wide) - away * across
             _unite(grown[away * across :], wide[:rest])
-            _unite(grown[:rest], wide[away * across :])
+            if away:
+                _unite(grown[:rest], wide[away * across :])
     result = grown[1:].reshape(height, across)[:, :words].copy()
     if outside:
         near = min(len(reach) - 1, height)

@@ -409,7 +409,8 @@ def oracle(settings: ShadowSettings, _parameters: None) -> Callable[[View, Truth
     """Return the filter as it would be if it knew what is shadow; its compensation stays."""
 
     def run(view: View, truth: Truth) -> Output:
-        return Output(image=lift(view, Packed.of(truth == 1), settings)[0])
+        shadow = Packed.of(truth == 1)
+        return Output(image=lift(view, shadow, settings)[0]) if shadow.area() else Output()
 
     return run
 
