@@ -18,9 +18,10 @@ Table = npt.NDArray[np.uint8]
 Labels = npt.NDArray[np.int32]
 """``(H, W)``: a component's number at each of its pixels, 0 outside."""
 Runs = npt.NDArray[np.int32]
-"""``(n, 4)``: row, first column, column after the last, and label, row after row."""
+"""``(n, 4)``: row, first column, column after the last, and label, row after row and from left to
+right in each."""
 Columns = npt.NDArray[np.int32]
-"""``(n,)``: columns of runs, or labels along a row."""
+"""``(n,)``: first columns of runs, or those after their last."""
 Places = npt.NDArray[np.int64]
 """``(n,)``: indices of something."""
 Parents = npt.NDArray[np.uintp]

@@ -58,6 +58,7 @@ def grow(bits: Bits, reach: Reach, width: int, outside: bool) -> Bits:
     # All rows one behind the other, with a word before and after each, so that every step is one
     # long loop, which runs in vector instructions.
     across = words + 1
+    # The copy and what surrounds it set every word.
     wide = np.empty(1 + height * across, np.uint64)
     spare, grown = np.empty_like(wide), np.zeros_like(wide)
     wide[1:].reshape(height, across)[:, :words] = bits

@@ -58,8 +58,8 @@ def mahalanobis(
 ) -> tuple[Values, Plane]:
     """See `plain.mahalanobis`.
 
-    Of single precision twice as many numbers fit into a vector, and it is enough to decide nearly
-    every pixel. Those that lie so close to the limit that it is not are decided in double.
+    Twice as many numbers of single precision fit into a vector, and it decides nearly every pixel.
+    Those that lie too close to the limit for it are decided in double precision.
     """
     reds, greens, blues = planes
     height, width = reds.shape
@@ -68,8 +68,8 @@ def mahalanobis(
     linear = _linear(mean, whitening, np.float32)
     exact = _linear(mean, whitening, np.float64)
     limit = np.sqrt(greatest)
-    # A sum of terms that together are no larger than `reach` is off by six roundings at most, the
-    # distance by those of three sums and three of its own. One is 2^-24 of the number.
+    # A rounding is 2^-24 of a number. Each of the three components is off by six roundings of
+    # `reach`, their norm by sqrt(3) times as much, and by three more of its own: 16 are enough.
     reach = 255.0 * np.abs(whitening).sum(axis=1).max()
     error = 16.0 * 2.0**-24 * (reach + limit)
     surely, perhaps = np.float32(limit - error), np.float32(limit + error)
@@ -77,11 +77,11 @@ def mahalanobis(
         for x in range(width):
             r, g, b = np.float32(reds[y, x]), np.float32(greens[y, x]), np.float32(blues[y, x])
             distance[y, x] = np.sqrt(_squared(r, g, b, linear))
-        still = np.uint8(0)
+        undecided = np.uint8(0)
         for x in range(width):
             near[y, x] = distance[y, x] <= surely
-            still |= near[y, x] ^ np.uint8(distance[y, x] <= perhaps)
-        if still:
+            undecided |= near[y, x] ^ np.uint8(distance[y, x] <= perhaps)
+        if undecided:
             for x in range(width):
                 if surely < distance[y, x] <= perhaps:
                     r, g, b = reds[y, x], greens[y, x], blues[y, x]

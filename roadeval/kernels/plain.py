@@ -150,9 +150,10 @@ def mahalanobis(
     planes
         Red, green and blue, ``(H, W)`` uint8 each.
     mean, whitening
-        m, ``(3,)``, and W, ``(3, 3)`` lower triangular: ``W^T W`` is the inverse covariance.
+        m, ``(3,)``, a colour in 0..255, and W, ``(3, 3)`` lower triangular: ``W^T W`` is the
+        inverse covariance.
     greatest
-        Of the square, up to which a pixel is near.
+        Of the square, up to which a pixel is near: a finite number.
 
     Returns
     -------
@@ -269,8 +270,8 @@ def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
     -------
     runs, count
         ``(n, 4)`` int32: row, first column, column after the last, and label of each of their
-        rows' stretches, row after row; and how many components there are. Labels count from 1, in
-        the order of the components' first pixels.
+        rows' stretches, row after row and from left to right; and how many components there are.
+        Labels count from 1, in the order of the components' first pixels.
     """
     count, found = cv2.connectedComponents(unpack(bits, width), connectivity=connectivity)
     # The library numbers them by blocks of rows.

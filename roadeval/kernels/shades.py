@@ -73,9 +73,9 @@ def paint(runs: Runs, height: int, width: int) -> Labels:
 def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
     """See `plain.ring_sums`.
 
-    A component reaches a row wherever it has runs in the rows within ``width``, each as much wider
-    on either side. They are taken from left to right, out of all those rows: what is new of one
-    then lies right of where its component got to.
+    A component reaches a row wherever it has runs in the rows within ``width``, each widened by
+    ``width`` on either side. They are taken from left to right, out of all those rows: what is new
+    of one then lies right of where its component got to.
     """
     rows, columns = planes[0].shape
     sums = np.zeros((count, 7), np.int64)

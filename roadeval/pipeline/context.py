@@ -71,8 +71,8 @@ class ContextSettings:
     planes
         Planes of the feature map. What a decision costs grows with them.
     spare
-        Random planes drawn beyond those. The machine is solved on all of them first, and on the
-        heaviest again: with a quarter to spare, 96 planes decide as well as 128.
+        Random planes drawn beyond those. The machine is solved on all of them first, and again on
+        those that move decisions most: 96 of 128 planes decide as well as the 128.
     c
         Penalty of a training pixel on the wrong side.
     smoothing
@@ -192,14 +192,11 @@ def fit(sample: TrainingSet, settings: ContextSettings) -> RectifiedMachine:
     values = sampled(sample, settings)
     planes, bias = draw_planes(values, settings.planes + settings.spare, sample.seed)
     mapped = np.maximum(values @ planes.T + bias, 0)
-    if settings.spare:
-        kept = heaviest(mapped, sample.road, settings)
-        planes, bias, mapped = planes[kept], bias[kept], mapped.take(kept, axis=1)
-    weights, offset = _solve(mapped, sample.road, settings.c)
+    kept, weights, offset = solve(mapped, sample.road, settings)
     learnt = settings.threshold
     if learnt is None:
         learnt = threshold(left_out(mapped, sample, settings), sample.road)
-    return RectifiedMachine(planes, bias, weights.astype(np.float32), offset, learnt)
+    return RectifiedMachine(planes[kept], bias[kept], weights.astype(np.float32), offset, learnt)
 
 
 def draw_planes(values: Values, count: int, seed: int) -> tuple[Values, Values]:
@@ -218,17 +215,32 @@ def draw_planes(values: Values, count: int, seed: int) -> tuple[Values, Values]:
     return (planes / largest[:, None]).astype(np.float32), (bias / largest).astype(np.float32)
 
 
-def heaviest(
+def solve(
     mapped: Values, road: npt.NDArray[np.bool_], settings: ContextSettings
-) -> npt.NDArray[np.intp]:
-    """Find the planes that move decisions most: the ``settings.planes`` of them, ascending.
+) -> tuple[npt.NDArray[np.intp], Values, float]:
+    """Solve the linear machine on the planes that move its decisions most.
 
-    ``mapped`` is ``(n, K)``, what each plane makes of each pixel. A plane moves a decision by its
-    weight times the deviation of that.
+    Parameters
+    ----------
+    mapped
+        ``(n, K)``: what each plane makes of each pixel.
+    road
+        ``(n,)``: the pixels' labels.
+    settings
+        ``planes`` are kept. A plane moves decisions by its weight times the deviation of what it
+        makes of the pixels.
+
+    Returns
+    -------
+    kept, weights, offset
+        The planes' places, ascending, their weights, and the machine's offset.
     """
-    weights, _ = _solve(mapped, road, settings.c)
-    moved = np.abs(weights) * mapped.std(axis=0)
-    return np.sort(np.argsort(-moved, kind="stable")[: settings.planes])
+    kept = np.arange(mapped.shape[1])
+    if settings.spare:
+        weights, _ = _solve(mapped, road, settings.c)
+        moved = np.abs(weights) * mapped.std(axis=0)
+        kept = np.sort(np.argsort(-moved, kind="stable")[: settings.planes])
+    return kept, *_solve(mapped.take(kept, axis=1), road, settings.c)
 
 
 def _solve(mapped: Values, road: npt.NDArray[np.bool_], c: float) -> tuple[Values, float]:
@@ -250,8 +262,8 @@ def left_out(mapped: Values, sample: TrainingSet, settings: ContextSettings) -> 
         here = part == fold
         others = sample.road[~here]
         if others.any() and not others.all():
-            weights, offset = _solve(mapped[~here], others, settings.c)
-            result[here] = mapped[here] @ weights + offset
+            kept, weights, offset = solve(mapped[~here], others, settings)
+            result[here] = mapped[here].take(kept, axis=1) @ weights + offset
     return result
 
 

@@ -110,10 +110,6 @@ def ndi(saturation: Floats, value: Floats) -> Floats:
     return np.where(total > 0, (saturation - value) / np.where(total > 0, total, 1.0), -1.0)
 
 
-CODES: Final = np.arange(256)
-"""The codes of NDI, j of Eq. 7."""
-
-
 def ndi_code(index: Floats) -> Codes:
     """Quantise NDI in -1..1 to the codes 0..255, ``rint((NDI + 1) * 127.5)``, uint8."""
     return np.rint((index + 1.0) * 127.5).astype(np.uint8)
@@ -132,6 +128,10 @@ NDI_CODES: Final = _ndi_codes()
 S, V and so NDI depend."""
 
 
+_LEVELS: Final = np.arange(256)
+"""j of Eq. 7."""
+
+
 def otsu_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
     """Otsu's threshold of a ``(256,)`` histogram (Eq. 7 as its source means it).
 
@@ -139,7 +139,7 @@ def otsu_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
     ``w(T)`` and the first moment ``mu(T) = sum_{j<=T} j p_j`` of the lower class. The printed
     text defines ``mu(T)`` as the upper class's weight. None with a single occupied code.
     """
-    lower, moment = histogram.cumsum(), (histogram * CODES).cumsum()
+    lower, moment = histogram.cumsum(), (histogram * _LEVELS).cumsum()
     total = lower[-1]
     return _first_maximum(moment[-1] * lower - moment * total, lower * (total - lower))
 
@@ -150,7 +150,7 @@ def printed_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
     The lowest T that maximises ``(mu_T w(T) - mu(T))^2 / (w(T) mu(T))``, where it is defined.
     None with a single occupied code.
     """
-    lower, mean = histogram.cumsum(), (histogram * CODES).sum()
+    lower, mean = histogram.cumsum(), (histogram * _LEVELS).sum()
     total = lower[-1]
     upper = total - lower
     return _first_maximum(mean * lower - upper * total, lower * upper)
@@ -244,8 +244,8 @@ def moments_of_sums(sums: npt.NDArray[np.int64]) -> Moments:
     The variance is taken about the grey level next to the mean, in integers: nothing cancels,
     a constant component has a deviation of exactly 0, and no component is too large.
     """
-    # Whole numbers below 2^53, so that float64 takes their products and differences exactly. A
-    # column's lie side by side, so that NumPy takes many at once.
+    # Whole numbers below 2^53, so that float64 takes their products and differences exactly. The
+    # values of a column lie side by side, so that NumPy takes many at once.
     exact = sums.astype(np.float64, order="F")
     n, first, second = np.maximum(exact[:, :1], 1.0), exact[:, 1:4], exact[:, 4:]
     mean = first / n

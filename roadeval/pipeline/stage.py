@@ -76,6 +76,7 @@ class View:
 
     def after(self, output: Output) -> View:
         """Give what the next stage sees."""
+        # By hand: `dataclasses.replace` takes several times as long, and runs thirty times a frame.
         mask = self.mask if output.mask is None else output.mask
         if output.image is None or output.image is self.image:
             return View(self.original, self.image, mask, self.moment, self._apart)

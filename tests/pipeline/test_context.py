@@ -171,17 +171,38 @@ def test_the_planes_that_move_decisions_most_are_kept():
     # Not those of the greatest weight: a plane that hardly varies has much and moves little.
     for scale in (np.ones(6), np.array([0.01, 0.1, 1, 1, 10, 100])):
         given = (mapped * scale).astype(np.float32), road
-        assert context.heaviest(*given, ContextSettings(planes=2, c=1e4)).tolist() == [1, 4]
+        kept, weights, _ = context.solve(*given, ContextSettings(planes=2, c=1e4))
+        assert (kept.tolist(), weights.shape) == ([1, 4], (2,))
 
 
 def test_spare_planes_are_drawn_but_not_kept():
     truth = np.zeros((24, 32), np.uint8)
     truth[12:] = 1
     sample = every_pixel([grey(), grey(seed=1)], [truth, truth])
-    machine = context.fit(sample, ContextSettings(planes=16, spare=16))
-    drawn, _ = context.draw_planes(context.sampled(sample, ContextSettings()), 32, sample.seed)
-    assert machine.planes.shape == (16, drawn.shape[1])
-    assert all((drawn == plane).all(axis=1).any() for plane in machine.planes)
+    settings = ContextSettings(planes=16, spare=16)
+    machine = context.fit(sample, settings)
+    values = context.sampled(sample, settings)
+    planes, bias = context.draw_planes(values, 32, sample.seed)
+    kept, *_ = context.solve(np.maximum(values @ planes.T + bias, 0), sample.road, settings)
+    assert kept.tolist() != list(range(16))
+    np.testing.assert_array_equal(machine.planes, planes[kept])
+    np.testing.assert_array_equal(machine.bias, bias[kept])
+
+
+def test_the_threshold_is_learnt_from_machines_that_chose_their_planes_without_the_frame(
+    monkeypatch,
+):
+    solved = []
+    truth = np.zeros((24, 32), np.uint8)
+    truth[12:] = 1
+    sample = every_pixel([grey(seed=n) for n in range(4)], [truth] * 4)
+    solve = context.solve
+    monkeypatch.setattr(
+        context, "solve", lambda mapped, *rest: solved.append(mapped.shape) or solve(mapped, *rest)
+    )
+    context.fit(sample, ContextSettings(planes=16, spare=16, folds=4))
+    pixels = len(sample.road)
+    assert solved == [(pixels, 32)] + 4 * [(pixels * 3 // 4, 32)]
 
 
 def test_the_same_seed_gives_the_same_machine():

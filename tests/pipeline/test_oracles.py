@@ -87,6 +87,15 @@ def test_the_replaced_stage_sees_the_image_that_those_before_it_made(chain):
         assert_same(told["shadow"][name], mask, name)
 
 
+def test_a_perfect_filter_leaves_a_frame_without_shadow_as_it_is(chain):
+    own = {step.stage.name: step.settings for step in chain.steps}
+    told = oracles(chain, np.zeros_like(TRULY_DARK))["shadow"]
+    expected = masks(Chain(NAMES[1:], own, fitted(own)), IMAGE)
+    assert list(told) == list(expected)
+    for name, mask in expected.items():
+        assert_same(told[name], mask, name)
+
+
 def test_running_oracles_changes_no_output(chain):
     outputs = [output for _, output in chain.run(SEEN)]
     before = [None if o.mask is None else o.mask.pixels() for o in outputs]

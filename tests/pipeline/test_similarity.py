@@ -78,14 +78,16 @@ def test_a_pixel_on_the_limit_is_road(quantile):
 
 @pytest.mark.parametrize("ridge", [1e-3, 1.0])
 def test_a_pixel_is_decided_in_double_precision_however_close_to_the_limit(ridge):
-    colours, road = noise(20, 20), grey_road(spread=0.1 if ridge < 1 else 4)
+    image, road = noise(9, 70), grey_road(spread=0.0 if ridge < 1 else 4.0)
     mean = road.mean(axis=0)
     factors = similarity.whitening(np.cov(road, rowvar=False) + ridge * np.eye(3))
-    squares = np.sum(np.square((colours - mean) @ factors.T), axis=2)
-    for pixel, square in zip(colours.reshape(-1, 1, 1, 3), squares.ravel(), strict=True):
-        for limit, near in ((square * (1 + 1e-12), 1), (square * (1 - 1e-12), 0)):
-            _, found = similarity.KERNELS.mahalanobis(cv2.split(pixel), mean, factors, limit)
-            assert found.item() == near
+    squares = np.sum(np.square((image - mean) @ factors.T), axis=2)
+    for row, column in ((0, 0), (3, 68), (8, 69), (5, 17)):
+        for part in (1 + 1e-12, 1 - 1e-12):
+            limit = squares[row, column] * part
+            _, near = similarity.KERNELS.mahalanobis(cv2.split(image), mean, factors, limit)
+            np.testing.assert_array_equal(near, squares <= limit)
+            assert near[row, column] == (part > 1)
 
 
 def test_the_quantile_is_the_share_of_normal_road_colours_kept():
