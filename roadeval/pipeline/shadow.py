@@ -300,7 +300,7 @@ def compensate(
 ) -> tuple[Rgb, Compensation]:
     """Apply Eq. 11 to every component of the image that is seen.
 
-    ``ring`` is the union of their buffer rings.
+    ``ring`` is the union of their buffer rings. Without a component it is the image itself.
     """
     if settings.colour_space == "hsi":
         return _compensate_hsi(view.image, found, ring, settings)
@@ -312,7 +312,8 @@ def compensate(
     change = compensation(both[:count], both[count:], settings)
     # A loop is compiled anew for each order of values in memory.
     linear = map(np.ascontiguousarray, (change.source, change.target, change.gain))
-    return KERNELS.transfer(view.image, found.runs, *linear), change
+    image = KERNELS.transfer(view.image, found.runs, *linear) if found.count else view.image
+    return image, change
 
 
 def lift(
@@ -409,8 +410,7 @@ def oracle(settings: ShadowSettings, _parameters: None) -> Callable[[View, Truth
     """Return the filter as it would be if it knew what is shadow; its compensation stays."""
 
     def run(view: View, truth: Truth) -> Output:
-        shadow = Packed.of(truth == 1)
-        return Output(image=lift(view, shadow, settings)[0]) if shadow.area() else Output()
+        return Output(image=lift(view, Packed.of(truth == 1), settings)[0])
 
     return run
 

@@ -468,6 +468,11 @@ def test_a_component_with_one_gain_above_3_is_counted_once_and_one_left_alone_is
     assert (facts["components"], facts["compensated"], facts["shadow_share"]) == (3, 2, 0.25)
 
 
+def test_an_image_without_shadow_is_handed_on_itself():
+    image = np.full((6, 8, 3), 90, np.uint8)
+    assert shadow.bind(ShadowSettings(), None)(View.of(image)).image is image
+
+
 def test_facts_of_an_image_without_shadow():
     facts = run(np.full((4, 4, 3), LIT, np.uint8))[0].facts
     assert np.isnan(facts["threshold"])
