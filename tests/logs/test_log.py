@@ -16,6 +16,8 @@ from roadeval.logs import (
     open_log,
     parse_time,
 )
+from roadeval.logs.pairing import UNREADABLE
+from roadeval.logs.records import Message
 
 from .making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
 
@@ -165,6 +167,23 @@ def test_a_bad_image_costs_its_frame_and_is_named(tmp_path: Path) -> None:
             second.decode()
         third.decode()
     assert list(stream.accounting.undecodable) == [1]
+
+
+def test_a_stamp_that_cannot_be_read_is_told_from_every_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = ros2_log(tmp_path / "drive.mcap", [("/cam", i, compressed(i, b"")) for i in range(3)])
+    with open_log(path) as log:
+        track = log._tracks["/cam"]
+        read = track.message
+
+        def message(position: int) -> Message:
+            if position == 1:
+                raise FrameError("torn")
+            return read(position)
+
+        monkeypatch.setattr(track, "message", message)
+        assert [track.stamp(i) for i in (0, 1, 2, 1)] == [0, UNREADABLE, 2, UNREADABLE]
 
 
 def test_truth_of_another_size_is_refused_and_the_remedy_named(tmp_path: Path) -> None:
