@@ -184,13 +184,13 @@ ROAD_CLASSES: Final = (
 )
 TRUTH: Final = LayerSpec(
     "truth",
-    LayerKind.LABELS,
+    LayerKind.MASK,
     "Ground truth",
     (*ROAD_CLASSES, LabelClass(IGNORE, "ignored", (128, 128, 128, 160))),
 )
 ERRORS: Final = LayerSpec(
     "errors",
-    LayerKind.LABELS,
+    LayerKind.MASK,
     "Errors of the final mask",
     (
         LabelClass(TN, "TN", TRANSPARENT),

@@ -82,11 +82,14 @@ def replay(
             sums = run.board.tables()
             recorder.finish(_texts(windows, summary, sums))
             files = results.finish(windows, summary, sums)
-        tables = Results(folder).windows
-        files += write_figures(folder, log.name, tables, run.gallery.examples)
         saved = None if isinstance(recorder, NullRecorder) else recorder.path
+        told, examples = (run.warnings(), run.losses()), run.gallery.examples
+        # Figures take the room of all that the run has learnt and held.
+        del run
+        give_back()
+        files += write_figures(folder, log.name, Results(folder).windows, examples)
         files += [sidecar.path] if sidecar.path else []
-        return Outcome(saved, folder, summary, run.warnings(), run.losses(), tuple(files))
+        return Outcome(saved, folder, summary, *told, tuple(files))
 
 
 def train(

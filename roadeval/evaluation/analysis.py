@@ -59,7 +59,6 @@ def histories(frames: pd.DataFrame) -> Iterator[History]:
             str(stage),
             rows["frame"].map(places).to_numpy(np.int64),
             rows[[*OUTCOMES]].to_numpy(np.int64),
-            rows[[*rates.RATES]].to_numpy(np.float64),
         )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise, permutations
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -28,54 +28,54 @@ PENDING: Final = 255
 class HeatMap:
     """How often each pixel was labelled, and was a false positive or a false negative.
 
-    Frames of another size than the first are left out, and counted.
+    Summed up in square cells, no more than `CELLS` across the longer side: a sum a pixel would be
+    a large part of a run's memory. Frames of another size than the first are left out, and counted.
     """
 
     def __init__(self) -> None:
         self.frames = 0
         self.left_out = 0
-        # Four bytes a sum are enough: no drive has 2^32 frames.
-        self._sums = np.zeros((3, 0, 0), np.uint32)
+        self._side = 1
+        self._sums = np.zeros((3, 0, 0), np.int64)
         self._bytes = np.zeros((3, 0, 0), np.uint8)
 
     def add(self, errors: npt.NDArray[np.uint8]) -> None:
         """Add a frame's errors, ``(H, W)`` uint8 in the classes of `roadeval.data.ERRORS`."""
         if not self.frames:
-            self._sums = np.zeros((3, *errors.shape), np.uint32)
+            self._side = max(1, -(-max(errors.shape) // CELLS))
             self._bytes = np.zeros((3, *errors.shape), np.uint8)
+            self._sums = self._in_cells()
         if errors.shape != self._bytes.shape[1:]:
             self.left_out += 1
             return
-        if self.frames % PENDING == 0:
+        if self.frames and self.frames % PENDING == 0:
             self._carry()
         self.frames += 1
         KERNELS.add_outcomes(errors, self._bytes)
 
-    def sums(self) -> Sums:
-        """``(3, H, W)`` int64: frames that label the pixel, that have it FP, and FN."""
-        self._carry()
-        return self._sums.astype(np.int64)
-
     def cells(self) -> tuple[int, Sums]:
-        """Sum up square cells, no more than `CELLS` across the longer side.
+        """Give the sums.
 
         Returns
         -------
         side, sums
-            The cells' side in pixels, and ``(3, rows, columns)`` int64 as in `sums`. The last row
-            and column may be narrower.
+            The cells' side in pixels, and ``(3, rows, columns)`` int64: pixels that were labelled,
+            FP and FN, over all frames. The last row and column may be narrower.
         """
-        sums = self.sums()
-        side = max(1, -(-max(sums.shape) // CELLS))
-        for axis in (1, 2):
-            if sums.shape[axis]:
-                starts = np.arange(0, sums.shape[axis], side)
-                sums = np.add.reduceat(sums, starts, axis=axis)
-        return side, sums
+        self._carry()
+        return self._side, self._sums.copy()
 
     def _carry(self) -> None:
-        self._sums += self._bytes
+        self._sums += self._in_cells()
         self._bytes[:] = 0
+
+    def _in_cells(self) -> Sums:
+        sums: npt.NDArray[Any] = self._bytes
+        for axis in (1, 2):
+            if sums.shape[axis]:
+                starts = np.arange(0, sums.shape[axis], self._side)
+                sums = np.add.reduceat(sums, starts, axis=axis, dtype=np.int64)
+        return sums.astype(np.int64)
 
 
 def changes(names: Sequence[Name], masks: Bits, truth: TruthBits) -> dict[Step, Change]:

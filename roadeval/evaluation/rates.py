@@ -9,6 +9,9 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final
 
+import numpy as np
+import numpy.typing as npt
+
 from roadeval.data import Counts
 
 
@@ -96,5 +99,26 @@ def of(counts: Counts) -> dict[str, float]:
     return {name: rate(counts) for name, rate in RATES.items()}
 
 
+def table(counts: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+    """Compute the paper's six rates of many frames at once, exactly as `of` does.
+
+    Parameters
+    ----------
+    counts
+        ``(n, 4)``: TP, TN, FP, FN.
+
+    Returns
+    -------
+    array
+        ``(n, 6)`` float64 in the order of `RATES`; NaN where a rate is undefined.
+    """
+    columns = Counts(*counts.T)
+    with np.errstate(invalid="ignore"):
+        return np.stack([rate(columns) for rate in RATES.values()], axis=1)
+
+
 def _ratio(part: int, whole: int) -> float:
-    return part / whole if whole else math.nan
+    try:
+        return part / whole  # of arrays, `table`'s, nothing by nothing is NaN as it is
+    except ZeroDivisionError:
+        return math.nan

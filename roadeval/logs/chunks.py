@@ -15,7 +15,7 @@ from roadeval.logs.source import Buffer, Bytes, Memory, Part, Source
 
 BIG: Final = 16 << 20
 """A chunk of more bytes is not held in memory; writers make chunks of about a megabyte."""
-CACHE: Final = 32 << 20
+CACHE: Final = 16 << 20
 """Bytes of uncompressed chunks to keep: topics that run side by side share their chunks."""
 KEEP: Final = 64
 """Chunks to keep at most."""

@@ -4,8 +4,8 @@
 kind       in the file                 what comes back
 =========  ==========================  ============================================================
 mask       PNG with a palette          the same array
-labels     raw class ids, LZ4          the same array (class names show under the mouse, which
-                                       takes some three times the bytes)
+labels     raw class ids, LZ4          the same array (class names show under the mouse, at a
+                                       byte a pixel in the viewer's memory and in ours)
 scalar     grey PNG, coloured by the   nearest of 256 levels over the range; if not exact, 52
            viewer                      levels at half resolution
 rgb        PNG                         the same image; if not exact, a JPEG at half resolution
@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final, Protocol
 
 import cv2
@@ -78,10 +79,24 @@ def codec(spec: LayerSpec, width: int, height: int) -> Codec:
 
 @dataclass(frozen=True)
 class MaskCodec:
-    """A mask: a PNG of a bit or two a pixel whose palette holds the classes' colours."""
+    """A mask: a PNG of a few bits a pixel whose palette holds the classes' colours."""
 
     spec: LayerSpec
     component = "EncodedImage:blob"
+
+    @cached_property
+    def _values(self) -> Array:
+        """The classes' values by their place in the palette."""
+        return np.array([c.value for c in self.spec.classes], np.uint8)
+
+    @cached_property
+    def _places(self) -> Array | None:
+        """The classes' places in the palette by their values; None if they are the same."""
+        if (self._values == np.arange(len(self._values))).all():
+            return None
+        places = np.zeros(256, np.uint8)
+        places[self._values] = np.arange(len(self._values))
+        return places
 
     def style(self) -> Sequence[Any]:
         """Draw it above the camera's image."""
@@ -89,6 +104,8 @@ class MaskCodec:
 
     def encode(self, array: npt.NDArray[np.uint8] | Packed) -> bytes:
         """Turn ``(H, W)`` uint8 of the classes' values, or two classes' bits, into a PNG file."""
+        if self._places is not None and not isinstance(array, Packed):
+            array = np.asarray(cv2.LUT(array, self._places), np.uint8)
         return indexed_png.encode(array, [c.rgba for c in self.spec.classes])
 
     def columns(self, payloads: list[bytes]) -> Any:
@@ -97,7 +114,8 @@ class MaskCodec:
 
     def decode(self, payload: bytes) -> Array:
         """Give back the same array."""
-        return indexed_png.decode(payload)
+        labels = indexed_png.decode(payload)
+        return labels if self._places is None else np.asarray(self._values[labels])
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,11 @@ from roadeval.errors import RoadevalError
 
 APPLICATION: Final = "roadeval"
 """Name under which the files are known to the viewer, and by which our own are told."""
-FORMAT: Final = 2
+FORMAT: Final = 3
 """Version of the arrangement inside the file; raised when an older reader would go wrong.
 
-In 2 rows without a value end what is shown, and the rows of masks are filtered. 1 can be read.
+In 2 rows without a value end what is shown, and the rows of masks are filtered; in 3 truths and
+errors are masks, where they were labels before. All can be read.
 """
 
 FRAME: Final = "frame"
@@ -145,7 +146,7 @@ class Layout:
 
 SHADOW_TRUTH: Final = LayerSpec(
     "true_shadow",
-    LayerKind.LABELS,
+    LayerKind.MASK,
     "True shadow",
     (
         LabelClass(0, "lit", (0, 0, 0, 0)),

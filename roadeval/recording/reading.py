@@ -17,9 +17,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from rerun.chunk import LazyChunkStream, LazyStore, RrdReader, StoreEntry
 
-from roadeval.data import VariantLayout
+from roadeval.data import ERRORS, TRUTH, VariantLayout
 from roadeval.recording import layout as at
-from roadeval.recording.codecs import Codec
+from roadeval.recording.codecs import Codec, LabelCodec
 from roadeval.recording.encoding import Encoder
 from roadeval.recording.layout import Layout, RecordingError
 from roadeval.tabular import read_table
@@ -77,7 +77,7 @@ class Recording:
         if text is None:
             raise RecordingError(f"{self.path}: the recording ends before its first frame")
         self.layout = Layout.from_json(text)
-        self._codecs: dict[str, Codec] = Encoder(self.layout).codecs
+        self._codecs = self._codecs_then()
         self._held: dict[str, frozenset[int]] = {}
         self._payloads: dict[str, dict[int, pa.ListScalar]] = {}
 
@@ -220,6 +220,18 @@ class Recording:
         for batch in self._batches(path, component, static=False):
             values = batch.column(component).flatten()
             yield from zip(batch.column(at.FRAME).to_pylist(), values.to_pylist(), strict=True)
+
+    def _codecs_then(self) -> dict[str, Codec]:
+        """Give the codecs with which a recording of this format was made."""
+        layout = self.layout
+        codecs = Encoder(layout).codecs
+        if self.format < 3:
+            codecs |= {
+                path: LabelCodec(spec, layout.width, layout.height)
+                for path, spec in layout.images()
+                if spec in (TRUTH, at.SHADOW_TRUTH, ERRORS)
+            }
+        return codecs
 
     def _format(self) -> int:
         for batch in self._batches(at.PROPERTIES, _FORMAT, static=True):

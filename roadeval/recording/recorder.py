@@ -11,7 +11,6 @@ from types import TracebackType
 from typing import Any, Final, Self
 
 import rerun as rr
-from rerun.chunk import Chunk
 
 from roadeval import folders
 from roadeval.data import FrameResult
@@ -20,18 +19,19 @@ from roadeval.recording import layout as at
 from roadeval.recording.encoding import Encoded, Encoder
 from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.reading import indexed_chunks
+from roadeval.recording.tracks import Patience, Track, Tracks
 
-PAGE: Final = 8
-"""Frames whose images, notes and table lines share a chunk: a killed run loses no more of them."""
-PAGE_BYTES: Final = 4 << 20
-"""Of images at which a page is full with fewer frames: while one is packed and written, memory
-holds it several times."""
-SERIES: Final = 64
-"""Frames whose numbers share a chunk; a killed run may lose that many frames' numbers."""
+PICTURES: Final = Patience(8, 64)
+"""Of images, notes, states and table lines, which are read frame by frame."""
+NUMBERS: Final = Patience(64, 512)
+"""Of the graphs' numbers: many tracks of a few bytes a frame."""
+
+UNWRITTEN: Final = 4 << 20
+"""Bytes that may wait for Rerun's own thread to write them; it would let any number wait."""
 
 LEAST_FREE: Final = 64 << 20
-"""Bytes that must stay free on the disk, more than a page takes. Checked before each page: the
-partial recording then ends whole, while Rerun, should a write fail, may wait for it forever."""
+"""Bytes that must stay free on the disk beside what waits. Checked before each chunk: the partial
+recording then ends whole, while Rerun, should a write fail, may wait for it forever."""
 
 
 class Recorder:
@@ -53,8 +53,9 @@ class Recorder:
         self.partial = path.with_name(f"{path.stem}.partial.rrd")
         self._layout = layout
         self._encoder = Encoder(layout)
-        self._pages, self._series = tracks.Tracks(), tracks.Tracks()
-        self._frames = self._chunks = self._waiting = self._bytes = 0
+        self._pictures, self._numbers = Tracks(PICTURES), Tracks(NUMBERS)
+        self._begun = False
+        self._chunks = self._unwritten = 0
         self._states: dict[str, str] = {}
         self._shown: set[str] = set()
         self._blank: Encoded | None = None
@@ -106,22 +107,18 @@ class Recorder:
         RecordingError
             If the disk is full.
         """
-        if not self._frames:
+        if not self._begun:
+            self._begun = True
             self._static(style.timing(encoded.scalars))
         self._add_images(encoded)
         self._add_words(encoded)
         when = encoded.number, encoded.stamp_ns
         for path, number in encoded.scalars.items():
-            self._series.add(path, tracks.scalars, *when, number)
+            self._numbers.add(path, tracks.scalars, *when, number)
         for path, numbers in encoded.counts.items():
-            self._series.add(path, tracks.counts, *when, numbers)
-        self._frames += 1
-        if self._frames % SERIES == 0:
-            self._send(self._series.take())
-        self._waiting += 1
-        self._bytes += sum(map(len, encoded.payloads.values()))
-        if self._waiting == PAGE or self._bytes >= PAGE_BYTES:
-            self._turn_page()
+            self._numbers.add(path, tracks.counts, *when, numbers)
+        self._turn(self._pictures)
+        self._turn(self._numbers)
 
     def write_pictures(self, held: Iterable[Encoded]) -> None:
         """Append the pictures of frames whose numbers stand already, in order.
@@ -135,11 +132,10 @@ class Recorder:
             self._add_images(encoded)
             number, stamp_ns = encoded.number + 1, encoded.stamp_ns + 1
             self._blank = replace(encoded, number=number, stamp_ns=stamp_ns, payloads={})
-            self._turn_page()
+            self._turn(self._pictures)
         if self._blank is not None:
             self._add_images(self._blank)
             self._blank = None
-            self._turn_page()
 
     def finish(self, results: Mapping[str, str]) -> None:
         """Add the results, close the file and give it its name.
@@ -165,45 +161,50 @@ class Recorder:
         """Raise a `RecordingError` if the disk is full, or as good as full."""
         disk = shutil.disk_usage(self.path.parent)
         # A place that is no disk, as /proc, has no room to tell of.
-        if disk.total and disk.free < LEAST_FREE:
+        if disk.total and disk.free < LEAST_FREE + self._pictures.size:
             raise RecordingError(f"{self.path}: cannot be written: the disk is full")
 
     def _add_images(self, encoded: Encoded) -> None:
         when = encoded.number, encoded.stamp_ns
         for path, payload in encoded.payloads.items():
             columns = self._encoder.codecs[path].columns
-            self._pages.add(path, columns, *when, payload)
+            self._pictures.add(path, columns, *when, payload)
         # The viewer goes on showing what it has; an image that this frame lacks must not stand.
         for path in sorted(self._shown - encoded.payloads.keys()):
-            self._pages.add(path, self._encoder.codecs[path].columns, *when, tracks.NOTHING)
+            self._pictures.add(path, self._encoder.codecs[path].columns, *when, tracks.NOTHING)
         self._shown = set(encoded.payloads)
 
     def _add_words(self, encoded: Encoded) -> None:
         when = encoded.number, encoded.stamp_ns
         for path, state in encoded.states.items():
             if self._states.get(path, "") != state:
-                self._pages.add(path, tracks.states, *when, state)
+                self._pictures.add(path, tracks.states, *when, state)
                 self._states[path] = state
         for note in encoded.notes:
-            self._pages.add(at.NOTES, tracks.notes, *when, note)
+            self._pictures.add(at.NOTES, tracks.notes, *when, note)
         for name, lines in encoded.tables.items():
-            self._pages.add(at.result_path(name), tracks.texts, *when, lines)
-
-    def _turn_page(self) -> None:
-        """Write what waits: the file is whole after every page, and memory holds one at most."""
-        self.check_room()
-        self._send(self._pages.take())
-        self._flush()
-        self._waiting = self._bytes = 0
+            self._pictures.add(at.result_path(name), tracks.texts, *when, lines)
 
     def _static(self, records: Iterable[tuple[str, list[Any]]]) -> None:
         stream = self._open_stream()
         for path, archetypes in records:
             stream.log(path, *archetypes, static=True, strict=True)
 
-    def _send(self, chunks: list[Chunk]) -> None:
-        self._open_stream().send_chunks(chunks)
-        self._chunks += len(chunks)
+    def _turn(self, waiting: Tracks) -> None:
+        """Write what has waited long enough, a frame being over: nobody but a track waits then."""
+        ended = waiting.turn()
+        for key in ended:
+            self.check_room()
+            self._send(waiting.take(key))
+        if ended:
+            self._flush()
+
+    def _send(self, track: Track) -> None:
+        self._open_stream().send_chunks(track.chunk())
+        self._chunks += 1
+        self._unwritten += track.size
+        if self._unwritten >= UNWRITTEN:
+            self._flush()
 
     def _open_stream(self) -> rr.RecordingStream:
         if self._stream is None:
@@ -221,6 +222,7 @@ class Recorder:
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
 
     def _flush(self) -> None:
+        self._unwritten = 0
         try:
             self._open_stream().flush()
         except RuntimeError as error:
@@ -230,7 +232,9 @@ class Recorder:
         if self._stream is None:
             return
         try:
-            self._send(self._pages.take() + self._series.take())
+            for tracks in (self._pictures, self._numbers):
+                for key in tracks.waiting():
+                    self._send(tracks.take(key))
             self._flush()
         finally:
             self._stream.disconnect()

@@ -1,12 +1,14 @@
 """Rows of one entity, gathered over frames and sent as one chunk.
 
-A chunk costs about 1.1 kB in the file, 0.5 kB of memory until the end (the file's index) and
-0.1 ms, so a chunk a frame and entity would cost more than most of what it holds.
+A chunk costs about 1.1 kB in the file, 0.1 ms, and 1.5 to 3 kB of memory until the end: Rerun's
+index of the file has a place for every component of the recording in every chunk's row. A chunk a
+frame and entity would cost more than most of what it holds, and more with every minute.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -17,6 +19,8 @@ from roadeval.recording.layout import COUNTS, FRAME, STAMP
 
 Columns = Callable[[list[Any]], Any]
 """Makes the viewer's component columns of one value a row."""
+Key = tuple[str, Columns]
+"""A track: its entity's path, and the kind of its rows."""
 
 NOTHING: Final = None
 """Stands for a row without a value: from there on the viewer shows nothing of the entity.
@@ -26,33 +30,56 @@ https://github.com/rerun-io/rerun/issues/12793.
 """
 
 
-class Track:
-    """The pending rows of one entity."""
+CHUNK_BYTES: Final = 2 << 20
+"""Of images or text at which a chunk is full, however few its frames: the viewer reads chunks
+whole, and memory holds one several times while it is packed and written."""
 
-    def __init__(self, path: str, columns: Columns) -> None:
+SHARE: Final = 8
+"""Of a recording no more than this part of its frames waits, so that a short one waits little."""
+
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """For how many frames rows wait: a part of those so far, between ``least`` and ``most``.
+
+    A killed run loses what waits.
+    """
+
+    least: int
+    most: int
+
+    def after(self, frames: int) -> int:
+        """Say for how many frames, when the recording has this many."""
+        return min(max(frames // SHARE, self.least), self.most)
+
+
+class Track:
+    """The pending rows of one entity, the first of which came with the frame ``since``."""
+
+    def __init__(self, path: str, columns: Columns, since: int) -> None:
         self._path = path
         self._columns = columns
         self._frames: list[int] = []
         self._stamps: list[int] = []
         self._values: list[Any] = []
+        self.since = since
+        self.size = 0
 
     def add(self, frame: int, stamp_ns: int, value: Any) -> None:
         """Append a row, perhaps with `NOTHING`, at this frame number and header stamp."""
         self._frames.append(frame)
         self._stamps.append(stamp_ns)
         self._values.append(value)
+        if isinstance(value, bytes | str):
+            self.size += len(value)
 
-    def take(self) -> Chunk | None:
-        """Give away the pending rows as one chunk; None if there are none."""
-        if not self._frames:
-            return None
+    def chunk(self) -> Chunk:
+        """Give all rows as one chunk."""
         times = [
             rr.TimeColumn(FRAME, sequence=self._frames),
             rr.TimeColumn(STAMP, timestamp=np.array(self._stamps, "datetime64[ns]")),
         ]
-        chunk = Chunk.from_columns(self._path, times, self._filled())
-        self._frames, self._stamps, self._values = [], [], []
-        return chunk
+        return Chunk.from_columns(self._path, times, self._filled())
 
     def _filled(self) -> Any:
         values = [value for value in self._values if value is not NOTHING]
@@ -63,21 +90,42 @@ class Track:
 
 
 class Tracks:
-    """Tracks that are sent together, made when their first row comes."""
+    """The tracks of a recording that wait alike, each from its first row until it is full."""
 
-    def __init__(self) -> None:
-        self._tracks: dict[tuple[str, Columns], Track] = {}
+    def __init__(self, patience: Patience) -> None:
+        self._patience = patience
+        self._tracks: dict[Key, Track] = {}
+        self._frames = 0
 
     def add(self, path: str, columns: Columns, frame: int, stamp_ns: int, value: Any) -> None:
         """Append a row of this kind to the entity at ``path``."""
-        if (path, columns) not in self._tracks:
-            self._tracks[path, columns] = Track(path, columns)
-        self._tracks[path, columns].add(frame, stamp_ns, value)
+        track = self._tracks.get((path, columns))
+        if track is None:
+            track = self._tracks[path, columns] = Track(path, columns, self._frames)
+        track.add(frame, stamp_ns, value)
 
-    def take(self) -> list[Chunk]:
-        """Give away all pending rows."""
-        chunks = (track.take() for track in self._tracks.values())
-        return [chunk for chunk in chunks if chunk is not None]
+    @property
+    def size(self) -> int:
+        """Bytes of images and text that wait."""
+        return sum(track.size for track in self._tracks.values())
+
+    def turn(self) -> list[Key]:
+        """End a frame; name the tracks that have waited long enough, or hold enough."""
+        self._frames += 1
+        oldest = self._frames - self._patience.after(self._frames)
+        return [
+            key
+            for key, track in self._tracks.items()
+            if track.since <= oldest or track.size >= CHUNK_BYTES
+        ]
+
+    def waiting(self) -> list[Key]:
+        """Name all tracks."""
+        return list(self._tracks)
+
+    def take(self, key: Key) -> Track:
+        """Give a track away."""
+        return self._tracks.pop(key)
 
 
 def scalars(values: list[float]) -> Any:

@@ -29,7 +29,8 @@ def heat_of(*masks, truth=TRUTH):
 
 
 def test_a_heat_map_counts_labels_false_positives_and_negatives_pixel_by_pixel():
-    labelled, fp, fn = heat_of(pixels("#..#", "##.#"), pixels("#..#", "##..")).sums()
+    side, (labelled, fp, fn) = heat_of(pixels("#..#", "##.#"), pixels("#..#", "##..")).cells()
+    assert side == 1
     assert labelled.tolist() == [[2, 2, 2, 2], [2, 2, 2, 0]]
     assert fp.tolist() == [[0, 0, 0, 2], [0, 0, 0, 0]]
     assert fn.tolist() == [[0, 2, 0, 0], [0, 0, 0, 0]]
@@ -44,8 +45,8 @@ def test_a_frame_of_another_size_is_left_out_and_counted():
 @pytest.mark.parametrize("frames", [254, 255, 256, 511])
 def test_a_sum_that_does_not_fit_in_a_byte_is_carried(frames):
     heat = heat_of(*[pixels("#..#", "##..")] * frames)
-    assert heat.sums()[1, 0, 3] == frames
-    assert heat.sums()[1, 0, 3] == frames
+    assert heat.cells()[1][1, 0, 3] == frames
+    assert heat.cells()[1][1, 0, 3] == frames
 
 
 def test_a_large_map_is_summed_up_in_square_cells_and_loses_nothing():
@@ -58,10 +59,14 @@ def test_a_large_map_is_summed_up_in_square_cells_and_loses_nothing():
     assert cells[0, 0, 107] == 3
 
 
-def test_a_small_map_has_a_cell_a_pixel():
-    side, cells = heat_of(pixels("#..#", "##..")).cells()
-    assert side == 1
-    assert cells[1].tolist() == [[0, 0, 0, 1], [0, 0, 0, 0]]
+def test_a_large_map_carried_between_bytes_and_cells_loses_nothing():
+    truth = np.zeros((170, 200), np.uint8)
+    masks = np.random.default_rng(0).integers(0, 2, (5, *truth.shape), np.uint8)
+    heat = heat_of(*[mask for mask in masks for _ in range(103)], truth=truth)
+    total = 103 * masks.sum(axis=0, dtype=np.int64)
+    side, cells = heat.cells()
+    assert side == 2
+    assert cells[1].tolist() == total.reshape(85, 2, 100, 2).sum(axis=(1, 3)).tolist()
 
 
 def test_a_change_tells_the_newly_right_from_the_newly_wrong_and_counts_no_ignored_pixel():
@@ -100,4 +105,4 @@ def test_maps_add_up_over_frames():
         found.add({"a": error_map(mask, TRUTH)}, {("a", "svm", "a", "post"): Change(1, 2, 7)})
     assert found.frames == 3
     assert found.changes == {("a", "svm", "a", "post"): Change(3, 6, 21)}
-    assert found.heat["a"].sums()[2, 0, 1] == 3
+    assert found.heat["a"].cells()[1][2, 0, 1] == 3

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from sklearn import metrics
 
 from roadeval.data import Counts
-from roadeval.evaluation.rates import OVERLAP_RATES, RATES, of
+from roadeval.evaluation.rates import OVERLAP_RATES, RATES, of, table
 
 pixels = st.integers(0, 40)
 
@@ -66,3 +66,11 @@ def test_rates_equal_scikit_learns(tp: int, tn: int, fp: int, fn: int) -> None:
     }
     found = {name: rate(Counts(tp, tn, fp, fn)) for name, rate in (RATES | OVERLAP_RATES).items()}
     assert found == pytest.approx(expected, abs=1e-12)
+
+
+@given(st.lists(st.tuples(*[st.sampled_from([0, 1, 7, 2_000_000_000])] * 4), min_size=1))
+def test_many_frames_rates_at_once_are_those_of_each_to_the_last_bit(
+    rows: list[tuple[int, int, int, int]],
+) -> None:
+    single = [list(of(Counts(*row)).values()) for row in rows]
+    np.testing.assert_array_equal(table(np.array(rows, np.int64)), single)

@@ -1,12 +1,15 @@
 """What comes back of a layer of each kind."""
 
 from dataclasses import replace
+from io import BytesIO
 
 import numpy as np
 import pytest
+from PIL import Image
 
-from roadeval.data import ERRORS, LayerKind, LayerSpec
+from roadeval.data import ERRORS, TRUTH, LayerKind, LayerSpec
 from roadeval.recording.codecs import codec
+from roadeval.recording.layout import SHADOW_TRUTH
 from tests.recording.making import NDI, POST, RINGS
 
 HEIGHT, WIDTH = 9, 13
@@ -19,10 +22,20 @@ def there_and_back(spec, array):
     return chosen.decode(chosen.encode(array))
 
 
-@pytest.mark.parametrize(("spec", "values"), [(POST, 2), (RINGS, 3), (ERRORS, 5)])
-def test_masks_and_labels_come_back_equal(spec, values):
-    array = DRAW.integers(0, values, (HEIGHT, WIDTH)).astype(np.uint8)
+@pytest.mark.parametrize("spec", [POST, RINGS, ERRORS, TRUTH, SHADOW_TRUTH])
+def test_masks_and_labels_come_back_equal(spec):
+    values = np.array([each.value for each in spec.classes], np.uint8)
+    array = DRAW.choice(values, (HEIGHT, WIDTH))
+    assert set(values) == set(array.flat)
     np.testing.assert_array_equal(there_and_back(spec, array), array)
+
+
+@pytest.mark.parametrize("spec", [ERRORS, TRUTH])
+def test_a_mask_is_a_picture_in_its_classes_colours(spec):
+    array = np.array([[each.value for each in spec.classes]], np.uint8)
+    with Image.open(BytesIO(codec(spec, array.shape[1], 1).encode(array))) as picture:
+        drawn = np.array(picture.convert("RGBA"))
+    assert drawn.tolist() == [[list(each.rgba) for each in spec.classes]]
 
 
 def test_the_value_for_ignored_pixels_comes_back():

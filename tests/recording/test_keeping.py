@@ -78,7 +78,7 @@ def test_a_run_that_is_stopped_keeps_the_worst_so_far(stop, tmp_path):
 
 
 @pytest.mark.parametrize("at", [1, 2, 3])
-@pytest.mark.parametrize("owner", [(Shelf, "get"), (Recorder, "_turn_page")])
+@pytest.mark.parametrize("owner", [(Shelf, "get"), (Recorder, "_turn")])
 def test_who_stops_a_run_while_the_worst_are_written_keeps_the_rest_of_them(
     owner, at, tmp_path, monkeypatch
 ):

@@ -17,8 +17,9 @@ import pyarrow as pa
 import pytest
 import rerun as rr
 
-from roadeval.data import Health, Pictures, Role
+from roadeval.data import ERRORS, TRUTH, Health, Pictures, Role
 from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError
+from roadeval.recording.codecs import LabelCodec, codec
 from roadeval.recording.reading import _around
 from tests.recording.making import HEIGHT, WIDTH, frame, layout, result, rows_of, unscored
 
@@ -361,17 +362,21 @@ def test_a_disk_that_is_full_from_the_start_is_told_at_once(tmp_path, monkeypatc
 def test_a_disk_that_fills_up_is_told_while_the_partial_recording_can_still_be_closed(
     drive, tmp_path, monkeypatch
 ):
+    given = []
+
     def write_until_it_is_full(recorder):
         with recorder:
             for each in drive:
                 leave_free(monkeypatch, (1 << 30) if each.frame.number < 10 else (1 << 20))
+                given.append(each.frame.number)
                 recorder.write(recorder.encode(each))
 
     recorder = _recorder(tmp_path / "out.rrd")
     with pytest.raises(RecordingError, match="the disk is full"):
         write_until_it_is_full(recorder)
     assert rerun("verify", recorder.partial) == 0
-    assert len(Recording(recorder.partial).frame_numbers) == 16
+    assert Recording(recorder.partial).frame_numbers == tuple(given)
+    assert 10 < len(given) < len(drive)
 
 
 def leave_free(monkeypatch, size):
@@ -441,9 +446,28 @@ def recorded_in(version, folder, monkeypatch):
 
 
 def test_the_arrangement_of_a_recording_has_a_version(recording, tmp_path, monkeypatch):
-    assert recording.format == 2
+    assert recording.format == 3
     earlier = Recording(recorded_in(1, tmp_path, monkeypatch))
     assert (earlier.format, earlier.frame_numbers) == (1, (0,))
+
+
+def test_truths_and_errors_of_the_second_version_were_labels(drive, tmp_path, monkeypatch):
+    def codec_then(spec, width, height):
+        labels = spec in (TRUTH, ERRORS)
+        return LabelCodec(spec, width, height) if labels else codec(spec, width, height)
+
+    with monkeypatch.context() as patched:
+        patched.setattr("roadeval.recording.layout.FORMAT", 2)
+        patched.setattr("roadeval.recording.encoding.codec", codec_then)
+        record(tmp_path / "out.rrd", drive[:4])
+    earlier = Recording(tmp_path / "out.rrd")
+    assert rows_of(earlier, "/truth", "SegmentationImage:buffer") == dict.fromkeys(range(4), 1)
+    np.testing.assert_array_equal(earlier.truth(3), drive[3].frame.truth)
+    errors = earlier.layer("filtered", "errors", 3)
+    np.testing.assert_array_equal(errors, drive[3].errors["filtered"].array)
+    np.testing.assert_array_equal(
+        earlier.layer("filtered", "post", 3), next(drive[3].variants[0].masks())[1].pixels()
+    )
 
 
 def test_a_recording_that_tells_no_version_is_of_the_first(recording, tmp_path):
@@ -454,7 +478,7 @@ def test_a_recording_that_tells_no_version_is_of_the_first(recording, tmp_path):
 
 
 def test_a_recording_of_a_later_version_is_one_line(tmp_path, monkeypatch):
-    path = recorded_in(3, tmp_path, monkeypatch)
+    path = recorded_in(4, tmp_path, monkeypatch)
     with pytest.raises(RecordingError) as caught:
         Recording(path)
     assert str(caught.value) == f"{path}: made by a later version of roadeval: update it"

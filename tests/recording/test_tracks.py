@@ -1,0 +1,67 @@
+"""How long rows wait, and that few chunks come of many frames."""
+
+import pytest
+
+from roadeval.recording.tracks import CHUNK_BYTES, Patience, Tracks, scalars, states, texts
+
+WAIT = Patience(8, 64)
+
+
+def rows_of(track):
+    return track.chunk().to_record_batch().column("frame").to_pylist()
+
+
+def run(frames, rows, patience=WAIT):
+    """Feed frames, each a row of ``rows(frame)`` by path; yield what is ended, and after which."""
+    tracks = Tracks(patience)
+    for frame in range(frames):
+        for path, columns, value in rows(frame):
+            tracks.add(path, columns, frame, frame, value)
+        for key in tracks.turn():
+            yield frame, key[0], rows_of(tracks.take(key))
+    for key in tracks.waiting():
+        yield frames, key[0], rows_of(tracks.take(key))
+
+
+@pytest.mark.parametrize(("frames", "waits"), [(0, 8), (71, 8), (80, 10), (511, 63), (9999, 64)])
+def test_rows_wait_for_a_part_of_the_frames_so_far(frames, waits):
+    assert WAIT.after(frames) == waits
+
+
+def test_every_row_comes_once_and_in_order_and_waits_no_longer_than_it_may():
+    ended = list(run(1000, lambda frame: [("/a", scalars, frame)]))
+    assert [row for *_, rows in ended for row in rows] == list(range(1000))
+    for after, _, rows in ended[:-1]:
+        assert after - rows[0] + 1 == WAIT.after(after + 1)
+
+
+def test_a_row_now_and_then_waits_no_longer_than_others():
+    ended = list(run(40, lambda frame: [("/a", states, "on")] if frame in (0, 9, 11) else []))
+    assert ended == [(7, "/a", [0]), (16, "/a", [9, 11])]
+
+
+def test_a_track_is_full_by_its_bytes_and_others_wait_on():
+    half = "x" * (CHUNK_BYTES // 2)
+    ended = list(run(8, lambda _: [("/large", texts, half), ("/small", texts, "x")]))
+    assert [rows for _, path, rows in ended if path == "/large"] == [[0, 1], [2, 3], [4, 5], [6, 7]]
+    assert [rows for _, path, rows in ended if path == "/small"] == [list(range(8))]
+
+
+def test_the_bytes_that_wait_are_known():
+    tracks = Tracks(WAIT)
+    for frame, text in enumerate(("four", "five5")):
+        tracks.add("/a", texts, frame, frame, text)
+        tracks.add("/b", scalars, frame, frame, 0.5)
+    assert tracks.size == 9
+    tracks.take(("/a", texts))
+    assert tracks.size == 0
+
+
+def test_an_hour_of_frames_makes_few_chunks():
+    tracks, made = Tracks(Patience(64, 512)), 0
+    for frame in range(36_000):
+        tracks.add("/a", scalars, frame, frame, 0.0)
+        for key in tracks.turn():
+            tracks.take(key)
+            made += 1
+    assert made < 110
