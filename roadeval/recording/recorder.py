@@ -21,9 +21,9 @@ from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.reading import indexed_chunks
 from roadeval.recording.tracks import Patience, Track, Tracks
 
-PICTURES: Final = Patience(8, 64)
+PICTURES: Final = Patience(8, 128)
 """Of images, notes, states and table lines, which are read frame by frame."""
-NUMBERS: Final = Patience(64, 512)
+NUMBERS: Final = Patience(64, 1024)
 """Of the graphs' numbers: many tracks of a few bytes a frame."""
 
 UNWRITTEN: Final = 4 << 20
