@@ -47,6 +47,14 @@ def test_version_goes_to_stdout(capsys):
     assert capsys.readouterr().out == f"roadeval {VERSION}\n"
 
 
+def test_an_environments_python_runs_the_command_too():
+    words = [sys.executable, "-m", "roadeval", "--version"]
+    run = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (run.returncode, run.stdout) == (0, f"roadeval {VERSION}\n")
+    words[-1] = "--nonsense"
+    assert subprocess.run(words, capture_output=True, check=False).returncode == 2
+
+
 def test_help_imports_nothing_heavy():
     words = [["--help"], ["--version"], *([command, "--help"] for command in COMMANDS)]
     program = (
