@@ -19,7 +19,7 @@ from roadeval.recording import layout as at
 from roadeval.recording.encoding import Encoded, Encoder
 from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.reading import indexed_chunks
-from roadeval.recording.tracks import Patience, Track, Tracks
+from roadeval.recording.tracks import Key, Patience, Tracks
 
 PICTURES: Final = Patience(8, 128)
 """Of images, notes, states and table lines, which are read frame by frame."""
@@ -191,16 +191,19 @@ class Recorder:
             stream.log(path, *archetypes, static=True, strict=True)
 
     def _turn(self, waiting: Tracks) -> None:
-        """Write what has waited long enough, a frame being over: nobody but a track waits then."""
+        """End a frame: write the tracks that have waited long enough."""
         ended = waiting.turn()
         for key in ended:
             self.check_room()
-            self._send(waiting.take(key))
+            self._send(waiting, key)
         if ended:
             self._flush()
 
-    def _send(self, track: Track) -> None:
+    def _send(self, waiting: Tracks, key: Key) -> None:
+        track = waiting[key]
         self._open_stream().send_chunks(track.chunk())
+        # Only now: of a run that is interrupted above, the end of the recording still sends it.
+        del waiting[key]
         self._chunks += 1
         self._unwritten += track.size
         if self._unwritten >= UNWRITTEN:
@@ -232,9 +235,9 @@ class Recorder:
         if self._stream is None:
             return
         try:
-            for tracks in (self._pictures, self._numbers):
-                for key in tracks.waiting():
-                    self._send(tracks.take(key))
+            for waiting in (self._pictures, self._numbers):
+                for key in list(waiting):
+                    self._send(waiting, key)
             self._flush()
         finally:
             self._stream.disconnect()

@@ -7,7 +7,7 @@ frame and entity would cost more than most of what it holds, and more with every
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -119,13 +119,17 @@ class Tracks:
             if track.since <= oldest or track.size >= CHUNK_BYTES
         ]
 
-    def waiting(self) -> list[Key]:
+    def __iter__(self) -> Iterator[Key]:
         """Name all tracks."""
-        return list(self._tracks)
+        return iter(self._tracks)
 
-    def take(self, key: Key) -> Track:
-        """Give a track away."""
-        return self._tracks.pop(key)
+    def __getitem__(self, key: Key) -> Track:
+        """Give a track."""
+        return self._tracks[key]
+
+    def __delitem__(self, key: Key) -> None:
+        """Drop a track; its entity's next row begins another."""
+        del self._tracks[key]
 
 
 def scalars(values: list[float]) -> Any:

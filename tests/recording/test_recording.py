@@ -21,6 +21,7 @@ from roadeval.data import ERRORS, TRUTH, Health, Pictures, Role
 from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError
 from roadeval.recording.codecs import LabelCodec, codec
 from roadeval.recording.reading import _around
+from roadeval.recording.tracks import Track
 from tests.recording.making import HEIGHT, WIDTH, frame, layout, result, rows_of, unscored
 
 SUMMARY = {"verdict": "It helps.", "totals": {}, "seconds": {"filtered": {"post": 0.5}}}
@@ -326,6 +327,29 @@ def _record_and_stop(recorder, results, stop):
         for each in results:
             recorder.write(recorder.encode(each))
         raise stop
+
+
+@pytest.mark.parametrize("at", [1, 5])
+def test_who_stops_a_run_while_a_chunk_is_made_loses_no_frame_of_it(
+    at, drive, tmp_path, monkeypatch
+):
+    calls, usual = [], Track.chunk
+
+    def interrupted(track):
+        calls.append(track)
+        if len(calls) == at:
+            raise KeyboardInterrupt
+        return usual(track)
+
+    monkeypatch.setattr(Track, "chunk", interrupted)
+    recorder = _recorder(tmp_path / "out.rrd")
+    with pytest.raises(KeyboardInterrupt):
+        _record_and_stop(recorder, drive, SystemExit)
+    partial = Recording(recorder.partial)
+    assert partial.frame_numbers == tuple(range(8))
+    for path in ("/camera", "/truth", "/filtered/post"):
+        assert rows_of(partial, path, "EncodedImage:blob") == dict.fromkeys(range(8), 1)
+    assert list(partial.frames.frame) == [2, 3, 4, 5, 6, 7]
 
 
 KILLED = """

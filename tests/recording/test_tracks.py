@@ -18,9 +18,10 @@ def run(frames, rows, patience=WAIT):
         for path, columns, value in rows(frame):
             tracks.add(path, columns, frame, frame, value)
         for key in tracks.turn():
-            yield frame, key[0], rows_of(tracks.take(key))
-    for key in tracks.waiting():
-        yield frames, key[0], rows_of(tracks.take(key))
+            yield frame, key[0], rows_of(tracks[key])
+            del tracks[key]
+    for key in tracks:
+        yield frames, key[0], rows_of(tracks[key])
 
 
 @pytest.mark.parametrize(("frames", "waits"), [(0, 8), (71, 8), (80, 10), (511, 63), (9999, 64)])
@@ -53,7 +54,7 @@ def test_the_bytes_that_wait_are_known():
         tracks.add("/a", texts, frame, frame, text)
         tracks.add("/b", scalars, frame, frame, 0.5)
     assert tracks.size == 9
-    tracks.take(("/a", texts))
+    del tracks["/a", texts]
     assert tracks.size == 0
 
 
@@ -62,6 +63,6 @@ def test_an_hour_of_frames_makes_few_chunks():
     for frame in range(36_000):
         tracks.add("/a", scalars, frame, frame, 0.0)
         for key in tracks.turn():
-            tracks.take(key)
+            del tracks[key]
             made += 1
     assert made < 110
