@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from roadeval.data import ERRORS, FILTERED, FINAL_STAGE, UNFILTERED, Role
+from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.evaluation import analysis
 from roadeval.evaluation.results import Results
 from roadeval.evaluation.scoreboard import COMPARED
@@ -75,10 +75,13 @@ class Opened:
         """
         if self.recording is None:
             return ()
-        numbers = list(self.recording.frame_numbers)
-        while not self.complete and numbers and not _is_whole(self.recording, numbers[-1]):
-            numbers.pop()
-        return tuple(numbers)
+        recording, unsure = self.recording, set(self.recording.unsure)
+        scored = set(self.frames["frame"]) if len(self.frames) else set()
+        return tuple(
+            number
+            for number in recording.frame_numbers
+            if number not in unsure or recording.is_whole(number, scored=number in scored)
+        )
 
     def layer(self, variant: str, name: str, frame: int) -> npt.NDArray[Any] | None:
         """Give a layer of a variant; None where the run did not keep it."""
@@ -137,21 +140,6 @@ class Opened:
             "seconds": {},
             "training": {"source": layout.properties.get("trained_on")},
         } | (_facts(self.frames) if scored else facts)
-
-
-def _is_whole(recording: Recording, frame: int) -> bool:
-    """Tell whether all masks of a frame can be read."""
-    try:
-        recording.image(frame)
-        for variant in recording.variants:
-            for stage in variant.stages:
-                recording.layer(variant.name, stage, frame)
-            if recording.roles[frame] == Role.EVALUATED:
-                recording.layer(variant.name, ERRORS.name, frame)
-                recording.truth(frame)
-    except RecordingError:
-        return False
-    return True
 
 
 def _facts(frames: pd.DataFrame) -> dict[str, Any]:

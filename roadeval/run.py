@@ -16,7 +16,7 @@ from roadeval.evaluation.results import STREAMED
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.flow import ordered
 from roadeval.gallery import Gallery
-from roadeval.memory import give_back
+from roadeval.memory import OFTEN, give_back
 from roadeval.options import OptionError, Progress, ReplayOptions
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import MisfitError, Moment, View
@@ -144,6 +144,8 @@ class Run:
         for processed in ordered(work, items, self._jobs):
             self.done += 1
             self._tell(Progress(self.done, self.total, "replaying"))
+            if self.done % OFTEN == 0:
+                give_back()
             if processed is None:
                 self.board.lose()
             else:

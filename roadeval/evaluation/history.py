@@ -1,4 +1,4 @@
-"""Every evaluated frame's counts and rates, kept small: what sums and intervals are made of."""
+"""Every evaluated frame's counts, kept small: what rates, sums and intervals are made of."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from roadeval.evaluation import rates
 
 @dataclass(slots=True)
 class History:
-    """The results of one stage of one variant, frame by frame: 20 bytes a frame.
+    """The results of one stage of one variant, frame by frame: 20 bytes a frame as it grows.
 
     A mask that the log itself carries may be missing on some frames, so each row says which
     evaluated frame it belongs to.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise, permutations
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -44,7 +44,7 @@ class HeatMap:
         if not self.frames:
             self._side = max(1, -(-max(errors.shape) // CELLS))
             self._bytes = np.zeros((3, *errors.shape), np.uint8)
-            self._sums = self._in_cells()
+            self._sums = np.zeros((3, *(-(-n // self._side) for n in errors.shape)), np.int64)
         if errors.shape != self._bytes.shape[1:]:
             self.left_out += 1
             return
@@ -66,16 +66,13 @@ class HeatMap:
         return self._side, self._sums.copy()
 
     def _carry(self) -> None:
-        self._sums += self._in_cells()
+        # A row of cells at a time: sums of a whole frame would be eight times as large as it.
+        columns = np.arange(0, self._bytes.shape[2], self._side)
+        for row in range(self._sums.shape[1]):
+            band = self._bytes[:, row * self._side : (row + 1) * self._side]
+            sums = band.sum(axis=1, dtype=np.int64)
+            self._sums[:, row] += np.add.reduceat(sums, columns, axis=1)
         self._bytes[:] = 0
-
-    def _in_cells(self) -> Sums:
-        sums: npt.NDArray[Any] = self._bytes
-        for axis in (1, 2):
-            if sums.shape[axis]:
-                starts = np.arange(0, sums.shape[axis], self._side)
-                sums = np.add.reduceat(sums, starts, axis=axis, dtype=np.int64)
-        return sums.astype(np.int64)
 
 
 def changes(names: Sequence[Name], masks: Bits, truth: TruthBits) -> dict[Step, Change]:

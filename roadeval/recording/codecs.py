@@ -103,7 +103,10 @@ class MaskCodec:
         return [rr.EncodedImage.from_fields(media_type="image/png", draw_order=10)]
 
     def encode(self, array: npt.NDArray[np.uint8] | Packed) -> bytes:
-        """Turn ``(H, W)`` uint8 of the classes' values, or two classes' bits, into a PNG file."""
+        """Turn ``(H, W)`` uint8, or the bits of two classes, into a PNG file.
+
+        No value may be there but the classes': there is no colour for another.
+        """
         if self._places is not None and not isinstance(array, Packed):
             array = np.asarray(cv2.LUT(array, self._places), np.uint8)
         return indexed_png.encode(array, [c.rgba for c in self.spec.classes])

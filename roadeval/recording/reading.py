@@ -6,6 +6,7 @@ import json
 import warnings
 from collections import deque
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -22,6 +23,7 @@ from roadeval.recording import layout as at
 from roadeval.recording.codecs import Codec, LabelCodec
 from roadeval.recording.encoding import Encoder
 from roadeval.recording.layout import Layout, RecordingError
+from roadeval.recording.tracks import IMAGES_AND_WORDS
 from roadeval.tabular import read_table
 
 if TYPE_CHECKING:
@@ -99,9 +101,18 @@ class Recording:
         batches = self._batches(at.CAMERA, _CAMERA, static=False)
         return tuple(frame for batch in batches for frame in batch.column(at.FRAME).to_pylist())
 
+    @property
+    def unsure(self) -> tuple[int, ...]:
+        """The last frames of a partial recording, of which a killed run may lack some layers."""
+        return () if self.complete else self.frame_numbers[-IMAGES_AND_WORDS.most :]
+
     @cached_property
     def roles(self) -> dict[int, str]:
-        """What each frame was used for, see `roadeval.data.Role`."""
+        """What each frame was used for, see `roadeval.data.Role`.
+
+        A killed run may not have written what it knew of its last frames: theirs is an earlier
+        one's then.
+        """
         changes = dict(self._rows(at.ROLE, "StateChange:state"))
         roles, role = {}, ""
         for frame in self.frame_numbers:
@@ -182,6 +193,13 @@ class Recording:
         """
         return self._array(at.layer_path(variant, name), frame)
 
+    def is_whole(self, frame: int, *, scored: bool) -> bool:
+        """Tell whether all masks of a frame are there, and if it was scored truth and errors."""
+        layers = [(v.name, stage) for v in self.variants for stage in v.stages]
+        layers += [(v.name, ERRORS.name) for v in self.variants if scored]
+        paths = (at.CAMERA, *(at.layer_path(*layer) for layer in layers))
+        return all(self._holds(path, frame) for path in (*paths, *[at.TRUTH_PATH] * scored))
+
     # --- How -------------------------------------------------------------------------------------
 
     @cached_property
@@ -215,6 +233,12 @@ class Recording:
             self._held[path], self._payloads[path] = _around(frame, pages)
         if frame not in self._held[path]:
             raise RecordingError(f"{self.path}: {path} has nothing on frame {frame}")
+
+    def _holds(self, path: str, frame: int) -> bool:
+        if path not in self._held:
+            with suppress(RecordingError):
+                self._read_ahead(path, self._codecs[path].component, frame)
+        return frame in self._held[path]
 
     def _rows(self, path: str, component: str) -> Iterator[tuple[int, Any]]:
         for batch in self._batches(path, component, static=False):

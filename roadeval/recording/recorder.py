@@ -19,19 +19,15 @@ from roadeval.recording import layout as at
 from roadeval.recording.encoding import Encoded, Encoder
 from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.reading import indexed_chunks
-from roadeval.recording.tracks import Key, Patience, Tracks
-
-PICTURES: Final = Patience(8, 128)
-"""Of images, notes, states and table lines, which are read frame by frame."""
-NUMBERS: Final = Patience(64, 1024)
-"""Of the graphs' numbers: many tracks of a few bytes a frame."""
+from roadeval.recording.tracks import IMAGES_AND_WORDS, NUMBERS, Key, Tracks
 
 UNWRITTEN: Final = 4 << 20
 """Bytes that may wait for Rerun's own thread to write them; it would let any number wait."""
 
 LEAST_FREE: Final = 64 << 20
-"""Bytes that must stay free on the disk beside what waits. Checked before each chunk: the partial
-recording then ends whole, while Rerun, should a write fail, may wait for it forever."""
+"""Bytes that must stay free on the disk beside what waits. Checked before each chunk but the last,
+for which it is meant: the partial recording then ends whole, while Rerun, should a write fail, may
+wait for it forever."""
 
 
 class Recorder:
@@ -53,7 +49,7 @@ class Recorder:
         self.partial = path.with_name(f"{path.stem}.partial.rrd")
         self._layout = layout
         self._encoder = Encoder(layout)
-        self._pictures, self._numbers = Tracks(PICTURES), Tracks(NUMBERS)
+        self._rows, self._numbers = Tracks(IMAGES_AND_WORDS), Tracks(NUMBERS)
         self._begun = False
         self._chunks = self._unwritten = 0
         self._states: dict[str, str] = {}
@@ -117,7 +113,7 @@ class Recorder:
             self._numbers.add(path, tracks.scalars, *when, number)
         for path, numbers in encoded.counts.items():
             self._numbers.add(path, tracks.counts, *when, numbers)
-        self._turn(self._pictures)
+        self._turn(self._rows)
         self._turn(self._numbers)
 
     def write_pictures(self, held: Iterable[Encoded]) -> None:
@@ -132,7 +128,7 @@ class Recorder:
             self._add_images(encoded)
             number, stamp_ns = encoded.number + 1, encoded.stamp_ns + 1
             self._blank = replace(encoded, number=number, stamp_ns=stamp_ns, payloads={})
-            self._turn(self._pictures)
+            self._turn(self._rows)
         if self._blank is not None:
             self._add_images(self._blank)
             self._blank = None
@@ -161,29 +157,29 @@ class Recorder:
         """Raise a `RecordingError` if the disk is full, or as good as full."""
         disk = shutil.disk_usage(self.path.parent)
         # A place that is no disk, as /proc, has no room to tell of.
-        if disk.total and disk.free < LEAST_FREE + self._pictures.size:
+        if disk.total and disk.free < LEAST_FREE + self._rows.size:
             raise RecordingError(f"{self.path}: cannot be written: the disk is full")
 
     def _add_images(self, encoded: Encoded) -> None:
         when = encoded.number, encoded.stamp_ns
         for path, payload in encoded.payloads.items():
             columns = self._encoder.codecs[path].columns
-            self._pictures.add(path, columns, *when, payload)
+            self._rows.add(path, columns, *when, payload)
         # The viewer goes on showing what it has; an image that this frame lacks must not stand.
         for path in sorted(self._shown - encoded.payloads.keys()):
-            self._pictures.add(path, self._encoder.codecs[path].columns, *when, tracks.NOTHING)
+            self._rows.add(path, self._encoder.codecs[path].columns, *when, tracks.NOTHING)
         self._shown = set(encoded.payloads)
 
     def _add_words(self, encoded: Encoded) -> None:
         when = encoded.number, encoded.stamp_ns
         for path, state in encoded.states.items():
             if self._states.get(path, "") != state:
-                self._pictures.add(path, tracks.states, *when, state)
+                self._rows.add(path, tracks.states, *when, state)
                 self._states[path] = state
         for note in encoded.notes:
-            self._pictures.add(at.NOTES, tracks.notes, *when, note)
+            self._rows.add(at.NOTES, tracks.notes, *when, note)
         for name, lines in encoded.tables.items():
-            self._pictures.add(at.result_path(name), tracks.texts, *when, lines)
+            self._rows.add(at.result_path(name), tracks.texts, *when, lines)
 
     def _static(self, records: Iterable[tuple[str, list[Any]]]) -> None:
         stream = self._open_stream()
@@ -235,7 +231,7 @@ class Recorder:
         if self._stream is None:
             return
         try:
-            for waiting in (self._pictures, self._numbers):
+            for waiting in (self._rows, self._numbers):
                 for key in list(waiting):
                     self._send(waiting, key)
             self._flush()

@@ -29,18 +29,18 @@ Rerun has `rerun.Clear` for that, which its viewer overlooks on encoded images:
 https://github.com/rerun-io/rerun/issues/12793.
 """
 
-
 CHUNK_BYTES: Final = 2 << 20
-"""Of images or text at which a chunk is full, however few its frames: the viewer reads chunks
+"""Of images and text at which a chunk is full, however few its frames: the viewer reads chunks
 whole, and memory holds one several times while it is packed and written."""
 
 SHARE: Final = 8
-"""Of a recording no more than this part of its frames waits, so that a short one waits little."""
+"""One frame in so many may wait, where `Patience` does not say otherwise: of a short recording few
+do."""
 
 
 @dataclass(frozen=True, slots=True)
 class Patience:
-    """For how many frames rows wait: a part of those so far, between ``least`` and ``most``.
+    """For how many frames rows wait: a share of those so far, but from ``least`` to ``most``.
 
     A killed run loses what waits.
     """
@@ -51,6 +51,12 @@ class Patience:
     def after(self, frames: int) -> int:
         """Say for how many frames, when the recording has this many."""
         return min(max(frames // SHARE, self.least), self.most)
+
+
+IMAGES_AND_WORDS: Final = Patience(8, 128)
+"""Of what is read frame by frame: images, notes, states, table lines."""
+NUMBERS: Final = Patience(64, 1024)
+"""Of the graphs' numbers: many tracks of a few bytes a frame."""
 
 
 class Track:
@@ -70,8 +76,7 @@ class Track:
         self._frames.append(frame)
         self._stamps.append(stamp_ns)
         self._values.append(value)
-        if isinstance(value, bytes | str):
-            self.size += len(value)
+        self.size += _size(value)
 
     def chunk(self) -> Chunk:
         """Give all rows as one chunk."""
@@ -130,6 +135,13 @@ class Tracks:
     def __delitem__(self, key: Key) -> None:
         """Drop a track; its entity's next row begins another."""
         del self._tracks[key]
+
+
+def _size(value: Any) -> int:
+    """Count the bytes of an image, the letters of a text or of a note's two; numbers take none."""
+    if isinstance(value, tuple):
+        return sum(map(_size, value))
+    return len(value) if isinstance(value, bytes | str) else 0
 
 
 def scalars(values: list[float]) -> Any:

@@ -47,7 +47,7 @@ def rerun(*words):
 
 @pytest.fixture(scope="module")
 def drive():
-    """Two training frames, 17 evaluated ones with a note on one: more than two pages."""
+    """Two training frames, 17 evaluated ones with a note on one."""
     return some_frames()
 
 
@@ -363,7 +363,7 @@ KILLED = """
 """
 
 
-def test_a_killed_run_leaves_all_but_the_last_page(tmp_path):
+def test_a_killed_run_leaves_all_but_the_frames_that_wait(tmp_path):
     command = [sys.executable, "-c", textwrap.dedent(KILLED), str(tmp_path / "out.rrd")]
     root = Path(__file__).resolve().parents[2]
     assert subprocess.run(command, cwd=root, check=False).returncode == -signal.SIGKILL

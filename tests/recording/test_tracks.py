@@ -2,7 +2,17 @@
 
 import pytest
 
-from roadeval.recording.tracks import CHUNK_BYTES, Patience, Tracks, scalars, states, texts
+from roadeval.recording.tracks import (
+    CHUNK_BYTES,
+    IMAGES_AND_WORDS,
+    NUMBERS,
+    Patience,
+    Tracks,
+    notes,
+    scalars,
+    states,
+    texts,
+)
 
 WAIT = Patience(8, 64)
 
@@ -53,16 +63,14 @@ def test_the_bytes_that_wait_are_known():
     for frame, text in enumerate(("four", "five5")):
         tracks.add("/a", texts, frame, frame, text)
         tracks.add("/b", scalars, frame, frame, 0.5)
-    assert tracks.size == 9
+        tracks.add("/c", notes, frame, frame, ("It rains.", "INFO"))
+    assert tracks.size == 9 + 2 * 13
     del tracks["/a", texts]
-    assert tracks.size == 0
+    assert tracks.size == 2 * 13
 
 
-def test_an_hour_of_frames_makes_few_chunks():
-    tracks, made = Tracks(Patience(64, 512)), 0
-    for frame in range(36_000):
-        tracks.add("/a", scalars, frame, frame, 0.0)
-        for key in tracks.turn():
-            del tracks[key]
-            made += 1
-    assert made < 110
+@pytest.mark.parametrize(("patience", "most"), [(IMAGES_AND_WORDS, 320), (NUMBERS, 70)])
+def test_an_hour_of_small_rows_makes_few_chunks(patience, most):
+    ended = list(run(36_000, lambda _: [("/a", states, "on")], patience))
+    assert sum(len(rows) for *_, rows in ended) == 36_000
+    assert len(ended) < most
