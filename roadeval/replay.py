@@ -5,10 +5,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 from roadeval import learning, logs
 from roadeval.data import Frame
@@ -18,7 +19,7 @@ from roadeval.evaluation.tables import header, window_lines
 from roadeval.memory import give_back
 from roadeval.options import Outcome, Progress, ReplayOptions, keep_apart
 from roadeval.recording import NullRecorder, Rule, recorder_for
-from roadeval.report.figures import write_figures
+from roadeval.report.figures import Example, write_figures
 from roadeval.run import Run
 from roadeval.training import Model, save_model
 
@@ -68,28 +69,48 @@ def replay(
         path = Path(save or Path("recordings", f"{log.name}.rrd"))
         folder = Path(reports or Path("reports", log.name))
         keep_apart((drive, options.model), (path, mcap))
-        with ResultsWriter(folder) as results, _sidecar(mcap) as sidecar, ExitStack() as opened:
-            run = Run(log, options, tell)
-            recorder = recorder_for(path, run.layout(), rule)
-            opened.enter_context(recorder)
-            for result, encoded in run.frames(recorder):
-                recorder.write(encoded)
-                results.append(result)
-                sidecar.write(result)
-            give_back()
-            tell(Progress(run.done, run.total, "writing"))
-            windows, summary = run.board.windows(), run.summary()
-            sums = run.board.tables()
-            recorder.finish(_texts(windows, summary, sums))
-            files = results.finish(windows, summary, sums)
-        saved = None if isinstance(recorder, NullRecorder) else recorder.path
-        told, examples = (run.warnings(), run.losses()), run.gallery.examples
-        # Figures take the room of all that the run has learnt and held.
-        del run
+        outcome, examples = _run(log, _Outputs(path, rule, folder, mcap), options, tell)
+        # What the run has learnt and held is gone: figures take its room.
         give_back()
-        files += write_figures(folder, log.name, Results(folder).windows, examples)
-        files += [sidecar.path] if sidecar.path else []
-        return Outcome(saved, folder, summary, *told, tuple(files))
+        figures = write_figures(folder, log.name, Results(folder).windows, examples)
+        return replace(outcome, files=(*outcome.files, *figures))
+
+
+class _Outputs(NamedTuple):
+    """Where a run writes, and whose pictures it records."""
+
+    recording: Path
+    rule: Rule
+    reports: Path
+    mcap: str | Path | None
+
+
+def _run(
+    log: logs.Log, to: _Outputs, options: ReplayOptions, tell: Callable[[Progress], None]
+) -> tuple[Outcome, list[Example]]:
+    """Run over the log into a recording and tables; give the frames for the figure of masks."""
+    with (
+        ResultsWriter(to.reports) as results,
+        _sidecar(to.mcap) as sidecar,
+        ExitStack() as opened,
+    ):
+        run = Run(log, options, tell)
+        recorder = recorder_for(to.recording, run.layout(), to.rule)
+        opened.enter_context(recorder)
+        for result, encoded in run.frames(recorder):
+            recorder.write(encoded)
+            results.append(result)
+            sidecar.write(result)
+        give_back()
+        tell(Progress(run.done, run.total, "writing"))
+        windows, summary = run.board.windows(), run.summary()
+        sums = run.board.tables()
+        recorder.finish(_texts(windows, summary, sums))
+        files = results.finish(windows, summary, sums)
+    saved = None if isinstance(recorder, NullRecorder) else recorder.path
+    files += [sidecar.path] if sidecar.path else []
+    outcome = Outcome(saved, to.reports, summary, run.warnings(), run.losses(), tuple(files))
+    return outcome, run.gallery.examples
 
 
 def train(

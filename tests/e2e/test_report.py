@@ -8,9 +8,13 @@ import socket
 import subprocess
 import sys
 
+import cv2
+import numpy as np
 import pytest
 from pypdf import PdfReader
 
+from roadeval.logs import LogWriter
+from roadeval.opened import Opened
 from roadeval.report.words import DASH
 from roadeval.reporting import report as report_of
 from tests.e2e.commands import DEMO, roadeval
@@ -132,18 +136,23 @@ KILLED = """
 import os, signal, sys
 from roadeval import ReplayOptions, replay
 
-def kill_at_32(progress):
-    if progress.stage == "replaying" and progress.done == 32:
+def kill(progress):
+    if progress.stage == "replaying" and progress.done == int(sys.argv[2]):
         os.kill(os.getpid(), signal.SIGKILL)
 
-replay(sys.argv[1], save="out.rrd", options=ReplayOptions(jobs=1), on_progress=kill_at_32)
+replay(sys.argv[1], save="out.rrd", options=ReplayOptions(jobs=1), on_progress=kill)
 """
 
 
+def killed(drive, done, folder):
+    """The partial recording of a run that is killed when this many frames are done."""
+    command = [sys.executable, "-c", KILLED, drive, str(done)]
+    assert subprocess.run(command, cwd=folder, check=False).returncode == -signal.SIGKILL
+    return folder / "out.partial.rrd"
+
+
 def test_a_killed_run_gives_a_report_of_its_readable_part_marked_on_page_1(tmp_path):
-    command = [sys.executable, "-c", KILLED, DEMO]
-    assert subprocess.run(command, cwd=tmp_path, check=False).returncode == -signal.SIGKILL
-    (recording,) = tmp_path.glob("*.rrd")
+    recording = killed(DEMO, 32, tmp_path)
     run = roadeval("report", recording, "-o", tmp_path / "report.pdf")
     assert run.returncode == 0, run.stderr
     assert "a partial recording" in run.stderr
@@ -154,6 +163,27 @@ def test_a_killed_run_gives_a_report_of_its_readable_part_marked_on_page_1(tmp_p
     assert "This run did not reach its end" in first
     (evaluated,) = re.findall(r"evaluated (\d+)", first)
     assert 0 < int(evaluated) < 32
+
+
+def test_a_killed_run_shows_no_frame_whose_truth_is_missing_while_a_later_ones_masks_are_there(
+    tmp_path,
+):
+    noise = np.random.default_rng(0)
+    road = np.repeat(np.uint8([0, 255]), 60)[:, None].repeat(160, axis=1)
+    with LogWriter(tmp_path / "drive.mcap") as log:
+        for stamp in range(1, 61):
+            image = noise.integers(0, 256, (*road.shape, 3), np.uint8)
+            log.image("/camera", stamp * 10**8, cv2.imencode(".jpg", image)[1].tobytes(), "jpeg")
+            if stamp % 3 == 1:
+                log.mask("/road_mask", stamp * 10**8, road)
+    opened = Opened(killed(tmp_path / "drive.mcap", 42, tmp_path))
+    seen = set(opened.pictured)
+    scored = set(opened.frames["frame"])
+    assert 36 in scored - seen, "the case that this test is about"
+    assert len(seen & scored) > 1
+    for frame in seen & scored:
+        opened.recording.truth(frame)
+        opened.recording.layer("unfiltered", "errors", frame)
 
 
 def test_without_truth_the_report_says_what_it_cannot_say(unlabelled, tmp_path):

@@ -20,8 +20,10 @@ import rerun as rr
 from roadeval.data import ERRORS, TRUTH, Health, Pictures, Role
 from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError
 from roadeval.recording.codecs import LabelCodec, codec
+from roadeval.recording.layout import SHADOW_TRUTH
 from roadeval.recording.reading import _around
-from roadeval.recording.tracks import Track
+from roadeval.recording.recorder import LEAST_FREE, UNWRITTEN
+from roadeval.recording.tracks import CHUNK_BYTES, Track
 from tests.recording.making import HEIGHT, WIDTH, frame, layout, result, rows_of, unscored
 
 SUMMARY = {"verdict": "It helps.", "totals": {}, "seconds": {"filtered": {"post": 0.5}}}
@@ -357,22 +359,32 @@ KILLED = """
     from roadeval.recording import Recorder
     from tests.recording.making import layout, result
     with Recorder(pathlib.Path(sys.argv[1]), layout()) as recorder:
-        for number in range(20):
+        for number in range(int(sys.argv[2])):
             recorder.write(recorder.encode(result(number)))
         os.kill(os.getpid(), signal.SIGKILL)
 """
 
 
-def test_a_killed_run_leaves_all_but_the_frames_that_wait(tmp_path):
-    command = [sys.executable, "-c", textwrap.dedent(KILLED), str(tmp_path / "out.rrd")]
+@pytest.mark.parametrize(("frames", "images", "numbers"), [(20, 16, 0), (100, 94, 64)])
+def test_a_killed_run_leaves_all_but_the_frames_that_wait(frames, images, numbers, tmp_path):
+    written = [sys.executable, "-c", textwrap.dedent(KILLED), tmp_path / "out.rrd", str(frames)]
     root = Path(__file__).resolve().parents[2]
-    assert subprocess.run(command, cwd=root, check=False).returncode == -signal.SIGKILL
+    assert subprocess.run(written, cwd=root, check=False).returncode == -signal.SIGKILL
     partial = Recording(tmp_path / "out.partial.rrd")
     assert not partial.complete
-    assert partial.frame_numbers == tuple(range(16))
-    assert list(partial.frames.frame) == list(range(16))
-    back = partial.layer("filtered", "post", 15)
-    np.testing.assert_array_equal(back, next(result(15).variants[0].masks())[1].pixels())
+    assert partial.frame_numbers == tuple(range(images))
+    assert partial.unsure == tuple(range(images))
+    assert list(partial.frames.frame) == list(range(images))
+    assert len(partial.scalars("/metrics/filtered/post/ERR")) == numbers
+    last = images - 1
+    assert partial.is_whole(last, scored=True)
+    assert not partial.is_whole(images, scored=False)
+    back = partial.layer("filtered", "post", last)
+    np.testing.assert_array_equal(back, next(result(last).variants[0].masks())[1].pixels())
+
+
+def test_of_a_complete_recording_no_frame_is_unsure(recording):
+    assert recording.unsure == ()
 
 
 def test_a_disk_that_is_full_from_the_start_is_told_at_once(tmp_path, monkeypatch):
@@ -401,6 +413,33 @@ def test_a_disk_that_fills_up_is_told_while_the_partial_recording_can_still_be_c
     assert rerun("verify", recorder.partial) == 0
     assert Recording(recorder.partial).frame_numbers == tuple(given)
     assert 10 < len(given) < len(drive)
+
+
+def test_what_waits_has_its_room_on_the_disk_beside_the_least(drive, tmp_path, monkeypatch):
+    with _recorder(tmp_path / "out.rrd") as recorder:
+        leave_free(monkeypatch, LEAST_FREE + 1)
+        recorder.check_room()
+        recorder.write(recorder.encode(drive[3]))
+        with pytest.raises(RecordingError, match="the disk is full"):
+            recorder.check_room()
+
+
+def test_few_bytes_ever_wait_for_reruns_own_thread(tmp_path, monkeypatch):
+    sent = []
+    flush = Recorder._flush
+
+    def counted(recorder):
+        sent.append(recorder._unwritten)
+        flush(recorder)
+
+    monkeypatch.setattr(Recorder, "_flush", counted)
+    with _recorder(tmp_path / "out.rrd") as recorder:
+        first = recorder.encode(result(0))
+        large = replace(first, payloads=dict.fromkeys(first.payloads, bytes(CHUNK_BYTES - 1)))
+        for number in range(2):
+            recorder.write(replace(large, number=number))
+    assert len(first.payloads) > 4
+    assert max(sent) < UNWRITTEN + 2 * CHUNK_BYTES
 
 
 def leave_free(monkeypatch, size):
@@ -477,14 +516,17 @@ def test_the_arrangement_of_a_recording_has_a_version(recording, tmp_path, monke
 
 def test_truths_and_errors_of_the_second_version_were_labels(drive, tmp_path, monkeypatch):
     def codec_then(spec, width, height):
-        labels = spec in (TRUTH, ERRORS)
+        labels = spec in (TRUTH, SHADOW_TRUTH, ERRORS)
         return LabelCodec(spec, width, height) if labels else codec(spec, width, height)
 
     with monkeypatch.context() as patched:
         patched.setattr("roadeval.recording.layout.FORMAT", 2)
         patched.setattr("roadeval.recording.encoding.codec", codec_then)
-        record(tmp_path / "out.rrd", drive[:4])
+        shadow = drive[3].frame.truth
+        shown = replace(drive[3], frame=replace(drive[3].frame, shadow_truth=shadow))
+        record(tmp_path / "out.rrd", [*drive[:3], shown], layout(has_shadow_truth=True))
     earlier = Recording(tmp_path / "out.rrd")
+    np.testing.assert_array_equal(earlier._array("/true_shadow", 3), shadow)
     assert rows_of(earlier, "/truth", "SegmentationImage:buffer") == dict.fromkeys(range(4), 1)
     np.testing.assert_array_equal(earlier.truth(3), drive[3].frame.truth)
     errors = earlier.layer("filtered", "errors", 3)
