@@ -60,15 +60,14 @@ NUMBERS: Final = Patience(64, 1024)
 
 
 class Track:
-    """The pending rows of one entity, the first of which came with the frame ``since``."""
+    """The pending rows of one entity."""
 
-    def __init__(self, path: str, columns: Columns, since: int) -> None:
+    def __init__(self, path: str, columns: Columns) -> None:
         self._path = path
         self._columns = columns
         self._frames: list[int] = []
         self._stamps: list[int] = []
         self._values: list[Any] = []
-        self.since = since
         self.size = 0
 
     def add(self, frame: int, stamp_ns: int, value: Any) -> None:
@@ -95,18 +94,18 @@ class Track:
 
 
 class Tracks:
-    """The tracks of a recording that wait alike, each from its first row until it is full."""
+    """The tracks of a recording that wait alike: all end together, but one that is full at once."""
 
     def __init__(self, patience: Patience) -> None:
         self._patience = patience
         self._tracks: dict[Key, Track] = {}
-        self._frames = 0
+        self._frames = self._ended = 0
 
     def add(self, path: str, columns: Columns, frame: int, stamp_ns: int, value: Any) -> None:
         """Append a row of this kind to the entity at ``path``."""
         track = self._tracks.get((path, columns))
         if track is None:
-            track = self._tracks[path, columns] = Track(path, columns, self._frames)
+            track = self._tracks[path, columns] = Track(path, columns)
         track.add(frame, stamp_ns, value)
 
     @property
@@ -117,12 +116,10 @@ class Tracks:
     def turn(self) -> list[Key]:
         """End a frame; name the tracks that have waited long enough, or hold enough."""
         self._frames += 1
-        oldest = self._frames - self._patience.after(self._frames)
-        return [
-            key
-            for key, track in self._tracks.items()
-            if track.since <= oldest or track.size >= CHUNK_BYTES
-        ]
+        if self._frames - self._ended >= self._patience.after(self._frames):
+            self._ended = self._frames
+            return list(self._tracks)
+        return [key for key, track in self._tracks.items() if track.size >= CHUNK_BYTES]
 
     def __iter__(self) -> Iterator[Key]:
         """Name all tracks."""
