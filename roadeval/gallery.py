@@ -26,4 +26,4 @@ class Gallery:
         self._due.pop(0)
         frame = result.frame
         masks = {v.variant: v.final() for v in result.variants}
-        self.examples.append(Example(frame.number, frame.image, frame.truth, masks))
+        self.examples.append(Example(frame.number, frame.image, frame.truth, masks).small())

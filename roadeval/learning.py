@@ -8,10 +8,12 @@ from itertools import chain
 from pathlib import Path
 from typing import Final, Protocol
 
+from roadeval.apart import elsewhere
 from roadeval.config import Variant
 from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.baselines import BlindPrior
+from roadeval.pipeline import solvers
 from roadeval.training import Model, Plan, TrainingError, TrainingSettings, fit, load_model
 
 BY_PATCH: Final = (
@@ -118,6 +120,7 @@ def from_file(path: Path, variants: Sequence[Variant]) -> tuple[Model, Schedule]
     return model, Schedule(model.digests)
 
 
+@elsewhere(solvers)
 def from_log(
     frames: Callable[[], Iterable[Readable]],
     variants: Sequence[Variant],
@@ -192,6 +195,7 @@ def _teachers(
     return iter(frames()), False
 
 
+@elsewhere(solvers)
 def from_drives(
     frames: Mapping[Path, Sequence[Frame]], variants: Sequence[Variant], settings: TrainingSettings
 ) -> Model:

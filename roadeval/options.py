@@ -159,7 +159,11 @@ def keep_apart(inputs: Iterable[AnyPath | None], outputs: Iterable[AnyPath | Non
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a run is: ``stage`` is ``training``, ``replaying`` or ``writing``."""
+    """How far a run is.
+
+    ``stage`` is ``compiling`` (the first time on a machine), ``training``, ``replaying`` or
+    ``writing``.
+    """
 
     done: int
     total: int | None

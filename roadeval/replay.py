@@ -16,6 +16,7 @@ from roadeval.data import Frame
 from roadeval.evaluation import rates
 from roadeval.evaluation.results import Results, ResultsWriter, summary_text
 from roadeval.evaluation.tables import header, window_lines
+from roadeval.kernels.first_time import prepare
 from roadeval.memory import give_back
 from roadeval.options import Outcome, Progress, ReplayOptions, keep_apart
 from roadeval.recording import NullRecorder, Rule, recorder_for
@@ -136,6 +137,7 @@ def train(
     settings = options.training()
     total, by_truth = settings.frames * len(drives), settings.source != "patch"
     memory = learning.Memory()
+    prepare(lambda: tell(Progress(0, None, "compiling")))
     frames: dict[Path, list[Frame]] = {}
     for drive in drives:
         with logs.open_log(drive, keep_corrupt=options.keep_corrupt) as log:

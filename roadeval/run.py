@@ -16,6 +16,7 @@ from roadeval.evaluation.results import STREAMED
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.flow import ordered
 from roadeval.gallery import Gallery
+from roadeval.kernels.first_time import prepare
 from roadeval.memory import OFTEN, give_back
 from roadeval.options import OptionError, Progress, ReplayOptions
 from roadeval.pipeline.chain import Chain
@@ -64,6 +65,7 @@ class Run:
         self._selection = options.select(log)
         self._frames = log.frames(self._selection, options.span())
         self.total = len(self._frames)
+        prepare(lambda: tell(Progress(0, None, "compiling")))
         self.model, self._schedule = self._learn()
         self._chains = self._bind()
         give_back()

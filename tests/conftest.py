@@ -4,13 +4,23 @@ import os
 from pathlib import Path
 
 import pytest
+
+# Dozens of replays of a few frames need not each start a process that imports it.
+import sklearn.svm  # noqa: F401
 from hypothesis import settings
+
+from roadeval.kernels.first_time import prepare
 
 # A compiled kernel takes seconds where it is compiled: no deadline for a single example.
 settings.register_profile("roadeval", deadline=None)
 settings.load_profile("roadeval")
 
 ROOT = Path(__file__).resolve().parents[1]
+
+
+def pytest_sessionstart() -> None:
+    """Have everything compiled before several processes want to at once."""
+    prepare(lambda: None)
 
 
 @pytest.fixture(scope="session")

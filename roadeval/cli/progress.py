@@ -121,6 +121,9 @@ class Lines:
         if not begins and self.clock.now() - self.written < LINE_PERIOD_S:
             return
         self.written = self.clock.now()
+        if step.total is None and not step.done:
+            self.write(step.stage)
+            return
         of = f" of {step.total}" if step.total is not None else ""
         figures = f"{step.done}{of} frames", *self.clock.pace(step)
         self.write(f"{step.stage}: {', '.join(figures)}")

@@ -14,7 +14,8 @@ from types import ModuleType
 from typing import Any, Final
 
 
-def _pick() -> ModuleType:
+def pick() -> ModuleType:
+    """Give the module of the kernels that are used: `compiled`, or its twin `plain`."""
     from roadeval.kernels import plain
 
     if os.environ.get("ROADEVAL_PLAIN") == "1":
@@ -30,7 +31,7 @@ class _Kernels:
     """Gives the kernels by name."""
 
     def __getattr__(self, name: str) -> Any:
-        kernels = _pick()
+        kernels = pick()
         for known in vars(kernels):
             if not known.startswith("__"):
                 setattr(self, known, getattr(kernels, known))

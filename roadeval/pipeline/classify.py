@@ -12,11 +12,13 @@ import numpy.typing as npt
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
+from roadeval.apart import call
 from roadeval.data import Layer, LayerSpec, mask_spec
 from roadeval.kernels.packing import Packed
 from roadeval.pipeline import cube
 from roadeval.pipeline.colour_table import ColourTable
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
+from roadeval.pipeline.solvers import support_vectors
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask
 
 Floats = npt.NDArray[np.float64]
@@ -89,22 +91,21 @@ class SupportVectors:
 
 def fit(sample: TrainingSet, settings: SvmSettings) -> SupportVectors:
     """Solve the dual (Eq. 14) for the training set's colours with scikit-learn's libsvm."""
-    from sklearn.svm import SVC
-
     colours = sample.colours().astype(np.float64)
     mean, scale = np.zeros(3), np.ones(3)
     if settings.standardise:
         mean, scale = colours.mean(axis=0), colours.std(axis=0)
         scale = np.where(scale > 0, scale, 1.0)
-    machine = SVC(C=settings.c, kernel=settings.kernel, gamma=settings.gamma)
-    machine.fit((colours - mean) / scale, sample.road)
-    return SupportVectors(
-        mean,
-        scale,
-        np.ascontiguousarray(machine.support_vectors_),
-        np.ascontiguousarray(machine.dual_coef_[0]),
-        float(machine.intercept_[0]),
+    found = call(
+        support_vectors,
+        features=(colours - mean) / scale,
+        road=sample.road,
+        c=settings.c,
+        kernel=settings.kernel,
+        gamma=settings.gamma,
     )
+    offset = float(found["offset"])
+    return SupportVectors(mean, scale, found["vectors"], found["weights"], offset)
 
 
 def decision(

@@ -19,7 +19,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import cv2
 import numpy as np
@@ -27,6 +27,7 @@ import numpy.typing as npt
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
+from roadeval.apart import call
 from roadeval.data import Layer, LayerKind, LayerSpec, Rgb
 from roadeval.kernels import KERNELS
 from roadeval.kernels.packing import Packed
@@ -35,6 +36,7 @@ from roadeval.pipeline.colour import planes as colour_planes
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.scale import reduced, stretched
 from roadeval.pipeline.shade import LOGS
+from roadeval.pipeline.solvers import hyperplane
 from roadeval.pipeline.stage import (
     MisfitError,
     Moment,
@@ -244,10 +246,8 @@ def solve(
 
 
 def _solve(mapped: Values, road: npt.NDArray[np.bool_], c: float) -> tuple[Values, float]:
-    from sklearn.svm import LinearSVC
-
-    machine: Any = LinearSVC(C=c, dual=False).fit(mapped, road)
-    return machine.coef_[0], float(machine.intercept_[0])
+    found = call(hyperplane, features=mapped, road=road, c=c)
+    return found["weights"], float(found["offset"])
 
 
 def left_out(mapped: Values, sample: TrainingSet, settings: ContextSettings) -> Values:

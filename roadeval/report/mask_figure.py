@@ -38,6 +38,12 @@ class Example:
     truth: Truth | None
     masks: Mapping[str, Mask]
 
+    def small(self) -> Example:
+        """Give it as the figure draws it, which a run can keep at little cost until its end."""
+        truth = None if self.truth is None else _fitted(self.truth, self.image)
+        masks = {name: _fitted(mask, self.image) for name, mask in self.masks.items()}
+        return Example(self.frame, _shrunk(self.image), truth, masks)
+
 
 def road_masks(drive: str, examples: Sequence[Example]) -> Figure:
     """Draw figure 2: a row a frame, with the image, each mask over it, and the truth over it.
@@ -117,8 +123,7 @@ def _overlay(image: Rgb, labels: Mask | Truth | None) -> Rgb:
     base = _shrunk(image)
     if labels is None:
         return base
-    height, width = base.shape[:2]
-    small = cv2.resize(labels, (width, height), interpolation=cv2.INTER_NEAREST)
+    small = _fitted(labels, image)
     painted = base.astype(np.float32)
     for value, colour, strength in ((ROAD, GREEN, 0.45), (IGNORE, GREY, 0.8)):
         here = small == value
@@ -132,9 +137,24 @@ def _shrunk(image: Rgb) -> Rgb:
     """Bring an image down to `WIDTH` pixels across, if it is wider."""
     import cv2
 
-    height, width = image.shape[:2]
-    if width <= WIDTH:
+    size = _size(image)
+    if size[0] == image.shape[1]:
         return image
-    size = (WIDTH, max(round(height * WIDTH / width), 1))
     small: Rgb = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     return small
+
+
+def _fitted(labels: Mask | Truth, image: Rgb) -> Mask | Truth:
+    """Bring labels to the size in which their image is drawn."""
+    import cv2
+
+    fitted: Mask | Truth = cv2.resize(labels, _size(image), interpolation=cv2.INTER_NEAREST)
+    return fitted
+
+
+def _size(image: Rgb) -> tuple[int, int]:
+    """Width and height in which an image is drawn."""
+    height, width = image.shape[:2]
+    if width <= WIDTH:
+        return width, height
+    return WIDTH, max(round(height * WIDTH / width), 1)

@@ -50,7 +50,7 @@ def test_a_line_comes_now_and_then_with_rate_and_time_left():
 
 def test_a_job_of_unknown_length_tells_no_time_left():
     steps = [(0, Step(0, None)), (10, Step(5, None))]
-    assert lines_of(steps) == ["replaying: 0 frames", "replaying: 5 frames, 0.5 frames/s"]
+    assert lines_of(steps) == ["replaying", "replaying: 5 frames, 0.5 frames/s"]
 
 
 def test_quiet_says_nothing(capsys):

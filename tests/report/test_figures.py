@@ -215,6 +215,21 @@ def test_large_images_are_shrunk() -> None:
     assert {picture.shape for picture in pictures(road_masks("drive", [big]))[0]} == {(200, 400, 3)}
 
 
+@pytest.mark.parametrize("width", [40, 1200])
+def test_a_small_example_is_drawn_like_the_large_one(width: int) -> None:
+    rng = np.random.default_rng(0)
+    shape = 30, width
+    image = rng.integers(0, 256, (*shape, 3), np.uint8)
+    truth = rng.choice(np.array([0, 1, 255], np.uint8), shape)
+    large = Example(3, image, truth, {"net": rng.integers(0, 2, shape, np.uint8)})
+    small = large.small()
+    assert small.image.shape[1] <= 400
+    for mine, its in zip(
+        *(pictures(road_masks("drive", [each]))[0] for each in (small, large)), strict=True
+    ):
+        np.testing.assert_array_equal(mine, its)
+
+
 @pytest.fixture(scope="module")
 def twice(tmp_path_factory: pytest.TempPathFactory) -> list[list[Path]]:
     """The files of one drive, written twice."""

@@ -1,0 +1,60 @@
+"""What scikit-learn solves: two problems of optimisation, here or in a process of its own."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from roadeval import apart
+from roadeval.apart import Arrays
+
+LIBRARY: Final = "sklearn.svm"
+
+
+def support_vectors(features: Any, road: Any, c: Any, kernel: Any, gamma: Any) -> Arrays:
+    """Solve the dual of a soft margin (Eq. 14) with libsvm.
+
+    Parameters
+    ----------
+    features, road
+        ``(n, 3)`` float64 and ``(n,)`` bool.
+    c, kernel, gamma
+        As in `roadeval.pipeline.classify.SvmSettings`.
+
+    Returns
+    -------
+    dict
+        ``vectors`` ``(m, 3)``, ``weights`` ``(m,)`` and ``offset`` ``()``, all float64.
+    """
+    from sklearn.svm import SVC
+
+    machine = SVC(C=float(c), kernel=str(kernel), gamma=float(gamma)).fit(features, road)
+    return {
+        "vectors": np.ascontiguousarray(machine.support_vectors_),
+        "weights": np.ascontiguousarray(machine.dual_coef_[0]),
+        "offset": machine.intercept_[0],
+    }
+
+
+def hyperplane(features: Any, road: Any, c: Any) -> Arrays:
+    """Solve the primal of a linear machine with a squared hinge loss, with liblinear.
+
+    Parameters
+    ----------
+    features, road, c
+        ``(n, k)`` float32, ``(n,)`` bool, and the penalty.
+
+    Returns
+    -------
+    dict
+        ``weights`` ``(k,)`` and ``offset`` ``()``, in the features' precision.
+    """
+    from sklearn.svm import LinearSVC
+
+    machine = LinearSVC(C=float(c), dual=False).fit(features, road)
+    return {"weights": machine.coef_[0], "offset": machine.intercept_[0]}
+
+
+if __name__ == "__main__":
+    apart.serve(LIBRARY, support_vectors, hyperplane)

@@ -1,0 +1,120 @@
+"""What is compiled ahead is all that a run needs, and is compiled once."""
+
+import subprocess
+import sys
+from collections import Counter
+from types import SimpleNamespace
+
+import pytest
+
+from roadeval import apart
+from roadeval.kernels import compiled, first_time
+from roadeval.kernels.first_time import call_all, prepare
+
+
+class Calls(Counter):
+    """Stands for the kernels and counts how often each is called."""
+
+    def __getattr__(self, name):
+        return lambda *given: self.update([name])
+
+
+def test_every_kernel_is_called_once():
+    calls = Calls()
+    call_all(calls)
+    assert calls == Counter(compiled.__all__)
+
+
+def test_a_run_of_any_preset_needs_nothing_else():
+    program = """
+import sys
+import tempfile
+
+import arch.bootstrap, sklearn.svm
+import roadeval.replay
+from roadeval.config import PRESETS, preset
+from roadeval.kernels import compiled, first_time
+
+sys.modules["roadeval.replay"].write_figures = lambda *given: []
+
+
+def kinds():
+    return {name: getattr(compiled, name).signatures for name in compiled.__all__}
+
+
+first_time.call_all(compiled)
+ahead = kinds()
+for name in PRESETS:
+    with tempfile.TemporaryDirectory() as folder:
+        options = roadeval.ReplayOptions(
+            config=preset(name), max_frames=14, train_frames=4, scale=0.25, record="none"
+        )
+        roadeval.replay("recordings/demo.mcap", reports=folder, options=options)
+assert kinds() == ahead, [name for name, made in kinds().items() if made != ahead[name]]
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
+@pytest.fixture
+def unmarked(tmp_path, monkeypatch):
+    """A machine where nothing is known to be compiled; gives what is started there."""
+    started = []
+
+    def start(module):
+        started.append(module)
+        return SimpleNamespace(communicate=lambda: None, kill=lambda: None)
+
+    monkeypatch.setattr(first_time, "_mark", lambda kernels: tmp_path / "mark")
+    monkeypatch.setattr(apart, "start", start)
+    return started
+
+
+def test_it_is_done_once_and_whoever_waits_is_told(unmarked):
+    told = []
+    for _ in range(2):
+        prepare(lambda: told.append(list(unmarked)))
+    assert told == [[]]
+    assert unmarked == ["roadeval.kernels.first_time"]
+
+
+def test_a_run_without_compiled_kernels_compiles_nothing(unmarked, monkeypatch):
+    monkeypatch.setenv("ROADEVAL_PLAIN", "1")
+    prepare(pytest.fail)
+    assert not unmarked
+
+
+def test_an_interruption_ends_what_was_started_and_it_is_done_again(unmarked, monkeypatch):
+    killed = []
+
+    def interrupted():
+        raise KeyboardInterrupt
+
+    process = SimpleNamespace(communicate=interrupted, kill=lambda: killed.append(1))
+    with monkeypatch.context() as patched:
+        patched.setattr(apart, "start", lambda module: process)
+        with pytest.raises(KeyboardInterrupt):
+            prepare(lambda: None)
+    assert len(killed) == 1
+    prepare(lambda: None)
+    assert len(unmarked) == 1
+
+
+def test_a_machine_that_starts_no_process_is_asked_again(unmarked, monkeypatch):
+    def no_process(module):
+        raise PermissionError
+
+    with monkeypatch.context() as patched:
+        patched.setattr(apart, "start", no_process)
+        prepare(lambda: None)
+    prepare(lambda: None)
+    assert len(unmarked) == 1
+
+
+def test_other_sources_are_compiled_anew(tmp_path, monkeypatch):
+    source = tmp_path / "kernel.py"
+    source.write_text("1")
+    monkeypatch.setattr(first_time, "__file__", str(tmp_path / "first_time.py"))
+    before = first_time._mark(compiled)
+    assert first_time._mark(compiled) == before
+    source.write_text("12")
+    assert first_time._mark(compiled) != before

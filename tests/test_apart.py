@@ -1,0 +1,132 @@
+"""What a process of its own computes is what this one would, and it is gone afterwards."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from sklearn.svm import SVC
+
+from roadeval import apart
+from roadeval.pipeline import solvers
+from tests.test_replay import write_log
+
+RNG = np.random.default_rng(0)
+FEATURES = RNG.normal(0, 1, (200, 3))
+ROAD = FEATURES @ [1, 2, 3] + RNG.normal(0, 1, 200) > 0
+DUAL = {"features": FEATURES, "road": ROAD, "c": 1.5, "kernel": "rbf", "gamma": 0.5}
+PRIMAL = {"features": FEATURES.astype(np.float32), "road": ROAD, "c": 0.01}
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """The processes that were started; as if this one had not imported the library."""
+    processes, start = [], apart.start
+
+    def kept(module):
+        processes.append(start(module))
+        return processes[-1]
+
+    monkeypatch.setattr(apart, "start", kept)
+    monkeypatch.setattr(solvers, "LIBRARY", "a library that is not imported")
+    return processes
+
+
+def assert_equal(found, twin):
+    assert found.keys() == twin.keys()
+    for name, array in twin.items():
+        assert np.asarray(array).dtype == found[name].dtype, name
+        np.testing.assert_array_equal(found[name], array, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("function", "given"),
+    [
+        (solvers.support_vectors, DUAL),
+        (solvers.support_vectors, DUAL | {"kernel": "linear"}),
+        (solvers.hyperplane, PRIMAL),
+    ],
+    ids=["dual, rbf", "dual, linear", "primal"],
+)
+def test_the_answer_is_the_same_elsewhere(started, function, given):
+    here = apart.call(function, **given)
+    assert not started
+    with apart.elsewhere(solvers):
+        assert_equal(apart.call(function, **given), here)
+        (process,) = started
+        assert process.poll() is None
+        assert_equal(apart.call(function, **given), here)
+    assert len(started) == 1
+    assert process.returncode is not None
+    assert_equal(apart.call(function, **given), here)
+
+
+def test_the_dual_is_scikit_learns():
+    machine = SVC(C=1.5, kernel="rbf", gamma=0.5).fit(FEATURES, ROAD)
+    found = solvers.support_vectors(**DUAL)
+    signs = np.where(ROAD[machine.support_], 1, -1)
+    np.testing.assert_array_equal(found["vectors"], FEATURES[machine.support_])
+    assert (np.sign(found["weights"]) == signs).all()
+
+
+def test_a_library_that_is_here_is_used_here(monkeypatch):
+    monkeypatch.setattr(apart, "start", pytest.fail)
+    with apart.elsewhere(solvers):
+        assert_equal(apart.call(solvers.hyperplane, **PRIMAL), solvers.hyperplane(**PRIMAL))
+
+
+def test_it_is_computed_here_where_no_process_can_be_started(started, monkeypatch):
+    monkeypatch.setattr(sys, "executable", "")
+    with apart.elsewhere(solvers):
+        assert_equal(apart.call(solvers.hyperplane, **PRIMAL), solvers.hyperplane(**PRIMAL))
+    assert not started
+
+
+def test_it_is_computed_here_where_python_is_built_into_a_program(monkeypatch):
+    monkeypatch.setattr(sys, "frozen", True, raising=False)
+    with pytest.raises(OSError, match="no Python"):
+        apart.start(solvers.__name__)
+
+
+def test_it_is_computed_here_once_the_process_is_gone(started):
+    with apart.elsewhere(solvers):
+        started[0].kill()
+        started[0].wait()
+        for _ in range(2):
+            assert_equal(apart.call(solvers.hyperplane, **PRIMAL), solvers.hyperplane(**PRIMAL))
+
+
+def test_what_goes_wrong_elsewhere_goes_wrong_here(started, capfd):
+    with (
+        apart.elsewhere(solvers),
+        pytest.raises(ValueError, match="classes has to be greater than one"),
+    ):
+        apart.call(solvers.support_vectors, **DUAL | {"road": np.ones(200, bool)})
+    assert started
+    assert capfd.readouterr() == ("", "")
+
+
+def test_the_process_imports_from_where_this_one_does(tmp_path, monkeypatch):
+    """A file of the working folder is not taken for a library."""
+    (tmp_path / "numpy.py").write_text("raise SystemExit('the wrong NumPy')")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [place for place in sys.path if place])
+    process = apart.start(solvers.__name__)
+    assert process.communicate() == (b"", None)
+    assert process.returncode == 0
+
+
+def test_a_run_has_no_use_for_the_library_itself(tmp_path):
+    drive = write_log(tmp_path / "drive.mcap")
+    program = f"""
+import sys
+
+import roadeval.replay
+
+sys.modules["roadeval.replay"].write_figures = lambda *given: []
+drive, save, reports = {[str(drive), str(tmp_path / "out.rrd"), str(tmp_path)]}
+outcome = roadeval.replay(drive, save=save, reports=reports)
+assert outcome.summary["training"]["frames"]
+assert "sklearn" not in sys.modules
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
