@@ -193,12 +193,19 @@ def _process(
     frames: list[Frame], size: tuple[int, int], folder: Path, options: argparse.Namespace
 ) -> Rows:
     short = drives.write(folder / "short.mcap", frames, size, options.memory_frames)
-    first, cold = processes.cold(short, folder)
-    rows = [
+    (folder / "nothing compiled").mkdir()
+    runs = {
+        "first run of all": processes.seconds(short, folder, compiled=folder / "nothing compiled"),
+        "later run": processes.seconds(short, folder),
+    }
+    rows: Rows = [
         {"what": "--help, CPU s", "value": Spread.of([processes.help_cpu() for _ in range(5)])},
-        {"what": "first recorded frame after, s", "value": f"{first:.3g}"},
-        {"what": f"cold run of {options.memory_frames} frames, s", "value": f"{cold:.3g}"},
     ]
+    for name, (first, end) in runs.items():
+        rows += [
+            {"what": f"{name}: first recorded frame after, s", "value": f"{first:.3g}"},
+            {"what": f"{name}: {options.memory_frames} frames, s", "value": f"{end:.3g}"},
+        ]
     for times in (1, 10):
         count = times * options.memory_frames
         drive = drives.write(folder / "long.mcap", frames, size, count)

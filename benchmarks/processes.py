@@ -1,4 +1,4 @@
-"""What only a process of its own shows: peak memory, the start, the cold first run."""
+"""What only a process of its own shows: peak memory, the start, the first run of all."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ sys.exit(code)
 
 
 def peak_mib(drive: Path, folder: Path, *words: str) -> float:
-    """Peak resident memory of ``roadeval replay`` in MiB; on Linux."""
+    """Peak resident memory of ``roadeval replay`` in MiB; on Linux, and of that process alone."""
     command = [sys.executable, "-c", _PEAK, *_replay(drive, folder), "--quiet", *words]
     run = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
     return int(run.stdout) / 1024
@@ -38,12 +38,20 @@ def help_cpu() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def cold(drive: Path, folder: Path, *words: str) -> tuple[float, float]:
-    """Seconds from the start of a replay to its first recorded frame, and to its end."""
+def seconds(drive: Path, folder: Path, *, compiled: Path | None = None) -> tuple[float, float]:
+    """Seconds from the start of a replay to its first recorded frame, and to its end.
+
+    With an empty folder for ``compiled`` code, it is the first replay on a machine.
+    """
     start, first = perf_counter(), None
-    command = [str(ROADEVAL), *_replay(drive, folder), *words]
+    command = [str(ROADEVAL), *_replay(drive, folder)]
+    given = {} if compiled is None else {"NUMBA_CACHE_DIR": str(compiled)}
     with subprocess.Popen(
-        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        command,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | given,
     ) as process:
         assert process.stderr is not None
         for line in process.stderr:

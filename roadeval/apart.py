@@ -31,6 +31,8 @@ _NAME: Final = "function"
 """Stands beside the arrays in a message, and names no argument."""
 _PREFIX: Final = 8
 """Bytes that tell the length of a message."""
+_GREATEST: Final = 1 << 32
+"""No message is as long; but a word reads so, if something else writes between them."""
 
 
 def start(module: str) -> subprocess.Popen[bytes]:
@@ -65,19 +67,23 @@ class _Helper:
         self._process = start(module)
 
     def ask(self, function: str, given: Mapping[str, Any]) -> Arrays | None:
-        """Let it call a function; None if it could not, or is gone."""
+        """Let it call a function; None if it could not, now or before."""
         to, back = self._process.stdin, self._process.stdout
-        assert to is not None
-        assert back is not None
+        if self._process.returncode is not None or to is None or back is None:
+            return None
+        found = None
         with suppress(OSError):
             _send(to, {_NAME: function, **given})
-            return _receive(back)
-        return None
+            found = _receive(back)
+        if found is None:
+            self.end()
+        return found
 
     def end(self) -> None:
         """End it, whatever it is doing."""
-        self._process.kill()
-        self._process.communicate()
+        if self._process.returncode is None:
+            self._process.kill()
+            self._process.communicate()
 
 
 _HELPERS: ContextVar[Mapping[str, _Helper]] = ContextVar("_HELPERS")
@@ -138,9 +144,9 @@ def _send(to: IO[bytes], arrays: Mapping[str, Any]) -> None:
 
 
 def _receive(back: IO[bytes]) -> Arrays | None:
-    """Read a message; None at the end of all."""
+    """Read a message; None at the end of all, or where there is something else."""
     length = int.from_bytes(back.read(_PREFIX))
-    packed = back.read(length)
+    packed = back.read(length) if length < _GREATEST else b""
     if not packed or len(packed) < length:
         return None
     with np.load(BytesIO(packed), allow_pickle=False) as arrays:

@@ -96,6 +96,16 @@ def test_it_is_computed_here_once_the_process_is_gone(started):
             assert_equal(apart.call(solvers.hyperplane, **PRIMAL), solvers.hyperplane(**PRIMAL))
 
 
+def test_a_process_that_says_something_else_is_not_listened_to(started, monkeypatch, tmp_path):
+    """As where every start of Python prints a line."""
+    (tmp_path / "sitecustomize.py").write_text("print('welcome', flush=True)")
+    monkeypatch.syspath_prepend(tmp_path)
+    with apart.elsewhere(solvers):
+        for _ in range(2):
+            assert_equal(apart.call(solvers.hyperplane, **PRIMAL), solvers.hyperplane(**PRIMAL))
+            assert started[0].returncode is not None
+
+
 def test_what_goes_wrong_elsewhere_goes_wrong_here(started, capfd):
     with (
         apart.elsewhere(solvers),
