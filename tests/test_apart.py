@@ -1,5 +1,6 @@
 """What a process of its own computes is what this one would, and it is gone afterwards."""
 
+import os
 import subprocess
 import sys
 
@@ -114,6 +115,13 @@ def test_what_goes_wrong_elsewhere_goes_wrong_here(started, capfd):
         apart.call(solvers.support_vectors, **DUAL | {"road": np.ones(200, bool)})
     assert started
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sessions are POSIX")
+def test_a_ctrl_c_at_the_terminal_is_not_for_it():
+    process = apart.start(solvers.__name__)
+    assert os.getsid(process.pid) != os.getsid(0)
+    process.communicate()
 
 
 def test_the_process_imports_from_where_this_one_does(tmp_path, monkeypatch):

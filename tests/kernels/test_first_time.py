@@ -7,9 +7,11 @@ from types import SimpleNamespace
 
 import pytest
 
+import roadeval
 from roadeval import apart
 from roadeval.kernels import compiled, first_time
 from roadeval.kernels.first_time import call_all, prepare
+from tests.test_replay import write_log
 
 
 class Calls(Counter):
@@ -75,6 +77,18 @@ def test_it_is_done_once_and_whoever_waits_is_told(unmarked):
         prepare(lambda: told.append(list(unmarked)))
     assert told == [[]]
     assert unmarked == ["roadeval.kernels.first_time"]
+
+
+def test_replay_and_train_compile_before_all_else(unmarked, tmp_path):
+    drive, stages = write_log(tmp_path / "drive.mcap"), []
+    folder = {"save": tmp_path / "out.rrd", "reports": tmp_path / "reports"}
+    roadeval.replay(drive, **folder, on_progress=lambda step: stages.append(step.stage))
+    assert list(dict.fromkeys(stages)) == ["compiling", "training", "replaying", "writing"]
+    (tmp_path / "mark").unlink()
+    stages.clear()
+    roadeval.train([drive], tmp_path / "x.model", on_progress=lambda s: stages.append(s.stage))
+    assert list(dict.fromkeys(stages)) == ["compiling", "training"]
+    assert len(unmarked) == 2
 
 
 def test_a_run_without_compiled_kernels_compiles_nothing(unmarked, monkeypatch):
