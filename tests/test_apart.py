@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from sklearn.svm import SVC
+from sklearn.svm import SVC, LinearSVC
 
 from roadeval import apart
 from roadeval.pipeline import solvers
@@ -59,15 +59,20 @@ def test_the_answer_is_the_same_elsewhere(started, function, given):
         assert_equal(apart.call(function, **given), here)
     assert len(started) == 1
     assert process.returncode is not None
+    assert not apart._HELPERS.get({})
     assert_equal(apart.call(function, **given), here)
 
 
-def test_the_dual_is_scikit_learns():
-    machine = SVC(C=1.5, kernel="rbf", gamma=0.5).fit(FEATURES, ROAD)
+def test_the_solutions_are_scikit_learns():
+    dual = SVC(C=1.5, kernel="rbf", gamma=0.5).fit(FEATURES, ROAD)
     found = solvers.support_vectors(**DUAL)
-    signs = np.where(ROAD[machine.support_], 1, -1)
-    np.testing.assert_array_equal(found["vectors"], FEATURES[machine.support_])
-    assert (np.sign(found["weights"]) == signs).all()
+    np.testing.assert_array_equal(found["vectors"], FEATURES[dual.support_])
+    np.testing.assert_array_equal(found["weights"], dual.dual_coef_[0])
+    assert found["offset"] == dual.intercept_[0]
+    primal = LinearSVC(C=0.01, dual=False).fit(FEATURES.astype(np.float32), ROAD)
+    found = solvers.hyperplane(**PRIMAL)
+    np.testing.assert_array_equal(found["weights"], primal.coef_[0])
+    assert found["offset"] == primal.intercept_[0]
 
 
 def test_a_library_that_is_here_is_used_here(monkeypatch):
@@ -76,8 +81,9 @@ def test_a_library_that_is_here_is_used_here(monkeypatch):
         assert_equal(apart.call(solvers.hyperplane, **PRIMAL), solvers.hyperplane(**PRIMAL))
 
 
-def test_it_is_computed_here_where_no_process_can_be_started(started, monkeypatch):
-    monkeypatch.setattr(sys, "executable", "")
+@pytest.mark.parametrize("executable", ["", None, "/no/such/python"])
+def test_it_is_computed_here_where_no_process_can_be_started(started, monkeypatch, executable):
+    monkeypatch.setattr(sys, "executable", executable)
     with apart.elsewhere(solvers):
         assert_equal(apart.call(solvers.hyperplane, **PRIMAL), solvers.hyperplane(**PRIMAL))
     assert not started
@@ -97,9 +103,15 @@ def test_it_is_computed_here_once_the_process_is_gone(started):
             assert_equal(apart.call(solvers.hyperplane, **PRIMAL), solvers.hyperplane(**PRIMAL))
 
 
-def test_a_process_that_says_something_else_is_not_listened_to(started, monkeypatch, tmp_path):
-    """As where every start of Python prints a line."""
-    (tmp_path / "sitecustomize.py").write_text("print('welcome', flush=True)")
+@pytest.mark.parametrize(
+    "saying",
+    ["print('welcome', flush=True)", "import os; os.write(1, bytes(7) + b'9PK'); os._exit(0)"],
+    ids=["a line at every start of Python", "half an answer"],
+)
+def test_a_process_that_says_something_else_is_not_listened_to(
+    started, monkeypatch, tmp_path, saying
+):
+    (tmp_path / "sitecustomize.py").write_text(saying)
     monkeypatch.syspath_prepend(tmp_path)
     with apart.elsewhere(solvers):
         for _ in range(2):
@@ -145,6 +157,7 @@ sys.modules["roadeval.replay"].write_figures = lambda *given: []
 drive, save, reports = {[str(drive), str(tmp_path / "out.rrd"), str(tmp_path)]}
 outcome = roadeval.replay(drive, save=save, reports=reports)
 assert outcome.summary["training"]["frames"]
+roadeval.train([drive], reports + "/drive.model")
 assert "sklearn" not in sys.modules
 """
     subprocess.run([sys.executable, "-c", program], check=True)

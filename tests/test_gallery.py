@@ -36,6 +36,6 @@ def test_frames_of_a_short_drive_are_shown_once():
 
 
 def test_what_is_kept_is_as_small_as_it_is_drawn():
-    for example in passed(4, [Role.EVALUATED] * 4, (600, 1200)):
-        assert example.image.shape == (200, 400, 3)
-        assert example.truth.shape == example.masks["filtered"].shape == (200, 400)
+    for example in passed(4, [Role.EVALUATED] * 4, (605, 1200)):
+        assert example.image.shape == (202, 400, 3)
+        assert example.truth.shape == example.masks["filtered"].shape == (202, 400)
