@@ -115,7 +115,7 @@ def loop(drive: Path, options: ReplayOptions, folder: Path) -> Cost:
                 results.append(result)
             recorder.finish({})
             cost = meter.read()
-            results.finish(run.board.windows(), run.summary())
+            results.finish(run.summary(), run.board.tables())
         return cost
 
 

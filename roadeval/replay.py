@@ -15,7 +15,7 @@ from roadeval import learning, logs
 from roadeval.data import Frame
 from roadeval.evaluation import rates
 from roadeval.evaluation.results import Results, ResultsWriter, summary_text
-from roadeval.evaluation.tables import header, window_lines
+from roadeval.evaluation.tables import header
 from roadeval.kernels.first_time import prepare
 from roadeval.memory import give_back
 from roadeval.options import Outcome, Progress, ReplayOptions, keep_apart
@@ -102,12 +102,12 @@ def _run(
             recorder.write(encoded)
             results.append(result)
             sidecar.write(result)
-        give_back()
         tell(Progress(run.done, run.total, "writing"))
-        windows, summary = run.board.windows(), run.summary()
-        sums = run.board.tables()
-        recorder.finish(_texts(windows, summary, sums))
-        files = results.finish(windows, summary, sums)
+        recorder.settle()
+        give_back()
+        sums, summary = run.board.tables(), run.summary()
+        recorder.finish(_texts(summary, sums))
+        files = results.finish(summary, sums)
     saved = None if isinstance(recorder, NullRecorder) else recorder.path
     files += [sidecar.path] if sidecar.path else []
     outcome = Outcome(saved, to.reports, summary, run.warnings(), run.losses(), tuple(files))
@@ -155,10 +155,9 @@ def _sidecar(path: str | Path | None) -> logs.SidecarWriter | logs.NoSidecar:
     return logs.NoSidecar() if path is None else logs.SidecarWriter(path, rates.of)
 
 
-def _texts(windows: Sequence[Any], summary: dict[str, Any], sums: dict[str, str]) -> dict[str, str]:
+def _texts(summary: dict[str, Any], sums: dict[str, str]) -> dict[str, str]:
     """Give the results as the recording keeps them: the files' own text."""
-    lines = {"windows": window_lines(windows), **sums}
-    tables = {name: header(name) + text for name, text in lines.items() if text}
+    tables = {name: header(name) + text for name, text in sums.items()}
     return {"summary": summary_text(summary), **tables}
 
 

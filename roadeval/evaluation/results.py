@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
@@ -19,7 +19,6 @@ from roadeval.data import FrameResult
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import tables
 from roadeval.evaluation.agreement import disagreement
-from roadeval.evaluation.windows import Window
 from roadeval.tabular import read_table
 
 if TYPE_CHECKING:
@@ -103,12 +102,7 @@ class ResultsWriter:
                 self._open[f"{table}.csv"].write(lines)
                 self._filled.add(f"{table}.csv")
 
-    def finish(
-        self,
-        windows: Iterable[Window],
-        summary: Mapping[str, Any],
-        sums: Mapping[str, str] | None = None,
-    ) -> list[Path]:
+    def finish(self, summary: Mapping[str, Any], sums: Mapping[str, str]) -> list[Path]:
         """Complete the tables and give all files their names.
 
         Where no frame was scored there are no tables, and those of an earlier run are removed:
@@ -116,12 +110,10 @@ class ResultsWriter:
 
         Parameters
         ----------
-        windows
-            The rows of ``windows.csv``.
         summary
             All of `PARTS` but ``format``.
         sums
-            The lines of the other tables in `SUMS`, by name.
+            The lines of the tables in `SUMS`, by name; one that is missing has none.
 
         Returns
         -------
@@ -129,10 +121,9 @@ class ResultsWriter:
             The files written.
         """
         with self._explained():
-            lines = {"windows": tables.window_lines(windows), **(sums or {})}
             for table in SUMS:
-                self._begin(f"{table}.csv", tables.header(table) + lines.get(table, ""))
-                self._filled.update([f"{table}.csv"] if lines.get(table) else [])
+                self._begin(f"{table}.csv", tables.header(table) + sums.get(table, ""))
+                self._filled.update([f"{table}.csv"] if sums.get(table) else [])
             self._begin(SUMMARY, summary_text(summary))
             # From here to the end an earlier run's summary would stand beside this one's tables.
             (self._folder / SUMMARY).unlink(missing_ok=True)

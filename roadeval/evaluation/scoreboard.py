@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import heapq
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
+from operator import attrgetter
 from typing import Any, Final
 
 import numpy as np
@@ -100,11 +102,9 @@ class Scoreboard:
         self._beyond.interrupt()
 
     def tables(self) -> dict[str, str]:
-        """Give the lines of the tables that sum up the drive, by name; none if nothing is scored.
-
-        ``windows`` is not among them: see `windows`.
-        """
+        """Give the lines of the tables that sum up the drive, by name; none without a score."""
         texts = {
+            "windows": tables.window_lines(self.windows()),
             "changes": tables.change_lines(self._maps),
             "heat": tables.heat_lines(self._maps),
         }
@@ -128,14 +128,13 @@ class Scoreboard:
             sums.setdefault(variant, {}).setdefault(oracle, {})[stage] = history.totals()
         return sums
 
-    def windows(self) -> list[windows.Window]:
+    def windows(self) -> Iterator[windows.Window]:
         """Cut the drive into windows: by window, then variant and stage."""
-        rows = [
-            row
+        rows = (
+            windows.rows(history, self._frames, self._settings.window)
             for history in self._ordered()
-            for row in windows.rows(history, self._frames, self._settings.window)
-        ]
-        return sorted(rows, key=lambda row: row.number)
+        )
+        return heapq.merge(*rows, key=attrgetter("number"))
 
     def differences(self) -> dict[str, dict[str, Difference]]:
         """Give the paired difference, filtered minus unfiltered, by stage and rate.

@@ -147,8 +147,13 @@ class Keeper:
             if len(self._worst) > self._rule.number:
                 self._shelf.drop(-heapq.heappop(self._worst)[1])
 
+    def settle(self) -> None:
+        """Write all that waits, the pictures held back too, once the last frame is written."""
+        self._write_held()
+        self._recorder.settle()
+
     def finish(self, results: Mapping[str, str]) -> None:
-        """Add the pictures held back and the results, close the file and give it its name."""
+        """Add what still waits and the results, close the file and give it its name."""
         self._write_held()
         self._recorder.finish(results)
 

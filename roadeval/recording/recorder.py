@@ -133,6 +133,19 @@ class Recorder:
             self._add_images(self._blank)
             self._blank = None
 
+    def settle(self) -> None:
+        """Write all that waits, once the last frame is written: its memory is needed for results.
+
+        Raises
+        ------
+        RecordingError
+            If it cannot be written.
+        """
+        for waiting in (self._rows, self._numbers):
+            for key in list(waiting):
+                self._send(waiting, key)
+        self._flush()
+
     def finish(self, results: Mapping[str, str]) -> None:
         """Add the results, close the file and give it its name.
 
@@ -231,10 +244,7 @@ class Recorder:
         if self._stream is None:
             return
         try:
-            for waiting in (self._rows, self._numbers):
-                for key in list(waiting):
-                    self._send(waiting, key)
-            self._flush()
+            self.settle()
         finally:
             self._stream.disconnect()
             self._stream = None
@@ -257,6 +267,9 @@ class NullRecorder:
 
     def write(self, encoded: None) -> None:
         """Write nothing."""
+
+    def settle(self) -> None:
+        """Nothing waits."""
 
     def finish(self, results: Mapping[str, str]) -> None:
         """Keep nothing."""

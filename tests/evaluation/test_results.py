@@ -49,7 +49,7 @@ def write(folder: Path, role: Role = Role.EVALUATED) -> list[Path]:
     with ResultsWriter(folder) as writer:
         for result in scored(board, role):
             writer.append(result)
-        return writer.finish(board.windows(), the_rest(board), board.tables())
+        return writer.finish(the_rest(board), board.tables())
 
 
 def names(folder: Path) -> set[str]:
@@ -102,7 +102,7 @@ def test_a_variant_named_like_a_number_keeps_its_name(tmp_path: Path) -> None:
         result = board.score(a_frame(TRUTHS[0]), Role.EVALUATED, (variant,))
         board.add(result)
         writer.append(result)
-        writer.finish(board.windows(), the_rest(board))
+        writer.finish(the_rest(board), {})
     assert Results(tmp_path).frames["variant"].tolist() == ["007"]
 
 
@@ -137,7 +137,7 @@ def test_a_table_that_nothing_was_counted_for_is_not_written_and_an_earlier_one_
         )
         board.add(result)
         writer.append(result)
-        writer.finish(board.windows(), the_rest(board), board.tables())
+        writer.finish(the_rest(board), board.tables())
     assert names(tmp_path) == {
         *("frames.csv", "regions.csv", "windows.csv", "heat.csv", "summary.json"),
     }
@@ -175,7 +175,7 @@ def test_nothing_bears_its_name_before_all_is_complete(tmp_path: Path) -> None:
         for result in scored(board):
             writer.append(result)
         assert all(name.startswith(".") for name in names(tmp_path))
-        writer.finish(board.windows(), the_rest(board), board.tables())
+        writer.finish(the_rest(board), board.tables())
     assert names(tmp_path) == {*(f"{table}.csv" for table in COLUMNS), "summary.json"}
 
 
@@ -260,7 +260,7 @@ def test_masks_that_are_missing_on_some_frames_agree_with_the_summary(tmp_path: 
             result = board.score(a_frame(truth, number), Role.EVALUATED, tuple(variants))
             board.add(result)
             writer.append(result)
-        writer.finish(board.windows(), the_rest(board), board.tables())
+        writer.finish(the_rest(board), board.tables())
     tables = {name: Results(tmp_path).table(name) for name in COLUMNS}
     assert len(tables["frames"]) == 3 * 2 + 1 + 1
     assert not {("net", "late"), ("late", "net")} & set(

@@ -53,6 +53,15 @@ def test_the_worst_frames_pictures_are_kept_and_of_equals_the_earlier(rule, fram
         np.testing.assert_array_equal(recording.layer("filtered", "post", number), mask)
 
 
+def test_settled_pictures_are_the_worst(tmp_path):
+    with Keeper(tmp_path / "out.rrd", layout(), Rule.parse("worst:2")) as keeper:
+        write(keeper)
+        keeper.settle()
+        assert set(Recording(keeper.partial).frame_numbers) == {1, 3}
+        keeper.finish(RESULTS)
+    assert list(Recording(keeper.path).frame_numbers) == [1, 3]
+
+
 def test_pictures_wait_in_a_file_that_is_gone_at_the_end(tmp_path):
     with Keeper(tmp_path / "out.rrd", layout(), Rule.parse("worst:3")) as keeper:
         assert names(tmp_path) == ["out.partial.rrd"]

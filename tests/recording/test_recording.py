@@ -310,6 +310,18 @@ def _slower(variant):
     return replace(variant, stages=stages)
 
 
+def test_settled_frames_wait_no_more(drive, tmp_path):
+    with Recorder(tmp_path / "out.rrd", layout()) as recorder:
+        for each in drive[:5]:
+            recorder.write(recorder.encode(each))
+        recorder.settle()
+        partial = Recording(recorder.partial)
+        assert partial.frame_numbers == (0, 1, 2, 3, 4)
+        assert list(partial.frames.frame) == [2, 3, 4]
+        recorder.finish(RESULTS)
+    assert Recording(recorder.path).frame_numbers == (0, 1, 2, 3, 4)
+
+
 @pytest.mark.parametrize("stop", [RuntimeError, KeyboardInterrupt, SystemExit])
 def test_an_exception_leaves_a_partial_recording_with_every_frame_so_far(stop, drive, tmp_path):
     recorder = Recorder(tmp_path / "out.rrd", layout())
@@ -494,6 +506,7 @@ def _recorder(path):
 def test_no_recording_is_made_by_the_recorder_that_does_nothing(drive):
     with NullRecorder() as recorder:
         recorder.write(recorder.encode(drive[0], 0))
+        recorder.settle()
         recorder.finish(RESULTS)
 
 
