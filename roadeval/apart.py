@@ -17,15 +17,18 @@ from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from importlib import import_module
 from io import BytesIO
+from pathlib import Path
 from types import ModuleType
-from typing import IO, Any, Final
+from typing import IO, Any, Final, ParamSpec
+from zipfile import BadZipFile
 
 import numpy as np
 import numpy.typing as npt
 
 Arrays = Mapping[str, npt.NDArray[Any]]
-Function = Callable[..., Arrays]
-"""Takes and gives arrays by name; numbers and words are arrays without dimensions."""
+P = ParamSpec("P")
+"""Of a function that takes and gives arrays by name. A number or a word is an array without
+dimensions where it comes from another process."""
 
 _NAME: Final = "function"
 """Stands beside the arrays in a message, and names no argument."""
@@ -38,17 +41,20 @@ _GREATEST: Final = 1 << 32
 def start(module: str) -> subprocess.Popen[bytes]:
     """Start a module of this package as a program, with pipes to it and from it.
 
-    It imports from where this process does. A Ctrl-C at the terminal does not reach it: whoever
+    It imports from where this process does. A Ctrl-C at a POSIX terminal does not reach it: whoever
     started it ends it.
 
     Raises
     ------
     OSError
-        If no process can be started, or this one is not Python's own program but one that it is
-        built into.
+        If no process can be started, as from a program that Python is built into, or it could not
+        be told where to import from.
     """
-    if not sys.executable or getattr(sys, "frozen", False):
+    program = Path(sys.executable or "").stem.lower()
+    if getattr(sys, "frozen", False) or not program.startswith(("python", "pypy")):
         raise OSError("there is no Python to start")
+    if any(os.pathsep in place for place in sys.path):
+        raise OSError("a place to import from cannot be named in a list of them")
     places = os.pathsep.join(map(os.path.abspath, sys.path))
     return subprocess.Popen(
         # -P: nothing is imported from the working folder unless this process would do so.
@@ -72,11 +78,14 @@ class _Helper:
         if self._process.returncode is not None or to is None or back is None:
             return None
         found = None
-        with suppress(OSError):
-            _send(to, {_NAME: function, **given})
+        try:
+            # A process that is gone cannot be sent anything; what it has said can be read.
+            with suppress(OSError):
+                _send(to, {_NAME: function, **given})
             found = _receive(back)
-        if found is None:
-            self.end()
+        finally:
+            if found is None:
+                self.end()
         return found
 
     def end(self) -> None:
@@ -105,8 +114,10 @@ def elsewhere(module: ModuleType) -> Iterator[None]:
         yield
 
 
-def call(function: Function, **given: Any) -> Arrays:
+def call(function: Callable[P, Arrays], *args: P.args, **given: P.kwargs) -> Arrays:
     """Call a function in its module's process if this context has one, or else here.
+
+    Arguments without a name are not sent anywhere: with one, it is called here.
 
     Raises
     ------
@@ -114,11 +125,11 @@ def call(function: Function, **given: Any) -> Arrays:
         Whatever the function raises.
     """
     helper = _HELPERS.get({}).get(function.__module__)
-    found = None if helper is None else helper.ask(function.__name__, given)
-    return function(**given) if found is None else found
+    found = None if helper is None or args else helper.ask(function.__name__, given)
+    return function(*args, **given) if found is None else found
 
 
-def serve(library: str, *functions: Function) -> None:
+def serve(library: str, *functions: Callable[..., Arrays]) -> None:
     """Call functions for the process that started this one, until it asks for no more.
 
     The library that they need is imported first: whoever asks is not ready yet. If a function fails
@@ -149,5 +160,8 @@ def _receive(back: IO[bytes]) -> Arrays | None:
     packed = back.read(length) if length < _GREATEST else b""
     if not packed or len(packed) < length:
         return None
-    with np.load(BytesIO(packed), allow_pickle=False) as arrays:
-        return dict(arrays)
+    try:
+        with np.load(BytesIO(packed), allow_pickle=False) as arrays:
+            return dict(arrays)
+    except (ValueError, BadZipFile):
+        return None

@@ -51,7 +51,8 @@ def replay(
     options
         Everything else.
     on_progress
-        Called in the caller's thread after every frame.
+        Called in the caller's thread after every frame, and where something else begins that takes
+        its time.
 
     Returns
     -------
@@ -137,11 +138,11 @@ def train(
     settings = options.training()
     total, by_truth = settings.frames * len(drives), settings.source != "patch"
     memory = learning.Memory()
-    prepare(lambda: tell(Progress(0, None, "compiling")))
     frames: dict[Path, list[Frame]] = {}
     for drive in drives:
         with logs.open_log(drive, keep_corrupt=options.keep_corrupt) as log:
             there = partial(log.frames, options.select(log), options.span())
+            prepare(lambda: tell(Progress(0, total, "compiling")))
             frames[log.path] = []
             for frame in learning.spread(there, settings.frames, labelled=by_truth):
                 frames[log.path].append(memory.hold(frame))

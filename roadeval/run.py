@@ -65,7 +65,6 @@ class Run:
         self._selection = options.select(log)
         self._frames = log.frames(self._selection, options.span())
         self.total = len(self._frames)
-        prepare(lambda: tell(Progress(0, None, "compiling")))
         self.model, self._schedule = self._learn()
         self._chains = self._bind()
         give_back()
@@ -80,7 +79,10 @@ class Run:
         if options.model is not None:
             if options.train_frames is not None or options.train_gap is not None:
                 raise OptionError("--train-frames and --train-gap do not go with --model")
-            return learning.from_file(options.model, self._variants)
+            learnt = learning.from_file(options.model, self._variants)
+            self._compile()
+            return learnt
+        self._compile()
         labelled = self._selection.truth is not None and settings.source != "patch"
         total = min(settings.frames, self.total)
         return learning.from_log(
@@ -90,6 +92,9 @@ class Run:
             lambda done: self._tell(Progress(done, total, "training")),
             labelled=labelled,
         )
+
+    def _compile(self) -> None:
+        prepare(lambda: self._tell(Progress(0, self.total, "compiling")))
 
     def _bind(self) -> Mapping[str, Chain]:
         try:

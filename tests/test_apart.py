@@ -73,6 +73,7 @@ def test_the_solutions_are_scikit_learns():
     found = solvers.hyperplane(**PRIMAL)
     np.testing.assert_array_equal(found["weights"], primal.coef_[0])
     assert found["offset"] == primal.intercept_[0]
+    assert found["weights"].dtype == found["offset"].dtype == np.float64
 
 
 def test_a_library_that_is_here_is_used_here(monkeypatch):
@@ -81,7 +82,7 @@ def test_a_library_that_is_here_is_used_here(monkeypatch):
         assert_equal(apart.call(solvers.hyperplane, **PRIMAL), solvers.hyperplane(**PRIMAL))
 
 
-@pytest.mark.parametrize("executable", ["", None, "/no/such/python"])
+@pytest.mark.parametrize("executable", ["", None, "/no/such/python", "/bin/cat"])
 def test_it_is_computed_here_where_no_process_can_be_started(started, monkeypatch, executable):
     monkeypatch.setattr(sys, "executable", executable)
     with apart.elsewhere(solvers):
@@ -89,24 +90,35 @@ def test_it_is_computed_here_where_no_process_can_be_started(started, monkeypatc
     assert not started
 
 
-def test_it_is_computed_here_where_python_is_built_into_a_program(monkeypatch):
+def test_no_process_is_started_from_a_program_that_python_is_built_into(monkeypatch):
     monkeypatch.setattr(sys, "frozen", True, raising=False)
     with pytest.raises(OSError, match="no Python"):
+        apart.start(solvers.__name__)
+
+
+def test_no_process_is_started_that_would_import_from_elsewhere(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(tmp_path / f"one{os.pathsep}two")
+    with pytest.raises(OSError, match="cannot be named"):
         apart.start(solvers.__name__)
 
 
 def test_it_is_computed_here_once_the_process_is_gone(started):
     with apart.elsewhere(solvers):
         started[0].kill()
-        started[0].wait()
+        # Gone, but nobody has asked yet.
+        os.waitid(os.P_PID, started[0].pid, os.WEXITED | os.WNOWAIT)
         for _ in range(2):
             assert_equal(apart.call(solvers.hyperplane, **PRIMAL), solvers.hyperplane(**PRIMAL))
 
 
 @pytest.mark.parametrize(
     "saying",
-    ["print('welcome', flush=True)", "import os; os.write(1, bytes(7) + b'9PK'); os._exit(0)"],
-    ids=["a line at every start of Python", "half an answer"],
+    [
+        "print('welcome', flush=True)",
+        "import os; os.write(1, bytes(7) + b'9PK'); os._exit(0)",
+        "import os; os.write(1, bytes(7) + bytes([5]) + b'hello')",
+    ],
+    ids=["a line at every start of Python", "half an answer", "no answer"],
 )
 def test_a_process_that_says_something_else_is_not_listened_to(
     started, monkeypatch, tmp_path, saying
@@ -117,6 +129,26 @@ def test_a_process_that_says_something_else_is_not_listened_to(
         for _ in range(2):
             assert_equal(apart.call(solvers.hyperplane, **PRIMAL), solvers.hyperplane(**PRIMAL))
             assert started[0].returncode is not None
+
+
+def test_whoever_waits_can_be_interrupted_and_nothing_is_left(started, monkeypatch):
+    """As by a signal whose handler raises an error that pipes know, too."""
+
+    def interrupted(_pipe):
+        raise TimeoutError
+
+    with apart.elsewhere(solvers):
+        with monkeypatch.context() as patched:
+            patched.setattr(apart, "_receive", interrupted)
+            with pytest.raises(TimeoutError):
+                apart.call(solvers.hyperplane, **PRIMAL)
+        assert started[0].returncode is not None
+        assert_equal(apart.call(solvers.hyperplane, **PRIMAL), solvers.hyperplane(**PRIMAL))
+
+
+def test_arguments_without_a_name_are_not_lost(started):
+    with apart.elsewhere(solvers):
+        assert_equal(apart.call(solvers.hyperplane, *PRIMAL.values()), solvers.hyperplane(**PRIMAL))
 
 
 def test_what_goes_wrong_elsewhere_goes_wrong_here(started, capfd):

@@ -121,7 +121,7 @@ class Lines:
         if not begins and self.clock.now() - self.written < LINE_PERIOD_S:
             return
         self.written = self.clock.now()
-        if step.total is None and not step.done:
+        if not step.done:
             self.write(step.stage)
             return
         of = f" of {step.total}" if step.total is not None else ""

@@ -21,10 +21,12 @@ def pick() -> ModuleType:
     if os.environ.get("ROADEVAL_PLAIN") == "1":
         return plain
     try:
+        from numba import config
+
         from roadeval.kernels import compiled
     except Exception:  # whatever keeps a compiler from working, the twins give the same numbers
         return plain
-    return compiled
+    return plain if config.DISABLE_JIT else compiled
 
 
 class _Kernels:

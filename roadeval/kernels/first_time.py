@@ -35,14 +35,19 @@ def prepare(on_compile: Callable[[], None]) -> None:
     if mark.exists():
         return
     on_compile()
-    with suppress(OSError):
+    try:
         process = apart.start(__name__)
+    except OSError:
+        return
+    with process:
         try:
             process.communicate()
         finally:
             process.kill()
-        # Also where it failed: it would again.
-        mark.touch()
+    # Also where it failed, for it would again; but not where somebody ended it.
+    if process.returncode >= 0:
+        with suppress(OSError):
+            mark.touch()
 
 
 def _mark(compiled: ModuleType) -> Path:

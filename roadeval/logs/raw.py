@@ -109,7 +109,7 @@ def rows_of(picture: RawPicture, layout: Layout) -> Array:
 
 
 def raw_to_rgb(picture: RawPicture) -> Rgb:
-    """Convert a picture to ``(H, W, 3)`` uint8 RGB.
+    """Convert a picture to ``(H, W, 3)`` uint8 RGB, an array of its own.
 
     Raises
     ------
@@ -121,7 +121,8 @@ def raw_to_rgb(picture: RawPicture) -> Rgb:
     layout = layout_of(picture)
     samples = eight_bits(rows_of(picture, layout))
     if layout.code is None:
-        return samples
+        # A loop is compiled anew for parts of a message: they may not be written to.
+        return np.require(samples, requirements=["C", "W"])
     rgb: Rgb = np.asarray(cv2.cvtColor(samples, getattr(cv2, layout.code)), np.uint8)
     return rgb
 

@@ -48,6 +48,7 @@ from roadeval.pipeline.stage import (
 )
 
 Values = npt.NDArray[np.float32]
+Floats = npt.NDArray[np.float64]
 
 DECISION: Final = LayerSpec(
     "decision", LayerKind.SCALAR, "Decision value (Eq. 16)", value_range=(-2.0, 2.0), exact=False
@@ -219,7 +220,7 @@ def draw_planes(values: Values, count: int, seed: int) -> tuple[Values, Values]:
 
 def solve(
     mapped: Values, road: npt.NDArray[np.bool_], settings: ContextSettings
-) -> tuple[npt.NDArray[np.intp], Values, float]:
+) -> tuple[npt.NDArray[np.intp], Floats, float]:
     """Solve the linear machine on the planes that move its decisions most.
 
     Parameters
@@ -245,7 +246,7 @@ def solve(
     return kept, *_solve(mapped.take(kept, axis=1), road, settings.c)
 
 
-def _solve(mapped: Values, road: npt.NDArray[np.bool_], c: float) -> tuple[Values, float]:
+def _solve(mapped: Values, road: npt.NDArray[np.bool_], c: float) -> tuple[Floats, float]:
     found = call(hyperplane, features=mapped, road=road, c=c)
     return found["weights"], float(found["offset"])
 

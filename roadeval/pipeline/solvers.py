@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from roadeval import apart
 from roadeval.apart import Arrays
 
+Floats = npt.NDArray[np.float64]
+
 LIBRARY: Final = "sklearn.svm"
 
 
-def support_vectors(features: Any, road: Any, c: Any, kernel: Any, gamma: Any) -> Arrays:
+def support_vectors(
+    features: Floats, road: npt.NDArray[np.bool_], c: float, kernel: str, gamma: float
+) -> Arrays:
     """Solve the dual of a soft margin (Eq. 14) with libsvm.
 
     Parameters
@@ -37,7 +42,7 @@ def support_vectors(features: Any, road: Any, c: Any, kernel: Any, gamma: Any) -
     }
 
 
-def hyperplane(features: Any, road: Any, c: Any) -> Arrays:
+def hyperplane(features: npt.NDArray[np.float32], road: npt.NDArray[np.bool_], c: float) -> Arrays:
     """Solve the primal of a linear machine with a squared hinge loss, with liblinear.
 
     Parameters
@@ -48,7 +53,7 @@ def hyperplane(features: Any, road: Any, c: Any) -> Arrays:
     Returns
     -------
     dict
-        ``weights`` ``(k,)`` and ``offset`` ``()``, in the features' precision.
+        ``weights`` ``(k,)`` and ``offset`` ``()``, both float64.
     """
     from sklearn.svm import LinearSVC
 

@@ -58,7 +58,7 @@ def road_masks(drive: str, examples: Sequence[Example]) -> Figure:
     from matplotlib.figure import Figure
 
     columns = _columns(examples)
-    height, width = examples[0].image.shape[:2]
+    width, height = _size(examples[0].image)
     row = (8 - LEFT) / len(columns) * height / width
     total = TOP + row * len(examples) + 0.05
     figure = Figure(figsize=(8, total))

@@ -39,6 +39,11 @@ def test_the_first_step_of_a_stage_is_a_line():
     assert lines_of(steps) == ["training: 1 of 10 frames", "replaying: 1 of 50 frames"]
 
 
+def test_before_the_first_frame_there_are_no_frames_to_tell_of():
+    steps = [(0, Step(0, 10, "compiling")), (1, Step(1, 10, "training"))]
+    assert lines_of(steps) == ["compiling", "training: 1 of 10 frames"]
+
+
 def test_a_line_comes_now_and_then_with_rate_and_time_left():
     steps = [(second, Step(1 + 2 * second, 101)) for second in range(25)]
     assert lines_of(steps) == [

@@ -3,14 +3,16 @@
 import subprocess
 import sys
 from collections import Counter
-from types import SimpleNamespace
+from signal import SIGKILL
+from subprocess import Popen
 
 import pytest
 
 import roadeval
-from roadeval import apart
-from roadeval.kernels import compiled, first_time
+from roadeval import ReplayOptions, apart
+from roadeval.kernels import compiled, first_time, pick, plain
 from roadeval.kernels.first_time import call_all, prepare
+from tests.e2e.commands import DEMO
 from tests.test_replay import write_log
 
 
@@ -27,8 +29,20 @@ def test_every_kernel_is_called_once():
     assert calls == Counter(compiled.__all__)
 
 
-def test_a_run_of_any_preset_needs_nothing_else():
+def test_the_process_that_compiles_calls_them():
     program = """
+import runpy
+
+from roadeval.kernels import compiled
+
+runpy.run_module("roadeval.kernels.first_time", run_name="__main__")
+assert all(getattr(compiled, name).signatures for name in compiled.__all__)
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_a_run_of_any_preset_needs_nothing_else():
+    program = f"""
 import sys
 import tempfile
 
@@ -41,7 +55,7 @@ sys.modules["roadeval.replay"].write_figures = lambda *given: []
 
 
 def kinds():
-    return {name: getattr(compiled, name).signatures for name in compiled.__all__}
+    return {{name: getattr(compiled, name).signatures for name in compiled.__all__}}
 
 
 first_time.call_all(compiled)
@@ -51,7 +65,7 @@ for name in PRESETS:
         options = roadeval.ReplayOptions(
             config=preset(name), max_frames=14, train_frames=4, scale=0.25, record="none"
         )
-        roadeval.replay("recordings/demo.mcap", reports=folder, options=options)
+        roadeval.replay({str(DEMO)!r}, reports=folder, options=options)
 assert kinds() == ahead, [name for name, made in kinds().items() if made != ahead[name]]
 """
     subprocess.run([sys.executable, "-c", program], check=True)
@@ -64,7 +78,7 @@ def unmarked(tmp_path, monkeypatch):
 
     def start(module):
         started.append(module)
-        return SimpleNamespace(communicate=lambda: None, kill=lambda: None)
+        return Popen("true")
 
     monkeypatch.setattr(first_time, "_mark", lambda kernels: tmp_path / "mark")
     monkeypatch.setattr(apart, "start", start)
@@ -97,20 +111,37 @@ def test_a_run_without_compiled_kernels_compiles_nothing(unmarked, monkeypatch):
     assert not unmarked
 
 
-def test_an_interruption_ends_what_was_started_and_it_is_done_again(unmarked, monkeypatch):
-    killed = []
+@pytest.mark.parametrize("error", [KeyboardInterrupt, TimeoutError])
+def test_an_interruption_ends_what_was_started_and_it_is_done_again(unmarked, monkeypatch, error):
+    process = Popen(["sleep", "100"])
 
     def interrupted():
-        raise KeyboardInterrupt
+        raise error
 
-    process = SimpleNamespace(communicate=interrupted, kill=lambda: killed.append(1))
     with monkeypatch.context() as patched:
+        patched.setattr(process, "communicate", interrupted)
         patched.setattr(apart, "start", lambda module: process)
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(error):
             prepare(lambda: None)
-    assert len(killed) == 1
+    assert process.returncode == -SIGKILL
     prepare(lambda: None)
     assert len(unmarked) == 1
+
+
+def test_what_somebody_ended_is_done_again(unmarked, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr(apart, "start", lambda module: Popen(["sh", "-c", "kill -9 $$"]))
+        prepare(lambda: None)
+    prepare(lambda: None)
+    assert len(unmarked) == 1
+
+
+def test_what_fails_is_not_tried_again(unmarked, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr(apart, "start", lambda module: Popen("false"))
+        prepare(lambda: None)
+    prepare(lambda: None)
+    assert not unmarked
 
 
 def test_a_machine_that_starts_no_process_is_asked_again(unmarked, monkeypatch):
@@ -122,6 +153,35 @@ def test_a_machine_that_starts_no_process_is_asked_again(unmarked, monkeypatch):
         prepare(lambda: None)
     prepare(lambda: None)
     assert len(unmarked) == 1
+
+
+@pytest.mark.parametrize(
+    ("where", "what"),
+    [
+        ("numba.__version__", "0.0"),
+        ("sys.version", "2.7"),
+        ("llvmlite.binding.get_host_cpu_name", lambda: "6502"),
+    ],
+)
+def test_the_mark_is_another_for_other_versions_and_processors(monkeypatch, where, what):
+    before = first_time._mark(compiled)
+    monkeypatch.setattr(where, what)
+    assert first_time._mark(compiled) != before
+
+
+def test_a_mistake_is_told_before_anything_is_compiled(unmarked, tmp_path):
+    drive, model = write_log(tmp_path / "drive.mcap"), tmp_path / "none.model"
+    folder = {"save": tmp_path / "out.rrd", "reports": tmp_path / "reports"}
+    with pytest.raises(roadeval.RoadevalError, match=r"none\.model"):
+        roadeval.replay(drive, **folder, options=ReplayOptions(model=model))
+    with pytest.raises(roadeval.RoadevalError, match="nosuch"):
+        roadeval.train([tmp_path / "nosuch.mcap"], model)
+    assert not unmarked
+
+
+def test_loops_that_must_not_be_compiled_are_not(monkeypatch):
+    monkeypatch.setattr("numba.config.DISABLE_JIT", 1)
+    assert pick() is plain
 
 
 def test_other_sources_are_compiled_anew(tmp_path, monkeypatch):
