@@ -16,6 +16,12 @@ MEASURE = f"""
 {PEAK}
 import json, sys
 from roadeval import replay
+from roadeval.recording import recorder
+from roadeval.recording.tracks import Patience
+
+# Rows wait in memory for more frames the longer the recording, up to a limit at 1,024 frames and
+# more. Here that limit is reached before the first measurement.
+recorder.IMAGES_AND_WORDS = recorder.NUMBERS = Patience(8, 8)
 
 peaks = {{}}
 
@@ -45,4 +51,4 @@ def test_a_log_ten_times_as_long_takes_the_same_memory(tmp_path):
     run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     peaks = json.loads(run.stdout)
     assert peaks["40"] > 100_000, "a process with these libraries is not so small"
-    assert peaks["400"] < 1.1 * peaks["40"]
+    assert peaks["400"] < 1.05 * peaks["40"]
