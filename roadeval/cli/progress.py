@@ -69,7 +69,8 @@ def _bar(stderr: Console) -> Iterator[Watch]:
                 task,
                 description=step.stage,
                 completed=step.done,
-                total=step.total,
+                # Before the first frame nothing is known; the bar shows that something moves.
+                total=step.total if step.done else None,
                 pace="  ".join(clock.pace(step)),
             )
 

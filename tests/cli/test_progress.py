@@ -80,3 +80,13 @@ def test_at_a_terminal_there_is_a_bar(monkeypatch):
     assert "replaying" in shown
     assert "60/100" in shown
     assert "frames/s" in shown
+
+
+def test_the_bar_has_no_end_before_the_first_frame(monkeypatch):
+    screen = Console(file=io.StringIO(), force_terminal=True, width=80)
+    monkeypatch.setattr(console, "diagnostics", lambda: screen)
+    with progress.watched() as watch:
+        watch(Step(0, 100, "compiling"))
+    shown = screen.file.getvalue()
+    assert "compiling" in shown
+    assert "0/100" not in shown
