@@ -102,7 +102,12 @@ def test_replay_and_train_compile_before_all_else(unmarked, tmp_path):
     stages.clear()
     roadeval.train([drive], tmp_path / "x.model", on_progress=lambda s: stages.append(s.stage))
     assert list(dict.fromkeys(stages)) == ["compiling", "training"]
-    assert len(unmarked) == 2
+    (tmp_path / "mark").unlink()
+    stages.clear()
+    learnt = ReplayOptions(model=tmp_path / "x.model", record="none")
+    roadeval.replay(drive, **folder, options=learnt, on_progress=lambda s: stages.append(s.stage))
+    assert list(dict.fromkeys(stages)) == ["compiling", "replaying", "writing"]
+    assert len(unmarked) == 3
 
 
 def test_a_run_without_compiled_kernels_compiles_nothing(unmarked, monkeypatch):
