@@ -149,6 +149,7 @@ def test_whoever_waits_can_be_interrupted_and_nothing_is_left(started, monkeypat
 def test_arguments_without_a_name_are_not_lost(started):
     with apart.elsewhere(solvers):
         assert_equal(apart.call(solvers.hyperplane, *PRIMAL.values()), solvers.hyperplane(**PRIMAL))
+        assert started[0].poll() is None
 
 
 def test_what_goes_wrong_elsewhere_goes_wrong_here(started, capfd):
