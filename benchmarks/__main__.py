@@ -20,13 +20,14 @@ from benchmarks.drives import Source
 from benchmarks.plainly import PlainWay
 from benchmarks.replaying import Held, Whole, floor, hold, loop, whole
 from benchmarks.timing import Spread, ratios, table, timed
-from roadeval import logs, runner
+from roadeval import logs
 from roadeval.data import Frame, Role
-from roadeval.flow import one_thread_each
-from roadeval.options import ReplayOptions
+from roadeval.jobs import frame as runner
+from roadeval.jobs.options import ReplayOptions
+from roadeval.jobs.run import Run
 from roadeval.pipeline.stage import View
 from roadeval.recording import Rule, recorder_for
-from roadeval.run import Run
+from roadeval.runtime.threads import one_thread_each
 
 Rows = list[dict[str, Any]]
 PAIRS = 3

@@ -17,8 +17,8 @@ from mcap_ros2.writer import Writer
 
 from roadeval import logs
 from roadeval.data import Frame
+from roadeval.jobs.options import ReplayOptions
 from roadeval.logs import LogWriter
-from roadeval.options import ReplayOptions
 
 PERIOD_NS: Final = 100_000_000
 JPEG_QUALITY: Final = 90

@@ -14,7 +14,7 @@ import numpy as np
 import rerun as rr
 
 from roadeval.data import FILTERED, UNFILTERED, Frame, VariantResult
-from roadeval.options import ReplayOptions
+from roadeval.jobs.options import ReplayOptions
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import TrainingSet
 from roadeval.training.sampling import sample

@@ -15,12 +15,12 @@ import roadeval
 from benchmarks.timing import Cost, Meter
 from roadeval import logs
 from roadeval.data import FrameResult
-from roadeval.evaluation.results import ResultsWriter
-from roadeval.flow import ordered
-from roadeval.kernels.packing import Packed
-from roadeval.options import ReplayOptions
+from roadeval.data.packed import Packed
+from roadeval.jobs.options import ReplayOptions
+from roadeval.jobs.run import Run
 from roadeval.recording import Rule, recorder_for
-from roadeval.run import Run
+from roadeval.results.folder import ResultsWriter
+from roadeval.runtime.threads import ordered
 
 ALL: Final = Rule.parse("all")
 HELD_BYTES: Final = 400 << 20

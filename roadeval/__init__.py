@@ -20,10 +20,11 @@ from roadeval.version import VERSION
 if TYPE_CHECKING:
     from roadeval.config import Config, load_config, preset
     from roadeval.errors import RoadevalError
-    from roadeval.options import Outcome, Progress, ReplayOptions
+    from roadeval.jobs.frame import run_frame
+    from roadeval.jobs.options import Outcome, Progress, ReplayOptions
+    from roadeval.jobs.replay import replay
+    from roadeval.jobs.train import train
     from roadeval.recording import Recording
-    from roadeval.replay import replay, train
-    from roadeval.runner import run_frame
     from roadeval.training import Model, load_model, save_model
 
 __version__ = VERSION
@@ -47,12 +48,13 @@ __all__ = [
 
 _HOMES: Final = {
     **dict.fromkeys(("Config", "load_config", "preset"), "config"),
-    **dict.fromkeys(("Outcome", "Progress", "ReplayOptions"), "options"),
+    **dict.fromkeys(("Outcome", "Progress", "ReplayOptions"), "jobs.options"),
     **dict.fromkeys(("Model", "load_model", "save_model"), "training"),
-    **dict.fromkeys(("replay", "train"), "replay"),
+    "replay": "jobs.replay",
+    "train": "jobs.train",
     "Recording": "recording",
     "RoadevalError": "errors",
-    "run_frame": "runner",
+    "run_frame": "jobs.frame",
 }
 
 

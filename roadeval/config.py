@@ -23,14 +23,7 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from roadeval.data import (
-    FILTERED,
-    FINAL_STAGE,
-    RESERVED,
-    UNFILTERED,
-    LayerSpec,
-    VariantLayout,
-)
+from roadeval.data import FILTERED, FINAL_STAGE, RESERVED, UNFILTERED, LayerSpec, VariantLayout
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.pipeline.chain import STAGES, Chain, layers_of, masks_of

@@ -4,13 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.config import (
-    Config,
-    ConfigError,
-    load_config,
-    preset,
-    variants_of,
-)
+from roadeval.config import Config, ConfigError, load_config, preset, variants_of
 from roadeval.data import RESERVED
 
 

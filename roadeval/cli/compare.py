@@ -78,9 +78,9 @@ def compare(
     judged, as where two results have fewer than ten frames in common, or fewer than half of those
     of the shorter one.
     """
-    from roadeval import comparing
     from roadeval.cli import changes
-    from roadeval.report.typeset import Paper
+    from roadeval.jobs import compare as comparing
+    from roadeval.report.pdf.typeset import Paper
 
     compared = comparing.compare(results, variants=variant, fail_if=fail_if or ())
     for path in output or ():

@@ -25,7 +25,7 @@ def demo(
     100 frames, 640x480, 10 Hz; truth of the road and of shadow. The same seed gives the same
     drive.
     """
-    from roadeval.options import Progress
+    from roadeval.jobs.options import Progress
     from roadeval.synth import DriveSettings, write_drive
 
     with progress.watched(quiet) as watch:

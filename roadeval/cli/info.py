@@ -29,8 +29,8 @@ def info(
     would pick what it picks, or what it would ask for.
     """
     from roadeval.cli import contents, settings
+    from roadeval.jobs.options import ReplayOptions
     from roadeval.logs import describe
-    from roadeval.options import ReplayOptions
 
     labels = settings.labels(road_label, ignore_label, road_color, ignore_color)
     chosen = ReplayOptions(

@@ -15,7 +15,7 @@ from roadeval.cli.exit_codes import ExitCode
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from roadeval.inspecting import Suspect
+    from roadeval.jobs.inspect import Suspect
 
 
 def inspect(
@@ -52,8 +52,8 @@ def inspect(
     The viewer works offline and listens on 127.0.0.1 alone. Of neighbouring frames only the worst
     is listed.
     """
-    from roadeval import inspecting
-    from roadeval.opened import Opened
+    from roadeval.jobs import inspect as inspecting
+    from roadeval.jobs.result import Opened
 
     if frame is not None and worst is not None:
         raise typer.BadParameter("give --frame or --worst, not both")

@@ -63,9 +63,9 @@ def replay(
     stage is scored against it, with the shadow filter and without.
     """
     from roadeval.cli import outcome, settings
-    from roadeval.evaluation.results import summary_text
-    from roadeval.replay import ReplayOptions
-    from roadeval.replay import replay as run
+    from roadeval.jobs.options import ReplayOptions
+    from roadeval.jobs.replay import replay as run
+    from roadeval.results.folder import summary_text
 
     labels = settings.labels(road_label, ignore_label, road_color, ignore_color)
     chosen = ReplayOptions(

@@ -39,9 +39,9 @@ def report(
     Does the filter help, where are the errors, which stage broke it, and the frames to look at;
     from the recording alone, or from a results folder, then without pictures.
     """
-    from roadeval.opened import Opened
-    from roadeval.report.typeset import Paper
-    from roadeval.reporting import report as write
+    from roadeval.jobs.report import report as write
+    from roadeval.jobs.result import Opened
+    from roadeval.report.pdf.typeset import Paper
 
     opened = Opened(result)
     path = write(opened, output, paper=Paper(paper))

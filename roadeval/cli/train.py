@@ -44,8 +44,8 @@ def train(
     Replay never evaluates the training frames, on whatever drive it meets them.
     """
     from roadeval.cli import settings
-    from roadeval.replay import ReplayOptions
-    from roadeval.replay import train as run
+    from roadeval.jobs.options import ReplayOptions
+    from roadeval.jobs.train import train as run
 
     labels = settings.labels(road_label, ignore_label, road_color, ignore_color)
     chosen = ReplayOptions(

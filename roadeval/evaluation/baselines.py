@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import IGNORE, ROAD, Truth
-from roadeval.kernels.packing import Packed
+from roadeval.data.packed import Packed
 
 _NEAREST: Final = 0
 _LINEAR: Final = 1

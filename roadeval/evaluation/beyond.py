@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from roadeval.data import FrameResult, Role, TruthBits
-from roadeval.kernels.packing import Packed, ones
+from roadeval.data.packed import Packed, ones
 
 
 class Flicker:

@@ -9,8 +9,8 @@ from math import isqrt
 import numpy as np
 
 from roadeval.data import TruthBits
+from roadeval.data.arrays import Bits, Reach
 from roadeval.kernels import KERNELS
-from roadeval.kernels.arrays import Bits, Reach
 
 
 def grow(bits: Bits, reach: Reach, truth: TruthBits) -> Bits:

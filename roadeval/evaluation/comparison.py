@@ -12,13 +12,13 @@ from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.asked import TELLING
 from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import analysis
 from roadeval.evaluation.rates import RATES
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import mean_difference
+from roadeval.jobs.asked import TELLING
 
 if TYPE_CHECKING:
     import pandas as pd

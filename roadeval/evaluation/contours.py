@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 
 from roadeval.data import TruthBits
+from roadeval.data.arrays import Bits
+from roadeval.data.packed import ones
 from roadeval.evaluation.bits import disk, grow, square
-from roadeval.kernels.arrays import Bits
-from roadeval.kernels.packing import ones
 
 
 def boundary_f(masks: Mapping[str, Bits], truth: TruthBits, width: int) -> dict[str, float]:

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from roadeval.data import ERRORS, Layer, Mask, Truth, TruthBits
+from roadeval.data.arrays import Bits, Sums
+from roadeval.data.packed import everywhere
 from roadeval.evaluation.bits import flat
 from roadeval.kernels import KERNELS
-from roadeval.kernels.arrays import Bits, Sums
-from roadeval.kernels.packing import everywhere
 
 
 def count(masks: Bits, truth: TruthBits, regions: Sequence[Bits]) -> Sums:

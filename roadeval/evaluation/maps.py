@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Change, Layer, Step, TruthBits
+from roadeval.data.arrays import Bits
+from roadeval.data.packed import everywhere, ones
 from roadeval.evaluation.bits import flat
 from roadeval.kernels import KERNELS
-from roadeval.kernels.arrays import Bits
-from roadeval.kernels.packing import everywhere, ones
 
 Sums = npt.NDArray[np.int64]
 Name = tuple[str, str]

@@ -8,9 +8,9 @@ from functools import lru_cache
 import numpy as np
 
 from roadeval.data import Frame, TruthBits, VariantResult
+from roadeval.data.arrays import Bits
+from roadeval.data.packed import Packed, everywhere
 from roadeval.evaluation.bits import grow, square
-from roadeval.kernels.arrays import Bits
-from roadeval.kernels.packing import Packed, everywhere
 
 
 def of_frame(

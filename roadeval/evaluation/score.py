@@ -17,12 +17,13 @@ from roadeval.data import (
     TruthBits,
     VariantResult,
 )
-from roadeval.evaluation import contours, counts, health, maps, rates, regions, tables
+from roadeval.data.arrays import Bits, Sums
+from roadeval.data.packed import Packed, ones
+from roadeval.evaluation import contours, counts, health, maps, rates, regions
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.maps import Name
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.kernels.arrays import Bits, Sums
-from roadeval.kernels.packing import Packed, ones
+from roadeval.results import tables
 
 
 class CountsNotConservedError(RuntimeError):

@@ -22,7 +22,7 @@ from roadeval.data import (
     Role,
     VariantResult,
 )
-from roadeval.evaluation import tables, windows
+from roadeval.evaluation import windows
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.beyond import Beyond
 from roadeval.evaluation.history import History
@@ -32,6 +32,7 @@ from roadeval.evaluation.score import score_frame
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference, mean_difference
 from roadeval.evaluation.verdict import NO_PAIR, NOTHING_SCORED, verdict
+from roadeval.results import tables
 
 COMPARED: Final = ("ACC", "ERR", "FNR", "FPR")
 """The rates whose paired differences are given; TPR and TNR only mirror two of them."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from roadeval.kernels.arrays import Bits, Reach, Sums, Words
+from roadeval.data.arrays import Bits, Reach, Sums, Words
 from roadeval.kernels.words import ones
 
 _compiled = njit(cache=True, nogil=True)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from roadeval.kernels.arrays import (
+from roadeval.data.arrays import (
     FN,
     FP,
     IGNORED,

@@ -14,8 +14,8 @@ from types import ModuleType
 
 import numpy as np
 
-from roadeval import apart
 from roadeval.kernels import pick, plain
+from roadeval.runtime import processes as apart
 
 
 def prepare(on_compile: Callable[[], None]) -> None:

@@ -1,11 +1,11 @@
-"""Compiled loops of the machine on planes of features (`roadeval.pipeline.context`)."""
+"""Compiled loops of the machine on planes of features (`roadeval.pipeline.beyond.context`)."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from roadeval.kernels.arrays import Values
+from roadeval.data.arrays import Values
 
 _BLOCK = 512
 """Pixels at a time: with a dozen features each, they stay in the nearest cache."""

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.kernels.arrays import (
+from roadeval.data.arrays import (
     FN,
     FP,
     IGNORED,
@@ -23,7 +23,7 @@ from roadeval.kernels.arrays import (
     Values,
     Words,
 )
-from roadeval.kernels.packing import pack, unpack
+from roadeval.data.packed import pack, unpack
 
 # --- Colours --------------------------------------------------------------------------------------
 
@@ -262,7 +262,7 @@ def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
     Parameters
     ----------
     bits, width
-        The mask, see `roadeval.kernels.packing`.
+        The mask, see `roadeval.data.packed`.
     connectivity
         8, or 4 where pixels that touch by a corner are not connected.
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from roadeval.kernels.arrays import Bits, Columns, Labels, Parents, Places, Plane, Runs
+from roadeval.data.arrays import Bits, Columns, Labels, Parents, Places, Plane, Runs
 from roadeval.kernels.words import lowest
 
 _compiled = njit(cache=True, nogil=True)

@@ -11,17 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from roadeval.kernels.arrays import (
-    Bits,
-    Floats,
-    Image,
-    Labels,
-    Places,
-    Planes,
-    Runs,
-    Sums,
-    Table,
-)
+from roadeval.data.arrays import Bits, Floats, Image, Labels, Places, Planes, Runs, Sums, Table
 from roadeval.kernels.words import lowest
 
 _compiled = njit(cache=True, nogil=True)

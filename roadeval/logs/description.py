@@ -9,8 +9,8 @@ from typing import Any
 
 from roadeval.logs.errors import LogError
 from roadeval.logs.log import Log, open_log
-from roadeval.logs.selection import Selection
-from roadeval.logs.topics import TopicInfo
+from roadeval.logs.topics.description import TopicInfo
+from roadeval.logs.topics.selection import Selection
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,9 +6,9 @@ import re
 from pathlib import Path
 from typing import Final
 
-from roadeval.logs.damage import Damage
+from roadeval.logs.container.damage import Damage
+from roadeval.logs.container.records import MAGIC
 from roadeval.logs.errors import LogError
-from roadeval.logs.records import MAGIC
 
 _HEAD: Final = 64
 """Bytes that tell what a file is."""

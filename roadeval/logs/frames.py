@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from roadeval.logs.label_track import LabelTrack, read_or_error
 from roadeval.logs.logged import SHADOW, TRUTH, LoggedFrame
-from roadeval.logs.messages import Kind
-from roadeval.logs.pairing import UNREADABLE
-from roadeval.logs.selection import Clock, Selection
-from roadeval.logs.span import Span
-from roadeval.logs.track import Track
-from roadeval.logs.video import Pictures, Video
+from roadeval.logs.messages.pictures import Kind
+from roadeval.logs.messages.video import Pictures, Video
+from roadeval.logs.topics.label_track import LabelTrack, read_or_error
+from roadeval.logs.topics.pairing import UNREADABLE
+from roadeval.logs.topics.selection import Clock, Selection
+from roadeval.logs.topics.span import Span
+from roadeval.logs.topics.track import Track
 
 
 @dataclass(slots=True)

@@ -12,18 +12,18 @@ import numpy as np
 import numpy.typing as npt
 from mcap.records import Channel, Schema
 
-from roadeval.logs.container import Container
-from roadeval.logs.damage import Damage, damage_of
-from roadeval.logs.decoders import message_is_whole
+from roadeval.logs.container.damage import Damage, damage_of
+from roadeval.logs.container.file import Container
 from roadeval.logs.errors import BadRecord, LogError
 from roadeval.logs.files import files_of
 from roadeval.logs.frames import FrameStream
-from roadeval.logs.labels import LabelValues
-from roadeval.logs.messages import Kind, kind_of
-from roadeval.logs.selection import Asked, Selection, settle
-from roadeval.logs.span import NS, Span
-from roadeval.logs.topics import TopicInfo, describe_topic, sources_by_topic
-from roadeval.logs.track import Track
+from roadeval.logs.messages.decoders import message_is_whole
+from roadeval.logs.messages.pictures import Kind, kind_of
+from roadeval.logs.topics.description import TopicInfo, describe_topic, sources_by_topic
+from roadeval.logs.topics.labels import LabelValues
+from roadeval.logs.topics.selection import Asked, Selection, settle
+from roadeval.logs.topics.span import NS, Span
+from roadeval.logs.topics.track import Track
 
 
 def open_log(path: str | Path, *, keep_corrupt: bool = False) -> Log:

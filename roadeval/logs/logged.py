@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from roadeval.data import IGNORE, Frame, Mask, Rgb, Truth
 from roadeval.logs.errors import BadMessage, FrameError
-from roadeval.logs.labels import LabelMap
-from roadeval.logs.messages import CompressedPicture, Picture
-from roadeval.logs.pixels import media_type, to_rgb
+from roadeval.logs.messages.pictures import CompressedPicture, Picture
+from roadeval.logs.messages.pixels import media_type, to_rgb
+from roadeval.logs.topics.labels import LabelMap
 
 TRUTH: Final = "/truth"
 SHADOW: Final = "/shadow"

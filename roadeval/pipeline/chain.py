@@ -7,16 +7,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from roadeval.data import LayerSpec, Rgb, Truth
-from roadeval.kernels.packing import Packed
-from roadeval.pipeline import (
-    classify,
-    context,
-    exposure,
-    gated,
-    morphology,
-    shadow,
-    similarity,
-)
+from roadeval.data.packed import Packed
+from roadeval.pipeline.beyond import context, exposure, gated
+from roadeval.pipeline.paper import post as morphology
+from roadeval.pipeline.paper import shadow, similarity
+from roadeval.pipeline.paper import svm as classify
 from roadeval.pipeline.stage import Output, Stage, View, perfect_mask
 
 STAGES: Final[Mapping[str, Stage[Any, Any]]] = {

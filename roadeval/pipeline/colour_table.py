@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Mask
+from roadeval.data.arrays import Words
+from roadeval.data.packed import ones
 from roadeval.kernels import KERNELS
-from roadeval.kernels.arrays import Words
-from roadeval.kernels.packing import ones
-from roadeval.pipeline.colour import Planes
 from roadeval.pipeline.cube import Slabs
+from roadeval.pipeline.paper.hsi import Planes
 
 Colours = npt.NDArray[np.uint8]
 Decide = Callable[[Colours], npt.NDArray[np.bool_]]

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval import apart
-from roadeval.apart import Arrays
+from roadeval.runtime import processes as apart
+from roadeval.runtime.processes import Arrays
 
 Floats = npt.NDArray[np.float64]
 
@@ -25,7 +25,7 @@ def support_vectors(
     features, road
         ``(n, 3)`` float64 and ``(n,)`` bool.
     c, kernel, gamma
-        As in `roadeval.pipeline.classify.SvmSettings`.
+        As in `roadeval.pipeline.paper.svm.SvmSettings`.
 
     Returns
     -------

@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import ROAD, Layer, LayerSpec, Rgb, Truth
+from roadeval.data.packed import Packed
 from roadeval.errors import RoadevalError
-from roadeval.kernels.packing import Packed
-from roadeval.pipeline.colour import Planes, planes
+from roadeval.pipeline.paper.hsi import Planes, planes
 
 S = TypeVar("S")
 """Settings of a stage: a frozen, validated dataclass."""

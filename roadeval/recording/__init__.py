@@ -1,10 +1,10 @@
 """Rerun out and back in: nobody else knows Rerun."""
 
-from roadeval.recording.encoding import Encoded
-from roadeval.recording.keeping import Keeper, Rule, recorder_for
 from roadeval.recording.layout import RESERVED, Layout, RecordingError
-from roadeval.recording.reading import Recording
-from roadeval.recording.recorder import NullRecorder, Recorder
+from roadeval.recording.read.recording import Recording
+from roadeval.recording.write.encoding import Encoded
+from roadeval.recording.write.keeping import Keeper, Rule, recorder_for
+from roadeval.recording.write.recorder import NullRecorder, Recorder
 
 __all__ = [
     "RESERVED",

@@ -28,7 +28,7 @@ import numpy.typing as npt
 import rerun as rr
 
 from roadeval.data import LayerKind, LayerSpec
-from roadeval.kernels.packing import Packed
+from roadeval.data.packed import Packed
 from roadeval.recording import indexed_png
 
 Array = npt.NDArray[Any]

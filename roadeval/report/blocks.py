@@ -1,4 +1,4 @@
-"""What a document is made of: plain blocks, which `roadeval.report.typeset` sets on pages.
+"""What a document is made of: plain blocks, which `roadeval.report.pdf.typeset` sets on pages.
 
 Text is text, never markup: whatever a log, a topic or a path is called is printed as it is.
 """

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from roadeval.report import frames, front, origin, outcomes, plots, reasons
 from roadeval.report.blocks import Block, Document, Figure, Heading, Strip, Text
+from roadeval.report.figures import plots
 from roadeval.report.findings import Findings
+from roadeval.report.sections import frames, front, origin, outcomes, reasons
 
 
 def document(found: Findings) -> Document:

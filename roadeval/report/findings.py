@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.report.figures import Example
+from roadeval.report.figures.files import Example
 from roadeval.report.pictures import Shot
 
 if TYPE_CHECKING:

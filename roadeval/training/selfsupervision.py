@@ -6,9 +6,9 @@ import numpy as np
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Rgb, Truth
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.colour import planes
+from roadeval.pipeline.paper.hsi import planes
+from roadeval.pipeline.paper.similarity import limit, whitening
 from roadeval.pipeline.patch import patch_mask
-from roadeval.pipeline.similarity import limit, whitening
 from roadeval.training.settings import TrainingSettings
 
 

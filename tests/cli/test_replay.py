@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from roadeval import replay as job
 from roadeval.cli.app import main
 from roadeval.config import Config
-from roadeval.options import Outcome, Progress, ReplayOptions
+from roadeval.jobs import replay as job
+from roadeval.jobs.options import Outcome, Progress, ReplayOptions
 
 SUMMARY = {
     "verdict": "",
@@ -41,7 +41,7 @@ def asked(monkeypatch):
         on_progress(Progress(3, 3, "replaying"))
         return Outcome(None, None, SUMMARY, asked["warnings"], asked["losses"], ())
 
-    monkeypatch.setattr("roadeval.replay.replay", replay)
+    monkeypatch.setattr("roadeval.jobs.replay.replay", replay)
     return asked
 
 

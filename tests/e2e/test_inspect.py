@@ -6,11 +6,12 @@ from pathlib import Path
 import cv2
 import pytest
 
-from roadeval import Recording, inspecting
+from roadeval import Recording
 from roadeval.cli.app import main
 from roadeval.errors import RoadevalError
-from roadeval.opened import Opened
-from roadeval.recording import viewer
+from roadeval.jobs import inspect as inspecting
+from roadeval.jobs.result import Opened
+from roadeval.recording.screen import viewer
 from tests.e2e.commands import DEMO, replay, roadeval
 
 DRIVER = Path("/usr/share/vulkan/icd.d")
@@ -60,7 +61,7 @@ def test_the_viewer_is_drawn_without_a_screen_at_the_worst_frame(demo, tmp_path)
 def told(monkeypatch, tmp_path, capsys):
     """Ask for a picture by a viewer that draws nothing; returns what is said of it."""
     monkeypatch.setattr(
-        "roadeval.recording.viewer.screenshot", lambda recording, picture, frame: frame
+        "roadeval.recording.screen.viewer.screenshot", lambda recording, picture, frame: frame
     )
 
     def told(recording, *words):
@@ -101,7 +102,9 @@ def test_the_window_opens_at_the_first_evaluated_frame_that_has_pictures(
     rule, sparse, tmp_path, monkeypatch
 ):
     shown = []
-    monkeypatch.setattr("roadeval.recording.viewer.show", lambda path, frame: shown.append(frame))
+    monkeypatch.setattr(
+        "roadeval.recording.screen.viewer.show", lambda path, frame: shown.append(frame)
+    )
     if rule == "worst":
         sparse = replay(tmp_path, DEMO, "--max-frames", 24, "--record", "worst:3")
     assert main(["inspect", str(sparse.recording)]) == 0
@@ -139,7 +142,7 @@ def test_a_frame_without_pictures_is_drawn_with_a_warning(
     words, sparse, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.setattr(
-        "roadeval.recording.viewer.screenshot", lambda recording, picture, frame: frame
+        "roadeval.recording.screen.viewer.screenshot", lambda recording, picture, frame: frame
     )
     bad = worst(sparse)
     words = words if len(words) == 2 else (*words, str(bad))

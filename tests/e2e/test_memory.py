@@ -16,8 +16,8 @@ MEASURE = f"""
 {PEAK}
 import json, sys
 from roadeval import replay
-from roadeval.recording import recorder
-from roadeval.recording.tracks import Patience
+from roadeval.recording.write import recorder
+from roadeval.recording.write.tracks import Patience
 
 # Rows wait in memory for more frames the longer the recording, up to a limit at 1,024 frames and
 # more. Here that limit is reached before the first measurement.

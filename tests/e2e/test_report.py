@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from pypdf import PdfReader
 
+from roadeval.jobs.report import report as report_of
+from roadeval.jobs.result import Opened
 from roadeval.logs import LogWriter
-from roadeval.opened import Opened
 from roadeval.report.words import DASH
-from roadeval.reporting import report as report_of
 from tests.e2e.commands import DEMO, roadeval
 from tests.report.documents import text
 
@@ -251,7 +251,7 @@ def test_the_same_result_gives_the_same_file_and_nothing_is_left_beside_nor_fetc
 def test_the_command_that_makes_the_results_again_names_gap_and_variants():
     from types import SimpleNamespace
 
-    from roadeval.report.origin import _replay
+    from roadeval.report.sections.origin import _replay
 
     plain = {"training": {"gap": 3}}
     summary = {

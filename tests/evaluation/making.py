@@ -9,9 +9,9 @@ import numpy.typing as npt
 import pandas as pd
 
 from roadeval.data import Counts, Frame, Mask, StageResult, Tally, Truth, VariantResult
+from roadeval.data.arrays import Bits
+from roadeval.data.packed import Packed
 from roadeval.evaluation import rates
-from roadeval.kernels.arrays import Bits
-from roadeval.kernels.packing import Packed
 
 
 def pixels(*rows: str) -> npt.NDArray[np.uint8]:

@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 
 from roadeval.data import Role
-from roadeval.evaluation import analysis, tables
+from roadeval.evaluation import analysis
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
-
-from .making import a_frame, a_table, a_variant, pixels
+from roadeval.results import tables
+from tests.evaluation.making import a_frame, a_table, a_variant, pixels
 
 POST, SVM = ("filtered", "post"), ("filtered", "svm")
 CONTROL_POST, CONTROL_SVM = ("unfiltered", "post"), ("unfiltered", "svm")

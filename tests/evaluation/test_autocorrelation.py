@@ -6,8 +6,7 @@ from scipy import stats
 from statsmodels.tsa.stattools import acovf
 
 from roadeval.evaluation.autocorrelation import autocovariance, error_of_mean
-
-from .coverage import autoregression
+from tests.evaluation.coverage import autoregression
 
 RNG = np.random.default_rng(1)
 INDEPENDENT = RNG.standard_normal(400)

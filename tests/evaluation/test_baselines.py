@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from roadeval.evaluation.baselines import BlindPrior
-
-from .making import pixels
+from tests.evaluation.making import pixels
 
 
 def test_the_prior_is_the_mean_truth() -> None:

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from roadeval.data import IGNORE, FrameResult, Role, TruthBits
+from roadeval.data.packed import Packed
 from roadeval.evaluation.beyond import Beyond, Flicker
-from roadeval.kernels.packing import Packed
-
-from .making import a_frame, a_variant, pixels
+from tests.evaluation.making import a_frame, a_variant, pixels
 
 TRUTH = pixels("##..", "##.?")
 

@@ -4,16 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.evaluation.comparison import (
-    ComparisonError,
-    Side,
-    compare,
-    variants_as_sides,
-)
+from roadeval.evaluation.comparison import ComparisonError, Side, compare, variants_as_sides
 from roadeval.evaluation.conditions import Condition, ConditionError, judge
 from roadeval.evaluation.settings import EvaluationSettings
-
-from .making import a_table
+from tests.evaluation.making import a_table
 
 SETTINGS = EvaluationSettings(resamples=200)
 POST = ("filtered", "post")

@@ -7,11 +7,10 @@ import pytest
 from scipy.ndimage import distance_transform_edt
 
 from roadeval.data import IGNORE, TruthBits
+from roadeval.data.packed import pack
 from roadeval.evaluation import contours
 from roadeval.evaluation.bits import disk
-from roadeval.kernels.packing import pack
-
-from .making import pixels, unpacked
+from tests.evaluation.making import pixels, unpacked
 
 
 def one(mask, truth, width=1):

@@ -8,11 +8,10 @@ from hypothesis.extra.numpy import arrays
 from sklearn.metrics import confusion_matrix
 
 from roadeval.data import Counts, TruthBits
+from roadeval.data.packed import Packed
 from roadeval.evaluation import counts
 from roadeval.evaluation.counts import error_map
-from roadeval.kernels.packing import Packed
-
-from .making import pixels
+from tests.evaluation.making import pixels
 
 TRUTH = pixels("##..", "##.?")
 

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 from roadeval.data import IGNORE, Change, TruthBits
+from roadeval.data.packed import Packed
 from roadeval.evaluation import maps
 from roadeval.evaluation.counts import error_map
 from roadeval.evaluation.maps import HeatMap, Maps
-from roadeval.kernels.packing import Packed
-
-from .making import pixels
+from tests.evaluation.making import pixels
 
 TRUTH = pixels("##..", "##.?")
 

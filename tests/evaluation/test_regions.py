@@ -4,8 +4,7 @@ import numpy as np
 
 from roadeval.data import TruthBits
 from roadeval.evaluation import regions
-
-from .making import a_frame, a_variant, pixels, unpacked
+from tests.evaluation.making import a_frame, a_variant, pixels, unpacked
 
 
 def boundary(truth, width):

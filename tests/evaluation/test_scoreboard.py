@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from roadeval.data import Counts, Health, Role
+from roadeval.data.packed import Packed
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.score import CountsNotConservedError, prove
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.kernels.packing import Packed
-
-from .making import a_frame, a_variant, pixels
+from tests.evaluation.making import a_frame, a_variant, pixels
 
 TRUTH = pixels("##..", "##.?")
 FILTERED = a_variant(

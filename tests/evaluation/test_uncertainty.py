@@ -8,8 +8,7 @@ from scipy import stats
 
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import bootstrap_means, mean_difference
-
-from .coverage import autoregression, simulate
+from tests.evaluation.coverage import autoregression, simulate
 
 SETTINGS = EvaluationSettings(resamples=400)
 QUICK = EvaluationSettings(resamples=200)

@@ -9,8 +9,7 @@ import pytest
 from roadeval.data import Counts
 from roadeval.evaluation import rates, windows
 from roadeval.evaluation.history import History
-
-from .making import a_tally
+from tests.evaluation.making import a_tally
 
 
 def history_of(*counts: tuple[int, int, int, int]) -> History:

@@ -9,11 +9,12 @@ from subprocess import Popen
 import pytest
 
 import roadeval
-from roadeval import ReplayOptions, apart
+from roadeval import ReplayOptions
 from roadeval.kernels import compiled, first_time, pick, plain
 from roadeval.kernels.first_time import call_all, prepare
+from roadeval.runtime import processes as apart
 from tests.e2e.commands import DEMO
-from tests.test_replay import write_log
+from tests.jobs.test_replay import write_log
 
 
 class Calls(Counter):
@@ -47,11 +48,11 @@ import sys
 import tempfile
 
 import arch.bootstrap, sklearn.svm
-import roadeval.replay
+import roadeval, roadeval.jobs.replay
 from roadeval.config import PRESETS, preset
 from roadeval.kernels import compiled, first_time
 
-sys.modules["roadeval.replay"].write_figures = lambda *given: []
+sys.modules["roadeval.jobs.replay"].write_figures = lambda *given: []
 
 
 def kinds():

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roadeval import kernels
+from roadeval.data.packed import Packed, pack, unpack
 from roadeval.kernels import compiled as fast
 from roadeval.kernels import plain, shades
-from roadeval.kernels.packing import Packed, pack, unpack
-from roadeval.pipeline import shadow, similarity
+from roadeval.pipeline.paper import shadow, similarity
 from tests.pipeline.images import IMAGES, images, noise
 
 RNG = np.random.default_rng(0)
@@ -310,7 +310,7 @@ def test_whoever_only_reads_results_waits_for_no_compiler():
     import subprocess
     import sys
 
-    code = "import sys, roadeval.comparing, roadeval.reporting; print('numba' in sys.modules)"
+    code = "import sys, roadeval.jobs.compare, roadeval.jobs.report; print('numba' in sys.modules)"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "False"
 

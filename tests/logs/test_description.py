@@ -4,8 +4,7 @@ import json
 from pathlib import Path
 
 from roadeval.logs import describe
-
-from .making import SECOND, drive
+from tests.logs.making import SECOND, drive
 
 START = 1_700_000_000 * SECOND
 

@@ -6,20 +6,11 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType
 
-from roadeval.logs import (
-    FrameError,
-    Instant,
-    LabelValues,
-    LogError,
-    Span,
-    chunks,
-    open_log,
-    parse_time,
-)
-from roadeval.logs.pairing import UNREADABLE
-from roadeval.logs.records import Message
-
-from .making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
+from roadeval.logs import FrameError, Instant, LabelValues, LogError, Span, open_log, parse_time
+from roadeval.logs.container import chunks
+from roadeval.logs.container.records import Message
+from roadeval.logs.topics.pairing import UNREADABLE
+from tests.logs.making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
 
 START = 1_700_000_000_123_456_789
 STAMPS = [START + i * SECOND // 10 for i in range(10)]

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from roadeval.logs import FrameError, LogError, open_log
-from roadeval.logs.container import OUTSIDE, Container
-
-from .making import CAMERA, CONTAINERS, small_log
+from roadeval.logs.container.file import OUTSIDE, Container
+from tests.logs.making import CAMERA, CONTAINERS, small_log
 
 CASES = 500
 """Random cases for each container of a finished log, and half as many for an unfinished one."""

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from roadeval.kernels.packing import Packed
-from roadeval.pipeline import shadow
+from roadeval.data.packed import Packed
 from roadeval.pipeline.chain import STAGES, Chain
+from roadeval.pipeline.paper import shadow
 from roadeval.pipeline.stage import View
 from tests.pipeline.images import noise
 from tests.pipeline.test_chain import NAMES, SETTINGS, fitted

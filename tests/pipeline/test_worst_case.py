@@ -5,10 +5,10 @@ from time import thread_time
 import numpy as np
 import pytest
 
-from roadeval.flow import one_thread_each
-from roadeval.pipeline import morphology
 from roadeval.pipeline.chain import Chain
+from roadeval.pipeline.paper import post as morphology
 from roadeval.pipeline.stage import View
+from roadeval.runtime.threads import one_thread_each
 from tests.pipeline.test_chain import SETTINGS
 
 SMALL, LARGE = (180, 320), (1440, 2560)

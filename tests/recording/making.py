@@ -21,7 +21,7 @@ from roadeval.data import (
     VariantResult,
     mask_spec,
 )
-from roadeval.kernels.packing import Packed
+from roadeval.data.packed import Packed
 from roadeval.recording import Layout
 
 HEIGHT, WIDTH = 6, 8

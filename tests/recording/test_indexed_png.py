@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from roadeval.kernels.packing import Packed
+from roadeval.data.packed import Packed
 from roadeval.recording import indexed_png
 
 ROAD = [(0, 0, 0, 0), (0, 158, 115, 160)]

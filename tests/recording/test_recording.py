@@ -21,9 +21,9 @@ from roadeval.data import ERRORS, TRUTH, Health, Pictures, Role
 from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError
 from roadeval.recording.codecs import LabelCodec, codec
 from roadeval.recording.layout import SHADOW_TRUTH
-from roadeval.recording.reading import _around
-from roadeval.recording.recorder import LEAST_FREE, UNWRITTEN
-from roadeval.recording.tracks import CHUNK_BYTES, Track
+from roadeval.recording.read.recording import _around
+from roadeval.recording.write.recorder import LEAST_FREE, UNWRITTEN
+from roadeval.recording.write.tracks import CHUNK_BYTES, Track
 from tests.recording.making import HEIGHT, WIDTH, frame, layout, result, rows_of, unscored
 
 SUMMARY = {"verdict": "It helps.", "totals": {}, "seconds": {"filtered": {"post": 0.5}}}
@@ -131,7 +131,7 @@ def test_frames_without_pictures_end_what_is_shown_and_are_not_among_those_that_
 
 @pytest.mark.parametrize("read_ahead", [8 << 20, 0])
 def test_every_frame_comes_back_in_any_order(drive, recording, read_ahead, monkeypatch):
-    monkeypatch.setattr("roadeval.recording.reading.READ_AHEAD", read_ahead)
+    monkeypatch.setattr("roadeval.recording.read.recording.READ_AHEAD", read_ahead)
     again = Recording(recording.path)
     for each in (*drive[9:], *reversed(drive)):
         np.testing.assert_array_equal(again.truth(each.frame.number), each.frame.truth)
@@ -166,7 +166,7 @@ def pages_of(sizes):
 
 
 def test_no_more_of_an_entity_is_held_than_is_read_ahead(monkeypatch):
-    monkeypatch.setattr("roadeval.recording.reading.READ_AHEAD", 500)
+    monkeypatch.setattr("roadeval.recording.read.recording.READ_AHEAD", 500)
     pages, most = pages_of([100] * 60)
     there, payloads = _around(30, pages)
     assert len(there) == 60
@@ -189,7 +189,7 @@ def test_the_frames_after_one_are_kept_first_then_the_nearest_before(
     frame, sizes, kept, monkeypatch
 ):
     one = pa.array([[0] * 10], pa.list_(pa.uint8())).nbytes
-    monkeypatch.setattr("roadeval.recording.reading.READ_AHEAD", 4 * one)
+    monkeypatch.setattr("roadeval.recording.read.recording.READ_AHEAD", 4 * one)
     assert list(_around(frame, pages_of(sizes)[0])[1]) == kept
 
 
@@ -534,7 +534,7 @@ def test_truths_and_errors_of_the_second_version_were_labels(drive, tmp_path, mo
 
     with monkeypatch.context() as patched:
         patched.setattr("roadeval.recording.layout.FORMAT", 2)
-        patched.setattr("roadeval.recording.encoding.codec", codec_then)
+        patched.setattr("roadeval.recording.write.encoding.codec", codec_then)
         shadow = drive[3].frame.truth
         shown = replace(drive[3], frame=replace(drive[3].frame, shadow_truth=shadow))
         record(tmp_path / "out.rrd", [*drive[:3], shown], layout(has_shadow_truth=True))

@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from roadeval.synth.light import (
-    CASTING_BEAM,
-    SHADOW_VISIBILITY,
-    Sun,
-    daylight,
-    is_shadow,
-)
+from roadeval.synth.light import CASTING_BEAM, SHADOW_VISIBILITY, Sun, daylight, is_shadow
 
 SUN = Sun(elevation=np.radians(40), azimuth=np.radians(90))
 

@@ -12,7 +12,7 @@ import pytest
 from roadeval.cli.app import main
 from roadeval.config import preset, variants_of
 from roadeval.errors import RoadevalError
-from roadeval.learning import from_file, plans_of
+from roadeval.jobs.learning import from_file, plans_of
 from roadeval.training import TrainingSettings, fit, save_model
 from tests.e2e.commands import DEMO
 from tests.training.making import frame

@@ -10,7 +10,7 @@ import pytest
 
 from roadeval.config import Config, preset
 from roadeval.errors import RoadevalError
-from roadeval.pipeline.context import ContextSettings
+from roadeval.pipeline.beyond.context import ContextSettings
 from roadeval.training import Model, TrainingSettings, fit, load_model, save_model
 from tests.training.making import frame, plans
 

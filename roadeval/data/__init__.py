@@ -1,0 +1,73 @@
+"""The facts that travel between the rooms: frozen, typed, and free of any library but NumPy.
+
+Images are ``(H, W, 3)`` uint8 RGB, masks ``(H, W)`` uint8 with 1 for road (or shadow) and 0
+otherwise, or `Packed`. Times are integer nanoseconds since the Unix epoch, or whatever epoch the
+log uses.
+"""
+
+from roadeval.data.counts import Change, Counts, Step, Tally
+from roadeval.data.frame import IGNORE, NON_ROAD, ROAD, Frame, Mask, Rgb, Role, Truth
+from roadeval.data.layer import (
+    ERRORS,
+    ROAD_CLASSES,
+    TRANSPARENT,
+    TRUTH,
+    LabelClass,
+    Layer,
+    LayerKind,
+    LayerSpec,
+    mask_spec,
+)
+from roadeval.data.names import BASELINE, CAMERA, FILTERED, FINAL_STAGE, NAMES, RESERVED, UNFILTERED
+from roadeval.data.packed import Packed, TruthBits, everywhere, ones, pack, unpack
+from roadeval.data.result import (
+    FrameResult,
+    Health,
+    Pictures,
+    StageResult,
+    VariantLayout,
+    VariantResult,
+)
+
+__all__ = [
+    "BASELINE",
+    "CAMERA",
+    "ERRORS",
+    "FILTERED",
+    "FINAL_STAGE",
+    "IGNORE",
+    "NAMES",
+    "NON_ROAD",
+    "RESERVED",
+    "ROAD",
+    "ROAD_CLASSES",
+    "TRANSPARENT",
+    "TRUTH",
+    "UNFILTERED",
+    "Change",
+    "Counts",
+    "Frame",
+    "FrameResult",
+    "Health",
+    "LabelClass",
+    "Layer",
+    "LayerKind",
+    "LayerSpec",
+    "Mask",
+    "Packed",
+    "Pictures",
+    "Rgb",
+    "Role",
+    "StageResult",
+    "Step",
+    "Tally",
+    "Truth",
+    "TruthBits",
+    "VariantLayout",
+    "VariantResult",
+    "everywhere",
+    "mask_spec",
+    "ones",
+    "pack",
+    "unpack",
+]

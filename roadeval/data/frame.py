@@ -1,0 +1,71 @@
+"""A camera frame as it travels: image, times, truth, and what it is used for."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+Rgb = npt.NDArray[np.uint8]
+"""``(H, W, 3)`` uint8, channels red, green, blue."""
+Mask = npt.NDArray[np.uint8]
+"""``(H, W)`` uint8: 1 inside, 0 outside."""
+Truth = npt.NDArray[np.uint8]
+"""``(H, W)`` uint8: 0 non-road, 1 road, 255 ignore."""
+
+NON_ROAD: Final = 0
+ROAD: Final = 1
+IGNORE: Final = 255
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One camera image with its times and, if the log has one, its truth.
+
+    Parameters
+    ----------
+    number
+        Position in the image topic by log time, from 0, before any range or stride.
+    stamp_ns, log_time_ns
+        Header stamp and log time.
+    image
+        ``(H, W, 3)`` uint8 RGB.
+    payload
+        The image as the log holds it (for a compressed image the JPEG or PNG file itself).
+    media_type
+        ``image/jpeg`` or ``image/png`` if ``payload`` is such a file, else None.
+    truth
+        ``(H, W)`` uint8 road truth (0, 1, 255), or None for an unlabelled frame.
+    shadow_truth
+        ``(H, W)`` uint8 (0, 1, 255) mask of truly shadowed pixels, or None.
+    external
+        Masks that the log itself carries (another system's output), by variant name.
+    """
+
+    number: int
+    stamp_ns: int
+    log_time_ns: int
+    image: Rgb
+    payload: bytes | memoryview
+    media_type: str | None = None
+    truth: Truth | None = None
+    shadow_truth: Truth | None = None
+    external: Mapping[str, Mask] = field(default_factory=dict)
+
+    def digest(self) -> str:
+        """Hash of the image as logged: equal for equal images, whatever log they lie in."""
+        return hashlib.blake2b(self.payload, digest_size=16).hexdigest()
+
+
+class Role(StrEnum):
+    """What a frame is used for. Only `EVALUATED` frames are ever counted."""
+
+    EVALUATED = "evaluated"
+    TRAINING = "training"
+    GAP = "gap"
+    UNLABELLED = "unlabelled"

@@ -1,0 +1,113 @@
+"""Layers: the named arrays that stages hand out, and how each is to be read and coloured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data.arrays import FN, FP, IGNORED, TN, TP
+from roadeval.data.frame import IGNORE
+from roadeval.data.packed import Packed
+
+
+class LayerKind(StrEnum):
+    """How a layer's array is to be read.
+
+    `MASK`: one class or a few, told apart by their colours alone. `LABELS`: classes whose names a
+    viewer is to show. `SCALAR`: a map of numbers. `RGB`: a colour image.
+    """
+
+    RGB = "rgb"
+    MASK = "mask"
+    LABELS = "labels"
+    SCALAR = "scalar"
+
+
+@dataclass(frozen=True, slots=True)
+class LabelClass:
+    """One value of a label image: its name and its sRGB colour with opacity (0..255 each)."""
+
+    value: int
+    name: str
+    rgba: tuple[int, int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class LayerSpec:
+    """What a layer is, known before the first frame.
+
+    Parameters
+    ----------
+    name
+        Last part of the entity path, as ``ndi`` in ``/filtered/ndi``.
+    kind
+        How the array is to be read.
+    title
+        A few words for a person, as ``NDI (Eq. 6)``.
+    classes
+        For `LABELS` and `MASK`: the values that occur.
+    value_range
+        For `SCALAR`: the closed range of meaning; values outside are clipped for display.
+    exact
+        Whether the recording must give back the same array (masks, labels), or, for a scalar
+        map, the nearest of 255 levels over ``value_range``. A layer that is not exact may be
+        recorded lossily and at half resolution.
+    """
+
+    name: str
+    kind: LayerKind
+    title: str
+    classes: tuple[LabelClass, ...] = ()
+    value_range: tuple[float, float] = (0.0, 1.0)
+    exact: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layer:
+    """A named array that a stage hands out; a mask of two classes may stay packed."""
+
+    spec: LayerSpec
+    content: npt.NDArray[np.uint8] | npt.NDArray[np.float32] | Packed
+
+    @property
+    def array(self) -> npt.NDArray[np.uint8] | npt.NDArray[np.float32]:
+        """The array itself.
+
+        ``(H, W, 3)`` uint8 for `RGB`, ``(H, W)`` uint8 for `MASK` and `LABELS`, and ``(H, W)``
+        float32, or uint8 codes 0..255 that span ``spec.value_range``, for `SCALAR`.
+        """
+        return self.content.pixels() if isinstance(self.content, Packed) else self.content
+
+
+TRANSPARENT: Final = (0, 0, 0, 0)
+ROAD_CLASSES: Final = (
+    LabelClass(0, "non-road", TRANSPARENT),
+    LabelClass(1, "road", (0, 158, 115, 160)),
+)
+TRUTH: Final = LayerSpec(
+    "truth",
+    LayerKind.MASK,
+    "Ground truth",
+    (*ROAD_CLASSES, LabelClass(IGNORE, "ignored", (128, 128, 128, 160))),
+)
+ERRORS: Final = LayerSpec(
+    "errors",
+    LayerKind.MASK,
+    "Errors of the final mask",
+    (
+        LabelClass(TN, "TN", TRANSPARENT),
+        LabelClass(TP, "TP", (0, 158, 115, 160)),
+        LabelClass(FP, "FP", (213, 94, 0, 220)),
+        LabelClass(FN, "FN", (204, 121, 167, 220)),
+        LabelClass(IGNORED, "ignored", (128, 128, 128, 160)),
+    ),
+)
+
+
+def mask_spec(name: str, title: str) -> LayerSpec:
+    """Describe a road mask (0 non-road, 1 road) named ``name``."""
+    return LayerSpec(name, LayerKind.MASK, title, ROAD_CLASSES)

@@ -1,0 +1,28 @@
+"""Names that variants, stages and table columns bear, and those that are taken."""
+
+from __future__ import annotations
+
+from typing import Final
+
+CAMERA: Final = "camera"
+FILTERED: Final = "filtered"
+UNFILTERED: Final = "unfiltered"
+"""The names of the two variants that come by default: with the chain's filters, and without."""
+BASELINE: Final = "blind"
+"""The variant name of the baseline that never looks at the image."""
+FINAL_STAGE: Final = "post"
+"""The stage whose mask is the pipeline's answer, and under which the baseline is filed."""
+
+RESERVED: Final = frozenset(
+    {
+        *("blind", "camera", "counts", "facts", "frame", "metrics", "notes", "results"),
+        *("roadeval", "state", "timing", "true_shadow", "truth"),
+    }
+)
+"""Names that no variant may bear: the tables or the recording use them for something else."""
+
+NAMES: Final = (
+    *("variant", "stage", "region", "oracle"),
+    *("from_variant", "from_stage", "to_variant", "to_stage"),
+)
+"""Columns of the tables that hold names, which are text even where a variant is called ``007``."""

@@ -1,0 +1,183 @@
+"""Results side by side: from recordings or results folders to a comparison and its files."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from roadeval.data import BASELINE
+from roadeval.errors import RoadevalError
+from roadeval.evaluation import analysis, comparison
+from roadeval.evaluation.comparison import Side
+from roadeval.evaluation.conditions import Condition, judge
+from roadeval.jobs.result import Opened
+from roadeval.report.pdf.typeset import Paper, pdf, put
+from roadeval.report.sections.comparison import document, markdown
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+ROWS: Final = 60
+"""Points of the figure over the drive, at most."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Compared:
+    """What came of a comparison.
+
+    Parameters
+    ----------
+    content
+        See `roadeval.evaluation.comparison.compare`; and ``conditions``, as
+        `roadeval.evaluation.conditions.judge` gives them.
+    windows
+        ERR and the rest over the drive, with each result as a variant; empty for different
+        drives.
+    """
+
+    content: Mapping[str, Any]
+    windows: pd.DataFrame
+
+    @property
+    def held(self) -> list[str]:
+        """The sentences of the conditions that hold."""
+        return [row["sentence"] for row in self.content["conditions"] if row["holds"]]
+
+
+def compare(
+    results: Sequence[str | Path],
+    *,
+    variants: Sequence[str] | None = None,
+    fail_if: Sequence[str] = (),
+) -> Compared:
+    """Compare results with the first of them, or the variants of one result with each other.
+
+    Parameters
+    ----------
+    results
+        Recordings or results folders. Of a single one the variants are compared.
+    variants
+        Of several results: only these. Of a single one: these, the first being the base;
+        by default all, ``unfiltered`` first.
+    fail_if
+        Conditions, see `roadeval.evaluation.conditions`.
+
+    Raises
+    ------
+    RoadevalError
+        If a result cannot be read, or there is nothing to compare, or a condition not to be
+        judged.
+    """
+    conditions = [Condition.parse(text) for text in fail_if]
+    opened = [Opened(path) for path in results]
+    across = len(opened) == 1
+    if across:
+        (only,) = opened
+        sides = comparison.variants_as_sides(only.frames, only.name, _digest(only), variants)
+    else:
+        names = _labels([each.path for each in opened])
+        sides = [
+            Side(
+                name,
+                each.name,
+                _digest(each),
+                _chosen(each, variants),
+                each.summary.get("selection") or {},
+            )
+            for name, each in zip(names, opened, strict=True)
+        ]
+    settings = analysis.settings_of(opened[0].summary)
+    content = comparison.compare(sides, settings, across_variants=across)
+    content["conditions"] = judge(content, conditions, settings)
+    windows = _windows(sides, settings.window) if content["same_drive"] else sides[0].frames[:0]
+    return Compared(content, windows)
+
+
+def write(compared: Compared, path: Path, *, paper: Paper = Paper.A4) -> Path:
+    """Write a comparison as PDF, Markdown or JSON, by the file's ending.
+
+    Raises
+    ------
+    RoadevalError
+        If the ending is another, or the file cannot be written.
+    """
+    return put(path, writer(path)(compared, paper))
+
+
+def writer(path: Path) -> Callable[[Compared, Paper], bytes]:
+    """Choose what writes a file by its ending.
+
+    Raises
+    ------
+    RoadevalError
+        If nothing does.
+    """
+    known: dict[str, Callable[[Compared, Paper], bytes]] = {
+        ".pdf": lambda compared, paper: pdf(document(compared.content, compared.windows), paper),
+        ".md": lambda compared, _: markdown(compared.content).encode(),
+        ".json": lambda compared, _: as_json(compared).encode(),
+    }
+    if path.suffix.lower() not in known:
+        raise RoadevalError(f"{path}: a comparison is written as {', '.join(known)}")
+    return known[path.suffix.lower()]
+
+
+def as_json(compared: Compared) -> str:
+    """Write a comparison as JSON; undefined numbers become null."""
+    return json.dumps(_plain(compared.content), indent=2, ensure_ascii=False) + "\n"
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and value != value else value  # noqa: PLR0124
+
+
+def _digest(opened: Opened) -> str | None:
+    digest = opened.summary.get("log", {}).get("sha256")
+    return str(digest) if digest else None
+
+
+def _chosen(opened: Opened, variants: Sequence[str] | None) -> pd.DataFrame:
+    frames = opened.frames
+    if not variants:
+        return frames
+    chosen = frames[frames["variant"].isin(variants)]
+    if not len(chosen):
+        there = ", ".join(frames["variant"].unique())
+        raise RoadevalError(f"{opened.path}: no variant {', '.join(variants)}; there are {there}")
+    return chosen
+
+
+def _labels(paths: Sequence[Path]) -> list[str]:
+    """Call each result by its file's name, or where that is not its own by its whole path."""
+    stems = [path.stem or str(path) for path in paths]
+    counted = Counter(stems)
+    labels: list[str] = []
+    for stem, path in zip(stems, paths, strict=True):
+        label = stem if counted[stem] == 1 else str(path)
+        labels.append(f"{label} ({labels.count(label) + 1})" if label in labels else label)
+    return labels
+
+
+def _windows(sides: Sequence[Side], size: int) -> pd.DataFrame:
+    """Cut each result's first variant, and the base's baseline, into rows of common frames."""
+    import pandas as pd
+
+    tables = []
+    for side in sides:
+        variant = side.frames["variant"].iloc[0]
+        own = side.frames[side.frames["variant"] == variant]
+        tables.append(own.assign(variant=side.label))
+    blind = sides[0].frames[sides[0].frames["variant"] == BASELINE]
+    common = set.intersection(*(set(table["frame"]) for table in tables))
+    frames = pd.concat([*tables, blind])
+    frames = frames[frames["frame"].isin(common)]
+    size *= max(-(-len(common) // (size * ROWS)), 1)
+    return analysis.rows(frames, size)

@@ -1,0 +1,111 @@
+"""Running chains on frames, stage by stage, with a clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from time import perf_counter
+from typing import Any, Final
+
+from roadeval.config import Config, Variant
+from roadeval.data import (
+    FILTERED,
+    FINAL_STAGE,
+    UNFILTERED,
+    Layer,
+    Mask,
+    Rgb,
+    StageResult,
+    Truth,
+    VariantLayout,
+    VariantResult,
+    mask_spec,
+)
+from roadeval.data.packed import Packed
+from roadeval.pipeline.chain import Chain
+from roadeval.pipeline.stage import View
+from roadeval.training import Model
+
+EXTERNAL: Final = mask_spec(FINAL_STAGE, "Road mask in the log")
+
+
+def run_variant(
+    name: str,
+    chain: Chain,
+    view: View,
+    *,
+    truth: Truth | None = None,
+    shadow_truth: Truth | None = None,
+    known: dict[Any, dict[str, Packed]] | None = None,
+) -> VariantResult:
+    """Run a chain on a frame and time each of its stages.
+
+    To take the image's channels apart is counted to the stage that first asks for them, of all
+    variants that share the view.
+
+    Given the truth, run it also with each stage that has an oracle replaced by that, untimed;
+    ``known`` is what the frame's variants share of it, see `Chain.oracles`.
+    """
+    results, outputs = [], []
+    start = perf_counter()
+    for stage, output in chain.run(view):
+        seconds = perf_counter() - start
+        results.append(
+            StageResult(stage, output.layers, output.mask, output.regions, output.facts, seconds)
+        )
+        outputs.append(output)
+        start = perf_counter()
+    oracles = {}
+    if truth is not None:
+        shared = {} if known is None else known
+        oracles = dict(chain.oracles(view, outputs, truth, shadow_truth, shared))
+    return VariantResult(name, tuple(results), oracles)
+
+
+def external_layout(name: str, topic: str) -> VariantLayout:
+    """Describe a variant whose masks the log carries, under ``topic``."""
+    return VariantLayout(name, f"mask in {topic}", (FINAL_STAGE,), (EXTERNAL,))
+
+
+def external_variant(name: str, mask: Mask) -> VariantResult:
+    """Present a mask that the log carries as a variant with the final stage alone."""
+    road = Packed.of(mask)
+    stage = StageResult(FINAL_STAGE, (Layer(EXTERNAL, road),), road, {}, {}, 0.0)
+    return VariantResult(name, (stage,))
+
+
+def bind(variants: tuple[Variant, ...], model: Model) -> Mapping[str, Chain]:
+    """Make the variants' chains ready to run with what the model learnt for each."""
+    return {v.name: v.config.bind(model.parameters[v.name]) for v in variants}
+
+
+def run_frame(
+    image: Rgb, model: Model, config: Config | None = None, *, variant: str = FILTERED
+) -> VariantResult:
+    """Run one variant on one image, with all layers: the notebook's way in.
+
+    Parameters
+    ----------
+    image
+        ``(H, W, 3)`` uint8 RGB.
+    model
+        What `roadeval.train` or `roadeval.load_model` gave.
+    config
+        The configuration that the model was trained with; the preset ``paper`` by default.
+        ``unfiltered`` runs it without its filters.
+    variant
+        Whose parameters to use.
+
+    Returns
+    -------
+    VariantResult
+        The stages' layers, masks, facts and seconds.
+
+    Examples
+    --------
+    >>> result = roadeval.run_frame(image, roadeval.load_model("city.model"))  # doctest: +SKIP
+    >>> {layer.spec.name: layer.array.shape for layer in result.layers()}  # doctest: +SKIP
+    """
+    config = config or Config()
+    if variant == UNFILTERED:
+        config = config.without_filter()
+    return run_variant(variant, config.bind(model.parameters[variant]), View.of(image))

@@ -1,0 +1,43 @@
+"""A report of one drive from its recording or results folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from roadeval.jobs.finding import find
+from roadeval.jobs.result import Opened
+from roadeval.report.document import document
+from roadeval.report.pdf.typeset import Paper, pdf, put
+
+__all__ = ["find", "report"]
+
+
+def report(
+    result: str | Path | Opened, output: str | Path | None = None, *, paper: Paper = Paper.A4
+) -> Path:
+    """Write the report of one drive as a PDF.
+
+    Parameters
+    ----------
+    result
+        A recording, whole or partial, or a results folder, or either opened already. Without a
+        recording there are no pictures.
+    output
+        By default ``report.pdf`` in the results folder, or ``reports/<recording>.pdf``.
+    paper
+        A4 or Letter.
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    RoadevalError
+        If there is nothing to read there, or the file cannot be written.
+    """
+    opened = result if isinstance(result, Opened) else Opened(result)
+    beside = opened.path / "report.pdf"
+    usual = beside if opened.recording is None else Path("reports", f"{opened.path.stem}.pdf")
+    return put(Path(output or usual), pdf(document(find(opened)), paper))

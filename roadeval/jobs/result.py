@@ -1,0 +1,155 @@
+"""A result, whichever way it comes: a recording, whole or partial, or a folder of results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
+from roadeval.evaluation import analysis
+from roadeval.evaluation.scoreboard import COMPARED
+from roadeval.evaluation.verdict import NO_PAIR, NOTHING_SCORED, verdict
+from roadeval.recording import Recording, RecordingError
+from roadeval.results.folder import Results
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    import pandas as pd
+
+
+class Opened:
+    """What ``roadeval replay`` left, from an ``.rrd`` or a results folder.
+
+    Parameters
+    ----------
+    path
+        Either.
+
+    Raises
+    ------
+    RoadevalError
+        If it is neither, or by another program or format.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self.recording = None if self.path.is_dir() else Recording(self.path)
+        self._tables: Results | Recording = self.recording or Results(self.path)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run reached its end."""
+        return self.recording is None or self.recording.complete
+
+    @property
+    def name(self) -> str:
+        """The drive's name."""
+        return self.recording.layout.drive if self.recording else self.summary["drive"]["name"]
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """As ``summary.json``; of an incomplete run, what its tables give."""
+        if self.complete:
+            return self._tables.summary
+        return self._summary_of_part()
+
+    @cached_property
+    def frames(self) -> pd.DataFrame:
+        """The rows of ``frames.csv``."""
+        return self._whole(self._tables.frames)
+
+    @cached_property
+    def regions(self) -> pd.DataFrame:
+        """The rows of ``regions.csv``."""
+        return self._whole(self._tables.regions)
+
+    @cached_property
+    def pictured(self) -> tuple[int, ...]:
+        """The frames whose pictures are there; none of a folder.
+
+        A run may have kept few, and a killed one may have written some layers of its last frames
+        and not others: those are left out.
+        """
+        if self.recording is None:
+            return ()
+        recording, unsure = self.recording, set(self.recording.unsure)
+        scored = set(self.frames["frame"]) if len(self.frames) else set()
+        return tuple(
+            number
+            for number in recording.frame_numbers
+            if number not in unsure or recording.is_whole(number, scored=number in scored)
+        )
+
+    def layer(self, variant: str, name: str, frame: int) -> npt.NDArray[Any] | None:
+        """Give a layer of a variant; None where the run did not keep it."""
+        assert self.recording is not None
+        try:
+            return self.recording.layer(variant, name, frame)
+        except RecordingError:
+            return None
+
+    @property
+    def windows(self) -> pd.DataFrame:
+        """The rows of ``windows.csv``; none of an incomplete run."""
+        return self._tables.windows
+
+    @property
+    def properties(self) -> Mapping[str, str | int | float]:
+        """What the recording says of its origin; nothing of a folder."""
+        return self.recording.layout.properties if self.recording else {}
+
+    def notes(self, frame: int, variant: str) -> tuple[str, ...]:
+        """Give the recording's sentences about a frame, but those about other variants."""
+        if self.recording is None:
+            return ()
+        others = {each.name for each in self.recording.variants} - {variant}
+        notes = self.recording.notes(frame)
+        return tuple(note for note in notes if note.partition(" ")[0] not in others)
+
+    def extra(self, name: str) -> pd.DataFrame:
+        """Read a further table that the run counted, as ``oracles``; empty if it did not."""
+        return self._tables.table(name)
+
+    def _whole(self, table: pd.DataFrame) -> pd.DataFrame:
+        """Keep the rows of frames that stand in both tables; a killed run may have cut one."""
+        if self.complete or not len(table):
+            return table
+        both = set(self._tables.frames["frame"]) & set(self._tables.regions["frame"])
+        return table[table["frame"].isin(both)]
+
+    def _summary_of_part(self) -> dict[str, Any]:
+        """Make the summary that a killed run did not get to write, of what it had scored."""
+        assert self.recording is not None
+        layout, scored = self.recording.layout, len(self.frames) > 0
+        facts: dict[str, Any] = {"verdict": NOTHING_SCORED, "totals": {}}
+        return {
+            "drive": {"name": layout.drive, "width": layout.width, "height": layout.height},
+            "frames": {
+                "with_pictures": len(self.pictured),
+                "trained_on": layout.properties.get("training_frames", 0),
+                "evaluated": self.frames["frame"].nunique() if scored else 0,
+            },
+            "difference": {},
+            "warnings": [],
+            "losses": [],
+            "settings": {},
+            "versions": {},
+            "seconds": {},
+            "training": {"source": layout.properties.get("trained_on")},
+        } | (_facts(self.frames) if scored else facts)
+
+
+def _facts(frames: pd.DataFrame) -> dict[str, Any]:
+    settings, totals = analysis.settings_of({}), analysis.totals(frames)
+    if not {FILTERED, UNFILTERED} <= totals.keys():
+        return {"verdict": NO_PAIR, "totals": totals}
+    paired = analysis.pairs(frames, FILTERED, UNFILTERED)
+    found = analysis.differences(paired, settings, COMPARED)
+    return {
+        "verdict": verdict(found["ERR"], "ERR", FINAL_STAGE),
+        "totals": totals,
+        "difference": {FINAL_STAGE: {name: asdict(each) for name, each in found.items()}},
+    }

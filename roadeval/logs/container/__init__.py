@@ -1,0 +1,1 @@
+"""The MCAP container: records, chunks, damage and recovery."""

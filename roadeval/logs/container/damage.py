@@ -1,0 +1,139 @@
+"""What is wrong with a log, in sentences that say where, when and what is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from roadeval.logs.container.file import Container
+
+NS = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """Something wrong with a file.
+
+    Parameters
+    ----------
+    path, offset
+        The file, and the byte where it begins.
+    reason
+        What it is.
+    lossy
+        Whether messages are, or may be, lost or wrong by it.
+    start_ns, end_ns
+        Log times of the messages before and after what is lost, None where nothing tells.
+    lost
+        Topics and numbers of messages that are known to be lost.
+    log_start_ns
+        From where a sentence counts its seconds.
+    """
+
+    path: Path
+    offset: int
+    reason: str
+    lossy: bool = True
+    start_ns: int | None = None
+    end_ns: int | None = None
+    lost: tuple[tuple[str, int], ...] = ()
+    log_start_ns: int = 0
+
+    def __str__(self) -> str:
+        text = f"{self.path.name}: {self.reason} (byte {self.offset}{self._span()})"
+        if self.lost:
+            listed = ", ".join(f"{count} of {topic}" for topic, count in self.lost)
+            text += f"; lost: {listed}"
+        elif not self.lossy:
+            text += "; no message is lost"
+        return text
+
+    def _span(self) -> str:
+        """Say when, in seconds after the log's start."""
+        start, end = (
+            None if time is None else f"{(time - self.log_start_ns) / NS:.3f}"
+            for time in (self.start_ns, self.end_ns)
+        )
+        if start is not None and end is not None:
+            return f", {start} to {end} s"
+        if start is not None:
+            return f", after {start} s"
+        return f", before {end} s" if end is not None else ""
+
+
+def damage_of(container: Container) -> tuple[Damage, ...]:
+    """List what is wrong with a file, as far as it is known by now, in the file's order."""
+    found = [
+        *_gaps(container),
+        *_bad_chunks(container),
+        *_wrong_indexes(container),
+        *_missing(container),
+        *_unnamed(container),
+        *_wrong_sums(container),
+    ]
+    return tuple(sorted(found, key=lambda damage: damage.offset))
+
+
+def _gaps(container: Container) -> Iterator[Damage]:
+    last = container.chunks[-1] if container.chunks else None
+    for gap in container.scan.gaps:
+        if gap.offset in container.reader.bad and not gap.lossy:
+            continue
+        before = gap.before_ns
+        if last is not None and last.cut and last.offset == gap.offset:
+            before = container.saved_ns or before
+        yield Damage(container.path, gap.offset, gap.reason, gap.lossy, before, gap.after_ns)
+
+
+def _bad_chunks(container: Container) -> Iterator[Damage]:
+    for number, chunk in enumerate(container.chunks):
+        reason = container.reader.bad.get(chunk.offset)
+        if reason is not None:
+            index = container.scan.indexes[number] or {}
+            lost = tuple((container.topic(key), len(found)) for key, found in index.items())
+            span = (chunk.start, chunk.end)
+            yield Damage(container.path, chunk.offset, reason, True, *span, lost)
+        if chunk.offset in container.reader.kept:
+            reason = container.reader.kept[chunk.offset]
+            yield Damage(container.path, chunk.offset, reason, True, chunk.start, chunk.end)
+
+
+def _wrong_indexes(container: Container) -> Iterator[Damage]:
+    for number in container.misled:
+        reason = "the message index of a chunk is wrong"
+        yield Damage(container.path, container.chunks[number].offset, reason, lossy=False)
+
+
+def _missing(container: Container) -> Iterator[Damage]:
+    """Messages that the file's own statistics count, if nothing else explains the loss."""
+    if any(gap.lossy for gap in container.scan.gaps) or container.reader.bad:
+        return
+    for channel_id, expected in container.expected.items():
+        log = container.logs.get(channel_id)
+        missing = expected - (log.count if log else 0)
+        if missing > 0:
+            lost = ((container.topic(channel_id), missing),)
+            reason = "messages that the file's own statistics count are missing"
+            yield Damage(container.path, container.source.size, reason, lost=lost)
+
+
+def _unnamed(container: Container) -> Iterator[Damage]:
+    for channel_id, log in container.logs.items():
+        if channel_id not in container.channels:
+            reason = f"{log.count} messages of a channel {channel_id} that is defined nowhere"
+            yield Damage(container.path, 0, reason, True, log.first_ns, log.last_ns)
+
+
+def _wrong_sums(container: Container) -> Iterator[Damage]:
+    scan, summary = container.scan, container.summary
+    if scan.data_end is not None and summary.problem:
+        yield Damage(container.path, scan.data_end, summary.problem, lossy=False)
+    if container.data_is_right is False:
+        unchecked = bool(scan.loose) or not all(chunk.crc for chunk in container.chunks)
+        reason = "the checksum of all data is wrong"
+        if unchecked:
+            reason += ", and nothing tells which message is; any may be"
+        yield Damage(container.path, scan.data_end or 0, reason, lossy=unchecked)

@@ -1,0 +1,98 @@
+"""The summary at the end of an MCAP file: a second witness of what lies before it."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass, field
+from typing import Final
+
+from mcap.opcode import Opcode
+from mcap.records import Channel, Footer, Schema, Statistics
+
+from roadeval.logs.container.chunks import crc_of
+from roadeval.logs.container.records import (
+    HEAD,
+    LARGEST,
+    MAGIC,
+    ChunkIndex,
+    parse,
+    parse_chunk_index,
+    walk,
+)
+from roadeval.logs.container.source import Part, Source
+from roadeval.logs.errors import BadRecord
+
+FOOTER_SIZE: Final = HEAD.size + 20 + len(MAGIC)
+_KEPT: Final = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.CHUNK_INDEX, Opcode.STATISTICS)
+_CHECKED: Final = HEAD.size + 16
+"""Bytes of the footer that its own checksum covers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What the summary says.
+
+    Attributes
+    ----------
+    chunks
+        Chunk indexes by the offset of their chunk.
+    checked
+        Whether its checksum is given, and right.
+    problem
+        Why there is no summary to rely on, or empty; then all else is empty too.
+    """
+
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    chunks: dict[int, ChunkIndex] = field(default_factory=dict)
+    statistics: Statistics | None = None
+    checked: bool = False
+    problem: str = ""
+
+
+def read_summary(source: Source) -> Summary:
+    """Read the summary, if it can be relied on."""
+    try:
+        return _read(source)
+    except BadRecord as error:
+        return Summary(problem=str(error))
+
+
+def _read(source: Source) -> Summary:
+    footer_at = source.size - FOOTER_SIZE
+    tail = source.read(max(footer_at, 0), FOOTER_SIZE)
+    if len(tail) < FOOTER_SIZE or not tail.endswith(MAGIC) or tail[0] != Opcode.FOOTER:
+        raise BadRecord("the file does not end as it should")
+    footer: Footer = parse(Opcode.FOOTER, tail[HEAD.size : -len(MAGIC)])
+    if footer.summary_start == 0:
+        return Summary()
+    size = footer_at - footer.summary_start
+    if not 0 <= size <= LARGEST:
+        raise BadRecord("its summary is not where it should be")
+    part = Part(source, footer.summary_start, size)
+    if footer.summary_crc and zlib.crc32(tail[:_CHECKED], crc_of(part)) != footer.summary_crc:
+        raise BadRecord("the checksum of its summary is wrong")
+    return _collect(part, checked=footer.summary_crc != 0)
+
+
+def _collect(part: Part, *, checked: bool) -> Summary:
+    summary, statistics, end = Summary(), None, 0
+    for place in walk(part):
+        end = place.end
+        if place.opcode not in _KEPT:
+            continue
+        body = part.peek(place.body, place.end - place.body)
+        if place.opcode == Opcode.CHUNK_INDEX:
+            index = parse_chunk_index(body)
+            summary.chunks[index.chunk.offset] = index
+            continue
+        record = parse(place.opcode, body)
+        if isinstance(record, Schema):
+            summary.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            summary.channels[record.id] = record
+        else:
+            statistics = record
+    if end != part.size:
+        raise BadRecord("its summary does not add up")
+    return Summary(summary.schemas, summary.channels, summary.chunks, statistics, checked)

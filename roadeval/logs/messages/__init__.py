@@ -1,0 +1,1 @@
+"""Camera messages and the pictures in them."""

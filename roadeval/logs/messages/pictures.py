@@ -1,0 +1,150 @@
+"""What a camera's message carries, and what kinds of it there are."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Final
+
+from mcap.records import Channel, Schema
+
+from roadeval.data import Rgb
+from roadeval.logs.container.source import Buffer
+from roadeval.logs.errors import BadMessage, LogError
+from roadeval.logs.topics.span import parse_time
+
+
+class Kind(StrEnum):
+    """What a topic carries."""
+
+    IMAGE = "image"
+    COMPRESSED = "compressed"
+    VIDEO = "video"
+    OTHER = "other"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RawPicture:
+    """Pixels as logged: ``height`` rows of ``step`` bytes (0: not said), in ``encoding``."""
+
+    stamp_ns: int
+    width: int
+    height: int
+    encoding: str
+    step: int
+    big_endian: bool
+    data: Buffer
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CompressedPicture:
+    """An image file, or a packet of a video, with what the message says its format is."""
+
+    stamp_ns: int
+    format: str
+    data: Buffer
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DecodedPicture:
+    """A video's frame: its packet, and what became of it together with those before it."""
+
+    stamp_ns: int
+    data: Buffer
+    pixels: Rgb
+
+
+Picture = RawPicture | CompressedPicture | DecodedPicture
+
+_KINDS: Final = {
+    "Image": Kind.IMAGE,
+    "RawImage": Kind.IMAGE,
+    "CompressedImage": Kind.COMPRESSED,
+    "CompressedVideo": Kind.VIDEO,
+    "FFMPEGPacket": Kind.VIDEO,
+}
+_SECONDS: Final = ("sec", "secs", "seconds")
+_NANOSECONDS: Final = ("nanosec", "nsec", "nsecs", "nanos", "nanoseconds")
+_CODECS: Final = {
+    "h264": "h264",
+    "avc": "h264",
+    "libx264": "h264",
+    "h265": "hevc",
+    "hevc": "hevc",
+    "libx265": "hevc",
+    "vp9": "vp9",
+    "av1": "av1",
+}
+_START_CODES: Final = (b"\x00\x00\x00\x01", b"\x00\x00\x01")
+
+
+def kind_of(channel: Channel, schema: Schema | None) -> Kind:
+    """Tell by its schema's name what a channel carries.
+
+    JSON without a schema may carry images (`Kind.COMPRESSED`); its first message tells.
+    """
+    if schema is None:
+        return Kind.COMPRESSED if channel.message_encoding == "json" else Kind.OTHER
+    return _KINDS.get(re.split(r"[/.:]", schema.name)[-1], Kind.OTHER)
+
+
+def codec_of(picture: Picture) -> str | None:
+    """Name the video codec of a packet, None for a picture that stands alone."""
+    if not isinstance(picture, CompressedPicture):
+        return None
+    words = re.split(r"[^a-z0-9]+", picture.format.lower())
+    for word in words:
+        if word in _CODECS:
+            return _CODECS[word]
+    return "h264" if bytes(picture.data[:4]).startswith(_START_CODES) else None
+
+
+def picture_in(message: Any) -> Picture:
+    """Take the picture out of a decoded message by the names of its fields.
+
+    Raises
+    ------
+    BadMessage
+        If it has not the fields of an image.
+    """
+    try:
+        return _picture_in(message)
+    except (AttributeError, StopIteration, TypeError, ValueError, LogError) as error:
+        raise BadMessage("it has not the fields of an image") from error
+
+
+def _picture_in(message: Any) -> Picture:
+    stamp_ns = _stamp_ns(message)
+    if not hasattr(message, "height") or hasattr(message, "pts"):
+        name = message.format if hasattr(message, "format") else message.encoding
+        return CompressedPicture(stamp_ns, name, message.data)
+    return RawPicture(
+        stamp_ns,
+        int(message.width),
+        int(message.height),
+        message.encoding,
+        int(getattr(message, "step", 0)),
+        bool(getattr(message, "is_bigendian", False)),
+        message.data,
+    )
+
+
+def _stamp_ns(message: Any) -> int:
+    """Integer nanoseconds of the header stamp; 0 without one."""
+    if hasattr(message, "header"):
+        stamp = message.header.stamp
+    elif hasattr(message, "timestamp"):
+        stamp = message.timestamp
+    else:
+        return 0
+    return nanoseconds(stamp)
+
+
+def nanoseconds(stamp: Any) -> int:
+    """Integer nanoseconds of a stamp in any of its forms; a float would round them."""
+    if isinstance(stamp, str):
+        return parse_time(stamp).ns
+    seconds = next(getattr(stamp, name) for name in _SECONDS if hasattr(stamp, name))
+    rest = next((getattr(stamp, name) for name in _NANOSECONDS if hasattr(stamp, name)), 0)
+    return int(seconds) * 1_000_000_000 + int(rest)

@@ -1,0 +1,217 @@
+"""Video in a log: frames that need the frames before them."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Any, Final, Protocol
+
+from roadeval.logs.container.source import Buffer
+from roadeval.logs.errors import BadMessage, FrameError, LogError
+from roadeval.logs.messages.pictures import CompressedPicture, DecodedPicture, Picture, codec_of
+
+PATIENCE: Final = 16
+"""Packets to feed beyond a frame before it counts as not decodable."""
+FARTHEST_KEY: Final = 3000
+"""Packets to look back for a keyframe."""
+_DECODERS: Final = {"av1": "libdav1d"}
+"""Where the codec's own name is not a decoder that every machine can run."""
+
+
+_HEVC_KEYS: Final = (*range(16, 22), 33)
+"""HEVC units of pictures that stand alone, and of sequence parameters."""
+
+
+class Pictures(Protocol):
+    """The pictures of a topic, by position."""
+
+    def __len__(self) -> int: ...
+
+    def picture(self, position: int) -> Picture:
+        """Read a picture, or raise `FrameError`."""
+        ...
+
+
+def import_av() -> Any:
+    """Import PyAV.
+
+    Raises
+    ------
+    LogError
+        If it is not installed; says how to.
+    """
+    try:
+        import av
+    except ImportError as error:
+        raise LogError("video needs PyAV: install it with pip install 'roadeval[video]'") from error
+    return av
+
+
+class Video:
+    """The frames of a video topic, by position; fastest one after the other.
+
+    Raises
+    ------
+    LogError
+        If PyAV, which decodes video, is not installed.
+    """
+
+    def __init__(self, packets: Pictures) -> None:
+        self._av = import_av()
+        self._packets = packets
+        self._decoder: Any = None
+        self._next = 0
+        self._broken = ""
+        self._waiting: dict[int, Picture] = {}
+        self._ready: dict[int, DecodedPicture | FrameError] = {}
+
+    def __len__(self) -> int:
+        return len(self._packets)
+
+    def picture(self, position: int) -> DecodedPicture:
+        """Decode a frame, from the keyframe before it if need be.
+
+        Raises
+        ------
+        FrameError
+            If it, or one that it builds upon, cannot be decoded.
+        """
+        if position not in self._ready:
+            self._go_to(position)
+        last = min(position + PATIENCE, len(self._packets) - 1)
+        while position not in self._ready and self._next <= last:
+            self._feed(self._next)
+            self._next += 1
+        if position not in self._ready and self._next == len(self._packets):
+            self._flush()
+        found = self._ready.pop(position, None)
+        self._ready = {ready: late for ready, late in self._ready.items() if ready > position}
+        if found is None:
+            raise FrameError("the decoder gave no picture for it")
+        if isinstance(found, FrameError):
+            raise found
+        return found
+
+    def _go_to(self, position: int) -> None:
+        """Begin at the keyframe before a position, unless decoding on gets there sooner."""
+        if self._next <= position <= self._next + PATIENCE:
+            return
+        keyframe = self._keyframe(position)
+        if position < self._next or keyframe > self._next:
+            self._decoder, self._waiting, self._ready, self._broken = None, {}, {}, ""
+            self._next = keyframe
+
+    def _flush(self) -> None:
+        """Take what the decoder still holds at the end of the video."""
+        with suppress(BadMessage):
+            self._drain(None)
+        self._decoder = None
+
+    def _keyframe(self, position: int) -> int:
+        """Position of the last keyframe at or before ``position``."""
+        for candidate in range(position, max(position - FARTHEST_KEY, -1), -1):
+            try:
+                packet = self._packets.picture(candidate)
+            except FrameError:
+                continue
+            if is_keyframe(packet):
+                return candidate
+        return position
+
+    def _feed(self, position: int) -> None:
+        try:
+            packet = self._packets.picture(position)
+        except FrameError as error:
+            self._broken = "a frame that it builds upon is lost"
+            self._ready[position] = error
+            return
+        if is_keyframe(packet):
+            self._broken = ""
+        elif self._decoder is None:
+            self._broken = "the video has no keyframe before it"
+        if self._broken:
+            self._ready[position] = FrameError(self._broken)
+            return
+        try:
+            self._decode(position, packet)
+        except BadMessage as error:
+            self._ready[position] = FrameError(str(error))
+            self._broken = "a frame that it builds upon is lost"
+
+    def _decode(self, position: int, packet: Picture) -> None:
+        codec = codec_of(packet)
+        if self._decoder is None:
+            if codec is None:
+                raise BadMessage("its video codec is unknown")
+            self._decoder = self._av.CodecContext.create(_DECODERS.get(codec, codec), "r")
+            self._decoder.thread_count = 1
+        self._waiting[position] = packet
+        unit = self._av.Packet(bytes(packet.data))
+        unit.pts = unit.dts = position
+        self._drain(unit)
+
+    def _drain(self, unit: Any) -> None:
+        if self._decoder is None:
+            return
+        try:
+            frames = self._decoder.decode(unit)
+        except self._av.FFmpegError as error:
+            raise BadMessage(f"its video cannot be decoded: {error.strerror}") from error
+        for frame in frames:
+            packet = self._waiting.pop(frame.pts, None)
+            if packet is not None:
+                pixels = frame.to_ndarray(format="rgb24")
+                self._ready[frame.pts] = DecodedPicture(packet.stamp_ns, packet.data, pixels)
+
+
+def is_keyframe(packet: Picture) -> bool:
+    """Whether decoding can begin with this packet."""
+    codec = codec_of(packet)
+    if not isinstance(packet, CompressedPicture) or codec is None:
+        return False
+    data = packet.data
+    if codec == "h264":
+        return any(unit & 31 in (5, 7) for unit in _units(data))
+    if codec == "hevc":
+        return any(unit >> 1 & 63 in _HEVC_KEYS for unit in _units(data))
+    if codec == "vp9":
+        return _vp9_key(data)
+    return _av1_key(data)
+
+
+def _units(data: Buffer) -> list[int]:
+    """First byte of each unit of an Annex B stream."""
+    raw = bytes(data)
+    found, at = [], raw.find(b"\x00\x00\x01")
+    while 0 <= at < len(raw) - 3:
+        found.append(raw[at + 3])
+        at = raw.find(b"\x00\x00\x01", at + 3)
+    return found
+
+
+def _vp9_key(data: Buffer) -> bool:
+    """Read the uncompressed header: marker, profile, existing-frame flag, frame type 0."""
+    head = data[0] if len(data) else 0
+    profile = (head >> 5 & 1) | (head >> 4 & 1) << 1
+    shift = 3 if profile < 3 else 2
+    return head >> 6 == 2 and not head >> shift & 1 and not head >> (shift - 1) & 1
+
+
+def _av1_key(data: Buffer) -> bool:
+    """Whether it brings a sequence header (OBU type 1), as every keyframe of a stream does."""
+    at = 0
+    while at < len(data):
+        head = data[at]
+        if head >> 3 & 15 == 1:
+            return True
+        size, at = _leb128(data, at + 1 + (head >> 2 & 1)) if head & 2 else (len(data), at)
+        at += size
+    return False
+
+
+def _leb128(data: Buffer, at: int) -> tuple[int, int]:
+    value = 0
+    for index, byte in enumerate(bytes(data[at : at + 8])):
+        value |= (byte & 127) << 7 * index
+        if not byte & 128:
+            return value, at + index + 1
+    return len(data), at

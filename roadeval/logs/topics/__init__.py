@@ -1,0 +1,1 @@
+"""The topics of a log: their kinds, labels, pairing, and which to replay."""

@@ -1,0 +1,197 @@
+"""Which topics to replay: what the user named, else what is plain; and why, in words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Final
+
+from roadeval.logs.errors import LogError
+from roadeval.logs.messages.pictures import Kind
+from roadeval.logs.topics.description import TopicInfo
+
+
+def _set(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+LABEL_WORDS: Final = _set(
+    "label labels truth gt groundtruth annotation annotations semantic semantics seg segmentation"
+)
+MASK_WORDS: Final = _set("mask masks")
+ROAD_WORDS: Final = _set("road roads drivable driveable freespace lane lanes")
+SHADOW_WORDS: Final = _set("shadow shadows")
+OUTPUT_WORDS: Final = _set(
+    "pred preds prediction predictions predicted net network nn cnn dnn model inference "
+    "detection detections detected output result results estimate estimated"
+)
+PICTURE_WORDS: Final = _set(
+    "overlay overlays blend blended vis viz visual visualization visualisation debug colored"
+)
+PLAIN_WORDS: Final = _set(
+    "camera cam image images img raw compressed front left right rear png mono rect color"
+)
+DEPTH_FORMATS: Final = _set("16uc1 32fc1")
+NO_TOPIC: Final = ""
+"""The name that means: none, even if one is plain."""
+
+
+def words(name: str) -> frozenset[str]:
+    """Split a topic's name into its words, in lower case."""
+    spaced = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", name)
+    found = re.findall(r"[a-z]+", spaced.lower())
+    return frozenset(found) | ({"groundtruth"} if {"ground", "truth"} <= set(found) else set())
+
+
+def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicInfo, str]:
+    """Choose the camera's topic; returns it and why.
+
+    Raises
+    ------
+    LogError
+        If the one asked for is not there or no image, or if none or several are candidates.
+    """
+    if asked is not None:
+        return named(topics, asked, "--image-topic"), "asked for"
+    images = [topic for topic in topics if topic.is_image and topic.count]
+    candidates = [topic for topic in images if not _looks_like_label(topic)]
+    cameras = [topic for topic in candidates if not _looks_like_depth(topic)] or candidates
+    if len(cameras) == 1:
+        others = len(images) - 1
+        return cameras[0], "the only camera image" if others else "the only image topic"
+    if not cameras:
+        raise LogError(_no_image(topics, images))
+    listed = ", ".join(topic.name for topic in cameras)
+    raise LogError(f"{len(cameras)} image topics: {listed}; choose one with --image-topic")
+
+
+def choose_truth(
+    topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None, *, colors: bool = False
+) -> tuple[TopicInfo | None, str]:
+    """Choose the topic of the road truth; returns it, or None, and why.
+
+    An image of single values is preferred; one of ``colors`` where those are asked for, or
+    where there is no other.
+
+    Raises
+    ------
+    LogError
+        If the one asked for is not there or no image, or if several are candidates.
+    """
+    if asked == NO_TOPIC:
+        return None, "asked to use none"
+    if asked is not None:
+        return named(topics, asked, "--truth-topic"), "asked for"
+    labels = _label_topics(topics, image)
+    roads = [topic for topic in labels if not words(topic.name) & SHADOW_WORDS]
+    kinds = [
+        [topic for topic in roads if topic.channels == 3 and _is_plainly_truth(topic)],
+        [topic for topic in roads if topic.channels == 1 and _is_plainly_truth(topic)],
+        [topic for topic in roads if topic.channels == 1 and _is_plain_mask(topic, image)],
+    ]
+    order = kinds if colors else [*kinds[1:], kinds[0]]
+    plain = _most_alike(next((found for found in order if found), []), image)
+    if len(plain) == 1:
+        by = "colours" if plain[0].channels == 3 else "single channel"
+        return plain[0], f"the label image, by its name and its {by}"
+    if plain:
+        listed = ", ".join(topic.name for topic in plain)
+        raise LogError(f"{len(plain)} label topics: {listed}; choose one with --truth-topic")
+    if roads:
+        listed = ", ".join(topic.name for topic in roads)
+        return None, f"no topic is plainly road truth; --truth-topic takes one of: {listed}"
+    return None, "no label topic"
+
+
+def choose_shadow(
+    topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None
+) -> tuple[TopicInfo | None, str]:
+    """Choose the topic of the true shadow; returns it, or None, and why.
+
+    Raises
+    ------
+    LogError
+        If the one asked for is not there or no image, or if several are candidates.
+    """
+    if asked == NO_TOPIC:
+        return None, "asked to use none"
+    if asked is not None:
+        return named(topics, asked, "--shadow-topic"), "asked for"
+    labels = _label_topics(topics, image)
+    shadows = [t for t in labels if words(t.name) & SHADOW_WORDS and t.channels == 1]
+    shadows = _most_alike(shadows, image)
+    if len(shadows) == 1:
+        return shadows[0], "the shadow mask, by its name and its single channel"
+    if shadows:
+        listed = ", ".join(topic.name for topic in shadows)
+        raise LogError(f"{len(shadows)} shadow topics: {listed}; choose one with --shadow-topic")
+    return None, "no shadow topic"
+
+
+def named(topics: Sequence[TopicInfo], name: str, option: str) -> TopicInfo:
+    """Find the image topic a user named.
+
+    Raises
+    ------
+    LogError
+        If there is none of that name, or it carries no images; the valid ones are listed.
+    """
+    for topic in topics:
+        if topic.name == name and topic.is_image:
+            return topic
+    valid = ", ".join(topic.name for topic in topics if topic.is_image) or "none"
+    there = any(topic.name == name for topic in topics)
+    what = "carries no images" if there else "is not in the log"
+    raise LogError(f"{option} {name}: {what}; its image topics are: {valid}")
+
+
+def _label_topics(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:
+    """Topics without loss that look like label images and are no network's output."""
+    return [
+        topic
+        for topic in topics
+        if topic.name != image.name
+        and topic.count
+        and _looks_like_label(topic)
+        and not _is_lossy(topic)
+        and not words(topic.name) & (OUTPUT_WORDS | PICTURE_WORDS)
+    ]
+
+
+def _looks_like_label(topic: TopicInfo) -> bool:
+    return topic.is_image and bool(words(topic.name) & (LABEL_WORDS | MASK_WORDS | SHADOW_WORDS))
+
+
+def _is_lossy(topic: TopicInfo) -> bool:
+    name = topic.format.lower()
+    return topic.kind is Kind.VIDEO or "jpeg" in name or "jpg" in name
+
+
+def _looks_like_depth(topic: TopicInfo) -> bool:
+    named_depth = bool(words(topic.name) & {"depth", "disparity"})
+    return named_depth or topic.format.lower() in DEPTH_FORMATS or "depth" in topic.format.lower()
+
+
+def _is_plainly_truth(topic: TopicInfo) -> bool:
+    name = words(topic.name)
+    return bool(name & LABEL_WORDS) or bool(name & MASK_WORDS and name & ROAD_WORDS)
+
+
+def _is_plain_mask(topic: TopicInfo, image: TopicInfo) -> bool:
+    """Whether nothing in its name says that it masks something other than the road."""
+    return not words(topic.name) - MASK_WORDS - PLAIN_WORDS - words(image.name)
+
+
+def _most_alike(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:
+    """Those that share the most words with the image's name: its own camera's."""
+    shared = [len(words(topic.name) & words(image.name)) for topic in topics]
+    return [t for t, s in zip(topics, shared, strict=True) if s == max(shared)]
+
+
+def _no_image(topics: Sequence[TopicInfo], images: Sequence[TopicInfo]) -> str:
+    if images:
+        listed = ", ".join(topic.name for topic in images)
+        return f"only label images: {listed}; choose the camera's with --image-topic"
+    found = ", ".join(f"{topic.name} ({topic.schema or 'no schema'})" for topic in topics[:8])
+    more = ", ..." if len(topics) > 8 else ""
+    return f"no image topic; the log has: {found or 'no topics at all'}{more}"

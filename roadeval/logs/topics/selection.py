@@ -1,0 +1,231 @@
+"""What of a log is to be replayed, settled before the first frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from enum import StrEnum
+from itertools import islice
+from typing import Final
+
+import numpy as np
+
+from roadeval.logs.errors import BadMessage, FrameError, LogError
+from roadeval.logs.logged import scaled_size
+from roadeval.logs.messages.pictures import Picture
+from roadeval.logs.messages.pixels import to_rgb
+from roadeval.logs.topics.choose import choose_image, choose_shadow, choose_truth, named
+from roadeval.logs.topics.description import TopicInfo, median_period
+from roadeval.logs.topics.labels import LabelMap, LabelValues, seen_in, understand
+from roadeval.logs.topics.pairing import UNREADABLE
+from roadeval.logs.topics.track import Track
+
+LOOKED_AT: Final = 10
+"""Label images at the log's start, and as many spread over it, that settle what values mean."""
+
+
+class Clock(StrEnum):
+    """What tells which label belongs to which image."""
+
+    STAMP = "header stamps"
+    LOG_TIME = "log times"
+    ORDER = "their order"
+
+
+@dataclass(frozen=True, slots=True)
+class LabelTopic:
+    """A topic of label images, how its values are understood, and why it was chosen."""
+
+    topic: TopicInfo
+    labels: LabelMap
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """Topics and rules of a replay.
+
+    Parameters
+    ----------
+    image, image_why
+        The camera's topic, and why that one.
+    truth, shadow, masks
+        Road truth, truth of shadow, and other systems' road masks by name.
+    tolerance_ns
+        Largest difference of the header stamps of an image and its label.
+    clock
+        What pairs images and labels: header stamps if they tell the images apart, else log
+        times, else their order.
+    resize_truth
+        Whether label images of another size are scaled to the image's (nearest neighbour).
+    scale
+        Of the frames that are handed out, relative to the camera's; at most 1.
+    notes
+        Sentences for a person: every choice that was made, and why.
+    """
+
+    image: TopicInfo
+    image_why: str
+    truth: LabelTopic | None
+    shadow: LabelTopic | None
+    masks: Mapping[str, LabelTopic]
+    tolerance_ns: int
+    clock: Clock = Clock.STAMP
+    resize_truth: bool = False
+    scale: float = 1.0
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """Width and height of the frames as they are handed out, if the log tells."""
+        return None if self.image.size is None else scaled_size(self.image.size, self.scale)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """One sentence a topic: what was picked and why."""
+        lines = [f"image: {self.image.name} ({self.image_why})"]
+        named = {"truth": self.truth, "shadow truth": self.shadow}
+        named |= {f"mask {name}": topic for name, topic in self.masks.items()}
+        for name, label in named.items():
+            if label:
+                words = label.labels.words
+                if label is self.shadow:
+                    words = words.replace("road is", "shadow is")
+                lines.append(f"{name}: {label.topic.name} ({label.why}; {words})")
+        return (*lines, *self.notes)
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What the user said about topics and labels; see `roadeval.logs.Log.select`."""
+
+    image: str | None
+    truth: str | None
+    shadow: str | None
+    masks: Mapping[str, str]
+    labels: LabelValues
+    tolerance_ns: int | None
+    resize: bool
+    scale: float = 1.0
+
+
+def settle(topics: Sequence[TopicInfo], tracks: Mapping[str, Track], asked: Asked) -> Selection:
+    """Settle what to replay of these topics.
+
+    Raises
+    ------
+    LogError
+        As `roadeval.logs.Log.select` says.
+    """
+    image, why = choose_image(topics, asked.image)
+    check_readable(tracks[image.name], image)
+
+    def label(chosen: tuple[TopicInfo | None, str], labels: LabelValues) -> LabelTopic | None:
+        topic, why = chosen
+        if topic is None:
+            return None
+        meaning = look_at_labels(tracks[topic.name], topic, image, labels, resize=asked.resize)
+        return LabelTopic(topic, meaning, why)
+
+    truth = choose_truth(topics, image, asked.truth, colors=bool(asked.labels.road_colors))
+    shadow = choose_shadow(topics, image, asked.shadow)
+    masks = {
+        name: (named(topics, topic, f"--mask-topic {name}"), "asked for")
+        for name, topic in asked.masks.items()
+    }
+    track = tracks[image.name]
+    clock = clock_of(track)
+    return Selection(
+        image,
+        why,
+        label(truth, asked.labels),
+        label(shadow, LabelValues()),
+        {name: found for name, mask in masks.items() if (found := label(mask, LabelValues()))},
+        tolerance(track, asked.tolerance_ns),
+        clock,
+        asked.resize,
+        asked.scale,
+        _notes(truth, clock),
+    )
+
+
+def _notes(truth: tuple[TopicInfo | None, str], clock: Clock) -> tuple[str, ...]:
+    notes = []
+    if truth[0] is None:
+        notes.append(f"no truth: {truth[1]}")
+    if clock is not Clock.STAMP:
+        notes.append(f"the header stamps are all zero or equal: {clock} take their place")
+    return tuple(notes)
+
+
+def check_readable(track: Track, topic: TopicInfo) -> None:
+    """Refuse a topic of which nothing can be decoded.
+
+    Raises
+    ------
+    LogError
+        If neither the first messages nor some spread over the log can be.
+    """
+    if not topic.problem:
+        return
+    for picture in _samples(track):
+        with suppress(BadMessage):
+            to_rgb(picture)
+            return
+    raise LogError(f"nothing of {topic.name} can be decoded: {topic.problem}")
+
+
+def look_at_labels(
+    track: Track, topic: TopicInfo, image: TopicInfo, labels: LabelValues, *, resize: bool
+) -> LabelMap:
+    """Look at some label images: settle what their values mean, and that their size fits.
+
+    Raises
+    ------
+    LogError
+        If the size differs and ``resize`` is off, or the values cannot be understood.
+    """
+    if not resize and None not in (topic.size, image.size) and topic.size != image.size:
+        theirs, ours = ("x".join(map(str, size or ())) for size in (topic.size, image.size))
+        raise LogError(
+            f"{topic.name} is {theirs}, but {image.name} is {ours}: "
+            "scale the labels with --resize-truth"
+        )
+    seen: set[int] = set()
+    for picture in _samples(track):
+        try:
+            seen |= seen_in(picture, labels, topic.name)
+        except BadMessage:
+            continue
+    return understand(labels, seen, topic.name)
+
+
+def clock_of(track: Track) -> Clock:
+    """Find what tells the first images of a topic apart."""
+    stamps = (track.stamp(position) for position in range(len(track)))
+    known = [stamp for stamp in islice(stamps, LOOKED_AT) if stamp != UNREADABLE]
+    if len(set(known)) > 1 or (len(track) <= 1 and any(known)):
+        return Clock.STAMP
+    times = track.log_times[:LOOKED_AT]
+    return Clock.LOG_TIME if len(times) <= 1 or times[0] != times[-1] else Clock.ORDER
+
+
+def tolerance(track: Track, asked_ns: int | None) -> int:
+    """Nanoseconds asked for, or else half the frame period."""
+    if asked_ns is not None:
+        return asked_ns
+    period = median_period(track.log_times)
+    if period == 0:
+        stamps = sorted(track.stamp(position) for position in range(min(LOOKED_AT, len(track))))
+        known = [stamp for stamp in stamps if stamp != UNREADABLE]
+        period = median_period(np.array(known, np.int64))
+    return period // 2
+
+
+def _samples(track: Track) -> Iterator[Picture]:
+    """Read the first label images and some spread over the rest."""
+    spread = np.linspace(0, max(len(track) - 1, 0), LOOKED_AT, dtype=int).tolist()
+    for position in sorted({*range(min(LOOKED_AT, len(track))), *spread}):
+        with suppress(FrameError):
+            yield track.picture(position)

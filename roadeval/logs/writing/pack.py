@@ -1,0 +1,201 @@
+"""A folder of images, or a video, becomes a camera log."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from roadeval.logs.errors import LogError
+from roadeval.logs.files import natural
+from roadeval.logs.topics.span import NS
+from roadeval.logs.writing.pack_video import VIDEO_SUFFIXES, frames_of
+from roadeval.logs.writing.writer import LogWriter
+
+CAMERA: Final = "/camera/image"
+TRUTH: Final = "/truth/road"
+DEFAULT_RATE_HZ: Final = 10.0
+LABEL_DELAY_NS: Final = 1
+"""A label is logged right after its image."""
+
+_VERBATIM: Final = {".jpg": "jpeg", ".jpeg": "jpeg", ".png": "png"}
+_CONVERTED: Final = (".bmp", ".tif", ".tiff", ".webp", ".ppm", ".pgm")
+_LABEL_SUFFIX: Final = re.compile(
+    r"[_.-]?(labelids|labels?|masks?|gt|truth|road|seg|segmentation|annotations?|L)$"
+)
+_TIME: Final = re.compile(r"(\d{10})(?:[._](\d{1,9}))?|(\d{13})|(\d{16})|(\d{19})")
+
+
+@dataclass(frozen=True, slots=True)
+class Packed:
+    """What was packed.
+
+    Parameters
+    ----------
+    path
+        The log.
+    frames, labelled
+        Images, and how many of them have a mask.
+    without_mask, without_image
+        Names of images without a mask (if there are masks), and of masks without an image.
+    stamps
+        Where the stamps come from, in words.
+    """
+
+    path: Path
+    frames: int
+    labelled: int = 0
+    without_mask: tuple[str, ...] = ()
+    without_image: tuple[str, ...] = ()
+    stamps: str = ""
+
+
+def pack(
+    images: str | Path,
+    output: str | Path,
+    *,
+    masks: str | Path | None = None,
+    rate_hz: float | None = None,
+    start_ns: int = 0,
+) -> Packed:
+    """Write a folder of images, or a video, as a log that Foxglove and Rerun open too.
+
+    JPEGs and PNGs go in as they are, a video's frames as JPEGs of quality 95. Masks belong to
+    the image of the same name, endings such as ``_mask`` aside. The same files give the same
+    bytes.
+
+    Parameters
+    ----------
+    images
+        A folder, taken in natural order (``2.png`` before ``10.png``), or a video file.
+    output
+        The log to write.
+    masks
+        A folder of label images without loss (PNG), for a folder of images.
+    rate_hz
+        Images a second. By default a video's own; of images, the times in their names if every
+        name is a time (seconds, or milli-, micro- or nanoseconds since 1970), else 10.
+    start_ns
+        Stamp of the first image, unless the names tell.
+
+    Raises
+    ------
+    LogError
+        If there is nothing to pack, a file is unreadable, or no mask belongs to an image.
+    """
+    images, output = Path(images), Path(output)
+    if rate_hz is not None and not 0 < rate_hz <= 1000:
+        raise LogError(f"--rate {rate_hz:g}: give images a second, above 0 and up to 1000")
+    if images.suffix.lower() in VIDEO_SUFFIXES and images.is_file():
+        if masks is not None:
+            raise LogError(f"{images}: masks go with a folder of images, not with a video")
+        return _pack_video(images, output, rate_hz, start_ns)
+    if not images.is_dir():
+        raise LogError(f"{images}: neither a folder of images nor a video")
+    return _pack_folder(images, output, Path(masks) if masks else None, rate_hz, start_ns)
+
+
+def _pack_folder(
+    images: Path, output: Path, masks: Path | None, rate_hz: float | None, start_ns: int
+) -> Packed:
+    files = _listed(images)
+    by_image = _pair(files, _listed(masks)) if masks else {}
+    if masks and not by_image:
+        raise LogError(f"{masks}: no mask has the name of an image in {images}")
+    stamps, words = _stamps(files, rate_hz, start_ns)
+    with LogWriter(output) as log:
+        for file, stamp in stamps.items():
+            log.image(CAMERA, stamp, *_image(file))
+            if file in by_image:
+                data = _label(by_image[file])
+                log.image(TRUTH, stamp, data, "png", log_time_ns=stamp + LABEL_DELAY_NS)
+    used = set(by_image.values())
+    lonely = [file.name for file in _listed(masks) if file not in used] if masks else []
+    unlabelled = [file.name for file in files if file not in by_image] if masks else []
+    return Packed(output, len(files), len(by_image), tuple(unlabelled), tuple(lonely), words)
+
+
+def _stamps(files: list[Path], rate_hz: float | None, start_ns: int) -> tuple[dict[Path, int], str]:
+    """Give each file its stamp, in the order of the stamps, and say where they come from."""
+    times = {file: time for file in files if (time := _time_in(file.stem)) is not None}
+    if rate_hz is None and len(times) == len(files) == len(set(times.values())):
+        ordered = sorted(times.items(), key=lambda item: item[1])
+        return dict(ordered), "the times in the files' names"
+    rate = rate_hz or DEFAULT_RATE_HZ
+    regular = {file: start_ns + round(i * NS / rate) for i, file in enumerate(files)}
+    return regular, f"{rate:g} images a second"
+
+
+def _pack_video(video: Path, output: Path, rate_hz: float | None, start_ns: int) -> Packed:
+    count = 0
+    with LogWriter(output) as log:
+        for count, (time_ns, jpeg) in enumerate(frames_of(video), start=1):
+            if rate_hz is not None:
+                time_ns = round((count - 1) * NS / rate_hz)  # noqa: PLW2901
+            log.image(CAMERA, start_ns + time_ns, jpeg, "jpeg")
+        if not count:
+            raise LogError(f"{video}: a video without frames")
+    words = "the video's own times" if rate_hz is None else f"{rate_hz:g} images a second"
+    return Packed(output, count, stamps=words)
+
+
+def _listed(folder: Path) -> list[Path]:
+    """Image files of a folder in natural order."""
+    if not folder.is_dir():
+        raise LogError(f"{folder}: no such folder")
+    known = {*_VERBATIM, *_CONVERTED}
+    files = sorted((f for f in folder.iterdir() if f.suffix.lower() in known), key=natural)
+    if not files:
+        raise LogError(f"{folder}: no image in it ({', '.join(sorted(known))})")
+    return files
+
+
+def _pair(images: list[Path], masks: list[Path]) -> Mapping[Path, Path]:
+    """Find for each image the mask of its name, or of its name with a label's ending."""
+    exact = {mask.stem: mask for mask in masks}
+    loose = {_LABEL_SUFFIX.sub("", mask.stem): mask for mask in masks}
+    found = {image: exact.get(image.stem) or loose.get(image.stem) for image in images}
+    return {image: mask for image, mask in found.items() if mask is not None}
+
+
+def _image(file: Path) -> tuple[bytes, str]:
+    """Read an image file as it is, or as a PNG if viewers would not know its format."""
+    name = _VERBATIM.get(file.suffix.lower())
+    return (_read(file), name) if name else (_as_png(file), "png")
+
+
+def _label(file: Path) -> bytes:
+    if _VERBATIM.get(file.suffix.lower()) == "jpeg":
+        raise LogError(f"{file}: a JPEG blurs its labels; masks must be PNG or another lossless")
+    return _read(file) if file.suffix.lower() == ".png" else _as_png(file)
+
+
+def _read(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise LogError(f"{file}: {error.strerror}") from error
+
+
+def _as_png(file: Path) -> bytes:
+    import cv2
+    import numpy as np
+
+    pixels = cv2.imdecode(np.frombuffer(_read(file), np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None:
+        raise LogError(f"{file}: not a readable image")
+    return cv2.imencode(".png", pixels)[1].tobytes()
+
+
+def _time_in(stem: str) -> int | None:
+    """Nanoseconds since 1970, if the whole name is a time."""
+    match = _TIME.fullmatch(stem)
+    if match is None:
+        return None
+    seconds, fraction, milli, micro, nano = match.groups()
+    if seconds is not None:
+        return int(seconds) * NS + int((fraction or "").ljust(9, "0"))
+    scales = ((milli, 1_000_000), (micro, 1000), (nano, 1))
+    return next(int(digits) * scale for digits, scale in scales if digits is not None)

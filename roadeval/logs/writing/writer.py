@@ -1,0 +1,208 @@
+"""Writing camera logs that Foxglove and Rerun open too."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from mcap.writer import Writer
+
+from roadeval.logs.errors import LogError
+from roadeval.runtime import files as folders
+from roadeval.version import VERSION
+
+FORMATS: Final = ("jpeg", "png", "webp")
+
+
+class LogWriter:
+    """Writes images to an MCAP file with Foxglove's protobuf schemas.
+
+    The same calls give the same bytes. The file appears under its name when it is complete:
+    at the end of the ``with`` statement, and never if that ends by an exception. Then its folder
+    goes too if it was made for it.
+
+    Parameters
+    ----------
+    path
+        The file to write; an existing one is replaced. Its folder is made if it does not exist.
+
+    Raises
+    ------
+    LogError
+        If it cannot be written.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self._temporary = self.path.with_name(f".{self.path.stem}.part.mcap")
+        with self._explained():
+            if self.path.is_dir():
+                raise LogError(f"{self.path}: is a folder; name a file in it, ending in .mcap")
+            with folders.made(self.path.parent) as self._made:
+                self._file = self._temporary.open("wb")
+        self._writer = Writer(self._file)
+        self._writer.start(library=f"roadeval {VERSION}")
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        self._counts: dict[int, int] = {}
+
+    def image(
+        self,
+        topic: str,
+        stamp_ns: int,
+        data: bytes,
+        format: str,  # noqa: A002
+        *,
+        frame_id: str = "camera",
+        log_time_ns: int | None = None,
+    ) -> None:
+        """Write an image file as it is.
+
+        Parameters
+        ----------
+        topic
+            Where to.
+        stamp_ns
+            Header stamp.
+        data, format
+            The file's bytes, and ``jpeg``, ``png`` or ``webp``.
+        frame_id
+            The camera's coordinate frame.
+        log_time_ns
+            Log time; the stamp by default.
+
+        Raises
+        ------
+        LogError
+            If the disk is full, or the format is another.
+        """
+        from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+
+        if format not in FORMATS:
+            raise LogError(f"{topic}: format {format!r} is none of {', '.join(FORMATS)}")
+        message = CompressedImage(frame_id=frame_id, data=data, format=format)
+        message.timestamp.FromNanoseconds(stamp_ns)
+        channel = self._channels.get(topic) or self._protobuf_channel(topic, CompressedImage)
+        data = message.SerializeToString(deterministic=True)
+        self._write(channel, stamp_ns, log_time_ns, data)
+
+    def mask(
+        self,
+        topic: str,
+        stamp_ns: int,
+        mask: npt.NDArray[np.uint8],
+        *,
+        frame_id: str = "camera",
+        log_time_ns: int | None = None,
+    ) -> None:
+        """Write a ``(H, W)`` mask, or an image in RGB or RGBA, uint8, as a PNG without loss.
+
+        Raises
+        ------
+        LogError
+            If the disk is full.
+        """
+        import cv2
+
+        codes = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
+        stored = mask if mask.ndim == 2 else cv2.cvtColor(mask, codes[mask.shape[2]])
+        _, png = cv2.imencode(".png", stored)
+        self.image(
+            topic, stamp_ns, png.tobytes(), "png", frame_id=frame_id, log_time_ns=log_time_ns
+        )
+
+    def json(
+        self,
+        topic: str,
+        stamp_ns: int,
+        message: Mapping[str, Any],
+        schema: tuple[str, str],
+        *,
+        log_time_ns: int | None = None,
+    ) -> None:
+        """Write a message in JSON, with its schema's name and text (JSON Schema).
+
+        Raises
+        ------
+        LogError
+            If the disk is full.
+        """
+        channel = self._channels.get(topic) or self._json_channel(topic, *schema)
+        data = json.dumps(message, allow_nan=False, separators=(",", ":")).encode()
+        self._write(channel, stamp_ns, log_time_ns, data)
+
+    def _write(self, channel: int, stamp_ns: int, log_time_ns: int | None, data: bytes) -> None:
+        sequence = self._counts[channel] = self._counts.get(channel, -1) + 1
+        log_time = stamp_ns if log_time_ns is None else log_time_ns
+        with self._explained():
+            self._writer.add_message(channel, log_time, data, stamp_ns, sequence)
+
+    def _protobuf_channel(self, topic: str, message: Any) -> int:
+        from mcap_protobuf.schema import build_file_descriptor_set
+
+        name = message.DESCRIPTOR.full_name
+        if name not in self._schemas:
+            text = build_file_descriptor_set(message).SerializeToString(deterministic=True)
+            self._schemas[name] = self._writer.register_schema(name, "protobuf", text)
+        return self._register(topic, "protobuf", self._schemas[name])
+
+    def _json_channel(self, topic: str, name: str, text: str) -> int:
+        if name not in self._schemas:
+            self._schemas[name] = self._writer.register_schema(name, "jsonschema", text.encode())
+        return self._register(topic, "json", self._schemas[name])
+
+    def _register(self, topic: str, encoding: str, schema: int) -> int:
+        self._channels[topic] = self._writer.register_channel(topic, encoding, schema)
+        return self._channels[topic]
+
+    def close(self) -> None:
+        """Complete the file and give it its name.
+
+        Raises
+        ------
+        LogError
+            If the disk is full.
+        """
+        try:
+            with self._explained():
+                self._writer.finish()  # type: ignore[no-untyped-call]
+                self._file.close()
+                self._temporary.replace(self.path)
+        except BaseException:
+            self._discard()
+            raise
+
+    def __enter__(self) -> LogWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self._discard()
+
+    def _discard(self) -> None:
+        """Leave nothing behind."""
+        # On a full disk closing fails as well, and what went wrong first is what counts.
+        with suppress(OSError):
+            self._file.close()
+        self._temporary.unlink(missing_ok=True)
+        folders.remove(self._made)
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise LogError(f"{self.path}: cannot be written: {error.strerror}") from error

@@ -1,0 +1,1 @@
+"""Stages that the paper does not have."""

@@ -1,0 +1,368 @@
+"""Phase 3 with more than colour: a support vector machine on colour, place, column and texture.
+
+Two grey pixels of one colour, one of the road and one of a wall, differ in where they are, in what
+surrounds them, and in what lies between them and the vehicle. The machine is the paper's
+(Eq. 12-16) on a feature map that is written out: instead of a kernel,
+``phi_k(x) = max(w_k . x + b_k, 0)``, planes of random direction through random pixels of the
+training set [1]_, and a linear machine on phi. Its decision costs the same for every training set,
+and it is evaluated on a working image.
+
+References
+----------
+.. [1] A. Rahimi, B. Recht, Weighted Sums of Random Kitchen Sinks: Replacing Minimization with
+   Randomization in Learning, NIPS 2008.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Annotated, Final
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as validated
+
+from roadeval.data import Layer, LayerKind, LayerSpec, Rgb
+from roadeval.data.packed import Packed
+from roadeval.kernels import KERNELS
+from roadeval.pipeline.beyond.scale import reduced, stretched
+from roadeval.pipeline.beyond.shade import LOGS
+from roadeval.pipeline.paper.hsi import planes as colour_planes
+from roadeval.pipeline.paper.svm import SVM, Penalty
+from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
+from roadeval.pipeline.solvers import hyperplane
+from roadeval.pipeline.stage import (
+    MisfitError,
+    Moment,
+    Output,
+    Stage,
+    TrainingSet,
+    View,
+    perfect_mask,
+)
+from roadeval.runtime.processes import call
+
+Values = npt.NDArray[np.float32]
+Floats = npt.NDArray[np.float64]
+
+DECISION: Final = LayerSpec(
+    "decision", LayerKind.SCALAR, "Decision value (Eq. 16)", value_range=(-2.0, 2.0), exact=False
+)
+
+BARE_FEATURES: Final = 9
+"""Three colours, two log-chromaticities, two coordinates, and two of the column below: what is not
+texture."""
+
+
+@validated(frozen=True, config=ConfigDict(extra="forbid"))
+class ContextSettings:
+    """Settings of the machine.
+
+    Parameters
+    ----------
+    width
+        Of the working image: the machine decides there, and its decision values are interpolated.
+    windows
+        Sides of the squares over which texture is averaged, in its pixels. Gravel and leaves show
+        in a small one; what a larger one tells of a facade, the columns below it tell as well.
+        At most 8: for each number of features the machine's sum is compiled anew.
+    planes
+        Planes of the feature map. What a decision costs grows with them.
+    spare
+        Random planes drawn beyond those. The machine is solved on all of them first, and again on
+        those that move decisions most: 96 of 128 planes decide as well as the 128.
+    c
+        Penalty of a training pixel on the wrong side.
+    smoothing
+        Side of the square over which decision values are averaged, in pixels of the working
+        image: neighbours belong together. 1 leaves them as they are.
+    memory
+        Seconds over which decision values of earlier frames fade, by ``exp(-age / memory)``; 0
+        forgets them. At 15 frames a second 0.2 halves the flicker for 0.2 points of ERR; a mask
+        that lags is a price not everybody wants to pay, so it is off.
+    threshold
+        A pixel is road where the decision value is above this. None: learnt, see `threshold`.
+    folds
+        Parts of the training frames that are left out in turn to learn the threshold.
+    """
+
+    width: Annotated[int, Field(ge=32, le=4096)] = 320
+    windows: Annotated[tuple[Annotated[int, Field(ge=1, le=255)], ...], Field(max_length=8)] = (5,)
+    planes: Annotated[int, Field(ge=1, le=4096)] = 96
+    spare: Annotated[int, Field(ge=0, le=4096)] = 32
+    c: Penalty = 1.0
+    smoothing: Annotated[int, Field(ge=1, le=255)] = 5
+    memory: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    threshold: Annotated[float, Field(allow_inf_nan=False)] | None = None
+    folds: Annotated[int, Field(ge=2, le=100)] = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RectifiedMachine:
+    """A fitted machine: ``sum_k weights[k] max(planes[k] . x + bias[k], 0) + offset``.
+
+    ``planes`` is ``(K, F)``, ``bias`` and ``weights`` are ``(K,)``, all float32. A pixel is road
+    where the sum is above ``threshold``.
+    """
+
+    planes: Values
+    bias: Values
+    weights: Values
+    offset: float
+    threshold: float
+
+    def __post_init__(self) -> None:
+        check_arrays(self, np.float32, planes=("K", "F"), bias=("K",), weights=("K",))
+        check_arrays(self, np.float32, offset=(), threshold=())
+        check_range("offset", self.offset, -GREATEST, GREATEST)
+        textures = self.planes.shape[1] - BARE_FEATURES
+        if textures < 0 or textures % 2:
+            raise ValueError("planes has not nine columns and two for each window of texture")
+
+
+# --- Features -------------------------------------------------------------------------------------
+
+
+def features(image: Rgb, windows: tuple[int, ...]) -> Values:
+    """Colour, chromaticity, place, column and texture: ``(F, h, w)`` float32 of ``(h, w, 3)`` RGB.
+
+    The column is what `_columns` finds below a pixel. Texture is, for each window, the root of the
+    mean absolute slope of the log brightness across and down: kerbs, wheels and house fronts have
+    edges of one direction, leaves of both.
+    """
+    colours = colour_planes(image)
+    red, green, blue = (cv2.LUT(plane, LOGS) for plane in colours)
+    light = (red + green + blue) / np.float32(3)
+    slopes = [np.abs(cv2.Sobel(light, cv2.CV_32F, *order)) for order in ((1, 0), (0, 1))]
+    found: Values = np.empty((BARE_FEATURES + 2 * len(windows), *image.shape[:2]), np.float32)
+    found[:3] = colours
+    np.subtract(red, green, out=found[3])
+    np.subtract(blue, green, out=found[4])
+    found[5:7] = _places(*image.shape[:2])
+    _columns(light, slopes[1], found[7:9])
+    textures = (cv2.blur(slope, (side, side)) for side in windows for slope in slopes)
+    for plane, texture in zip(found[9:], textures, strict=True):
+        np.sqrt(texture, out=plane)
+    return found
+
+
+def _columns(light: Values, slope: Values, found: Values) -> None:
+    """Fill ``found``, ``(2, h, w)``, with what lies between each pixel and the image's lower edge.
+
+    The steepest edge across the column, as the root of the mean absolute slope down of a few
+    pixels, and the least log brightness: whoever drives up the column to the pixel meets no kerb
+    and no shadow under a car as long as there is road. ``light`` and ``slope`` are ``(h, w)``
+    float32.
+    """
+    edge, dark = found
+    np.sqrt(cv2.blur(slope, (5, 3)), out=edge)
+    cv2.blur(light, (5, 5), dst=dark)
+    KERNELS.climb(edge, dark)
+
+
+@lru_cache(maxsize=8)
+def _places(height: int, width: int) -> tuple[Values, Values]:
+    """Column from -1 to 1 and row from 0 to 1 of each pixel's centre, ``(height, width)`` each."""
+    down, across = np.mgrid[0:height, 0:width].astype(np.float32) + np.float32(0.5)
+    return across * np.float32(2 / width) - 1, down / np.float32(height)
+
+
+def sampled(sample: TrainingSet, settings: ContextSettings) -> Values:
+    """Features of the sampled pixels, ``(n, F)`` float32."""
+    rows = []
+    for index, image in enumerate(sample.images):
+        here = sample.frame == index
+        small = features(reduced(image, settings.width), settings.windows)
+        height, width = small.shape[1:]
+        row = sample.row[here] * height // image.shape[0]
+        column = sample.column[here] * width // image.shape[1]
+        rows.append((np.flatnonzero(here), small[:, row, column].T))
+    order = np.concatenate([where for where, _ in rows])
+    result: Values = np.concatenate([values for _, values in rows])[np.argsort(order)]
+    return result
+
+
+# --- Learning -------------------------------------------------------------------------------------
+
+
+def fit(sample: TrainingSet, settings: ContextSettings) -> RectifiedMachine:
+    """Draw the planes, solve the linear machine (Eq. 13) on them, and learn the threshold."""
+    values = sampled(sample, settings)
+    planes, bias = draw_planes(values, settings.planes + settings.spare, sample.seed)
+    mapped = np.maximum(values @ planes.T + bias, 0)
+    kept, weights, offset = solve(mapped, sample.road, settings)
+    learnt = settings.threshold
+    if learnt is None:
+        learnt = threshold(left_out(mapped, sample, settings), sample.road)
+    return RectifiedMachine(planes[kept], bias[kept], weights.astype(np.float32), offset, learnt)
+
+
+def draw_planes(values: Values, count: int, seed: int) -> tuple[Values, Values]:
+    """Draw planes ``(count, F)`` and their bias ``(count,)`` for ``(n, F)`` features.
+
+    Directions are uniform on the sphere of standardised features; each plane goes through a
+    pixel of the training set, and is scaled so that its largest value there is 1.
+    """
+    rng = np.random.default_rng(seed)
+    deviation = values.std(axis=0)
+    planes = rng.normal(size=(count, values.shape[1]))
+    planes /= np.linalg.norm(planes, axis=1, keepdims=True) * np.where(deviation > 0, deviation, 1)
+    through = values[rng.integers(0, len(values), count)]
+    bias = -(planes * through).sum(axis=1)
+    largest = np.maximum((values @ planes.T + bias).max(axis=0), 1e-6)
+    return (planes / largest[:, None]).astype(np.float32), (bias / largest).astype(np.float32)
+
+
+def solve(
+    mapped: Values, road: npt.NDArray[np.bool_], settings: ContextSettings
+) -> tuple[npt.NDArray[np.intp], Floats, float]:
+    """Solve the linear machine on the planes that move its decisions most.
+
+    Parameters
+    ----------
+    mapped
+        ``(n, K)``: what each plane makes of each pixel.
+    road
+        ``(n,)``: the pixels' labels.
+    settings
+        ``planes`` are kept. A plane moves decisions by its weight times the deviation of what it
+        makes of the pixels.
+
+    Returns
+    -------
+    kept, weights, offset
+        The planes' places, ascending, their weights, and the machine's offset.
+    """
+    kept = np.arange(mapped.shape[1])
+    if settings.spare:
+        weights, _ = _solve(mapped, road, settings.c)
+        moved = np.abs(weights) * mapped.std(axis=0)
+        kept = np.sort(np.argsort(-moved, kind="stable")[: settings.planes])
+    return kept, *_solve(mapped.take(kept, axis=1), road, settings.c)
+
+
+def _solve(mapped: Values, road: npt.NDArray[np.bool_], c: float) -> tuple[Floats, float]:
+    found = call(hyperplane, features=mapped, road=road, c=c)
+    return found["weights"], float(found["offset"])
+
+
+def left_out(mapped: Values, sample: TrainingSet, settings: ContextSettings) -> Values:
+    """Decision value of each sampled pixel by a machine that has not seen its part of the drive.
+
+    The frames are cut into ``folds`` parts in their order: neighbouring frames look alike. NaN
+    where the others show one class alone, or there are none.
+    """
+    part = sample.frame * settings.folds // len(sample.images)
+    result = np.full(len(mapped), np.nan, np.float32)
+    for fold in np.unique(part):
+        here = part == fold
+        others = sample.road[~here]
+        if others.any() and not others.all():
+            kept, weights, offset = solve(mapped[~here], others, settings)
+            result[here] = mapped[here].take(kept, axis=1) @ weights + offset
+    return result
+
+
+def threshold(values: Values, road: npt.NDArray[np.bool_]) -> float:
+    """Give the threshold with the least sum of FNR and FPR on left-out decision ``values``.
+
+    Frames show more non-road than road, and the least ERR would be had a little higher; it is
+    the same within its noise once phase 4 has removed the false positives that stand alone, and
+    twice as much of the dark road would be missed. NaN are left out; 0 if no class is left.
+    """
+    known = ~np.isnan(values)
+    values, road = values[known], road[known]
+    if not road.any() or road.all():
+        return 0.0
+    order = np.argsort(values, kind="stable")
+    cost = np.where(road, 1 / road.sum(), -1 / (~road).sum())[order]
+    best = int(np.argmin(np.concatenate([[0.0], cost.cumsum()])))
+    ends = np.concatenate([values[order[:1]] - 1, values[order], values[order[-1:]] + 1])
+    return float((ends[best] + ends[best + 1]) / 2)
+
+
+# --- The stage ------------------------------------------------------------------------------------
+
+
+def check_fit(machine: RectifiedMachine, settings: ContextSettings) -> None:
+    """Raise a `MisfitError` if the machine is for other features than the settings'.
+
+    The compiled sum checks no index: with too few columns it would read beyond the array.
+    """
+    given, wanted = machine.planes.shape[1], BARE_FEATURES + 2 * len(settings.windows)
+    if given != wanted:
+        raise MisfitError(
+            f"the model is damaged: its machine of stage context is for {given} features, and "
+            f"windows = {list(settings.windows)} make {wanted}; train it again"
+        )
+
+
+def decision(image: Rgb, machine: RectifiedMachine, settings: ContextSettings) -> Values:
+    """Decision value (Eq. 16) of each pixel of ``(h, w, 3)`` uint8 RGB, ``(h, w)`` float32.
+
+    A `MisfitError` if the machine is for other features than the settings'.
+    """
+    check_fit(machine, settings)
+    planes = features(image, settings.windows)
+    values = KERNELS.rectified_sum(
+        tuple(planes.reshape(len(planes), -1)), machine.planes, machine.bias, machine.weights
+    )
+    side = (settings.smoothing, settings.smoothing)
+    smooth: Values = cv2.blur(values.reshape(planes.shape[1:]) + np.float32(machine.offset), side)
+    return smooth
+
+
+def remembered(values: Values, moment: Moment, memory: float) -> Values:
+    """Mix decision values with those that the frame before left, and leave them for the next.
+
+    ``memory`` is the time in seconds in which the past fades to 1/e. What does not lie in the
+    past, or was another size, is forgotten.
+    """
+    past = moment.baton.recall()
+    if past is not None:
+        stamp_ns, earlier = past
+        age = (moment.stamp_ns - stamp_ns) / 1e9
+        if age > 0 and earlier.shape == values.shape:
+            values = values + np.float32(math.exp(-age / memory)) * (earlier - values)
+    moment.baton.leave((moment.stamp_ns, values))
+    return values
+
+
+def bind(settings: ContextSettings, machine: RectifiedMachine) -> Callable[[View], Output]:
+    """Return the machine as a pure function of what it sees; a `MisfitError`, see `check_fit`."""
+    check_fit(machine, settings)
+
+    def run(view: View) -> Output:
+        values = decision(reduced(view.image, settings.width), machine, settings)
+        if settings.memory > 0 and view.moment is not None:
+            values = remembered(values, view.moment, settings.memory)
+        values = stretched(values, view.image.shape)
+        road = Packed.of(values > machine.threshold)
+        return Output((Layer(DECISION, values), Layer(SVM, road)), mask=road)
+
+    return run
+
+
+def layers(_settings: ContextSettings) -> tuple[LayerSpec, ...]:
+    """Name the layers of the machine."""
+    return DECISION, SVM
+
+
+STAGE: Final = Stage(
+    name="context",
+    title="Phase 3: support vector machine on colour, place, column and texture",
+    settings=ContextSettings,
+    bind=bind,
+    layers=layers,
+    fit=fit,
+    parameters=RectifiedMachine,
+    oracle=perfect_mask,
+    # Not the threshold: it is learnt, or takes the place of what would have been.
+    deciding=("memory", "smoothing"),
+    mask=SVM.name,
+)

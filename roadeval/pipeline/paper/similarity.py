@@ -1,0 +1,121 @@
+"""Phase 1, colour similarity (section 3.1): Mahalanobis distance to the road's colour (Eq. 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Final
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as validated
+
+from roadeval.data import Layer, LayerKind, LayerSpec, mask_spec
+from roadeval.data.packed import Packed
+from roadeval.kernels import KERNELS
+from roadeval.pipeline.parameters import check_arrays, check_covariance, check_range
+from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
+
+SIMILARITY: Final = mask_spec("similarity", "Similar to road (Eq. 2)")
+
+
+@validated(frozen=True, config=ConfigDict(extra="forbid"))
+class SimilaritySettings:
+    """Settings of phase 1.
+
+    Parameters
+    ----------
+    quantile
+        A pixel is road where ``d^2`` is at most this quantile of the chi-squared distribution
+        with 3 degrees of freedom: the share of normally distributed road colours kept.
+    ridge
+        Added to the covariance's diagonal, in squared grey levels: a grey camera's covariance
+        is singular. 1 is about the variance that 8-bit JPEG coding alone adds; much below 0.001
+        a singular covariance's inverse is lost in rounding.
+    """
+
+    quantile: Annotated[float, Field(gt=0, lt=1)] = 0.95
+    ridge: Annotated[float, Field(ge=1e-3, allow_inf_nan=False)] = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoadColour:
+    """Mean ``(3,)`` and covariance ``(3, 3)`` of the road training set, RGB in 0..255."""
+
+    mean: npt.NDArray[np.float64]
+    covariance: npt.NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        check_arrays(self, np.float64, mean=(3,), covariance=(3, 3))
+        check_range("mean", self.mean, 0, 255)
+        check_range("covariance", self.covariance, -(255**2), 255**2)
+        # One grey alone has no variance; the rest is rounding, and far below the least ridge.
+        check_covariance("covariance", self.covariance, -1e-6)
+
+
+def fit(sample: TrainingSet, _settings: SimilaritySettings) -> RoadColour:
+    """Estimate m and S of Eq. 2 from the road pixels of the training set."""
+    road = sample.colours()[sample.road].astype(np.float64)
+    return RoadColour(road.mean(axis=0), np.cov(road, rowvar=False, ddof=0))
+
+
+def limit(quantile: float) -> float:
+    """Greatest ``d^2`` of a road pixel: ``chi2.ppf(quantile, 3)``."""
+    # The same number as scipy.stats.chi2.ppf, without the seconds that importing it takes.
+    from scipy.special import chdtri
+
+    return float(chdtri(3, 1.0 - quantile))
+
+
+def whitening(covariance: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """W, ``(3, 3)`` lower triangular, of a positive covariance S: ``W^T W = S^-1``.
+
+    So the distance of Eq. 2 is ``|W (x - m)|``, which rounding can neither make negative nor blow
+    up: even where S is singular but for the least ridge it is off by less than 0.01 in single
+    precision.
+    """
+    factors: npt.NDArray[np.float64] = np.tril(np.linalg.inv(np.linalg.cholesky(covariance)))
+    return factors
+
+
+def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Output]:
+    """Return phase 1 as a pure function of what it sees.
+
+    ``d = sqrt((x - m)^T S^-1 (x - m))`` with S regularised. The printed Eq. 2 is no distance
+    (its brackets are misplaced).
+    """
+    factors = whitening(road.covariance + settings.ridge * np.eye(3))
+    greatest = limit(settings.quantile)
+    spec = _distance(settings)
+
+    def run(view: View) -> Output:
+        distance, near = KERNELS.mahalanobis(view.planes(), road.mean, factors, greatest)
+        mask = Packed.of(near)
+        return Output((Layer(spec, distance), Layer(SIMILARITY, mask)), mask=mask)
+
+    return run
+
+
+def _distance(settings: SimilaritySettings) -> LayerSpec:
+    """Describe the distance map, shown from 0 to three times the limit."""
+    span = (0.0, 3.0 * limit(settings.quantile) ** 0.5)
+    title = "Mahalanobis distance to road (Eq. 2)"
+    return LayerSpec("distance", LayerKind.SCALAR, title, value_range=span, exact=False)
+
+
+def layers(settings: SimilaritySettings) -> tuple[LayerSpec, ...]:
+    """Name the layers of phase 1."""
+    return _distance(settings), SIMILARITY
+
+
+STAGE: Final = Stage(
+    name="similarity",
+    title="Phase 1: colour similarity",
+    settings=SimilaritySettings,
+    bind=bind,
+    layers=layers,
+    fit=fit,
+    parameters=RoadColour,
+    deciding=("quantile", "ridge"),
+)

@@ -1,0 +1,205 @@
+"""Phase 3, the support vector machine on each pixel's colour (section 3.3, Eq. 12-16)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Annotated, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as validated
+
+from roadeval.data import Layer, LayerSpec, mask_spec
+from roadeval.data.packed import Packed
+from roadeval.pipeline import cube
+from roadeval.pipeline.colour_table import ColourTable
+from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
+from roadeval.pipeline.solvers import support_vectors
+from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask
+from roadeval.runtime.processes import call
+
+Floats = npt.NDArray[np.float64]
+
+SVM: Final = mask_spec("svm", "SVM: road (Eq. 16)")
+
+Penalty = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
+"""C of a soft margin. It bounds the machine's weights, which are to stay far below `GREATEST`."""
+
+_BLOCK: Final = 1 << 20
+"""Kernel values computed at once: 8 MB of float64, which stays in the cache."""
+
+
+@validated(frozen=True, config=ConfigDict(extra="forbid"))
+class SvmSettings:
+    """Settings of phase 3.
+
+    Parameters
+    ----------
+    kernel
+        ``rbf``, an adaptation of the printed machine: road is a mid grey between dark verges
+        and bright sky, which no plane in RGB cuts out; or ``linear``, as printed (Eq. 12).
+    c
+        Penalty of a training pixel on the wrong side. The printed Eq. 13 allows none, which
+        has no solution for classes that overlap.
+    gamma
+        Width of the RBF kernel ``exp(-gamma |x - y|^2)``, in standardised colours.
+    standardise
+        Whether colours are brought to mean 0 and deviation 1 over the training set.
+    threshold
+        A pixel is road where the decision function is above this.
+    """
+
+    kernel: Literal["rbf", "linear"] = "rbf"
+    c: Penalty = 1.0
+    gamma: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.5
+    standardise: bool = True
+    threshold: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SupportVectors:
+    """A fitted machine (Eq. 15-16).
+
+    Parameters
+    ----------
+    mean, scale
+        ``(3,)``: features are ``(colour - mean) / scale``, colours in 0..255.
+    vectors
+        ``(m, 3)``: the support vectors x_i, as features.
+    weights
+        ``(m,)``: their ``lambda_i y_i``, y = 1 for road and -1 otherwise.
+    offset
+        b.
+    """
+
+    mean: Floats
+    scale: Floats
+    vectors: Floats
+    weights: Floats
+    offset: float
+
+    def __post_init__(self) -> None:
+        check_arrays(self, np.float64, mean=(3,), scale=(3,))
+        check_arrays(self, np.float64, vectors=("m", 3), weights=("m",), offset=())
+        check_range("mean", self.mean, 0, 255)
+        check_range("scale", self.scale, 1e-6, 255)
+        check_range("offset", self.offset, -GREATEST, GREATEST)
+
+
+def fit(sample: TrainingSet, settings: SvmSettings) -> SupportVectors:
+    """Solve the dual (Eq. 14) for the training set's colours with scikit-learn's libsvm."""
+    colours = sample.colours().astype(np.float64)
+    mean, scale = np.zeros(3), np.ones(3)
+    if settings.standardise:
+        mean, scale = colours.mean(axis=0), colours.std(axis=0)
+        scale = np.where(scale > 0, scale, 1.0)
+    found = call(
+        support_vectors,
+        features=(colours - mean) / scale,
+        road=sample.road,
+        c=settings.c,
+        kernel=settings.kernel,
+        gamma=settings.gamma,
+    )
+    offset = float(found["offset"])
+    return SupportVectors(mean, scale, found["vectors"], found["weights"], offset)
+
+
+def decision(
+    colours: npt.NDArray[np.uint8], machine: SupportVectors, settings: SvmSettings
+) -> Floats:
+    """Decision value ``sum_i lambda_i y_i K(x, x_i) + b`` of ``(n, 3)`` colours (Eq. 16).
+
+    Returns ``(n,)`` float64, equal to scikit-learn's ``decision_function`` up to rounding. A
+    colour's value does not depend on the colours that it is computed with.
+    """
+    features = (colours - machine.mean) / machine.scale
+    if settings.kernel == "linear":
+        # Eq. 15: the machine's plane, w = sum_i lambda_i y_i x_i.
+        terms = features * (machine.weights @ machine.vectors)
+        plane: Floats = terms.sum(axis=1) + machine.offset
+        return plane
+    from scipy.spatial.distance import cdist
+
+    result = np.empty(len(features))
+    rows = max(1, _BLOCK // max(1, len(machine.vectors)))
+    for start in range(0, len(features), rows):
+        block = slice(start, start + rows)
+        squared = cdist(features[block], machine.vectors, "sqeuclidean")
+        # Row by row: a product with a matrix rounds a row differently in another company.
+        terms = np.exp(-settings.gamma * squared) * machine.weights
+        result[block] = terms.sum(axis=1) + machine.offset
+    return result
+
+
+@lru_cache(maxsize=4)
+def colour_table(machine: SupportVectors, settings: SvmSettings) -> ColourTable:
+    """Eq. 16 for every colour there is.
+
+    A pixel's features are its three colours alone, so this is all the machine can say. The last
+    tables are remembered, each 2 MiB, or 4 where many colours are open.
+    """
+    # Matrices this small gain nothing from threads, and lose all where other work needs a core.
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, "blas"):
+        return ColourTable(
+            _margins(machine, settings),
+            lambda colours: decision(colours, machine, settings) > settings.threshold,
+        )
+
+
+def _margins(machine: SupportVectors, settings: SvmSettings) -> cube.Slabs:
+    """Decision values on the colour cube, less the threshold."""
+    offset = machine.offset - settings.threshold
+
+    def features(channel: int, levels: Floats) -> Floats:
+        result: Floats = (levels - machine.mean[channel]) / machine.scale[channel]
+        return result
+
+    def factor(channel: int, levels: Floats) -> Floats:
+        away = features(channel, levels)[:, None] - machine.vectors[:, channel]
+        result: Floats = np.exp(-settings.gamma * away**2)
+        return result
+
+    every = np.stack([features(channel, cube.LEVELS) for channel in range(3)])
+    if settings.kernel == "linear":
+        plane = machine.weights @ machine.vectors
+        return cube.sums_of_terms(plane[:, None] * every, offset)
+    # A feature is off by a few roundings of the largest, and exp(-gamma x^2) is nowhere steeper
+    # than sqrt(gamma).
+    reach = float(max(np.abs(every).max(), np.abs(machine.vectors).max()))
+    rounding = 8 * cube.EPS * (1 + settings.gamma**0.5 * reach)
+    return cube.sums_of_products(machine.weights, factor, offset, rounding=rounding)
+
+
+def bind(settings: SvmSettings, machine: SupportVectors) -> Callable[[View], Output]:
+    """Return phase 3 as a pure function of what it sees."""
+    table = colour_table(machine, settings)
+
+    def run(view: View) -> Output:
+        road = Packed.of(table.look_up(view.planes()))
+        return Output((Layer(SVM, road),), mask=road)
+
+    return run
+
+
+def layers(_settings: SvmSettings) -> tuple[LayerSpec, ...]:
+    """Name the layer of phase 3."""
+    return (SVM,)
+
+
+STAGE: Final = Stage(
+    name="svm",
+    title="Phase 3: support vector machine",
+    settings=SvmSettings,
+    bind=bind,
+    layers=layers,
+    fit=fit,
+    parameters=SupportVectors,
+    oracle=perfect_mask,
+    deciding=("threshold",),
+)

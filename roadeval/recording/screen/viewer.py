@@ -1,0 +1,175 @@
+"""The real viewer, at a given frame: in its own window, or as a picture without any screen.
+
+Everything stays on this machine: the viewer listens on 127.0.0.1 alone, on a free port, and its
+usage statistics are off.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+import rerun_cli
+from rerun.experimental import ViewerClient
+
+from roadeval.recording import layout as at
+from roadeval.recording.layout import RecordingError
+from roadeval.runtime import files as folders
+
+SIZE: Final = (1920, 1080)
+"""Of a picture, in pixels; the recording's views are arranged for it."""
+PACKAGE: Final = "mesa-vulkan-drivers"
+"""Debian's package with the driver that draws without a graphics card."""
+DRIVERS: Final = Path("/usr/share/vulkan/icd.d")
+_LOADING_S: Final = 120.0
+_SETTLING_S: Final = 2.0
+"""How long to wait for a recording, and for what is drawn to stand still: the first frames after
+a jump show pictures that are not decoded yet."""
+_POLL_S: Final = 0.25
+
+
+def show(recording: Path, frame: int | None = None) -> None:
+    """Open a recording in the viewer, paused at a frame, and wait until its window is closed.
+
+    Parameters
+    ----------
+    recording
+        An ``.rrd`` file.
+    frame
+        Number of a frame in it; None for where the recording itself wants to begin.
+
+    Raises
+    ------
+    RecordingError
+        If there is no screen, or the viewer does not come up.
+    """
+    if os.name == "posix" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise RecordingError(
+            "no screen to open a window on; take a picture with --screenshot FILE.png, or open "
+            f"{recording} on another machine"
+        )
+    with _viewer(recording, []) as (process, client):
+        _go(client, frame)
+        process.wait()
+
+
+def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int | None:
+    """Draw the viewer's window into a PNG file, without a screen.
+
+    Returns
+    -------
+    int or None
+        The frame at which the viewer itself says it stands.
+
+    Raises
+    ------
+    RecordingError
+        If there is no graphics driver that works without a screen, or the picture cannot be
+        written.
+    """
+    width, height = SIZE
+    options = ["--headless", "--window-size", f"{width}x{height}"]
+    # How someone arranged their own viewer is kept in a folder of theirs; a picture knows none.
+    with tempfile.TemporaryDirectory() as home:
+        surroundings = {**_driver(), "XDG_DATA_HOME": home, "XDG_RUNTIME_DIR": home}
+        with _viewer(recording, options, **surroundings) as (_, client):
+            shown = _go(client, frame)
+            time.sleep(_SETTLING_S)
+            png = client.take_screenshot()
+    try:
+        folders.put(picture, png)
+    except OSError as error:
+        raise RecordingError(f"{picture}: cannot be written: {error.strerror}") from error
+    return shown
+
+
+@contextmanager
+def _viewer(
+    recording: Path, options: list[str], **environment: str
+) -> Iterator[tuple[subprocess.Popen[bytes], ViewerClient]]:
+    """Start the viewer on a recording; it ends with the block."""
+    port = _free_port()
+    address = ["--bind", "127.0.0.1", "--port", str(port), "--hide-welcome-screen"]
+    with tempfile.TemporaryFile() as log:
+        process = subprocess.Popen(
+            [_program(), *address, *options, str(recording)],
+            stdout=log,
+            stderr=log,
+            # It takes a machine that runs tests for one that must not be counted.
+            env={**os.environ, "CI": "1", "NO_COLOR": "1", **environment},
+        )
+        try:
+            yield process, _connect(process, port, log.fileno())
+        finally:
+            process.terminate()
+            process.wait()
+
+
+def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerClient:
+    """Wait until the viewer has the whole recording."""
+    deadline = time.monotonic() + _LOADING_S
+    while time.monotonic() < deadline:
+        if process.poll() is not None:
+            raise RecordingError(f"the viewer did not start: {_reason(log)}")
+        try:
+            client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+            state = client.get_state()
+        except (OSError, RuntimeError):
+            state = None
+        if state and not state.loading and any(each.timelines for each in state.recordings):
+            return client
+        time.sleep(_POLL_S)
+    raise RecordingError(f"the viewer did not load the recording within {_LOADING_S:.0f} s")
+
+
+def _go(client: ViewerClient, frame: int | None) -> int | None:
+    """Move the viewer to a frame; return where it says it stands then."""
+    if frame is not None:
+        client.set_time(at.FRAME, sequence=frame, play_state="paused")
+    deadline = time.monotonic() + _SETTLING_S
+    while True:
+        shown = client.get_state().recordings[0]
+        stands = shown.current_time if shown.current_timeline == at.FRAME else None
+        if frame in (None, stands) or time.monotonic() > deadline:
+            return stands
+        time.sleep(_POLL_S)
+
+
+def _driver() -> dict[str, str]:
+    """Choose the software driver, so that pictures look the same on every machine."""
+    if "VK_ICD_FILENAMES" in os.environ or os.name != "posix":
+        return {}
+    found = sorted(DRIVERS.glob("lvp_icd*.json"))
+    if not found:
+        raise RecordingError(
+            "no graphics driver that draws without a screen; on Debian or Ubuntu: "
+            f"apt-get install {PACKAGE}"
+        )
+    return {"VK_ICD_FILENAMES": str(found[0])}
+
+
+def _program() -> str:
+    """Find the viewer itself: the command on the path is a wrapper that leaves it running."""
+    folder = Path(rerun_cli.__file__).parent
+    return str(next(path for path in (folder / "rerun", folder / "rerun.exe") if path.exists()))
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def _reason(log: int) -> str:
+    """Give the last thing that the viewer said."""
+    os.lseek(log, 0, os.SEEK_SET)
+    said = os.read(log, 1 << 20).decode(errors="replace").split("\n")
+    return next((line.strip() for line in reversed(said) if line.strip()), "it said nothing")

@@ -1,0 +1,1 @@
+"""The machine: threads, processes, files and memory. Knows nothing of the domain."""

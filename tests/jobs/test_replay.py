@@ -1,0 +1,520 @@
+"""The main job, on a small log of our own."""
+
+import json
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+
+import cv2
+import pandas as pd
+import pytest
+
+import roadeval
+from roadeval import ReplayOptions, RoadevalError
+from roadeval.config import Config, load_config
+from roadeval.jobs.run import Run
+from roadeval.logs import LogWriter, open_log
+from roadeval.pipeline.paper import svm as classify
+from roadeval.results.folder import Results, summary_text
+from roadeval.results.tables import COLUMNS
+from tests.training.making import frame
+
+FRAMES = 26
+NS = 100_000_000
+
+
+def write_log(path: Path, *, truth: bool = True, net: bool = False, broken: int = -1) -> Path:
+    """Write a log of small frames; some have no truth, one may be broken."""
+    with LogWriter(path) as writer:
+        for number in range(FRAMES):
+            made, stamp = frame(number), (number + 1) * NS
+            # The verge creeps over the road, so that no fixed mask is right everywhere.
+            made.image[12 : 12 + number // 8] = made.image[0]
+            made.truth[12 : 12 + number // 8] = 0
+            _, png = cv2.imencode(".png", made.image[..., ::-1])
+            data = b"no image" if number == broken else png.tobytes()
+            writer.image("/camera/image", stamp, data, "png")
+            if truth and number != 20:
+                writer.mask("/truth/road", stamp, made.truth * 255)
+            if net:
+                writer.mask("/net/road_mask_prediction", stamp, made.truth * 255)
+    return path
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory) -> Path:
+    return write_log(tmp_path_factory.mktemp("log") / "small.mcap", net=True)
+
+
+@pytest.fixture(autouse=True)
+def _no_figures(request, monkeypatch):
+    """Draw figures only for the run that looks at them: they take most of a small run's time."""
+    if "once" not in request.fixturenames:
+        monkeypatch.setattr(
+            import_module("roadeval.jobs.replay"), "write_figures", lambda *given: []
+        )
+
+
+def run(drive: Path, folder: Path, **options):
+    return roadeval.replay(
+        drive,
+        save=folder / "out.rrd",
+        reports=folder / "reports",
+        options=ReplayOptions(**options),
+    )
+
+
+def frames_of(folder: Path) -> pd.DataFrame:
+    return pd.read_csv(folder / "reports" / "frames.csv")
+
+
+@pytest.fixture(scope="module")
+def once(drive, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("once")
+    return folder, run(drive, folder, jobs=2)
+
+
+def test_every_frame_is_accounted_for(once):
+    _, outcome = once
+    assert outcome.summary["frames"] == {
+        "in_log": 26,
+        "read": 26,
+        "decoded": 26,
+        "labelled": 25,
+        "trained_on": 10,
+        "evaluated": 15,
+        "skipped": {"trained on": 10, "unlabelled": 1},
+    }
+    assert outcome.summary["windows"] == 2
+
+
+def test_training_and_unlabelled_frames_are_in_no_table(once):
+    folder, _ = once
+    assert sorted(set(frames_of(folder).frame)) == [*range(10, 20), *range(21, 26)]
+    regions = pd.read_csv(folder / "reports" / "regions.csv")
+    assert set(regions.frame) == set(frames_of(folder).frame)
+
+
+def test_every_variant_and_stage_is_in_the_tables(once):
+    folder, _ = once
+    rows = frames_of(folder)
+    assert set(zip(rows.variant, rows.stage, strict=True)) == {
+        *((v, s) for v in ("filtered", "unfiltered") for s in ("similarity", "svm", "post")),
+        ("blind", "post"),
+    }
+
+
+def test_counts_are_conserved_in_every_row(once):
+    rows = frames_of(once[0])
+    assert (rows.TP + rows.TN + rows.FP + rows.FN == rows.N).all()
+    assert (rows.N == 24 * 32).all()
+
+
+def test_the_last_window_says_how_short_it_is(once):
+    windows = pd.read_csv(once[0] / "reports" / "windows.csv")
+    assert windows[windows.window == windows.window.max()].frames.unique() == [5]
+
+
+def test_the_recording_holds_the_masks_that_were_scored(once):
+    folder, outcome = once
+    recording = roadeval.Recording(outcome.recording)
+    scored = frames_of(folder).set_index(["frame", "variant", "stage"])
+    for number in (10, 25):
+        truth = recording.truth(number)
+        for stage in ("similarity", "svm", "post"):
+            mask = recording.layer("unfiltered", stage, number)
+            assert ((mask == 1) & (truth == 1)).sum() == scored.TP[number, "unfiltered", stage]
+            assert ((mask == 1) & (truth == 0)).sum() == scored.FP[number, "unfiltered", stage]
+
+
+def test_the_summary_file_is_the_outcome_s_summary(once):
+    folder, outcome = once
+    written = json.loads((folder / "reports" / "summary.json").read_text())
+    assert written["format"] == {"name": "roadeval-summary", "version": 1}
+    assert written == json.loads(summary_text(outcome.summary))
+
+
+def test_no_partial_file_is_left(once):
+    folder, _ = once
+    assert sorted(p.name for p in folder.iterdir()) == ["out.rrd", "reports"]
+    assert not [p for p in (folder / "reports").iterdir() if "partial" in p.name]
+
+
+def test_figures_are_written(once):
+    names = {p.name for p in (once[0] / "reports").iterdir()}
+    for figure in ("fig2_masks", "fig3a_error_rate", "fig3b_fp_fn_rate"):
+        assert {f"{figure}.png", f"{figure}.pdf"} <= names
+
+
+def test_the_number_of_workers_changes_no_number(drive, once, tmp_path):
+    run(drive, tmp_path, jobs=1)
+    for table in COLUMNS:
+        other = (tmp_path / "reports" / f"{table}.csv").read_bytes()
+        assert other == (once[0] / "reports" / f"{table}.csv").read_bytes()
+
+
+def test_frames_after_training_can_be_left_out(drive, tmp_path):
+    outcome = run(drive, tmp_path, train_frames=4, train_gap=5)
+    assert outcome.summary["frames"]["skipped"]["gap after training"] == 5
+    assert frames_of(tmp_path).frame.min() == 9
+
+
+def test_a_model_file_leaves_its_own_frames_out_and_evaluates_the_rest(drive, tmp_path):
+    model = roadeval.train([drive], tmp_path / "m.model", options=ReplayOptions(train_frames=5))
+    outcome = run(drive, tmp_path, model=tmp_path / "m.model")
+    assert outcome.summary["frames"]["trained_on"] == len(model.digests) == 5
+    assert outcome.summary["frames"]["evaluated"] == 20
+
+
+def test_training_frames_of_the_drive_itself_are_warned_of(drive, tmp_path):
+    roadeval.train([drive], tmp_path / "m.model", options=ReplayOptions(train_frames=5))
+    warnings = run(drive, tmp_path, model=tmp_path / "m.model").summary["warnings"]
+    assert any("5 of the model's 5 training frames lie in this drive; their" in w for w in warnings)
+
+
+def test_the_variants_of_a_model_file_are_bound_once(drive, tmp_path, monkeypatch):
+    roadeval.train([drive], tmp_path / "m.model")
+    bound = []
+
+    def table(machine, settings):
+        bound.append(machine)
+        return made(machine, settings)
+
+    made = classify.colour_table
+    monkeypatch.setattr(classify, "colour_table", table)
+    run(drive, tmp_path, model=tmp_path / "m.model", max_frames=3)
+    assert len(bound) == len({id(machine) for machine in bound}) == 2
+
+
+def test_a_model_of_another_drive_is_not_warned_of(drive, tmp_path):
+    half = ReplayOptions(train_frames=5, end="1.25")
+    roadeval.train([drive], tmp_path / "m.model", options=half)
+    outcome = run(drive, tmp_path, model=tmp_path / "m.model", start="1.25")
+    assert outcome.summary["frames"]["evaluated"] > 0
+    assert not [text for text in outcome.warnings if "training frames lie" in text]
+
+
+def test_a_range_without_truth_is_replayed_by_the_patch(drive, tmp_path):
+    # Frame 20 alone has no truth.
+    outcome = run(drive, tmp_path, start="2.0", end="2.1")
+    assert outcome.summary["training"]["source"] == "patch"
+    assert outcome.summary["frames"]["evaluated"] == 0
+    assert any("no frame of the range has road truth" in text for text in outcome.warnings)
+
+
+def test_a_log_without_truth_trains_a_model_for_others(drive, tmp_path):
+    bare = write_log(tmp_path / "bare.mcap", truth=False)
+    (tmp_path / "c.toml").write_text('[training]\nsource = "patch"')
+    options = ReplayOptions(config=load_config(tmp_path / "c.toml"))
+    assert roadeval.train([bare], tmp_path / "m.model", options=options).source == "patch"
+    assert roadeval.train([bare, drive], tmp_path / "m.model", options=options).source == "patch"
+    assert run(bare, tmp_path, model=tmp_path / "m.model").summary["training"]["frames"] == 10
+
+
+def test_the_memory_of_training_is_bounded_over_all_drives(drive, tmp_path, monkeypatch):
+    other = write_log(tmp_path / "other.mcap")
+    monkeypatch.setattr("roadeval.jobs.learning.GREATEST_MEMORY", 15 * 10_000)
+    with pytest.raises(RoadevalError, match=r"more than 1\d of them would take"):
+        roadeval.train([drive, other], tmp_path / "m.model")
+
+
+def test_a_drive_without_truth_is_no_help_to_others(drive, tmp_path):
+    bare = write_log(tmp_path / "bare.mcap", truth=False)
+    with pytest.raises(RoadevalError, match=r"bare\.mcap: no road truth to train on"):
+        roadeval.train([drive, bare], tmp_path / "m.model")
+    assert not (tmp_path / "m.model").exists()
+
+
+def test_a_model_made_for_other_settings_is_refused(drive, tmp_path):
+    roadeval.train([drive], tmp_path / "m.model")
+    (tmp_path / "c.toml").write_text("[svm]\ngamma = 3.0")
+    with pytest.raises(RoadevalError, match=r"gamma 0.5 there, 3.0 here"):
+        run(drive, tmp_path, model=tmp_path / "m.model", config=load_config(tmp_path / "c.toml"))
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["c.toml", "m.model"]
+
+
+def test_a_further_variant_is_run_like_the_two(drive, tmp_path):
+    config = Config()
+    wide = replace(
+        config, stages={**config.stages, "shadow": type(config.stages["shadow"])(ring_width=3)}
+    )
+    outcome = run(drive, tmp_path, variants={"wide": wide}, max_frames=16)
+    assert set(outcome.summary["totals"]["wide"]) == {"similarity", "svm", "post"}
+    assert roadeval.Recording(outcome.recording).layer("wide", "rings", 12).max() == 2
+
+
+def test_a_mask_in_the_log_is_scored_as_a_variant(drive, tmp_path):
+    outcome = run(drive, tmp_path, mask_topics={"net": "/net/road_mask_prediction"})
+    total = outcome.summary["totals"]["net"]["post"]
+    assert (total["ERR"], total["frames"]) == (0, 15)
+    assert roadeval.Recording(outcome.recording).layer("net", "post", 12).max() == 1
+
+
+def test_the_folder_of_the_log_is_made_and_gone_again_if_the_run_is_refused(drive, tmp_path):
+    names = {"save": "o.rrd", "reports": "reports", "mcap": "new/m.mcap"}
+    outputs = {option: tmp_path / name for option, name in names.items()}
+    with pytest.raises(RoadevalError, match="--train-frames"):
+        roadeval.replay(drive, **outputs, options=ReplayOptions(max_frames=3))
+    assert list(tmp_path.iterdir()) == []
+    roadeval.replay(drive, **outputs, options=ReplayOptions(max_frames=14))
+    assert (tmp_path / "new" / "m.mcap").exists()
+
+
+def test_results_become_a_log_with_the_images_own_times(drive, tmp_path):
+    roadeval.replay(drive, save=tmp_path / "o.rrd", reports=tmp_path, mcap=tmp_path / "side.mcap")
+    scored = pd.read_csv(tmp_path / "frames.csv").query("variant == 'filtered' and stage == 'post'")
+    with open_log(tmp_path / "side.mcap") as side:
+        counts = {topic.name: topic.count for topic in side.topics}
+        masks = side.select(image="/roadeval/filtered/post", truth="")
+        stamps = [logged.stamp_ns for logged in side.frames(masks)]
+    assert counts["/roadeval/unfiltered/svm"] == FRAMES
+    assert counts["/roadeval/metrics/filtered/post"] == len(scored)
+    assert stamps == [(number + 1) * NS for number in range(FRAMES)]
+
+
+def test_what_the_log_lost_is_told(data, tmp_path):
+    outcome = run(data / "mcap" / "broken" / "zero_hole.mcap", tmp_path)
+    assert outcome.summary["frames"]["read"] == 38
+    assert "a chunk that zstd cannot uncompress" in outcome.losses[0]
+    assert outcome.summary["losses"] == list(outcome.losses)
+
+
+def test_a_log_without_truth_is_recorded_and_not_scored(tmp_path):
+    log = write_log(tmp_path / "plain.mcap", truth=False)
+    outcome = run(log, tmp_path)
+    assert outcome.summary["totals"] == {}
+    assert "no road truth" in outcome.warnings[0]
+    assert not (tmp_path / "reports" / "frames.csv").exists()
+    assert roadeval.Recording(outcome.recording).layer("filtered", "post", 15).shape == (24, 32)
+
+
+def test_a_broken_frame_costs_itself_alone_and_is_named(tmp_path):
+    log = write_log(tmp_path / "hurt.mcap", broken=13)
+    outcome = run(log, tmp_path)
+    assert outcome.summary["frames"]["decoded"] == 25
+    assert outcome.summary["frames"]["evaluated"] == 14
+    assert "13" in outcome.losses[0]
+    assert 13 not in set(frames_of(tmp_path).frame)
+
+
+def test_without_a_recording_the_tables_are_the_same(drive, once, tmp_path):
+    outcome = run(drive, tmp_path, record="none")
+    assert outcome.recording is None
+    assert not (tmp_path / "out.rrd").exists()
+    frames = (tmp_path / "reports" / "frames.csv").read_bytes()
+    assert frames == (once[0] / "reports" / "frames.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("rule", "pictured", "layers"),
+    [
+        ("all", range(26), {"ndi", "post"}),
+        ("masks", range(26), {"post"}),
+        ("every:7", range(0, 26, 7), {"ndi", "post"}),
+    ],
+)
+def test_pictures_are_recorded_by_the_rule(drive, tmp_path, rule, pictured, layers):
+    recording = roadeval.Recording(run(drive, tmp_path, record=rule).recording)
+    assert list(recording.frame_numbers) == list(pictured)
+    assert len(recording.frames.frame.unique()) == 15
+    for layer in ("ndi", "post"):
+        if layer in layers:
+            recording.layer("filtered", layer, 14)
+        else:
+            with pytest.raises(RoadevalError):
+                recording.layer("filtered", layer, 14)
+
+
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_the_worst_frames_pictures_are_those_of_the_highest_err(drive, tmp_path, jobs):
+    recording = roadeval.Recording(run(drive, tmp_path, record="worst:4", jobs=jobs).recording)
+    final = frames_of(tmp_path).query("stage == 'post' and variant != 'blind'")
+    worst = final.groupby("frame").ERR.max().sort_values(ascending=False, kind="stable")
+    assert list(recording.frame_numbers) == sorted(worst.index[:4])
+
+
+@pytest.mark.parametrize("rule", ["worst", "worst:0", "some", "every:-1", ""])
+def test_another_rule_is_refused(drive, tmp_path, rule):
+    with pytest.raises(RoadevalError, match="choose all, masks, worst:K"):
+        run(drive, tmp_path, record=rule)
+
+
+def test_an_error_on_the_way_leaves_no_results_and_a_partial_recording(
+    drive, tmp_path, monkeypatch
+):
+    from roadeval.evaluation.scoreboard import Scoreboard
+
+    add = Scoreboard.add
+
+    def fail(self, result):
+        if result.frame.number == 12:
+            raise KeyboardInterrupt
+        add(self, result)
+
+    monkeypatch.setattr(Scoreboard, "add", fail)
+    with pytest.raises(KeyboardInterrupt):
+        run(drive, tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["out.partial.rrd"]
+    partial = roadeval.Recording(tmp_path / "out.partial.rrd")
+    assert not partial.complete
+    assert partial.layer("unfiltered", "svm", 5).shape == (24, 32)
+
+
+@pytest.mark.parametrize("output", ["save", "mcap"])
+def test_an_output_never_replaces_the_drive(tmp_path, output):
+    log = write_log(tmp_path / "small.mcap")
+    before = log.read_bytes()
+    with pytest.raises(RoadevalError, match="is an input or another output"):
+        roadeval.replay(log, **{"save": tmp_path / "o.rrd", "reports": tmp_path, output: log})
+    with pytest.raises(RoadevalError, match="is an input or another output"):
+        roadeval.train([log], log)
+    assert log.read_bytes() == before
+
+
+def test_a_variant_s_own_training_is_not_followed_and_this_is_said(drive, tmp_path):
+    (tmp_path / "v.toml").write_text("[training]\nframes = 3")
+    config = load_config(tmp_path / "v.toml")
+    outcome = run(drive, tmp_path, variants={"v": config}, max_frames=14)
+    assert outcome.summary["totals"]["v"]["post"]["frames"] == 4
+    assert any("v: its own [training] is not followed" in text for text in outcome.warnings)
+
+
+@pytest.mark.parametrize("jobs", [0, -2])
+def test_no_workers_are_refused(drive, tmp_path, jobs):
+    with pytest.raises(RoadevalError, match="at least one worker"):
+        run(drive, tmp_path, jobs=jobs)
+
+
+@pytest.mark.parametrize("table", COLUMNS)
+def test_a_table_is_the_same_in_the_folder_and_in_the_recording_bit_by_bit(once, table):
+    folder, outcome = once
+    recording, results = roadeval.Recording(outcome.recording), Results(folder / "reports")
+    written = results.table(table)
+    assert len(written)
+    pd.testing.assert_frame_equal(recording.table(table), written, check_exact=True)
+
+
+def test_the_summary_tells_what_was_asked_of_the_log(drive, tmp_path):
+    asked = {
+        "truth_topic": "/truth/road",
+        "road_labels": (255,),
+        "start": "0.2",
+        "every": 2,
+        "max_frames": 12,
+        "sync_tolerance_ms": 3.0,
+        "record": "none",
+        "resize_truth": True,
+    }
+    run(drive, tmp_path, train_frames=4, jobs=1, **asked)
+    told = json.loads((tmp_path / "reports" / "summary.json").read_text())["selection"]
+    assert {name: told[name] for name in asked} == asked | {"road_labels": [255]}
+    assert (told["end"], told["mask_topics"], told["keep_corrupt"]) == (None, {}, False)
+    assert not {"jobs", "config", "train_frames"} & set(told)
+
+
+def test_changes_are_what_the_recorded_masks_show(once):
+    folder, outcome = once
+    recording = roadeval.Recording(outcome.recording)
+    changes = Results(folder / "reports").table("changes")
+    step = changes.query("from_stage == 'similarity' and to_variant == 'unfiltered'").iloc[0]
+    repaired = spoiled = 0
+    for number in frames_of(folder).frame.unique():
+        truth = recording.truth(number)
+        before, after = (
+            recording.layer("unfiltered", stage, number) for stage in ("similarity", "svm")
+        )
+        repaired += ((before != truth) & (after == truth)).sum()
+        spoiled += ((before == truth) & (after != truth)).sum()
+    assert repaired + spoiled > 0
+    assert (step.repaired, step.spoiled, step.N) == (repaired, spoiled, 15 * 24 * 32)
+
+
+def test_heat_maps_add_up_to_the_tables(once):
+    folder, _ = once
+    heat = Results(folder / "reports").table("heat").groupby("variant")[["labelled", "FP", "FN"]]
+    final = frames_of(folder).query("stage == 'post'").groupby("variant")[["N", "FP", "FN"]]
+    for variant, sums in heat.sum().iterrows():
+        assert sums.tolist() == final.sum().loc[variant].tolist()
+
+
+def test_a_perfect_svm_is_counted_on_evaluated_frames_alone_and_in_no_other_table(once):
+    folder, outcome = once
+    oracles = Results(folder / "reports").table("oracles")
+    assert set(zip(oracles.variant, oracles.oracle, oracles.stage, strict=True)) == {
+        (variant, "svm", "post") for variant in ("filtered", "unfiltered")
+    }
+    assert set(oracles.frame) == set(frames_of(folder).frame)
+    total = outcome.summary["oracles"]["filtered"]["svm"]["post"]
+    assert total["frames"] == 15
+    assert total["FP"] == oracles[oracles.variant == "filtered"].FP.sum()
+
+
+def test_a_mask_in_the_log_has_no_oracles(drive, tmp_path):
+    outcome = run(drive, tmp_path, mask_topics={"net": "/net/road_mask_prediction"})
+    assert set(outcome.summary["oracles"]) == {"filtered", "unfiltered"}
+    assert outcome.summary["beyond"]["net"]["boundary_F"] == 1
+
+
+def test_flicker_is_counted_from_each_evaluated_frame_to_the_next_one_read(once, drive, tmp_path):
+    """Frame 20 has no truth, so neither 19 to 20 nor 20 to 21 is a pair."""
+    _, outcome = once
+    assert outcome.summary["beyond"]["filtered"]["pairs"] == 9 + 4
+    every = run(drive, tmp_path, every=2, train_frames=4).summary
+    assert every["beyond"]["filtered"]["pairs"] == (6 - 1) + (2 - 1)
+
+
+def test_a_broken_frame_is_no_neighbour(tmp_path):
+    log = write_log(tmp_path / "hurt.mcap", broken=13)
+    assert run(log, tmp_path).summary["beyond"]["filtered"]["pairs"] == 2 + 5 + 4
+
+
+def test_a_scale_reduces_images_truth_and_recording_alike(drive, tmp_path, once):
+    outcome = run(drive, tmp_path, scale=0.5, mask_topics={"net": "/net/road_mask_prediction"})
+    full, small = once[1].summary["drive"], outcome.summary["drive"]
+    assert (small["width"], small["height"]) == (full["width"] // 2, full["height"] // 2)
+    assert outcome.summary["selection"]["scale"] == 0.5
+    frames = frames_of(tmp_path)
+    assert set(frames["N"]) == {small["width"] * small["height"]}
+    # The log's own masks are reduced like the truth that they are copies of.
+    assert set(frames[frames["variant"] == "net"]["ERR"]) == {0.0}
+    recording = roadeval.Recording(outcome.recording)
+    number = int(frames["frame"].iloc[0])
+    assert recording.image(number).shape == (small["height"], small["width"], 3)
+    assert recording.layer("filtered", "post", number).shape == (small["height"], small["width"])
+
+
+@pytest.mark.parametrize("scale", [0, -1, 1.01, float("nan")])
+def test_a_scale_that_is_no_share_is_refused(scale):
+    with pytest.raises(RoadevalError, match="--scale"):
+        ReplayOptions(scale=scale)
+
+
+def test_reduced_frames_and_a_model_of_another_size_are_told(drive, tmp_path):
+    roadeval.train([drive], tmp_path / "m.model", options=ReplayOptions(scale=0.5))
+    warnings = " ".join(run(drive, tmp_path, model=tmp_path / "m.model").warnings)
+    assert "the model learnt from frames of" in warnings
+    assert "are reduced to" not in warnings
+    same = run(drive, tmp_path, model=tmp_path / "m.model", scale=0.5)
+    warnings = " ".join(same.summary["warnings"])
+    assert "in the log, are reduced to 0.5 of it" in warnings
+    assert "the model learnt from frames of" not in warnings
+
+
+def test_reduced_masks_do_not_go_beside_the_log(drive, tmp_path):
+    with pytest.raises(RoadevalError, match="--mcap and --scale do not go"):
+        roadeval.replay(drive, mcap=tmp_path / "o.mcap", options=ReplayOptions(scale=0.5))
+
+
+def test_results_that_wait_have_lost_their_layers_but_not_their_masks(drive):
+    class Seen:
+        def encode(self, result, position):
+            return result
+
+    options = ReplayOptions(max_frames=14)
+    with open_log(drive) as log:
+        *_, (lean, whole) = Run(log, options, lambda progress: None).frames(Seen())
+    assert any(list(variant.layers()) for variant in whole.variants)
+    assert not any(list(variant.layers()) for variant in lean.variants)
+    assert lean.tallies == whole.tallies
+    for mine, its in zip(lean.variants, whole.variants, strict=True):
+        assert [name for name, _ in mine.masks()] == [name for name, _ in its.masks()]

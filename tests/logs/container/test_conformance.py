@@ -1,0 +1,92 @@
+"""The MCAP project's own conformance suite: every record, message and channel as expected."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.opcode import Opcode
+
+from roadeval.logs.container.chunks import ChunkReader
+from roadeval.logs.container.damage import damage_of
+from roadeval.logs.container.file import Container
+from roadeval.logs.container.records import (
+    MAGIC,
+    Message,
+    Place,
+    message_at,
+    parse,
+    parse_chunk,
+    walk,
+)
+from roadeval.logs.container.source import Bytes, Part, Source
+
+FOLDERS = (
+    "NoData",
+    "OneAttachment",
+    "OneMessage",
+    "OneMetadata",
+    "OneSchemalessMessage",
+    "TenMessages",
+)
+
+
+def plain(value: Any) -> Any:
+    """A value as the suite's JSON writes it: numbers and bytes as strings."""
+    if isinstance(value, bytes | memoryview):
+        return [str(byte) for byte in value]
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    return value if isinstance(value, str) else str(value)
+
+
+def fields(record: Any) -> dict[str, Any]:
+    named = record._asdict() if isinstance(record, Message) else vars(record)
+    return {key: plain(value) for key, value in named.items()}
+
+
+def records(source: Bytes, chunks: ChunkReader) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Every record as the suite lists them: chunks unpacked, message indexes left out."""
+    for place in walk(source):
+        body = source.read(place.body, place.end - place.body)
+        if place.opcode == Opcode.CHUNK:
+            in_file = Place(place.opcode, *(offset + len(MAGIC) for offset in place[1:]))
+            yield from records(chunks.read(parse_chunk(in_file, body)), chunks)
+        elif place.opcode == Opcode.MESSAGE:
+            yield "Message", fields(message_at(source, place.offset))
+        elif place.opcode != Opcode.MESSAGE_INDEX and place.opcode <= Opcode.DATA_END:
+            record = parse(place.opcode, body)
+            yield type(record).__name__, fields(record)
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_every_file_reads_as_expected(data: Path, folder: str) -> None:
+    paths = sorted((data / "mcap" / "conformance" / folder).glob("*.mcap"))
+    assert paths
+    for path in paths:
+        expected = json.loads(path.with_suffix(".json").read_text())["records"]
+        source = Source(path)
+        inner = Part(source, len(MAGIC), source.size - 2 * len(MAGIC))
+        found = list(records(inner, ChunkReader(source)))
+        source.close()
+        assert found == [(r["type"], dict(r["fields"])) for r in expected], path.name
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_every_message_is_found_and_nothing_is_called_damaged(data: Path, folder: str) -> None:
+    for path in sorted((data / "mcap" / "conformance" / folder).glob("*.mcap")):
+        expected = json.loads(path.with_suffix(".json").read_text())["records"]
+        messages = [dict(r["fields"]) for r in expected if r["type"] == "Message"]
+        container = Container(path, lambda *_: True, lambda *_: True)
+        found = [
+            fields(container.message(chunk, offset))
+            for log in container.logs.values()
+            for chunk, entries in log.blocks
+            for _, offset in entries.tolist()
+        ]
+        topics = {channel.topic for channel in container.channels.values()}
+        assert damage_of(container) == (), path.name
+        container.close()
+        assert found == messages, path.name
+        assert topics == {dict(r["fields"])["topic"] for r in expected if r["type"] == "Channel"}

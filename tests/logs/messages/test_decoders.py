@@ -1,0 +1,144 @@
+"""Messages in every encoding, to the picture they carry."""
+
+import json
+import struct
+from typing import Any
+
+import pytest
+import zstandard
+from mcap.records import Channel, Schema
+from mcap_ros2._dynamic import serialize_dynamic
+
+from roadeval.logs.container.records import Message
+from roadeval.logs.errors import BadMessage
+from roadeval.logs.messages.decoders import decoder_for, message_is_whole
+from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPicture
+from tests.logs.making import COMPRESSED, IMAGE, compressed, grey, raw
+
+STAMP = 1_700_000_000_123_456_789
+IMAGE_NAME, COMPRESSED_NAME = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+
+
+def channel(encoding: str) -> Channel:
+    return Channel(id=1, topic="/cam", message_encoding=encoding, metadata={}, schema_id=1)
+
+
+def schema(name: str, encoding: str, text: str = "") -> Schema:
+    return Schema(id=1, name=name, encoding=encoding, data=text.encode())
+
+
+def cdr(message: dict[str, Any]) -> bytes:
+    name, text = (COMPRESSED_NAME, COMPRESSED) if "format" in message else (IMAGE_NAME, IMAGE)
+    data: bytes = serialize_dynamic(name, text)[name](message)
+    return data
+
+
+def read(encoding: str, described: Schema | None, data: bytes) -> Picture:
+    return decoder_for(channel(encoding), described).picture(data)
+
+
+RAW = cdr(raw(STAMP, grey(7, 2, 1), "mono8"))
+PACKED = cdr(compressed(STAMP, b"file"))
+
+
+@pytest.mark.parametrize(
+    ("encoding", "text"),
+    [("ros2msg", IMAGE), ("ros2idl", "module ..."), ("omgidl", "module ..."), ("", "")],
+)
+def test_cdr_is_read_whatever_language_its_schema_is_in(encoding: str, text: str) -> None:
+    picture = read("cdr", schema(IMAGE_NAME, encoding, text), RAW)
+    assert isinstance(picture, RawPicture)
+    assert (picture.stamp_ns, picture.width, picture.height) == (STAMP, 2, 1)
+    assert (picture.encoding, picture.step, bytes(picture.data)) == ("mono8", 2, b"\x07\x07")
+
+
+@pytest.mark.parametrize("data", [RAW, PACKED, zstandard.ZstdCompressor().compress(RAW)])
+def test_the_stamp_alone_is_read_without_the_rest(data: bytes) -> None:
+    name = COMPRESSED_NAME if data is PACKED else IMAGE_NAME
+    assert decoder_for(channel("cdr"), schema(name, "")).stamp(data) == STAMP
+
+
+def test_a_schema_that_makes_no_sense_leaves_its_name() -> None:
+    picture = read("cdr", schema(COMPRESSED_NAME, "ros2msg", "uint3 nonsense"), PACKED)
+    assert isinstance(picture, CompressedPicture)
+    assert bytes(picture.data) == b"file"
+
+
+def test_big_endian_cdr_is_read() -> None:
+    data = b"\x00\x00\x00\x00" + struct.pack(
+        ">III4sI5sxxxI4s", STAMP // 10**9, STAMP % 10**9, 4, b"cam\0", 5, b"jpeg\0", 4, b"file"
+    )
+    picture = read("cdr", schema(COMPRESSED_NAME, ""), data)
+    assert isinstance(picture, CompressedPicture)
+    assert (picture.stamp_ns, picture.format, bytes(picture.data)) == (STAMP, "jpeg", b"file")
+
+
+def test_ros_1_is_read_with_its_header_count_and_without_alignment() -> None:
+    data = struct.pack("<IIII3sI4sI4s", 9, 1, 2, 3, b"cam", 4, b"jpeg", 4, b"file")
+    picture = read("ros1", schema("sensor_msgs/CompressedImage", ""), data)
+    assert isinstance(picture, CompressedPicture)
+    assert (picture.stamp_ns, picture.format, bytes(picture.data)) == (10**9 + 2, "jpeg", b"file")
+
+
+def test_a_message_compressed_by_rosbag2_is_unpacked() -> None:
+    data = zstandard.ZstdCompressor().compress(PACKED)
+    picture = read("cdr", schema(COMPRESSED_NAME, "ros2msg", COMPRESSED), data)
+    assert isinstance(picture, CompressedPicture)
+    assert bytes(picture.data) == b"file"
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"timestamp": {"sec": 5, "nsec": 6}},
+        {"timestamp": {"seconds": 5, "nanos": 6}},
+        {"timestamp": "1970-01-01T00:00:05.000000006Z"},
+        {"header": {"stamp": {"sec": 5, "nanosec": 6}, "frame_id": "cam"}},
+        {"header": {"stamp": {"secs": 5, "nsecs": 6}, "frame_id": "cam"}},
+    ],
+)
+def test_json_is_read_with_every_form_of_a_stamp(fields: dict[str, Any]) -> None:
+    message = fields | {"format": "jpeg", "data": "ZmlsZQ=="}
+    picture = read("json", None, json.dumps(message).encode())
+    assert isinstance(picture, CompressedPicture)
+    assert (picture.stamp_ns, picture.format, bytes(picture.data)) == (
+        5_000_000_006,
+        "jpeg",
+        b"file",
+    )
+
+
+def test_json_may_hold_its_bytes_as_numbers_and_no_stamp() -> None:
+    message = {"width": 2, "height": 1, "encoding": "mono8", "step": 2, "data": [7, 8]}
+    picture = read("json", None, json.dumps(message).encode())
+    assert isinstance(picture, RawPicture)
+    assert (picture.stamp_ns, bytes(picture.data)) == (0, b"\x07\x08")
+
+
+@pytest.mark.parametrize(
+    ("encoding", "described", "data"),
+    [
+        ("json", None, b'{"x": 1}'),
+        ("json", None, b"{"),
+        ("json", None, b'{"format": "jpeg", "data": "?"}'),
+        ("cdr", schema(COMPRESSED_NAME, ""), b"\x00\x01\x00"),
+        ("cdr", schema(COMPRESSED_NAME, ""), PACKED[:-2]),
+        ("flatbuffer", schema("foxglove.CompressedImage", "flatbuffer"), b"\x10\x00\x00\x00abc"),
+        ("protobuf", schema("foxglove.CompressedImage", "protobuf", "?"), b""),
+        ("cbor", schema("foxglove.CompressedImage", ""), b""),
+    ],
+)
+def test_what_cannot_be_read_is_refused(
+    encoding: str, described: Schema | None, data: bytes
+) -> None:
+    with pytest.raises(BadMessage):
+        read(encoding, described, data)
+
+
+@pytest.mark.parametrize(
+    ("data", "whole"), [(PACKED, True), (PACKED[:-1], False), (PACKED + b"more", False)]
+)
+def test_a_message_is_as_long_as_its_fields_say(data: bytes, whole: bool) -> None:
+    message = Message(1, 0, 0, 0, memoryview(data))
+    described = schema(COMPRESSED_NAME, "ros2msg", COMPRESSED)
+    assert message_is_whole(channel("cdr"), described, message) is whole

@@ -1,0 +1,94 @@
+"""Pixels as logged, to RGB."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from roadeval.logs.errors import BadMessage
+from roadeval.logs.messages.pictures import RawPicture
+from roadeval.logs.messages.pixels import to_labels, to_rgb
+
+
+def picture(data: bytes, encoding: str, width: int, height: int = 1, **more: Any) -> RawPicture:
+    fields: dict[str, Any] = {"step": 0, "big_endian": False} | more
+    return RawPicture(0, width, height, encoding, fields["step"], fields["big_endian"], data)
+
+
+def row(data: bytes, encoding: str, width: int = 1, **more: Any) -> list[list[int]]:
+    found: npt.NDArray[np.uint8] = to_rgb(picture(data, encoding, width, **more))
+    pixels: list[list[int]] = found[0].tolist()
+    return pixels
+
+
+@pytest.mark.parametrize(
+    ("encoding", "data"),
+    [
+        ("rgb8", [10, 20, 30]),
+        ("RGB8", [10, 20, 30]),
+        ("bgr8", [30, 20, 10]),
+        ("8UC3", [30, 20, 10]),
+        ("rgba8", [10, 20, 30, 99]),
+        ("bgra8", [30, 20, 10, 99]),
+        ("8UC4", [30, 20, 10, 99]),
+    ],
+)
+def test_channels_are_put_in_order(encoding: str, data: list[int]) -> None:
+    assert row(bytes(data), encoding) == [[10, 20, 30]]
+
+
+@pytest.mark.parametrize("encoding", ["mono8", "8UC1"])
+def test_grey_fills_all_channels(encoding: str) -> None:
+    assert row(b"\x07\x09", encoding, 2) == [[7, 7, 7], [9, 9, 9]]
+
+
+def test_sixteen_bits_keep_the_upper_half() -> None:
+    assert row(b"\x34\x12", "mono16") == [[0x12] * 3]
+    assert row(b"\x12\x34", "mono16", big_endian=True) == [[0x12] * 3]
+    assert row(b"\x00\x01\x00\x02\x00\x03", "rgb16") == [[1, 2, 3]]
+
+
+def test_floats_count_from_zero_to_one_and_nan_is_black() -> None:
+    data = np.array([0, 0.5, 1, 2, np.nan], np.float32).tobytes()
+    assert [r for r, _, _ in row(data, "32FC1", 5)] == [0, 128, 255, 255, 0]
+
+
+@pytest.mark.parametrize(
+    ("encoding", "pixel"), [("rgb8", 3), ("bgr8", 3), ("mono8", 1), ("rgb16", 6), ("bgra8", 4)]
+)
+@pytest.mark.parametrize("padding", [0, 2])
+def test_an_image_is_an_array_of_its_own(encoding: str, pixel: int, padding: int) -> None:
+    """Else every loop would be compiled again, for arrays of another kind."""
+    step = 2 * pixel + padding
+    image = to_rgb(picture(bytes(2 * step), encoding, 2, 2, step=step))
+    assert image.flags.c_contiguous
+    assert image.flags.writeable
+
+
+def test_padding_between_rows_is_skipped() -> None:
+    padded = picture(b"\x01\x02xx\x03\x04xx", "mono8", 2, 2, step=4)
+    assert to_rgb(padded)[..., 0].tolist() == [[1, 2], [3, 4]]
+
+
+def test_the_last_row_may_lack_its_padding() -> None:
+    assert to_rgb(picture(b"\x01\x02xx\x03\x04", "mono8", 2, 2, step=4))[1, 1, 0] == 4
+
+
+def test_labels_keep_sixteen_bits() -> None:
+    assert to_labels(picture(b"\x2c\x01", "16UC1", 1)).tolist() == [[300]]
+
+
+@pytest.mark.parametrize(
+    ("bad", "reason"),
+    [
+        (picture(b"\x01", "mono8", 2), "1 bytes of pixels where 2 are needed"),
+        (picture(b"", "mono8", 0), "an image of 0x1"),
+        (picture(b"\x01\x02", "mono8", 2, step=1), "with 1 bytes a row"),
+        (picture(b"\x01", "mono8", 2**31, 2**31), "an image of"),
+        (picture(b"\x01", "h8s2", 1), "encoding 'h8s2' is unknown"),
+    ],
+)
+def test_what_cannot_be_is_refused(bad: RawPicture, reason: str) -> None:
+    with pytest.raises(BadMessage, match=reason):
+        to_rgb(bad)

@@ -1,0 +1,103 @@
+"""Which topics are picked, and when the user is asked."""
+
+import pytest
+
+from roadeval.logs import Kind, LogError, TopicInfo
+from roadeval.logs.topics.choose import choose_image, choose_shadow, choose_truth
+
+
+def camera(name: str) -> TopicInfo:
+    return TopicInfo(name, "CompressedImage", "cdr", Kind.COMPRESSED, 5, format="jpeg", channels=3)
+
+
+def label(name: str) -> TopicInfo:
+    return TopicInfo(name, "Image", "cdr", Kind.IMAGE, 5, format="mono8", channels=1)
+
+
+def other(name: str) -> TopicInfo:
+    return TopicInfo(name, "sensor_msgs/msg/Imu", "cdr", Kind.OTHER, 5)
+
+
+def truth_of(*labels: TopicInfo, image: str = "/front/image") -> str | None:
+    topics = [camera(image), *labels]
+    topic, _ = choose_truth(topics, topics[0], None)
+    return topic.name if topic else None
+
+
+def test_the_only_image_topic_is_picked() -> None:
+    topic, why = choose_image([camera("/cam"), other("/imu")], None)
+    assert topic.name == "/cam"
+    assert "only" in why
+
+
+def test_labels_and_masks_are_no_cameras() -> None:
+    topics = [camera("/cam"), label("/labels/semantic"), label("/road_mask"), label("/shadowMask")]
+    assert choose_image(topics, None)[0].name == "/cam"
+
+
+def test_a_grey_camera_is_a_camera() -> None:
+    assert choose_image([label("/cam/mono"), label("/labels")], None)[0].name == "/cam/mono"
+
+
+def test_depth_is_picked_only_where_there_is_nothing_else() -> None:
+    depth = TopicInfo("/cam/depth", "Image", "cdr", Kind.IMAGE, 5, format="16UC1", channels=1)
+    assert choose_image([camera("/cam/rgb"), depth], None)[0].name == "/cam/rgb"
+    assert choose_image([depth], None)[0].name == "/cam/depth"
+
+
+def test_two_cameras_are_listed_with_the_option() -> None:
+    with pytest.raises(LogError, match=r"/left/image, /right/image; .*--image-topic"):
+        choose_image([camera("/left/image"), camera("/right/image")], None)
+
+
+def test_an_unknown_topic_lists_the_valid_ones() -> None:
+    topics = [camera("/left"), camera("/right"), other("/imu")]
+    with pytest.raises(LogError, match=r"--image-topic /lef: is not in the log; .*: /left, /right"):
+        choose_image(topics, "/lef")
+    with pytest.raises(LogError, match=r"/imu: carries no images"):
+        choose_image(topics, "/imu")
+
+
+def test_a_log_without_images_lists_what_it_has() -> None:
+    with pytest.raises(LogError, match=r"no image topic; the log has: /imu \(sensor_msgs/msg/Imu"):
+        choose_image([other("/imu")], None)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["/labels/semantic", "/front/road_mask", "/truth/road", "/gt", "/mask", "/front/GroundTruth"],
+)
+def test_one_plain_label_image_is_the_truth(name: str) -> None:
+    assert truth_of(label(name)) == name
+
+
+@pytest.mark.parametrize(
+    "name", ["/ego_mask", "/shadow_mask", "/net/road_mask", "/mono", "/truth/shadow"]
+)
+def test_other_masks_are_no_road_truth(name: str) -> None:
+    assert truth_of(label(name)) is None
+
+
+def test_a_coloured_picture_of_labels_is_no_truth() -> None:
+    assert truth_of(camera("/labels/overlay")) is None
+
+
+def test_the_labels_of_the_chosen_camera_are_taken() -> None:
+    labels = (label("/front/labels"), label("/rear/labels"))
+    assert truth_of(*labels, image="/rear/image") == "/rear/labels"
+
+
+def test_two_label_topics_are_listed_with_the_option() -> None:
+    with pytest.raises(LogError, match=r"/a/labels, /b/labels; .*--truth-topic"):
+        truth_of(label("/a/labels"), label("/b/labels"))
+
+
+def test_shadow_truth_is_told_from_road_truth_by_its_name() -> None:
+    topics = [camera("/cam"), label("/truth/road"), label("/truth/shadow")]
+    assert choose_truth(topics, topics[0], None)[0] == topics[1]
+    assert choose_shadow(topics, topics[0], None)[0] == topics[2]
+
+
+def test_an_empty_name_takes_none() -> None:
+    topics = [camera("/cam"), label("/labels")]
+    assert choose_truth(topics, topics[0], "")[0] is None

@@ -1,0 +1,135 @@
+"""What the values of a label image mean."""
+
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from roadeval.logs import LabelValues, LogError
+from roadeval.logs.errors import BadMessage
+from roadeval.logs.messages.pictures import CompressedPicture
+from roadeval.logs.messages.pixels import to_labels
+from roadeval.logs.topics.labels import seen_in, understand
+from tests.logs.making import grey, jpeg, png
+
+
+def truth(values: list[int], labels: LabelValues | None = None) -> list[int]:
+    table = understand(labels or LabelValues(), values, "/labels")
+    return table.of_values(np.array([values], np.uint8))[0].tolist()
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ([0, 255], [0, 1]),
+        ([0, 128, 255], [0, 255, 1]),
+        ([0, 1], [0, 1]),
+        ([0, 1, 255], [0, 1, 255]),
+        ([0], [0]),
+    ],
+)
+def test_a_mask_is_understood_by_itself(values: list[int], expected: list[int]) -> None:
+    assert truth(values) == expected
+
+
+def test_class_ids_are_asked_for_with_the_values_seen() -> None:
+    with pytest.raises(LogError, match=r"/labels holds the values 0 3 11: .*--road-label"):
+        truth([0, 3, 11])
+
+
+def test_given_values_become_road_and_ignore_and_all_others_non_road() -> None:
+    labels = LabelValues(road=(3, 4), ignore=(11,))
+    assert truth([0, 3, 4, 11, 255], labels) == [0, 1, 1, 255, 0]
+
+
+def test_a_sixteen_bit_value_is_understood() -> None:
+    table = understand(LabelValues(road=(300,)), [0, 300], "/labels")
+    assert table.of_values(np.array([[0, 300, 44]], np.uint16)).tolist() == [[0, 1, 0]]
+
+
+@pytest.mark.parametrize(
+    ("labels", "option"),
+    [
+        (LabelValues(road=(7,)), "--road-label 7"),
+        (LabelValues(road=(3,), ignore=(9,)), "--ignore-label 9"),
+    ],
+)
+def test_a_given_value_that_never_occurs_is_refused(labels: LabelValues, option: str) -> None:
+    with pytest.raises(LogError, match=rf"{option} does not occur in /labels.* 0 3"):
+        truth([0, 3], labels)
+
+
+def test_a_value_cannot_mean_both() -> None:
+    with pytest.raises(LogError, match="label 3 cannot mean road and ignore"):
+        LabelValues(road=(3,), ignore=(3,))
+
+
+def test_a_mask_that_later_holds_another_value_is_not_guessed_at() -> None:
+    table = understand(LabelValues(), [0, 255], "/mask")
+    with pytest.raises(BadMessage, match="holds the value 7"):
+        table.of_values(np.array([[0, 7]], np.uint8))
+
+
+def colors(*rows: list[tuple[int, int, int]]) -> CompressedPicture:
+    return CompressedPicture(0, "png", png(np.array(rows, np.uint8)[..., ::-1]))
+
+
+def palette_png(indices: list[list[int]], palette: list[int]) -> CompressedPicture:
+    image = Image.fromarray(np.array(indices, np.uint8), "P")
+    image.putpalette(palette)
+    file = io.BytesIO()
+    image.save(file, "png")
+    return CompressedPicture(0, "png", file.getvalue())
+
+
+ROAD, LANE, SKY, CAR = (64, 32, 32), (255, 0, 0), (0, 0, 255), (204, 0, 255)
+
+
+def test_colours_can_mean_road_and_ignore() -> None:
+    picture = colors([ROAD, LANE, SKY, CAR])
+    labels = LabelValues(road_colors=(ROAD, LANE), ignore_colors=(CAR,))
+    table = understand(labels, seen_in(picture, labels, "/labels"), "/labels")
+    assert table.read(picture).tolist() == [[1, 1, 0, 255]]
+    assert table.words == "road is 64,32,32 255,0,0, 204,0,255 is ignored"
+
+
+def test_colours_are_asked_for_with_those_seen() -> None:
+    with pytest.raises(
+        LogError, match=r"/labels holds the colours 0,0,255 64,32,32: .*--road-color R,G,B"
+    ):
+        seen_in(colors([ROAD, SKY]), LabelValues(), "/labels")
+
+
+def test_a_colour_that_never_occurs_is_refused() -> None:
+    labels = LabelValues(road_colors=(LANE,))
+    with pytest.raises(LogError, match="--road-color 255,0,0 does not occur in /labels"):
+        understand(labels, seen_in(colors([ROAD, SKY]), labels, "/labels"), "/labels")
+
+
+def test_values_and_colours_cannot_be_mixed() -> None:
+    with pytest.raises(LogError, match="as values or as colours"):
+        LabelValues(road=(1,), road_colors=(ROAD,))
+
+
+def test_of_a_palette_the_indices_count_or_its_colours_as_asked() -> None:
+    picture = palette_png([[0, 1, 2]], [*SKY, *ROAD, *CAR])
+    assert to_labels(picture).tolist() == [[0, 1, 2]]
+    labels = LabelValues(road_colors=(ROAD,))
+    table = understand(labels, seen_in(picture, labels, "/labels"), "/labels")
+    assert table.read(picture).tolist() == [[0, 1, 0]]
+
+
+def test_a_palette_of_greys_is_a_grey_image() -> None:
+    picture = palette_png([[0, 1, 2]], [0, 0, 0, 128, 128, 128, 255, 255, 255])
+    assert to_labels(picture).tolist() == [[0, 128, 255]]
+
+
+def test_three_equal_channels_are_one() -> None:
+    assert to_labels(colors([(0, 0, 0), (3, 3, 3)])).tolist() == [[0, 3]]
+
+
+@pytest.mark.parametrize("data", [png(grey(0)), jpeg(grey(0))])
+def test_half_a_file_is_refused(data: bytes) -> None:
+    with pytest.raises(BadMessage, match="file that is cut off"):
+        to_labels(CompressedPicture(0, "", data[:-8]))

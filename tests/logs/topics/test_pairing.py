@@ -1,0 +1,79 @@
+"""Which label belongs to which image."""
+
+from collections.abc import Sequence
+
+from roadeval.logs.topics.pairing import UNREADABLE, Pairing
+
+
+class Stamps:
+    def __init__(self, stamps: Sequence[int]) -> None:
+        self.stamps = stamps
+        self.read: set[int] = set()
+
+    def __len__(self) -> int:
+        return len(self.stamps)
+
+    def stamp(self, position: int) -> int:
+        self.read.add(position)
+        return self.stamps[position]
+
+
+def pairs(images: Sequence[int], labels: Sequence[int], tolerance: int = 0) -> list[int | None]:
+    pairing = Pairing(Stamps(images), Stamps(labels), tolerance)
+    return [pairing.partner(image) for image in range(len(images))]
+
+
+def test_equal_stamps_are_a_pair() -> None:
+    assert pairs([10, 20, 30], [10, 20, 30]) == [0, 1, 2]
+
+
+def test_an_image_without_a_label_stays_alone() -> None:
+    assert pairs([10, 20, 30], [10, 30]) == [0, None, 1]
+
+
+def test_stamps_that_differ_by_one_nanosecond_are_not_equal() -> None:
+    now = 1_700_000_000_123_456_789
+    assert pairs([now], [now + 1]) == [None]
+    assert pairs([now, now + 1], [now, now + 1]) == [0, 1]
+
+
+def test_the_nearest_within_the_tolerance_is_taken() -> None:
+    assert pairs([10, 20, 30], [12, 21, 36], tolerance=5) == [0, 1, None]
+
+
+def test_a_label_goes_to_its_nearest_image_only() -> None:
+    assert pairs([10, 14], [13], tolerance=5) == [None, 0]
+
+
+def test_an_exact_pair_keeps_its_label_from_a_near_image() -> None:
+    assert pairs([10, 11], [11], tolerance=5) == [None, 0]
+
+
+def test_of_two_equally_near_images_the_first_gets_the_label() -> None:
+    assert pairs([10, 14], [12], tolerance=5) == [0, None]
+
+
+def test_repeated_stamps_pair_in_their_order() -> None:
+    assert pairs([10, 10, 20], [10, 10, 20]) == [0, 1, 2]
+
+
+def test_a_repeated_image_does_not_take_the_only_label_twice() -> None:
+    assert pairs([10, 10, 20], [10, 20]) == [0, None, 1]
+
+
+def test_neighbours_logged_out_of_order_are_found() -> None:
+    assert pairs([10, 30, 20, 40], [20, 10, 40, 30]) == [1, 3, 0, 2]
+
+
+def test_an_image_or_label_that_cannot_be_read_has_no_partner() -> None:
+    assert pairs([10, UNREADABLE, 30], [10, UNREADABLE, 30]) == [0, None, 2]
+
+
+def test_no_labels_no_partner() -> None:
+    assert pairs([10], []) == [None]
+
+
+def test_only_stamps_near_the_one_looked_for_are_read() -> None:
+    images, labels = Stamps(range(0, 100_000, 10)), Stamps(range(0, 100_000, 10))
+    assert Pairing(images, labels, 5).partner(7_000) == 7_000
+    assert len(images.read) + len(labels.read) < 60

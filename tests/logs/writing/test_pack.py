@@ -1,0 +1,118 @@
+"""Folders of images and videos become logs."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+from roadeval.logs import LabelValues, LogError, open_log, pack
+from tests.logs.making import grey, jpeg, png
+
+HALF_SECOND = 500_000_000
+
+
+def folder(path: Path, files: dict[str, bytes]) -> Path:
+    path.mkdir()
+    for name, data in files.items():
+        (path / name).write_bytes(data)
+    return path
+
+
+def test_images_go_in_as_they_are_in_natural_order(tmp_path: Path) -> None:
+    files = {f"{i}.jpg": jpeg(grey(20 * i)) for i in (10, 9, 2)}
+    packed = pack(folder(tmp_path / "images", files), tmp_path / "a.mcap", rate_hz=2)
+    with open_log(packed.path) as log:
+        frames = [frame.decode() for frame in log.frames(log.select())]
+    assert [bytes(frame.payload) for frame in frames] == [files[f"{i}.jpg"] for i in (2, 9, 10)]
+    assert [frame.stamp_ns for frame in frames] == [0, HALF_SECOND, 2 * HALF_SECOND]
+
+
+def test_masks_belong_to_the_image_of_their_name(tmp_path: Path) -> None:
+    images = folder(tmp_path / "images", {f"{name}.jpg": jpeg(grey(9)) for name in "abc"})
+    masks = {"a.png": png(grey(255)), "b_mask.png": png(grey(0)), "x.png": png(grey(1))}
+    packed = pack(images, tmp_path / "a.mcap", masks=folder(tmp_path / "masks", masks))
+    assert (packed.frames, packed.labelled) == (3, 2)
+    assert packed.without_mask == ("c.jpg",)
+    assert packed.without_image == ("x.png",)
+    with open_log(packed.path) as log:
+        truths = [frame.decode().truth for frame in log.frames(log.select())]
+    assert [None if truth is None else int(truth[0, 0]) for truth in truths] == [1, 0, None]
+
+
+def test_times_in_names_become_stamps(tmp_path: Path) -> None:
+    names = ("1700000000.25", "1700000000.5")
+    images = folder(tmp_path / "images", {f"{name}.jpg": jpeg(grey(9)) for name in names})
+    packed = pack(images, tmp_path / "a.mcap")
+    assert packed.stamps == "the times in the files' names"
+    with open_log(packed.path) as log:
+        stamps = [frame.stamp_ns for frame in log.frames(log.select())]
+    assert stamps == [1_700_000_000_250_000_000, 1_700_000_000_500_000_000]
+
+
+def test_what_viewers_do_not_know_becomes_a_png(tmp_path: Path) -> None:
+    image = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)
+    images = folder(tmp_path / "images", {"a.bmp": cv2.imencode(".bmp", image)[1].tobytes()})
+    with open_log(pack(images, tmp_path / "a.mcap").path) as log:
+        frame = next(log.frames(log.select())).decode()
+    assert frame.media_type == "image/png"
+    assert np.array_equal(frame.image, image[..., ::-1])
+
+
+def test_the_same_files_give_the_same_bytes(tmp_path: Path) -> None:
+    images = folder(tmp_path / "images", {"a.jpg": jpeg(grey(9))})
+    first, second = (pack(images, tmp_path / name).path for name in ("a.mcap", "b.mcap"))
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_what_cannot_be_packed_is_refused(tmp_path: Path) -> None:
+    images = folder(tmp_path / "images", {"a.jpg": jpeg(grey(9)), "b.txt": b""})
+    lossy = folder(tmp_path / "lossy", {"a.jpg": jpeg(grey(9))})
+    other = folder(tmp_path / "other", {"x.png": png(grey(9))})
+    empty = folder(tmp_path / "empty", {"b.txt": b""})
+    out = tmp_path / "a.mcap"
+    for arguments, said in (
+        ({"masks": lossy}, "a JPEG blurs its labels"),
+        ({"masks": other}, "no mask has the name of an image"),
+        ({"masks": empty}, "no image in it"),
+        ({"rate_hz": 0}, "--rate 0"),
+    ):
+        with pytest.raises(LogError, match=said):
+            pack(images, out, **arguments)
+    with pytest.raises(LogError, match="neither a folder of images nor a video"):
+        pack(tmp_path / "missing", out)
+    assert not out.exists()
+
+
+def test_a_file_that_is_no_video_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.mp4").write_bytes(b"no video")
+    with pytest.raises(LogError, match="not a readable video"):
+        pack(tmp_path / "a.mp4", tmp_path / "a.mcap")
+
+
+def test_images_and_colour_masks_of_the_road(data: Path, tmp_path: Path) -> None:
+    source = data / "comma10k_mini"
+    packed = pack(source / "imgs", tmp_path / "comma.mcap", masks=source / "masks")
+    labels = LabelValues(road_colors=((64, 32, 32), (255, 0, 0)), ignore_colors=((204, 0, 255),))
+    with open_log(packed.path) as log:
+        with pytest.raises(LogError, match=r"/truth/road.*--road-color R,G,B"):
+            log.select()
+        frames = [frame.decode() for frame in log.frames(log.select(labels=labels))]
+    first = cv2.imread(str(min((source / "masks").glob("*.png"))))[..., ::-1]
+    road = (first == (64, 32, 32)).all(2) | (first == (255, 0, 0)).all(2)
+    assert len(frames) == 11
+    assert frames[0].truth is not None
+    assert np.array_equal(frames[0].truth == 1, road)
+
+
+def test_a_video_is_packed_frame_by_frame_and_read_by_foxgloves_decoder(
+    data: Path, tmp_path: Path
+) -> None:
+    packed = pack(data / "solidWhiteRight.mp4", tmp_path / "white.mcap")
+    assert packed.frames == 221
+    with packed.path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        times = [m.timestamp.ToNanoseconds() for *_, m in reader.iter_decoded_messages()]
+    assert times == [40_000_000 * i for i in range(221)]

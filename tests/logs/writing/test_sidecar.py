@@ -1,0 +1,88 @@
+"""Results written back to MCAP, for people who live in Foxglove."""
+
+import json
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+from roadeval.data import (
+    ERRORS,
+    Counts,
+    Frame,
+    FrameResult,
+    Layer,
+    Role,
+    StageResult,
+    Tally,
+    VariantResult,
+)
+from roadeval.data.packed import Packed
+from roadeval.logs import SidecarWriter
+
+MASK = np.array([[0, 1]], np.uint8)
+STAMP, LOGGED = 1_700_000_000_000_000_005, 1_700_000_000_007_000_000
+
+
+def result() -> FrameResult:
+    frame = Frame(3, STAMP, LOGGED, np.zeros((1, 2, 3), np.uint8), b"")
+    stage = StageResult("post", (), Packed.of(MASK), {}, {}, 0.0)
+    return FrameResult(
+        frame,
+        Role.EVALUATED,
+        (VariantResult("filtered", (stage,)),),
+        errors={"filtered": Layer(ERRORS, np.array([[2, 1]], np.uint8))},
+        tallies=(Tally("filtered", "post", Counts(tp=1, fp=1)),),
+    )
+
+
+def rates(counts: Counts) -> dict[str, float]:
+    return {"ERR": counts.fp / counts.n if counts.n else math.nan, "TNR": math.nan}
+
+
+def write(path: Path) -> Path:
+    with SidecarWriter(path, rates) as sidecar:
+        sidecar.write(result())
+    return path
+
+
+def image(data: bytes) -> list[list[list[int]]]:
+    pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels.ndim == 3:
+        pixels = cv2.cvtColor(pixels, cv2.COLOR_BGRA2RGBA)
+    found: list[list[list[int]]] = pixels.tolist()
+    return found
+
+
+def test_masks_and_errors_bear_the_images_own_times(tmp_path: Path) -> None:
+    with write(tmp_path / "results.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        topics = ["/roadeval/filtered/post", "/roadeval/filtered/errors"]
+        found = {
+            channel.topic: (message.log_time, decoded.timestamp.ToNanoseconds(), decoded.data)
+            for _, channel, message, decoded in reader.iter_decoded_messages(topics)
+        }
+    assert {times[:2] for times in found.values()} == {(LOGGED, STAMP)}
+    assert image(found[topics[0]][2]) == [[0, 255]]
+    assert image(found[topics[1]][2]) == [[[213, 94, 0, 220], [0, 158, 115, 160]]]
+
+
+def test_metrics_are_json_with_a_schema_and_undefined_rates_are_null(tmp_path: Path) -> None:
+    with write(tmp_path / "results.mcap").open("rb") as file:
+        messages = make_reader(file).iter_messages(["/roadeval/metrics/filtered/post"])
+        ((schema, channel, message),) = messages
+    assert schema is not None
+    assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+    fields = json.loads(message.data)
+    assert set(json.loads(schema.data)["properties"]) == set(fields)
+    assert fields["timestamp"] == {"sec": STAMP // 10**9, "nsec": 5}
+    assert (fields["TP"], fields["FP"], fields["N"]) == (1, 1, 2)
+    assert (fields["ERR"], fields["TNR"]) == (0.5, None)
+
+
+def test_the_same_results_give_the_same_bytes(tmp_path: Path) -> None:
+    first, second = write(tmp_path / "a.mcap"), write(tmp_path / "b.mcap")
+    assert first.read_bytes() == second.read_bytes()

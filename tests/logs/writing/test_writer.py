@@ -1,0 +1,117 @@
+"""Logs that are written can be read, here and elsewhere."""
+
+import errno
+from pathlib import Path
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
+from mcap_protobuf.decoder import DecoderFactory
+
+from roadeval.logs import LogError, LogWriter, open_log
+from tests.logs.making import grey, jpeg
+
+
+def write(path: Path) -> Path:
+    with LogWriter(path) as log:
+        for stamp in (10, 20):
+            log.image("/camera", stamp, jpeg(grey(stamp)), "jpeg", log_time_ns=stamp + 1)
+            log.mask("/truth/road", stamp, grey(255))
+    return path
+
+
+def test_what_is_written_is_read(tmp_path: Path) -> None:
+    with open_log(write(tmp_path / "a.mcap")) as log:
+        first, second = (frame.decode() for frame in log.frames(log.select()))
+    assert (first.stamp_ns, first.log_time_ns) == (10, 11)
+    assert bytes(second.payload) == jpeg(grey(20))
+    assert second.truth is not None
+    assert np.array_equal(second.truth, np.ones((6, 8)))
+
+
+def test_foxgloves_own_decoder_reads_it(tmp_path: Path) -> None:
+    with write(tmp_path / "a.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        found = [
+            (schema.name, channel.topic, decoded.timestamp.ToNanoseconds(), decoded.format)
+            for schema, channel, _, decoded in reader.iter_decoded_messages()
+        ]
+    name = "foxglove.CompressedImage"
+    assert sorted(found) == [
+        (name, "/camera", 10, "jpeg"),
+        (name, "/camera", 20, "jpeg"),
+        (name, "/truth/road", 10, "png"),
+        (name, "/truth/road", 20, "png"),
+    ]
+
+
+def test_the_same_calls_give_the_same_bytes(tmp_path: Path) -> None:
+    first, second = write(tmp_path / "a.mcap"), write(tmp_path / "b.mcap")
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_nothing_appears_until_it_is_complete(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with LogWriter(path) as log:
+        log.image("/camera", 1, jpeg(grey(1)), "jpeg")
+        assert not path.exists()
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_nothing_is_left_of_a_log_that_failed(tmp_path: Path) -> None:
+    log = LogWriter(tmp_path / "a.mcap")
+    log.image("/camera", 1, jpeg(grey(1)), "jpeg")
+    log.__exit__(RuntimeError, RuntimeError(), None)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_made_for_a_log_that_failed_is_gone(tmp_path: Path) -> None:
+    log = LogWriter(tmp_path / "new" / "deep" / "a.mcap")
+    log.__exit__(RuntimeError, RuntimeError(), None)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_is_left_of_a_log_that_cannot_be_completed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_writer: Writer) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Writer, "finish", full)
+    path = tmp_path / "new" / "a.mcap"
+    with pytest.raises(LogError, match="cannot be written: No space left"):
+        write(path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, MemoryError])
+def test_nothing_is_left_of_a_log_that_is_stopped_while_it_is_completed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop: type[BaseException]
+) -> None:
+    monkeypatch.setattr(Writer, "finish", Mock(side_effect=stop))
+    with pytest.raises(stop):
+        write(tmp_path / "new" / "a.mcap")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_its_folder_is_made(tmp_path: Path) -> None:
+    assert write(tmp_path / "new" / "deep" / "a.mcap").exists()
+
+
+def test_a_folder_in_its_place_is_told_at_once(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="is a folder; name a file in it"):
+        LogWriter(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unwritable_place_is_told_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(LogError, match=r"file/new/a\.mcap: cannot be written: Not a directory"):
+        LogWriter(tmp_path / "file" / "new" / "a.mcap")
+    with pytest.raises(LogError, match="cannot be written: File name too long"):
+        LogWriter(tmp_path / "new" / f"{250 * 'a'}.mcap")
+    with pytest.raises(LogError, match="cannot be written: File name too long"):
+        LogWriter(tmp_path / f"{300 * 'a'}.mcap")
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]

@@ -1,0 +1,75 @@
+"""Exposure: the ground in front of the vehicle gets the same grey, whatever the light."""
+
+import numpy as np
+import pytest
+
+from roadeval.pipeline.beyond import exposure
+from roadeval.pipeline.beyond.exposure import ExposureSettings
+from roadeval.pipeline.chain import STAGES, Chain
+from roadeval.pipeline.patch import patch_mask
+from roadeval.pipeline.stage import View
+
+
+def scene(road, elsewhere=(10, 200, 90), shape=(40, 60)):
+    """An image with one colour in the reference patch and another one elsewhere."""
+    patch = patch_mask(*shape, ExposureSettings().patch)
+    return np.where(patch[..., None] > 0, road, elsewhere).astype(np.uint8)
+
+
+def run(image, **settings):
+    return exposure.bind(ExposureSettings(**settings), None)(View(image, image))
+
+
+def test_the_patch_turns_grey():
+    image = scene((48, 96, 192))
+    patch = patch_mask(40, 60, ExposureSettings().patch) > 0
+    assert (run(image).image[patch] == 96).all()
+
+
+def test_each_channel_is_multiplied_and_clipped_everywhere():
+    output = run(scene((48, 96, 192)))
+    assert output.image[0, 0].tolist() == [20, 200, 45]
+    assert output.facts == {"red_gain": 2.0, "green_gain": 1.0, "blue_gain": 0.5}
+    assert run(scene((48, 96, 192), elsewhere=(200, 0, 1))).image[0, 0].tolist() == [255, 0, 0]
+
+
+def test_alike_keeps_the_tint():
+    output = run(scene((24, 48, 72)), channels="alike")
+    assert set(output.facts.values()) == {2.0}
+
+
+def test_the_median_is_what_counts_not_what_stands_on_the_road():
+    image = scene((48, 48, 48))
+    image[:, 32:] = 255  # two fifths of the patch
+    assert run(image).facts["red_gain"] == 2.0
+
+
+@pytest.mark.parametrize(("grey", "gain"), [(0, 6.0), (1, 6.0), (255, 0.5)])
+def test_gains_are_bounded(grey, gain):
+    assert run(scene((grey,) * 3), least=0.5).facts["red_gain"] == gain
+
+
+def test_the_same_scene_under_another_exposure_gives_nearly_the_same_image():
+    rng = np.random.default_rng(0)
+    light = rng.uniform(40, 100, (40, 60, 3))
+    dim = run(np.rint(light).astype(np.uint8)).image.astype(int)
+    bright = run(np.rint(light * [1.8, 1.5, 1.2]).astype(np.uint8)).image.astype(int)
+    assert np.abs(dim - bright).max() <= 4
+
+
+def test_one_pixel_is_its_own_patch():
+    assert run(np.full((1, 1, 3), 48, np.uint8)).image.tolist() == [[[96, 96, 96]]]
+
+
+def test_bounds_out_of_order_are_refused():
+    with pytest.raises(ValueError, match="least must not be above greatest"):
+        ExposureSettings(least=3.0, greatest=2.0)
+
+
+def test_it_prepares_the_image_in_every_variant_and_makes_no_mask():
+    stage = STAGES["exposure"]
+    assert not stage.yields_mask
+    assert not stage.is_filter
+    image = scene((48, 96, 192))
+    chain = Chain(("exposure",), {"exposure": ExposureSettings()}, {})
+    np.testing.assert_array_equal(chain.filtered(image), run(image).image)

@@ -1,0 +1,309 @@
+"""Eq. 17-23 against SciPy on a plane wide enough that the image's border plays no part."""
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import ndimage
+
+from roadeval.data.packed import Packed
+from roadeval.pipeline.paper import post as morphology
+from roadeval.pipeline.paper.post import MorphologySettings
+from roadeval.pipeline.patch import ReferencePatch
+from roadeval.pipeline.stage import View
+from tests.pipeline import reference
+from tests.pipeline.images import mask, masks
+
+
+def on_masks(operation):
+    """Let an operation on packed masks take and give plain ones."""
+    return lambda road, *rest: operation(Packed.of(road), *rest).pixels()
+
+
+dilate, erode = on_masks(morphology.dilate), on_masks(morphology.erode)
+opening, closing = on_masks(morphology.opening), on_masks(morphology.closing)
+boundary, fill_holes = on_masks(morphology.boundary), on_masks(morphology.fill_holes)
+keep_region = on_masks(morphology.keep_region)
+
+elements = st.builds(
+    morphology.structuring_element,
+    st.sampled_from([1, 3, 5]),
+    st.sampled_from(["square", "ellipse"]),
+)
+
+
+def on_a_plane(operation, road, element, **options):
+    """Apply a SciPy operation with non-road all around, and cut the image out again."""
+    wide = np.pad(road, 12)
+    return operation(wide > 0, as_mask(element), **options)[12:-12, 12:-12]
+
+
+def as_mask(element):
+    """The ``(side, side)`` bool array of a structuring element."""
+    rows = np.concatenate([element[:0:-1], element])
+    columns = np.abs(np.arange(len(rows)) - len(element) + 1)
+    return columns[None, :] <= rows[:, None]
+
+
+def post_process(road, **options):
+    return on_masks(morphology.post_process)(road, MorphologySettings(**options))
+
+
+# --- Eq. 17-22 ------------------------------------------------------------------------------------
+
+
+def assert_as_scipy(road, element):
+    for ours, theirs in (
+        (dilate, ndimage.binary_dilation),
+        (erode, ndimage.binary_erosion),
+        (opening, ndimage.binary_opening),
+        (closing, ndimage.binary_closing),
+    ):
+        result = ours(road, element)
+        assert result.dtype == np.uint8
+        np.testing.assert_array_equal(result, on_a_plane(theirs, road, element))
+
+
+@given(masks, elements)
+def test_dilation_erosion_opening_and_closing_equal_scipys(road, element):
+    assert_as_scipy(road, element)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("width", [63, 64, 65, 127, 128, 129])
+def test_they_equal_scipys_where_a_word_of_pixels_ends(width, share):
+    road = (np.random.default_rng(width).random((20, width)) < share).astype(np.uint8)
+    for shape in ("square", "ellipse"):
+        assert_as_scipy(road, morphology.structuring_element(5, shape))
+
+
+@given(masks)
+def test_dilation_and_erosion_equal_the_set_definitions(road):
+    square = morphology.structuring_element(3, "square")
+    offsets = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
+    m = {(int(y), int(x)) for y, x in zip(*np.nonzero(road), strict=True)}
+    every = [(y, x) for y in range(road.shape[0]) for x in range(road.shape[1])]
+    union = {(y + dy, x + dx) for y, x in m for dy, dx in offsets}
+    kept = {p for p in every if all((p[0] + dy, p[1] + dx) in m for dy, dx in offsets)}
+    grown, eroded = dilate(road, square), erode(road, square)
+    assert {p for p in every if grown[p]} == union & set(every)
+    assert {p for p in every if eroded[p]} == kept
+
+
+def test_closing_keeps_road_along_the_border():
+    road = mask("####", "####", "....")
+    assert (closing(road, morphology.structuring_element(3, "square")) == road).all()
+
+
+@pytest.mark.parametrize("reach", [1, 32, 63, 64, 65, 128, 129, 250])
+def test_closing_fills_gaps_no_wider_than_the_element_and_keeps_the_border_as_it_is(reach):
+    gaps = 2 * reach, 2 * reach + 1, reach
+    road = np.concatenate([[1], *([*[0] * gap, 1] for gap in gaps[:2]), [0] * gaps[2]])
+    filled = road.copy()
+    filled[: gaps[0] + 2] = 1
+    element = np.array([reach])
+    for way in (1, -1):
+        found = closing(road[None, ::way].astype(np.uint8), element)
+        assert found.tolist() == [filled[::way].tolist()]
+
+
+def test_the_boundary_is_the_inner_edge_and_runs_along_the_image_border():
+    road = mask("....", ".###", ".###", ".###")
+    edge = boundary(road, morphology.structuring_element(3, "square"))
+    assert (edge == mask("....", ".###", ".#.#", ".###")).all()
+
+
+@given(masks, elements)
+def test_the_boundary_equals_scipys(road, element):
+    eroded = on_a_plane(ndimage.binary_erosion, road, element)
+    expected = (road > 0) & ~eroded
+    np.testing.assert_array_equal(boundary(road, element), expected)
+
+
+@pytest.mark.parametrize("side", range(1, 16, 2))
+@pytest.mark.parametrize("shape", ["square", "ellipse"])
+def test_structuring_elements_are_symmetric_and_hold_their_centre(side, shape):
+    element = as_mask(morphology.structuring_element(side, shape))
+    kind = cv2.MORPH_RECT if shape == "square" else cv2.MORPH_ELLIPSE
+    np.testing.assert_array_equal(element, cv2.getStructuringElement(kind, (side, side)))
+    assert element[side // 2, side // 2]
+    np.testing.assert_array_equal(element, element[::-1, ::-1])
+
+
+@given(st.integers(1, 5000))
+def test_the_elements_side_is_the_odd_number_nearest_to_1_percent_of_the_width(width):
+    side = morphology.element_side(width)
+    odd = range(3, 101, 2)
+    assert side in odd
+    assert abs(side - width / 100) == min(abs(n - width / 100) for n in odd)
+
+
+# --- The largest and connected area ---------------------------------------------------------------
+
+
+@given(masks)
+def test_the_largest_component_is_kept(road):
+    labels, count = ndimage.label(road, np.ones((3, 3)))
+    kept = keep_region(road)
+    if count == 0:
+        assert not kept.any()
+    else:
+        sizes = [(labels == k).sum() for k in range(1, count + 1)]
+        # The first of the largest: SciPy numbers components in the order of their first pixels.
+        np.testing.assert_array_equal(kept, labels == 1 + int(np.argmax(sizes)))
+
+
+def test_of_equal_components_the_first_from_the_top_is_kept():
+    road = mask("......##", "##......")
+    assert (keep_region(road) == mask("......##", "........")).all()
+
+
+def test_diagonal_neighbours_are_one_component():
+    road = mask("##..", "....", "...#", "..#.", ".#..")
+    assert (keep_region(road) == mask("....", "....", "...#", "..#.", ".#..")).all()
+
+
+def test_the_component_with_most_pixels_in_the_patch_is_preferred():
+    road = mask("######", "......", "##..#.")
+    patch = mask("......", "......", ".###.#")
+    assert (keep_region(road, patch) == mask("......", "......", "##....")).all()
+
+
+def test_without_any_pixel_in_the_patch_the_largest_component_is_kept():
+    road, patch = mask("##....", "......", "######"), mask("......", "######", "......")
+    assert (keep_region(road, patch) == mask("......", "......", "######")).all()
+
+
+def test_the_region_rule_is_a_setting():
+    road = mask(*["############"] * 6, *["............"] * 5, *["....####...."] * 5)
+    patch = ReferencePatch(top=0.8, bottom=1.0)
+    for region, kept in (
+        ("largest", road * (np.arange(16) < 6)[:, None]),
+        ("patch", road * (np.arange(16) > 6)[:, None]),
+        ("all", road),
+    ):
+        np.testing.assert_array_equal(post_process(road, region=region, patch=patch), kept)
+
+
+# --- Eq. 23 ---------------------------------------------------------------------------------------
+
+CROSS = ndimage.generate_binary_structure(2, 1)
+
+
+@given(masks)
+@settings(max_examples=200)
+def test_filling_equals_scipys(road):
+    np.testing.assert_array_equal(fill_holes(road), ndimage.binary_fill_holes(road, CROSS))
+
+
+@given(masks)
+@settings(max_examples=200)
+def test_filling_is_the_fixed_point_of_the_iteration_from_a_seed_in_every_hole(road):
+    complement = road == 0
+    filled = road > 0
+    spaces, count = ndimage.label(np.pad(complement, 1, constant_values=True), CROSS)
+    inner = spaces[1:-1, 1:-1]
+    for k in set(range(1, count + 1)) - {spaces[0, 0]}:
+        n = np.zeros(road.shape, bool)
+        n[tuple(np.argwhere(inner == k)[0])] = True  # N_0 = J
+        while True:
+            grown = ndimage.binary_dilation(n, CROSS) & complement
+            if (grown == n).all():
+                break
+            n = grown
+        filled |= n
+    np.testing.assert_array_equal(fill_holes(road), filled)
+
+
+def test_a_hole_behind_a_diagonal_wall_is_filled_and_a_bay_is_not():
+    road = mask(".#...", "#.#..", ".#.##", "...#.", "...##")
+    assert (fill_holes(road) == mask(".#...", "###..", ".#.##", "...#.", "...##")).all()
+
+
+# --- The whole phase ------------------------------------------------------------------------------
+
+
+PRINTED = {"operations": ("close", "open")}
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("width", [90, 300, 460])
+@pytest.mark.parametrize("options", [{}, PRINTED], ids=["paper", "printed"])
+def test_the_phase_equals_the_plain_pipeline(seed, width, options):
+    rng = np.random.default_rng(seed)
+    blobs = ndimage.gaussian_filter(rng.random((120, width)), 1 + seed)
+    road = (blobs > np.quantile(blobs, 0.45)).astype(np.uint8)
+    expected = reference.post(road > 0, options is PRINTED)
+    np.testing.assert_array_equal(post_process(road, **options), expected)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 40), (40, 1), (2, 3), (7, 9)])
+@pytest.mark.parametrize("value", [0, 1])
+@pytest.mark.parametrize("options", [{}, PRINTED], ids=["paper", "printed"])
+def test_tiny_and_constant_masks(shape, value, options):
+    road = np.full(shape, value, np.uint8)
+    expected = reference.post(road > 0, options is PRINTED)
+    np.testing.assert_array_equal(post_process(road, **options), expected)
+
+
+def test_every_step_can_be_left_out():
+    rng = np.random.default_rng(5)
+    road = (rng.random((30, 40)) > 0.4).astype(np.uint8)
+    nothing = {"operations": (), "region": "all", "fill": False}
+    square = morphology.structuring_element(3, "square")
+    opened, closed = opening(road, square), closing(road, square)
+    ellipse = morphology.structuring_element(7, "ellipse")
+    for step, expected in (
+        ({}, road),
+        ({"operations": ("close",), "element": 7, "shape": "ellipse"}, closing(road, ellipse)),
+        ({"operations": ("close",)}, closed),
+        ({"operations": ("open",)}, opened),
+        ({"operations": ("open", "close")}, closing(opened, square)),
+        ({"operations": ("close", "open")}, opening(closed, square)),
+        ({"region": "largest"}, keep_region(road)),
+        ({"fill": True}, fill_holes(road)),
+        (
+            {"operations": ("close",), "element": 5},
+            closing(road, morphology.structuring_element(5, "square")),
+        ),
+    ):
+        np.testing.assert_array_equal(post_process(road, **nothing | step), expected)
+
+
+@pytest.mark.parametrize("key", ["element", "boundary_element"])
+def test_an_even_side_is_refused(key):
+    with pytest.raises(ValueError, match="must be odd"):
+        MorphologySettings(**{key: 4})
+
+
+def test_the_boundary_layer_is_of_the_result():
+    road = (np.random.default_rng(2).random((30, 40)) > 0.3).astype(np.uint8)
+    output = morphology.bind(MorphologySettings(), None)(View(None, None, Packed.of(road)))
+    layers = {layer.spec.name: layer.array for layer in output.layers}
+    np.testing.assert_array_equal(layers["post"], output.mask.pixels())
+    np.testing.assert_array_equal(layers["boundary"], reference.boundary(layers["post"] > 0))
+    assert tuple(layer.spec for layer in output.layers) == morphology.layers(MorphologySettings())
+
+
+def test_post_processing_needs_a_mask_before_it():
+    with pytest.raises(ValueError, match="road mask before it"):
+        morphology.bind(MorphologySettings(), None)(View(None, None))
+
+
+def test_opencvs_own_border_would_differ():
+    # Why the border is stated: OpenCV's default lets road beyond the border keep road alive.
+    road = np.ones((4, 4), np.uint8)
+    assert cv2.erode(road, np.ones((3, 3), np.uint8)).all()
+    assert erode(road, morphology.structuring_element(3, "square")).sum() == 4
+
+
+def test_the_boundarys_width_is_a_setting():
+    road = (np.random.default_rng(2).random((30, 40)) > 0.01).astype(np.uint8)
+    output = morphology.bind(MorphologySettings(boundary_element=7), None)(
+        View(None, None, Packed.of(road))
+    )
+    layers = {layer.spec.name: layer.array for layer in output.layers}
+    expected = boundary(layers["post"], morphology.structuring_element(7, "square"))
+    assert expected.sum() > boundary(layers["post"], np.array([1, 1])).sum()
+    np.testing.assert_array_equal(layers["boundary"], expected)

@@ -1,0 +1,487 @@
+"""Eq. 6-11, each against a literal reading of it."""
+
+from fractions import Fraction
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import ndimage
+from skimage.filters import threshold_otsu
+
+from roadeval.data.packed import Packed
+from roadeval.kernels import plain
+from roadeval.pipeline.paper import shadow
+from roadeval.pipeline.paper.shadow import ShadowSettings
+from roadeval.pipeline.stage import View
+from tests.pipeline import reference
+from tests.pipeline.images import DARK, IMAGES, LIT, images, mask, masks, noise, picture
+
+PRINTED = ShadowSettings(
+    threshold="printed", inclusive=True, statistic="printed", colour_space="hsi"
+)
+
+
+def codes_of(image):
+    return shadow.KERNELS.look_up_sum_min(cv2.split(image), shadow.NDI_CODES)
+
+
+def run(image, options=None):
+    output = shadow.bind(options or ShadowSettings(), None)(View(image, image))
+    return output, {layer.spec.name: layer.array for layer in output.layers}
+
+
+# --- Eq. 6 ----------------------------------------------------------------------------------------
+
+
+def test_ndi_of_every_sum_and_minimum():
+    least, rest = np.mgrid[0:256, 0:511].astype(object)
+    total = 3 * least + rest
+    # (NDI + 1) * 127.5 = 255 S / (S + V) with S = (t - 3m) / t and V = t / 765, in whole numbers.
+    above, below = 255 * 765 * (total - 3 * least), 765 * (total - 3 * least) + total**2
+    twice = 2 * above // np.maximum(below, 1)
+    nearest = (twice + 1) // 2
+    halfway = (2 * above == twice * below) & (twice % 2 == 1)
+    expected = np.where(halfway & (nearest % 2 == 1), nearest - 1, nearest)
+    possible = total - least <= 510
+    np.testing.assert_array_equal(
+        shadow.NDI_CODES[total[possible].astype(int), least[possible].astype(int)],
+        expected[possible].astype(int),
+    )
+    assert halfway[possible].sum() == 2
+
+
+@pytest.mark.parametrize(
+    ("rgb", "ndi"),
+    [
+        ((0, 0, 0), -1),
+        ((1, 1, 1), -1),
+        ((255, 255, 255), -1),
+        ((255, 0, 0), 0.5),  # S = 1, V = 1/3
+        ((255, 255, 0), 0.2),  # S = 1, V = 2/3
+        ((0, 0, 1), 764 / 766),  # S = 1, V = 1/765
+        ((128, 0, 127), 0.5),
+    ],
+)
+def test_ndi_by_hand(rgb, ndi):
+    codes, histogram = codes_of(np.array([[rgb]], np.uint8))
+    assert codes[0, 0] == round((ndi + 1) * 127.5)
+    assert histogram[codes[0, 0]] == histogram.sum() == 1
+
+
+@pytest.mark.parametrize("image", IMAGES.values(), ids=IMAGES)
+def test_codes_equal_the_formula_on_every_pixel(image):
+    codes, histogram = codes_of(image)
+    np.testing.assert_array_equal(codes, reference.ndi_codes(image))
+    np.testing.assert_array_equal(histogram, np.bincount(codes.ravel(), minlength=256))
+
+
+# --- Eq. 7 and 8 ----------------------------------------------------------------------------------
+
+histograms = st.dictionaries(st.integers(0, 255), st.integers(1, 40), min_size=1, max_size=12)
+
+
+def first_maximum(histogram, lower_term):
+    """Eq. 7 in fractions: the first maximum of (mean w - lower_term)^2 / (w (1 - w))."""
+    total = sum(histogram.values())
+    p = {level: Fraction(count, total) for level, count in histogram.items()}
+    mean = sum(level * share for level, share in p.items())
+    criterion = {}
+    for t in range(256):
+        w = sum(share for level, share in p.items() if level <= t)
+        if 0 < w < 1:
+            criterion[t] = (mean * w - lower_term(p, t)) ** 2 / (w * (1 - w))
+    return max(criterion, key=criterion.get, default=None)
+
+
+def as_array(histogram):
+    counts = np.zeros(256, np.int64)
+    counts[list(histogram)] = list(histogram.values())
+    return counts
+
+
+@given(histograms)
+def test_otsu_is_the_first_maximum_of_the_between_class_variance(histogram):
+    def moment(p, t):
+        return sum(level * share for level, share in p.items() if level <= t)
+
+    assert shadow.otsu_threshold(as_array(histogram)) == first_maximum(histogram, moment)
+
+
+@given(histograms)
+def test_the_printed_threshold_takes_the_upper_weight_for_mu(histogram):
+    def weight(p, t):
+        return sum(share for level, share in p.items() if level > t)
+
+    assert shadow.printed_threshold(as_array(histogram)) == first_maximum(histogram, weight)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_otsu_equals_opencv_and_scikit_image(seed):
+    rng = np.random.default_rng(seed)
+    parts = rng.normal(rng.uniform(20, 100), 15, 4000), rng.normal(rng.uniform(110, 230), 20, 3000)
+    codes = np.clip(np.concatenate(parts), 0, 255).astype(np.uint8).reshape(70, 100)
+    ours = shadow.otsu_threshold(np.bincount(codes.ravel(), minlength=256))
+    assert ours == threshold_otsu(codes)
+    assert ours == cv2.threshold(codes, 0, 255, cv2.THRESH_OTSU)[0]
+
+
+def test_otsu_takes_the_lower_of_two_equal_maxima():
+    assert shadow.otsu_threshold(as_array({10: 5, 20: 5, 30: 5})) == 10
+
+
+def test_otsu_ties_on_codes_that_no_pixel_has_go_to_the_lowest():
+    assert shadow.otsu_threshold(as_array({3: 7, 200: 9})) == 3
+
+
+@pytest.mark.parametrize("pixels", [10**4, 3 * 10**7])
+def test_thresholds_do_not_depend_on_the_number_of_pixels(pixels):
+    counts = as_array({40: 4, 50: 3, 90: 1, 180: 2}) * (pixels // 10)
+    assert shadow.otsu_threshold(counts) == 90
+    assert shadow.printed_threshold(counts) == 90
+
+
+def test_the_printed_threshold_is_at_the_lower_edge_where_most_codes_are_near_0():
+    # Mean 60/56. T = 0: w = 1/56, criterion 53.0; T = 1: w = 51/56, criterion 9.7.
+    assert shadow.printed_threshold(as_array({0: 1, 1: 50, 2: 5})) == 0
+    # Mean 1: (w - mu)^2 / (w mu) is the same for w = 1/102 and for w = 101/102.
+    assert shadow.printed_threshold(as_array({0: 1, 1: 100, 2: 1})) == 0
+
+
+def test_the_printed_threshold_lands_at_the_edge_of_the_histogram():
+    counts = as_array({level: 400 - abs(level - 100) for level in range(5, 200)})
+    assert shadow.printed_threshold(counts) == 198
+    assert 80 < shadow.otsu_threshold(counts) < 120
+
+
+@pytest.mark.parametrize("threshold", [shadow.otsu_threshold, shadow.printed_threshold])
+def test_a_single_occupied_code_has_no_threshold_and_no_shadow(threshold):
+    assert threshold(as_array({77: 12})) is None
+    codes = np.full((3, 4), 77, np.uint8)
+    assert not shadow.shadow_mask(codes, None, inclusive=False).any()
+    assert not shadow.shadow_mask(codes, None, inclusive=True).any()
+
+
+def test_the_threshold_itself_is_shadow_only_as_printed():
+    codes = np.array([[4, 5, 6]], np.uint8)
+    assert shadow.shadow_mask(codes, 5, inclusive=False).tolist() == [[0, 0, 1]]
+    assert shadow.shadow_mask(codes, 5, inclusive=True).tolist() == [[0, 1, 1]]
+
+
+# --- Eq. 9 and 10 ---------------------------------------------------------------------------------
+
+CROSS, SQUARE = ndimage.generate_binary_structure(2, 1), ndimage.generate_binary_structure(2, 2)
+
+
+@pytest.mark.parametrize(("connectivity", "b"), [(4, CROSS), (8, SQUARE)])
+@given(shadowed=masks)
+@settings(max_examples=60)
+def test_components_are_the_fixed_points_of_the_iteration(connectivity, b, shadowed):
+    found = shadow.connected_components(Packed.of(shadowed), connectivity)
+    labels, count = found.labels(), found.count
+    assert set(np.unique(labels)) - {0} == set(range(1, count + 1))
+    assert ((labels > 0) == shadowed).all()
+    for seed in zip(*np.nonzero(shadowed), strict=True):
+        reached = np.zeros(shadowed.shape, bool)
+        reached[seed] = True
+        while True:
+            grown = ndimage.binary_dilation(reached, b) & (shadowed > 0)
+            if (grown == reached).all():
+                break
+            reached = grown
+        assert (reached == (labels == labels[seed])).all()
+
+
+def test_a_ring_by_hand():
+    shadowed = mask(
+        "......",
+        ".##...",
+        "...#..",
+        "......",
+    )
+    assert (buffer_ring(shadowed, 1) == mask("####..", "#..##.", "###.#.", "..###.")).all()
+
+
+def buffer_ring(shadowed, width):
+    return shadow.buffer_ring(Packed.of(shadowed), width).pixels()
+
+
+def literal_rings(shadowed, labels, width):
+    """Eq. 10 by components: dilate one alone, take away itself and all other shadow."""
+    for k in range(1, labels.max() + 1):
+        own = labels == k
+        dilated = ndimage.binary_dilation(own, SQUARE, iterations=width)
+        yield k, own, dilated & ~own & (shadowed == 0)
+
+
+@pytest.mark.parametrize("connectivity", [4, 8])
+@given(shadowed=masks, width=st.integers(1, 3))
+@settings(max_examples=60)
+def test_rings_equal_the_dilation_of_each_component_alone(connectivity, shadowed, width):
+    labels = shadow.connected_components(Packed.of(shadowed), connectivity).labels()
+    union = buffer_ring(shadowed, width)
+    label, pixel = shadow.ring_pairs(labels, union, width)
+    expected = list(literal_rings(shadowed, labels, width))
+    assert (union == sum([ring for *_, ring in expected], np.zeros(shadowed.shape, bool))).all()
+    for k, _, ring in expected:
+        assert pixel[label == k].tolist() == np.flatnonzero(ring).tolist()
+    assert len(label) == sum(ring.sum() for *_, ring in expected)
+
+
+def test_a_pixel_between_two_components_counts_in_both_rings():
+    image = noise(1, 7)
+    labels = np.array([[0, 1, 0, 0, 2, 0, 0]], np.int32)
+    ring = shadow.buffer_ring(Packed.of(labels > 0), 2).bits
+    outside = shadow.KERNELS.ring_sums(cv2.split(image), plain.label_runs(labels), ring, 3, 2)
+    assert outside[1, 1:4].tolist() == image[0, [0, 2, 3]].sum(axis=0).tolist()
+    assert outside[2, 1:4].tolist() == image[0, [2, 3, 5, 6]].sum(axis=0).tolist()
+
+
+def one(labels):
+    """The component that a hand-made label image holds."""
+    return shadow.Components(plain.label_runs(labels), 1, labels.shape)
+
+
+# --- Eq. 11 ---------------------------------------------------------------------------------------
+
+
+def test_compensation_by_hand():
+    # The component has mean 12 and deviation 2, its ring 100 and 6.
+    grey = np.array([[94, 10, 106], [94, 14, 106]], np.uint8)
+    image = np.repeat(grey[..., None], 3, axis=2)
+    labels = np.array([[0, 1, 0], [0, 1, 0]], np.int32)
+    ring = Packed.of(labels == 0)
+    result, change = shadow.compensate(View.of(image), one(labels), ring, ShadowSettings())
+    assert change.gain[1].tolist() == [3.0, 3.0, 3.0]
+    assert result[..., 0].tolist() == [[94, 94, 106], [94, 106, 106]]
+
+    printed = ShadowSettings(statistic="printed")
+    result, change = shadow.compensate(View.of(image), one(labels), ring, printed)
+    assert change.gain[1, 0] == pytest.approx(4 / 36)
+    assert result[..., 0].tolist() == [[94, 100, 106], [94, 100, 106]]
+
+
+def literal_eq_11(values, shadowed, options, connectivity=2):
+    """Eq. 11 on float channels, by loops over components and channels."""
+    labels, _ = ndimage.label(shadowed, ndimage.generate_binary_structure(2, connectivity))
+    result = values.astype(float)
+    for _, own, ring in literal_rings(shadowed, labels, options.ring_width):
+        if not ring.any() or own.sum() < options.min_area:
+            continue
+        for c in range(values.shape[2]):
+            inside, around = values[own, c].astype(float), values[ring, c].astype(float)
+            sigma, sigma_ring = inside.std(), around.std()
+            above, below = (
+                (sigma_ring, sigma)
+                if options.statistic == "deviation"
+                else (sigma**2, sigma_ring**2)
+            )
+            gain = above / below if below > 1e-9 else 1.0
+            gain = gain if options.max_gain is None else min(gain, options.max_gain)
+            result[own, c] = around.mean() + (inside - inside.mean()) * gain
+    return result
+
+
+def assert_rounded(image, exact):
+    """Hold an image to float values, rounded and clipped; a half may fall to either side."""
+    assert image.dtype == np.uint8
+    clipped = np.clip(exact, 0, 255)
+    assert np.abs(image - clipped).max() <= 0.5 + 1e-6
+
+
+options = st.builds(
+    ShadowSettings,
+    connectivity=st.sampled_from([4, 8]),
+    ring_width=st.integers(1, 3),
+    min_area=st.sampled_from([1, 1, 3]),
+    max_gain=st.sampled_from([None, None, 1.5]),
+    statistic=st.sampled_from(["deviation", "printed"]),
+)
+
+
+def check_rgb(image, chosen):
+    shadowed = run(image, chosen)[1]["shadow"]
+    found = shadow.connected_components(Packed.of(shadowed), chosen.connectivity)
+    ring = shadow.buffer_ring(Packed.of(shadowed), chosen.ring_width)
+    result, _ = shadow.compensate(View.of(image), found, ring, chosen)
+    connectivity = 2 if chosen.connectivity == 8 else 1
+    assert_rounded(result, literal_eq_11(image, shadowed, chosen, connectivity))
+    np.testing.assert_array_equal(result[shadowed == 0], image[shadowed == 0])
+
+
+@given(images(), options)
+def test_compensation_equals_the_loop_over_components(image, chosen):
+    check_rgb(image, chosen)
+
+
+@pytest.mark.parametrize("chosen", [ShadowSettings(), ShadowSettings(ring_width=3)])
+@pytest.mark.parametrize("image", [*IMAGES.values(), noise(40, 60)], ids=[*IMAGES, "small noise"])
+def test_compensation_equals_the_loop_on_odd_images(image, chosen):
+    check_rgb(image[:60, :60], chosen)
+
+
+@pytest.mark.parametrize("statistic", ["deviation", "printed"])
+@given(image=images(), width=st.integers(1, 3))
+@settings(max_examples=60)
+def test_compensation_in_hsi_equals_the_loop_over_components(statistic, image, width):
+    chosen = ShadowSettings(colour_space="hsi", statistic=statistic, ring_width=width)
+    _, layers = run(image, chosen)
+    shadowed = layers["shadow"]
+    values = np.stack([reference.saturation(image), reference.value(image)], axis=-1)
+    s, v = np.moveaxis(np.clip(literal_eq_11(values, shadowed, chosen), 0, 1), -1, 0)
+    exact = reference.from_hsi(reference.hue(image), s, v)
+    assert_rounded(layers["compensated"], np.where(shadowed[..., None] > 0, exact, image))
+
+
+def test_a_component_gets_the_mean_and_deviation_of_its_ring():
+    rng = np.random.default_rng(1)
+    image = rng.normal(130, 12, (40, 40, 3))
+    image[10:30, 10:30] = rng.normal(40, 4, (20, 20, 3))
+    image = np.clip(image, 0, 255).astype(np.uint8)
+    labels = np.zeros((40, 40), np.int32)
+    labels[10:30, 10:30] = 1
+    ring = shadow.buffer_ring(Packed.of(labels > 0), 3)
+    result, _ = shadow.compensate(View.of(image), one(labels), ring, ShadowSettings(ring_width=3))
+    around, inside = image[ring.pixels() > 0].astype(float), result[labels > 0].astype(float)
+    # Rounding moves no pixel, and so neither statistic, by more than half a level.
+    np.testing.assert_allclose(inside.mean(axis=0), around.mean(axis=0), rtol=0, atol=0.5)
+    np.testing.assert_allclose(inside.std(axis=0), around.std(axis=0), rtol=0, atol=0.5)
+
+
+def test_a_constant_component_takes_the_mean_of_its_ring_with_gain_1():
+    image = picture("....", ".#..", "....")
+    labels = mask("....", ".#..", "....").astype(np.int32)
+    ring = shadow.buffer_ring(Packed.of(labels > 0), 1)
+    result, change = shadow.compensate(View.of(image), one(labels), ring, ShadowSettings())
+    assert change.gain[1].tolist() == [1.0, 1.0, 1.0]
+    assert result[1, 1].tolist() == np.rint(image[ring.pixels() > 0].mean(axis=0)).tolist()
+
+
+@pytest.mark.parametrize("colour_space", ["rgb", "hsi"])
+def test_a_component_without_a_ring_is_left_as_it_is(colour_space):
+    image = noise(3, 4)
+    labels, ring = np.ones((3, 4), np.int32), Packed.of(np.zeros((3, 4), np.uint8))
+    chosen = ShadowSettings(colour_space=colour_space)
+    result, change = shadow.compensate(View.of(image), one(labels), ring, chosen)
+    np.testing.assert_array_equal(result, image)
+    assert change.applied.tolist() == [False, False]
+
+
+def test_the_gain_may_be_bounded_and_is_not_by_default():
+    image = np.repeat(np.array([[[0], [20], [22], [250]]], np.uint8), 3, axis=2)
+    labels = np.array([[0, 1, 1, 0]], np.int32)
+    ring = Packed.of(np.array([[1, 0, 0, 1]], np.uint8))
+    for most, gain in ((None, 125.0), (4.0, 4.0)):
+        chosen = ShadowSettings(max_gain=most)
+        _, change = shadow.compensate(View.of(image), one(labels), ring, chosen)
+        assert change.gain[1, 0] == gain
+
+
+@given(images())
+def test_moments_equal_numpy_on_the_pixels_themselves(image):
+    labels = np.ones(image.shape[:2], np.int32)
+    sums = shadow.KERNELS.run_sums(cv2.split(image), one(labels).runs, 2)
+    moments = shadow.moments_of_sums(sums)
+    pixels = image.reshape(-1, 3).astype(float)
+    assert moments.pixels[1] == len(pixels)
+    np.testing.assert_allclose(moments.mean[1], pixels.mean(axis=0), rtol=1e-14)
+    np.testing.assert_allclose(moments.deviation[1], pixels.std(axis=0), rtol=1e-12)
+    assert ((moments.deviation[1] == 0) == (np.ptp(pixels, axis=0) == 0)).all()
+
+
+@pytest.mark.parametrize("pixels", [3, 7, 41])
+def test_a_constant_component_has_no_deviation_in_hsi_either(pixels):
+    values = np.repeat(noise(1, 99)[0] / 255, pixels, axis=0)
+    labels = np.repeat(np.arange(99), pixels)
+    moments = shadow.moments_of_values(labels, values, 99)
+    assert (moments.deviation == 0).all()
+
+
+@pytest.mark.parametrize("pixels", [10, 10**7, 10**9])
+def test_moments_of_huge_components_neither_overflow_nor_cancel(pixels):
+    # All pixels 254 but one in ten, which is 255; then all of them 255.
+    tenth = pixels // 10
+    mixed = 9 * tenth * np.array([254, 254**2]) + tenth * np.array([255, 255**2])
+    even = pixels * np.array([255, 255**2])
+    sums = np.array([[pixels, *[s] * 3, *[q] * 3] for s, q in (mixed, even)], np.int64)
+    moments = shadow.moments_of_sums(sums)
+    np.testing.assert_allclose(moments.mean[:, 0], [254.1, 255], rtol=1e-15)
+    np.testing.assert_allclose(moments.deviation[:, 0], [0.3, 0], rtol=1e-14)
+
+
+# --- The stage ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("chosen", [ShadowSettings(), PRINTED], ids=["paper", "printed"])
+@pytest.mark.parametrize("image", IMAGES.values(), ids=IMAGES)
+def test_the_filter_equals_the_plain_pipeline(image, chosen):
+    image, printed = image[:50, :50], chosen is PRINTED
+    output, layers = run(image, chosen)
+    codes = reference.ndi_codes(image)
+    shadowed = reference.shadow_mask(codes, printed)
+    np.testing.assert_array_equal(layers["ndi"], codes)
+    np.testing.assert_array_equal(layers["shadow"], shadowed)
+    np.testing.assert_array_equal(layers["rings"], shadowed + 2 * reference.rings(shadowed))
+    assert_rounded(layers["compensated"], reference.compensate(image, shadowed, printed))
+    assert output.image is layers["compensated"]
+
+
+@pytest.mark.parametrize("image", IMAGES.values(), ids=IMAGES)
+def test_shadow_edge_and_lit_share_out_the_image(image):
+    output, layers = run(image, ShadowSettings(ring_width=2))
+    parts = [output.regions[name].pixels() for name in ("shadow", "shadow_edge", "lit")]
+    assert (sum(parts) == 1).all()
+    np.testing.assert_array_equal(layers["rings"], parts[0] + 2 * parts[1])
+
+
+def test_layers_are_the_ones_announced():
+    image = picture("..#", "...")
+    for chosen in (ShadowSettings(), PRINTED):
+        specs = [layer.spec for layer in run(image, chosen)[0].layers]
+        assert tuple(specs) == shadow.layers(chosen)
+
+
+def test_facts_state_threshold_components_and_gains():
+    image = picture("#...#", "#....", ".....")
+    image[2, 0] = 255  # so that the left ring varies much, and the right one does not
+    facts = run(image)[0].facts
+    _, histogram = codes_of(image)
+    assert facts["threshold"] == pytest.approx(shadow.otsu_threshold(histogram) / 127.5 - 1)
+    assert facts["shadow_share"] == pytest.approx(3 / 15)
+    assert facts["components"] == facts["compensated"] == 2
+    found = shadow.connected_components(Packed.of(run(image)[1]["shadow"]), 8)
+    ring = shadow.buffer_ring(Packed.of(found.labels() > 0), 1)
+    _, change = shadow.compensate(View.of(image), found, ring, ShadowSettings())
+    assert facts["max_gain"] == change.gain.max() > 3
+    assert facts["gains_above_3"] == (change.gain > 3).any(axis=1).sum() == 1
+    left = shadow.bind(ShadowSettings(min_area=2), None)(View(image, image)).facts
+    assert (left["components"], left["compensated"]) == (2, 1)
+
+
+def test_a_component_with_one_gain_above_3_is_counted_once_and_one_left_alone_is_not():
+    gain = np.array([[9.0, 9.0, 9.0], [1.0, 3.1, 3.2], [3.0, 3.0, 3.0], [9.0, 9.0, 9.0]])
+    applied = np.array([False, True, True, False])
+    change = shadow.Compensation(gain, gain, gain, applied)
+    facts = shadow._facts(100, Packed.of(np.eye(4, dtype=np.uint8)), 3, change)
+    assert (facts["max_gain"], facts["gains_above_3"]) == (3.2, 1)
+    assert (facts["components"], facts["compensated"], facts["shadow_share"]) == (3, 2, 0.25)
+
+
+def test_an_image_without_shadow_is_handed_on_itself():
+    image = np.full((6, 8, 3), 90, np.uint8)
+    assert shadow.bind(ShadowSettings(), None)(View.of(image)).image is image
+
+
+def test_facts_of_an_image_without_shadow():
+    facts = run(np.full((4, 4, 3), LIT, np.uint8))[0].facts
+    assert np.isnan(facts["threshold"])
+    assert facts["components"] == facts["shadow_share"] == facts["gains_above_3"] == 0
+    assert facts["max_gain"] == 1
+
+
+def test_black_borders_of_rectified_images_are_no_shadow():
+    image = np.full((6, 8, 3), LIT, np.uint8)
+    image[:, 4:6] = DARK
+    image[:2] = 0
+    assert (run(image)[1]["shadow"] == mask(*["........"] * 2, *["....##.."] * 4)).all()

@@ -1,0 +1,32 @@
+"""The words in a recording."""
+
+from roadeval.recording.screen import guide
+from tests.recording.making import layout
+
+TOTALS = {"filtered": {"post": {"ERR": 0.25, "FPR": None, "FNR": 0.5, "pooled_ERR": 0.2}}}
+
+
+def test_the_overview_is_explained_with_the_verdict_first():
+    text = guide.text(layout(), "It helps.")
+    assert text.index("street") < text.index("It helps.") < text.index("Errors")
+
+
+def test_without_truth_the_words_say_that_nothing_is_scored():
+    text = guide.text(layout(has_truth=False))
+    assert "nothing to score" in text
+    assert "Errors" not in text
+
+
+def test_rates_stand_in_a_table_in_percent_and_undefined_ones_as_a_dash():
+    text = guide.overview(layout(), {"totals": TOTALS})
+    assert "| filtered | post | 25.00 % | - | 50.00 % | 20.00 % |" in text
+
+
+def test_warnings_and_lost_parts_of_the_log_are_told():
+    text = guide.overview(layout(), {"warnings": ["It collapsed."], "losses": ["3 s are lost."]})
+    assert "- It collapsed." in text
+    assert "- 3 s are lost." in text
+
+
+def test_a_summary_without_anything_gives_the_drive_alone():
+    assert guide.overview(layout(), {}).strip() == "# street"

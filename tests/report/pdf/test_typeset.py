@@ -1,0 +1,130 @@
+"""From blocks to pages: text stays text, and the same document gives the same file."""
+
+import os
+import struct
+import zlib
+
+import pytest
+
+from roadeval.report.blocks import (
+    Asset,
+    Break,
+    Cell,
+    Columns,
+    Command,
+    Contents,
+    Figure,
+    Heading,
+    Points,
+    Strip,
+    Table,
+    Text,
+    Together,
+)
+from roadeval.report.pdf.typeset import Paper, ReportError, pdf, put
+from tests.report.documents import a_document, reader, text
+
+HOSTILE = '#panic("x") $x^2$ *bold* _it_ <label> @ref `raw` [c] \\ // # = - "quoted" ${x}'
+
+
+def a_png():
+    def chunk(kind, data):
+        return (
+            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        )
+
+    header = struct.pack(">IIBBBBB", 2, 1, 8, 0, 0, 0, 0)
+    parts = (b"IHDR", header), (b"IDAT", zlib.compress(b"\0\0\xff")), (b"IEND", b"")
+    return Asset(b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts))
+
+
+@pytest.mark.parametrize(
+    "block",
+    [
+        Heading(HOSTILE),
+        Text(HOSTILE),
+        Text(HOSTILE, "note"),
+        Text(HOSTILE, "verdict"),
+        Text(HOSTILE, "title"),
+        Command(HOSTILE),
+        Points(HOSTILE, [HOSTILE], "warning"),
+        Table([HOSTILE], [[HOSTILE]], caption=HOSTILE),
+        Figure(a_png(), HOSTILE),
+        Strip([(HOSTILE, a_png())], 1),
+    ],
+    ids=lambda block: type(block).__name__,
+)
+def test_text_that_looks_like_markup_is_printed_as_it_is(block):
+    assert '#panic("x") $x^2$ *bold* _it_ <label> @ref `raw`' in text(pdf(a_document(block)))
+
+
+def test_a_title_that_looks_like_markup_is_the_documents_title():
+    content = pdf(a_document(title=HOSTILE))
+    assert reader(content).metadata.title == HOSTILE
+
+
+def test_control_characters_and_broken_unicode_are_left_out():
+    assert "a?b c" in text(pdf(a_document(Text("a\udcffb\x00\x1b c"))))
+
+
+def test_the_same_document_gives_the_same_bytes():
+    document = a_document(Heading("one"), Contents(), Figure(a_png(), "two"))
+    assert pdf(document) == pdf(document)
+
+
+def test_headings_are_the_outline_and_the_table_of_contents():
+    content = pdf(a_document(Contents(), Heading("First"), Break(), Heading("Second")))
+    assert [entry["/Title"] for entry in reader(content).outline] == ["1 First", "2 Second"]
+    contents = reader(content).pages[0]
+    assert len(contents["/Annots"]) == 2
+    assert "1 / 2" in contents.extract_text()
+
+
+@pytest.mark.parametrize(("paper", "width"), [(Paper.A4, 595), (Paper.LETTER, 612)])
+def test_paper_has_its_size(paper, width):
+    (page,) = reader(pdf(a_document(Text("x")), paper)).pages
+    assert int(page.mediabox.width) == width
+
+
+def test_every_font_is_embedded():
+    content = pdf(a_document(Heading("x"), Text("y"), Command("z"), Text("w", "note")))
+    fonts = reader(content).pages[0]["/Resources"]["/Font"].values()
+    kinds = [font.get_object()["/DescendantFonts"][0]["/FontDescriptor"] for font in fonts]
+    assert kinds
+    assert all({"/FontFile2", "/FontFile3"} & set(kind.get_object()) for kind in kinds)
+
+
+def test_blocks_side_by_side_and_held_together_are_all_there():
+    words = text(
+        pdf(a_document(Columns([Text("left")], [Text("right")]), Together([Text("kept")])))
+    )
+    assert "left" in words
+    assert "right" in words
+    assert "kept" in words
+
+
+def test_a_table_keeps_its_rows_and_repeats_its_head_on_the_next_page():
+    rows = [[f"frame {number}", Cell(f"{number}.25", bold=True)] for number in range(100)]
+    table = Table(["<frame", "ERR"], rows, breaks=[50], groups=[("", 1), ("percent", 1)])
+    words = text(pdf(a_document(table)))
+    assert all(f"frame {number} {number}.25" in words for number in range(100))
+    assert words.count("percent") > 1
+
+
+def test_equal_pictures_are_kept_once():
+    document = a_document(Figure(a_png(), "one"), Figure(a_png(), "two"))
+    assert len(document.files()) == 1
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_place_that_cannot_be_written_to_is_told(tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(ReportError, match="choose another place with -o"):
+        put(tmp_path / "report.pdf", b"x")
+
+
+def test_a_folder_in_the_files_place_is_told_and_leaves_nothing_behind(tmp_path):
+    (tmp_path / "report.pdf").mkdir()
+    with pytest.raises(ReportError, match=r"report\.pdf: cannot be written"):
+        put(tmp_path / "report.pdf", b"x")
+    assert [path.name for path in tmp_path.iterdir()] == ["report.pdf"]

@@ -1,0 +1,312 @@
+"""The results folder: what is written is what is read, and nothing half-done is left."""
+
+import json
+import math
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from roadeval.data import FrameResult, Role
+from roadeval.data.packed import Packed
+from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.scoreboard import Scoreboard
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.results.folder import PARTS, Results, ResultsError, ResultsWriter, summary_text
+from roadeval.results.tables import COLUMNS
+from tests.evaluation.making import a_frame, a_variant, pixels
+
+TRUTHS = [pixels("##..", "##.?"), pixels("....", "...."), pixels("###.", "....")]
+MASK = pixels("#.#.", "##..")
+
+
+def a_board() -> Scoreboard:
+    settings = EvaluationSettings(window=2, boundary_width=1, bands=2)
+    return Scoreboard(settings, ["filtered"], BlindPrior.of_truths(TRUTHS))
+
+
+def scored(board: Scoreboard, role: Role = Role.EVALUATED) -> Iterator[FrameResult]:
+    variant = a_variant("filtered", {"post": MASK}, {"shadow": MASK})
+    variant = replace(variant, oracles={"svm": {"post": Packed.of(MASK)}})
+    for number, truth in enumerate(TRUTHS):
+        result = board.score(a_frame(truth, number + 5), role, (variant,))
+        board.add(result)
+        yield result
+
+
+def the_rest(board: Scoreboard) -> dict[str, Any]:
+    """A summary: the board's parts, and empty ones for those that it does not know."""
+    known = board.summary() | {"frames": {"evaluated": board.roles().get(Role.EVALUATED, 0)}}
+    return known | {name: {} for name in PARTS if name not in known and name != "format"}
+
+
+def write(folder: Path, role: Role = Role.EVALUATED) -> list[Path]:
+    board = a_board()
+    with ResultsWriter(folder) as writer:
+        for result in scored(board, role):
+            writer.append(result)
+        return writer.finish(the_rest(board), board.tables())
+
+
+def names(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def test_the_columns_are_those_of_the_design(tmp_path: Path) -> None:
+    write(tmp_path)
+    first = {path.stem: path.read_text().splitlines()[0] for path in tmp_path.glob("*.csv")}
+    assert first == {
+        "frames": "frame,stamp_ns,log_time_ns,variant,stage,TP,TN,FP,FN,N,ACC,ERR,TPR,FNR,TNR,FPR",
+        "windows": "window,first_frame,last_frame,frames,variant,stage,ACC,ERR,TPR,FNR,TNR,FPR,"
+        "pooled_ACC,pooled_ERR,pooled_TPR,pooled_FNR,pooled_TNR,pooled_FPR",
+        "regions": "frame,variant,stage,region,TP,TN,FP,FN,N",
+        "oracles": "frame,variant,oracle,stage,TP,TN,FP,FN,N,ACC,ERR,TPR,FNR,TNR,FPR",
+        "changes": "from_variant,from_stage,to_variant,to_stage,repaired,spoiled,N",
+        "heat": "variant,top,left,side,labelled,FP,FN",
+    }
+
+
+def test_a_line_of_frames_by_hand(tmp_path: Path) -> None:
+    write(tmp_path)
+    line = (tmp_path / "frames.csv").read_text().splitlines()[1]
+    rates = "0.7142857142857143,0.2857142857142857,0.75,0.25,0.6666666666666666,0.3333333333333333"
+    assert line == f"5,500000000,500000007,filtered,post,3,2,1,1,7,{rates}"
+
+
+def test_an_undefined_rate_is_an_empty_cell_and_reads_back_as_undefined(tmp_path: Path) -> None:
+    write(tmp_path)
+    line = (tmp_path / "frames.csv").read_text().splitlines()[3]
+    assert line == "6,600000000,600000007,filtered,post,0,4,4,0,8,0.5,0.5,,,0.5,0.5"
+    assert math.isnan(Results(tmp_path).frames.loc[2, "TPR"])
+
+
+def test_numbers_read_back_bit_by_bit(tmp_path: Path) -> None:
+    board = a_board()
+    tallies = [tally for result in scored(board) for tally in result.tallies]
+    write(tmp_path)
+    frames = Results(tmp_path).frames
+    assert frames["ERR"].tolist() == [tally.rates["ERR"] for tally in tallies]
+    assert frames["TP"].tolist() == [tally.counts.tp for tally in tallies]
+    windows = Results(tmp_path).windows
+    assert windows["pooled_ACC"].tolist() == [row.pooled["ACC"] for row in board.windows()]
+
+
+def test_a_variant_named_like_a_number_keeps_its_name(tmp_path: Path) -> None:
+    board = Scoreboard(EvaluationSettings(), ["007"], None)
+    with ResultsWriter(tmp_path) as writer:
+        variant = a_variant("007", {"post": MASK})
+        result = board.score(a_frame(TRUTHS[0]), Role.EVALUATED, (variant,))
+        board.add(result)
+        writer.append(result)
+        writer.finish(the_rest(board), {})
+    assert Results(tmp_path).frames["variant"].tolist() == ["007"]
+
+
+def test_the_sums_over_the_drive_read_back(tmp_path: Path) -> None:
+    write(tmp_path)
+    results = Results(tmp_path)
+    between = results.table("changes").set_index(["from_variant", "to_variant"])
+    assert between["N"].to_dict() == {("filtered", "blind"): 23, ("blind", "filtered"): 23}
+    heat, frames = results.table("heat"), results.frames
+    own = frames[frames["variant"] == "filtered"]
+    assert heat[["labelled", "FP", "FN"]].sum().tolist() == own[["N", "FP", "FN"]].sum().tolist()
+
+
+def test_oracles_have_a_row_per_frame_variant_oracle_and_stage_and_read_back(
+    tmp_path: Path,
+) -> None:
+    write(tmp_path)
+    told = Results(tmp_path).table("oracles")
+    assert told[["frame", "variant", "oracle", "stage"]].to_numpy().tolist() == [
+        [number, "filtered", "svm", "post"] for number in (5, 6, 7)
+    ]
+
+
+def test_a_table_that_nothing_was_counted_for_is_not_written_and_an_earlier_one_removed(
+    tmp_path: Path,
+) -> None:
+    write(tmp_path)
+    board = Scoreboard(EvaluationSettings(), ["net"], None)
+    with ResultsWriter(tmp_path) as writer:
+        result = board.score(
+            a_frame(TRUTHS[0]), Role.EVALUATED, (a_variant("net", {"post": MASK}),)
+        )
+        board.add(result)
+        writer.append(result)
+        writer.finish(the_rest(board), board.tables())
+    assert names(tmp_path) == {
+        *("frames.csv", "regions.csv", "windows.csv", "heat.csv", "summary.json"),
+    }
+    assert Results(tmp_path).table("oracles").empty
+
+
+def test_regions_have_a_row_per_frame_variant_stage_and_region(tmp_path: Path) -> None:
+    write(tmp_path)
+    regions = Results(tmp_path).regions
+    assert len(regions) == 3 * 2 * 5
+    assert set(regions["region"]) == {"shadow", "boundary", "interior", "band_0", "band_1"}
+    whole = Results(tmp_path).frames
+    bands = regions[regions["region"].str.startswith("band_")]
+    summed = bands.groupby(["frame", "variant"])["FP"].sum().to_dict()
+    assert summed == whole.groupby(["frame", "variant"])["FP"].sum().to_dict()
+
+
+def test_two_runs_give_equal_bytes(tmp_path: Path) -> None:
+    write(tmp_path / "a")
+    write(tmp_path / "b")
+    for name in names(tmp_path / "a"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def test_lines_end_alike_everywhere(tmp_path: Path) -> None:
+    for path in write(tmp_path):
+        content = path.read_bytes()
+        assert b"\r" not in content
+        assert content.endswith(b"\n")
+
+
+def test_nothing_bears_its_name_before_all_is_complete(tmp_path: Path) -> None:
+    board = a_board()
+    with ResultsWriter(tmp_path) as writer:
+        for result in scored(board):
+            writer.append(result)
+        assert all(name.startswith(".") for name in names(tmp_path))
+        writer.finish(the_rest(board), board.tables())
+    assert names(tmp_path) == {*(f"{table}.csv" for table in COLUMNS), "summary.json"}
+
+
+def test_an_interrupted_run_leaves_the_earlier_results(tmp_path: Path) -> None:
+    write(tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    board = a_board()
+    with suppress(KeyboardInterrupt), ResultsWriter(tmp_path) as writer:
+        writer.append(next(scored(board)))
+        raise KeyboardInterrupt
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("path", ["new", "new/er"])
+def test_a_folder_made_for_a_run_that_came_to_nothing_is_gone(tmp_path: Path, path: str) -> None:
+    with suppress(ResultsError), ResultsWriter(tmp_path / path):
+        raise ResultsError
+    assert names(tmp_path) == set()
+
+
+def test_a_folder_that_was_there_stays(tmp_path: Path) -> None:
+    (tmp_path / "old").mkdir()
+    with suppress(ResultsError), ResultsWriter(tmp_path / "old"):
+        raise ResultsError
+    assert names(tmp_path) == {"old"}
+
+
+def test_a_folder_into_which_something_else_was_put_stays(tmp_path: Path) -> None:
+    with suppress(ResultsError), ResultsWriter(tmp_path / "new" / "er"):
+        (tmp_path / "new" / "other").touch()
+        raise ResultsError
+    assert names(tmp_path / "new") == {"other"}
+
+
+WHAT_IS_MISSING = {
+    "frames": "2 of 3 frames of blind post",
+    "windows": "2 of 3 frames of blind post",
+    "regions": "5 of 6 bands of blind post",
+    "oracles": "2 of 3 frames of filtered svm post",
+    "changes": "0 of 1 rows of blind post filtered post",
+}
+
+
+@pytest.mark.parametrize("table", WHAT_IS_MISSING)
+def test_a_table_that_was_cut_at_the_end_of_a_line_is_refused(tmp_path: Path, table: str) -> None:
+    write(tmp_path)
+    path = tmp_path / f"{table}.csv"
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
+    with pytest.raises(ResultsError, match=WHAT_IS_MISSING[table]) as caught:
+        Results(tmp_path).table(table)
+    assert str(caught.value).startswith(f"{path}: does not agree with summary.json: it has ")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("table", WHAT_IS_MISSING)
+def test_a_table_that_was_taken_away_is_missed(tmp_path: Path, table: str) -> None:
+    write(tmp_path)
+    (tmp_path / f"{table}.csv").unlink()
+    with pytest.raises(ResultsError, match=r"\.csv: does not agree with summary\.json"):
+        Results(tmp_path).table(table)
+
+
+@pytest.mark.parametrize("table", ["oracles", "changes"])
+def test_tables_that_earlier_versions_did_not_write_are_not_missed(
+    tmp_path: Path, table: str
+) -> None:
+    write(tmp_path)
+    (tmp_path / f"{table}.csv").unlink()
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    del summary["oracles"]
+    (tmp_path / "summary.json").write_text(json.dumps(summary))
+    assert Results(tmp_path).table(table).empty
+
+
+def test_masks_that_are_missing_on_some_frames_agree_with_the_summary(tmp_path: Path) -> None:
+    board = Scoreboard(EvaluationSettings(window=2), ["net", "filtered", "late"], None)
+    with ResultsWriter(tmp_path) as writer:
+        for number, truth in enumerate(TRUTHS):
+            variants = [a_variant("filtered", {"svm": MASK, "post": MASK})]
+            variants += [a_variant("net", {"post": MASK})] if number == 0 else []
+            variants += [a_variant("late", {"post": MASK})] if number == 2 else []
+            result = board.score(a_frame(truth, number), Role.EVALUATED, tuple(variants))
+            board.add(result)
+            writer.append(result)
+        writer.finish(the_rest(board), board.tables())
+    tables = {name: Results(tmp_path).table(name) for name in COLUMNS}
+    assert len(tables["frames"]) == 3 * 2 + 1 + 1
+    assert not {("net", "late"), ("late", "net")} & set(
+        zip(tables["changes"]["from_variant"], tables["changes"]["to_variant"], strict=True)
+    )
+
+
+def test_a_run_that_scored_nothing_writes_no_tables_and_leaves_no_older_ones(
+    tmp_path: Path,
+) -> None:
+    write(tmp_path)
+    assert [path.name for path in write(tmp_path, Role.TRAINING)] == ["summary.json"]
+    assert names(tmp_path) == {"summary.json"}
+    assert Results(tmp_path).frames.empty
+    assert "ERR" in Results(tmp_path).frames
+
+
+def test_a_folder_that_cannot_be_written_is_one_line_with_a_remedy(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ResultsError, match=r"cannot write results.*--reports") as caught:
+        ResultsWriter(tmp_path / "file")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_folder_without_results_says_how_to_make_some(tmp_path: Path) -> None:
+    with pytest.raises(ResultsError, match=r"no results here.*roadeval replay"):
+        Results(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"format": {"name": "roadeval-summary"}}'])
+def test_a_file_that_is_no_summary_is_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / "summary.json").write_text(text)
+    with pytest.raises(ResultsError, match="not a summary"):
+        Results(tmp_path)
+
+
+def test_the_summary_writes_undefined_as_null_and_keeps_its_order() -> None:
+    document = json.loads(summary_text(the_rest(a_board()) | {"totals": {"ERR": math.nan}}))
+    assert tuple(document) == PARTS
+    assert document["totals"] == {"ERR": None}
+    assert document["format"] == {"name": "roadeval-summary", "version": 1}
+
+
+def test_a_summary_with_a_part_too_few_or_too_many_is_refused() -> None:
+    parts = the_rest(a_board())
+    with pytest.raises(ValueError, match="weather"):
+        summary_text(parts | {"weather": "fine"})
+    parts.pop("drive")
+    with pytest.raises(ValueError, match="drive"):
+        summary_text(parts)
