@@ -18,12 +18,11 @@ from roadeval.jobs.gallery import Gallery
 from roadeval.jobs.options import OptionError, Progress, ReplayOptions
 from roadeval.kernels.first_time import prepare
 from roadeval.pipeline.chain import Chain
-from roadeval.pipeline.stage import MisfitError, Moment, View
+from roadeval.pipeline.stage import MisfitError, View
 from roadeval.recording import Layout
 from roadeval.results import tables
 from roadeval.results.folder import STREAMED
 from roadeval.runtime.memory import OFTEN, give_back
-from roadeval.runtime.relay import Relay, Turn
 from roadeval.runtime.threads import ordered
 from roadeval.training import Model
 from roadeval.training.model import ModelError
@@ -144,13 +143,10 @@ class Run:
         the recorder's alone: a yielded result has none.
         """
 
-        def work(item: tuple[int, logs.LoggedFrame, Turn]) -> Processed | None:
-            with item[-1] as turn:
-                return self._process(*item[:2], turn, recorder)
+        def work(item: tuple[int, logs.LoggedFrame]) -> Processed | None:
+            return self._process(*item, recorder)
 
-        relay = Relay(self._chains)
-        items = ((*item, relay.turn()) for item in enumerate(self._frames))
-        for processed in ordered(work, items, self._jobs):
+        for processed in ordered(work, enumerate(self._frames), self._jobs):
             self.done += 1
             self._tell(Progress(self.done, self.total, "replaying"))
             if self.done % OFTEN == 0:
@@ -163,7 +159,7 @@ class Run:
                 yield processed
 
     def _process(
-        self, position: int, logged: logs.LoggedFrame, turn: Turn, recorder: Encoder
+        self, position: int, logged: logs.LoggedFrame, recorder: Encoder
     ) -> Processed | None:
         try:
             frame = logged.decode()
@@ -177,7 +173,7 @@ class Run:
             runner.run_variant(
                 name,
                 chain,
-                seen.at(Moment(frame.stamp_ns, turn.batons[name])),
+                seen,
                 truth=known[0],
                 shadow_truth=known[1],
                 known=shared,

@@ -89,10 +89,8 @@ class Chain:
         Yields
         ------
         stage, masks
-            The stage that was replaced, as it is reported, and the masks of those after it. They
-            see an image that stands alone: what a stage remembers of a drive is not for oracles.
+            The stage that was replaced, as it is reported, and the masks of those after it.
         """
-        view = view.at(None)
         for place, (step, output) in enumerate(zip(self.steps, outputs, strict=True)):
             truth = shadow if step.stage.is_filter else road
             if step.oracle is not None and truth is not None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -29,43 +29,23 @@ class MisfitError(RoadevalError, ValueError):
     """Parameters that do not fit a stage's settings: which, and what to do."""
 
 
-class Baton(Protocol):
-    """Carries what a stage remembers from each frame of a drive to the next."""
-
-    def recall(self) -> Any:
-        """Give what the frame before left; None on the first frame."""
-
-    def leave(self, value: Any) -> None:
-        """Leave a value to the next frame; once a frame."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Moment:
-    """A frame's place in its drive: its stamp in nanoseconds, and what the frame before left."""
-
-    stamp_ns: int
-    baton: Baton
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
     """What a stage sees of a frame.
 
     ``original`` is the image as logged, ``image`` the same after the filters that ran before
     this stage, both ``(H, W, 3)`` uint8 RGB; ``mask`` is the previous stage's road mask.
-    ``moment`` is None for an image that stands alone. One stage of a chain may use its baton.
     Views of one image share what `planes` has found of it, in a list that begins empty.
     """
 
     original: Rgb
     image: Rgb
     mask: Packed | None = None
-    moment: Moment | None = None
     _apart: list[Planes] = field(default_factory=list, repr=False)
 
     @classmethod
     def of(cls, image: Rgb) -> View:
-        """See an ``(H, W, 3)`` uint8 RGB image as it is before any stage, and alone."""
+        """See an ``(H, W, 3)`` uint8 RGB image as it is before any stage."""
         return cls(image, image)
 
     def planes(self) -> Planes:
@@ -79,12 +59,8 @@ class View:
         # By hand: `dataclasses.replace` takes several times as long, and runs thirty times a frame.
         mask = self.mask if output.mask is None else output.mask
         if output.image is None or output.image is self.image:
-            return View(self.original, self.image, mask, self.moment, self._apart)
-        return View(self.original, output.image, mask, self.moment)
-
-    def at(self, moment: Moment | None) -> View:
-        """Give the same at a moment of a drive, or alone."""
-        return View(self.original, self.image, self.mask, moment, self._apart)
+            return View(self.original, self.image, mask, self._apart)
+        return View(self.original, output.image, mask)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,7 +15,6 @@ References
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -38,7 +37,6 @@ from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.solvers import hyperplane
 from roadeval.pipeline.stage import (
     MisfitError,
-    Moment,
     Output,
     Stage,
     TrainingSet,
@@ -81,10 +79,6 @@ class ContextSettings:
     smoothing
         Side of the square over which decision values are averaged, in pixels of the working
         image: neighbours belong together. 1 leaves them as they are.
-    memory
-        Seconds over which decision values of earlier frames fade, by ``exp(-age / memory)``; 0
-        forgets them. At 15 frames a second 0.2 halves the flicker for 0.2 points of ERR; a mask
-        that lags is a price not everybody wants to pay, so it is off.
     threshold
         A pixel is road where the decision value is above this. None: learnt, see `threshold`.
     folds
@@ -97,7 +91,6 @@ class ContextSettings:
     spare: Annotated[int, Field(ge=0, le=4096)] = 32
     c: Penalty = 1.0
     smoothing: Annotated[int, Field(ge=1, le=255)] = 5
-    memory: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
     threshold: Annotated[float, Field(allow_inf_nan=False)] | None = None
     folds: Annotated[int, Field(ge=2, le=100)] = 5
 
@@ -317,30 +310,12 @@ def decision(image: Rgb, machine: RectifiedMachine, settings: ContextSettings) -
     return smooth
 
 
-def remembered(values: Values, moment: Moment, memory: float) -> Values:
-    """Mix decision values with those that the frame before left, and leave them for the next.
-
-    ``memory`` is the time in seconds in which the past fades to 1/e. What does not lie in the
-    past, or was another size, is forgotten.
-    """
-    past = moment.baton.recall()
-    if past is not None:
-        stamp_ns, earlier = past
-        age = (moment.stamp_ns - stamp_ns) / 1e9
-        if age > 0 and earlier.shape == values.shape:
-            values = values + np.float32(math.exp(-age / memory)) * (earlier - values)
-    moment.baton.leave((moment.stamp_ns, values))
-    return values
-
-
 def bind(settings: ContextSettings, machine: RectifiedMachine) -> Callable[[View], Output]:
     """Return the machine as a pure function of what it sees; a `MisfitError`, see `check_fit`."""
     check_fit(machine, settings)
 
     def run(view: View) -> Output:
         values = decision(reduced(view.image, settings.width), machine, settings)
-        if settings.memory > 0 and view.moment is not None:
-            values = remembered(values, view.moment, settings.memory)
         values = stretched(values, view.image.shape)
         road = Packed.of(values > machine.threshold)
         return Output((Layer(DECISION, values), Layer(SVM, road)), mask=road)
@@ -363,6 +338,6 @@ STAGE: Final = Stage(
     parameters=RectifiedMachine,
     oracle=perfect_mask,
     # Not the threshold: it is learnt, or takes the place of what would have been.
-    deciding=("memory", "smoothing"),
+    deciding=("smoothing",),
     mask=SVM.name,
 )

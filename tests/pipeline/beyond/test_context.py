@@ -8,7 +8,7 @@ from roadeval.kernels import compiled, plain
 from roadeval.pipeline.beyond import context
 from roadeval.pipeline.beyond.context import ContextSettings
 from roadeval.pipeline.chain import STAGES, layers_of, masks_of
-from roadeval.pipeline.stage import Moment, TrainingSet, View
+from roadeval.pipeline.stage import TrainingSet, View
 
 PLAIN = ContextSettings(planes=32, spare=0, smoothing=1)
 
@@ -281,66 +281,6 @@ def test_the_kernel_is_the_sum_over_rectified_planes(module):
     bias, weights = np.array([1, 5, -15], np.float32), np.array([1, 100, -2], np.float32)
     found = module.rectified_sum(features, planes, bias, weights)
     assert found.tolist() == [3, 5 - 2 * 5]
-
-
-# --- Memory ---------------------------------------------------------------------------------------
-
-
-class Hand:
-    """A baton with one value in it."""
-
-    def __init__(self, value=None):
-        self.value = value
-
-    def recall(self):
-        return self.value
-
-    def leave(self, value):
-        self.value = value
-
-
-def over_time(values, stamps, memory):
-    hand = Hand()
-    return [
-        context.remembered(np.full((1, 2), v, np.float32), Moment(round(t * 1e9), hand), memory)
-        for v, t in zip(values, stamps, strict=True)
-    ]
-
-
-def test_the_past_fades_with_its_age():
-    first, second = over_time([1.0, 0.0], [0.0, 0.3], memory=0.2)
-    assert (first == 1).all()
-    np.testing.assert_allclose(second, np.exp(-1.5), rtol=1e-6)
-
-
-def test_a_steady_value_stays_and_a_far_past_is_forgotten():
-    *_, steady, late = over_time([0.5, 0.5, -1.0], [0.0, 0.1, 60.0], memory=0.2)
-    assert (steady == 0.5).all()
-    assert (late == -1).all()
-
-
-def test_what_is_not_in_the_past_is_forgotten():
-    assert (over_time([1.0, 0.0], [5.0, 5.0], memory=0.2)[1] == 0).all()
-    assert (over_time([1.0, 0.0], [5.0, 4.0], memory=0.2)[1] == 0).all()
-
-
-def test_another_size_begins_anew():
-    hand = Hand((0, np.ones((3, 3), np.float32)))
-    values = np.zeros((1, 2), np.float32)
-    assert (context.remembered(values, Moment(1, hand), 1.0) == 0).all()
-
-
-def test_memory_is_off_unless_asked_for():
-    truth = np.zeros((24, 32), np.uint8)
-    truth[12:] = 1
-    machine = context.fit(every_pixel([grey()], [truth]), PLAIN)
-    image, hand = grey(seed=2), Hand()
-    context.bind(PLAIN, machine)(View(image, image, moment=Moment(0, hand)))
-    assert hand.value is None
-    context.bind(ContextSettings(planes=32, spare=0, memory=0.5), machine)(
-        View(image, image, moment=Moment(0, hand))
-    )
-    assert hand.value[0] == 0
 
 
 # --- The threshold --------------------------------------------------------------------------------
