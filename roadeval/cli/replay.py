@@ -65,7 +65,7 @@ def replay(
     from roadeval.cli import outcome, settings
     from roadeval.jobs.options import ReplayOptions
     from roadeval.jobs.replay import replay as run
-    from roadeval.results.folder import summary_text
+    from roadeval.results.summary import summary_text
 
     labels = settings.labels(road_label, ignore_label, road_color, ignore_color)
     chosen = ReplayOptions(

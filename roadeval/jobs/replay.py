@@ -14,8 +14,10 @@ from roadeval.jobs.options import Outcome, Progress, ReplayOptions, keep_apart
 from roadeval.jobs.run import Run
 from roadeval.recording import NullRecorder, Rule, recorder_for
 from roadeval.report.figures.files import Example, write_figures
-from roadeval.results.folder import Results, ResultsWriter, summary_text
-from roadeval.results.tables import header
+from roadeval.results.folder import Results, ResultsWriter
+from roadeval.results.lines import sum_lines
+from roadeval.results.schema import TABLES
+from roadeval.results.summary import summary_text
 from roadeval.runtime.memory import give_back
 
 __all__ = ["Outcome", "Progress", "ReplayOptions", "replay"]
@@ -93,16 +95,18 @@ def _run(
         run = Run(log, options, tell)
         recorder = recorder_for(to.recording, run.layout(), to.rule)
         opened.enter_context(recorder)
-        for result, encoded in run.frames(recorder):
+        for result, lines, encoded in run.frames(recorder):
             recorder.write(encoded)
-            results.append(result)
+            results.append(lines)
             sidecar.write(result)
         tell(Progress(run.done, run.total, "writing"))
         recorder.settle()
         give_back()
-        sums, summary = run.board.tables(), run.summary()
+        sums = sum_lines(run.board.sums())
+        results.append(sums)
+        summary = run.summary() | {"tables": results.tables}
         recorder.finish(_texts(summary, sums))
-        files = results.finish(summary, sums)
+        files = results.finish(summary)
     saved = None if isinstance(recorder, NullRecorder) else recorder.path
     files += [sidecar.path] if sidecar.path else []
     outcome = Outcome(saved, to.reports, summary, run.warnings(), run.losses(), tuple(files))
@@ -115,7 +119,7 @@ def _sidecar(path: str | Path | None) -> logs.SidecarWriter | logs.NoSidecar:
 
 def _texts(summary: dict[str, Any], sums: dict[str, str]) -> dict[str, str]:
     """Give the results as the recording keeps them: the files' own text."""
-    tables = {name: header(name) + text for name, text in sums.items()}
+    tables = {name: TABLES[name].header + text for name, text in sums.items()}
     return {"summary": summary_text(summary), **tables}
 
 

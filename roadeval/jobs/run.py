@@ -21,23 +21,23 @@ from roadeval.kernels.first_time import prepare
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import MisfitError, View
 from roadeval.recording import Layout
-from roadeval.results import tables
-from roadeval.results.folder import STREAMED
+from roadeval.results.lines import lines
+from roadeval.results.schema import streamed
 from roadeval.runtime.memory import OFTEN, give_back
 from roadeval.runtime.threads import ordered
 from roadeval.training import Model
 from roadeval.training.model import ModelError
 
 Tell = Callable[[Progress], None]
-Processed = tuple[FrameResult, Any]
-"""A scored frame, and what the recorder made of it."""
+Processed = tuple[FrameResult, Mapping[str, str], Any]
+"""A scored frame, its lines of the tables, and what the recorder made of it."""
 
 
 class Encoder(Protocol):
     """Whatever turns a frame into what it will record, in any thread."""
 
-    def encode(self, result: FrameResult, position: int) -> Any:
-        """Encode the frame at ``position`` among those read, from 0."""
+    def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> Any:
+        """Encode the frame at ``position`` among those read, from 0, with its table lines."""
 
 
 class Run:
@@ -118,7 +118,7 @@ class Run:
             has_shadow_truth=self._selection.shadow is not None,
             first_frame=self._schedule.first,
             rate_hz=self._selection.image.rate_hz,
-            tables={name: tables.header(name) for name in STREAMED},
+            tables={name: table.header for name, table in streamed().items()},
             properties=self._properties(),
         )
 
@@ -184,9 +184,10 @@ class Run:
         ]
         variants += [runner.external_variant(name, mask) for name, mask in frame.external.items()]
         result = self.board.score(frame, role, tuple(variants))
-        encoded = recorder.encode(result, position)
+        own = lines(result)
+        encoded = recorder.encode(result, position, own)
         # Results wait for their turn, and would wait with some 15 bytes a pixel.
-        return result.without_layers(), encoded
+        return result.without_layers(), own, encoded
 
     def summary(self) -> dict[str, Any]:
         """Give the content of ``summary.json``, but for its format."""
