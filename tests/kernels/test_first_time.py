@@ -47,7 +47,7 @@ def test_a_run_of_any_preset_needs_nothing_else():
 import sys
 import tempfile
 
-import arch.bootstrap, sklearn.svm
+import sklearn.svm
 import roadeval, roadeval.jobs.replay
 from roadeval.config import PRESETS, preset
 from roadeval.kernels import compiled, first_time
