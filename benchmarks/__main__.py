@@ -28,6 +28,7 @@ from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import Run
 from roadeval.pipeline.stage import View
 from roadeval.recording import Rule, recorder_for
+from roadeval.results.lines import lines
 from roadeval.runtime.threads import one_thread_each
 
 Rows = list[dict[str, Any]]
@@ -134,7 +135,7 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
                 score = partial(run.board.score, frame, Role.EVALUATED, variants)
                 result, seconds = timed(score)
                 lap("score", seconds)
-                encoded, seconds = timed(partial(recorder.encode, result, position))
+                encoded, seconds = timed(partial(recorder.encode, result, position, lines(result)))
                 lap("encode", seconds)
                 lap("write", timed(partial(recorder.write, encoded))[1])
             recorder.finish({})
@@ -150,7 +151,7 @@ def _plain(
         frames = [each.decode() for each in log.frames(run.selection)]
         step = max(1, len(frames) // options.plain_frames)
         chosen = range(len(frames))[step // 2 :: step][: options.plain_frames]
-        results = [r for i, (_, r) in enumerate(run.frames(Whole())) if i in chosen]
+        results = [r for i, (_, _, r) in enumerate(run.frames(Whole())) if i in chosen]
     plain = PlainWay(frames, config)
     for name, parameters in run.model.parameters.items():
         plain.require_same_machine(name, parameters["svm"])

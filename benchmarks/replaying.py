@@ -21,6 +21,7 @@ from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import Run, span
 from roadeval.recording import Rule, recorder_for
 from roadeval.results.folder import ResultsWriter
+from roadeval.results.lines import lines, sum_lines
 from roadeval.runtime.threads import ordered
 
 ALL: Final = Rule.parse("all")
@@ -49,7 +50,7 @@ class Held:
 class Whole:
     """Stands where a recorder does, and hands out what it is given, layers and all."""
 
-    def encode(self, result: FrameResult, _position: int) -> FrameResult:
+    def encode(self, result: FrameResult, _position: int, _lines: Any) -> FrameResult:
         """Give the result."""
         return result
 
@@ -60,10 +61,10 @@ def hold(drive: Path, config: RunConfig) -> Held:
         run = Run(log, config, ignore)
         results, sizes = [], []
         recorder = recorder_for(drive.with_suffix(".held.rrd"), run.layout(), ALL)
-        for position, (_, result) in enumerate(run.frames(Whole())):
+        for position, (_, _, result) in enumerate(run.frames(Whole())):
             if position % max(1, -(-run.total * _bytes(result) // HELD_BYTES)) == 0:
                 results.append(result)
-                encoded = recorder.encode(result, position).encoded
+                encoded = recorder.encode(result, position, lines(result)).encoded
                 sizes.append(_layer_bytes(encoded.payloads))
         files = [_files(logged) for logged in log.frames(run.selection, span(config))]
         return Held(files, results, run.layout(), float(np.mean(sizes)))
@@ -93,7 +94,7 @@ def floor(held: Held, folder: Path, jobs: int) -> Cost:
         number, files, result = item
         for flags, data in zip((cv2.IMREAD_COLOR_RGB, *[-1] * 9), files, strict=False):
             cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-        return recorder.encode(result, number)
+        return recorder.encode(result, number, lines(result))
 
     recorder = recorder_for(folder / "floor.rrd", held.layout, ALL)
     meter = Meter()
@@ -111,12 +112,13 @@ def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
         recorder = recorder_for(folder / "loop.rrd", run.layout(), ALL)
         meter = Meter()
         with recorder, ResultsWriter(folder / "reports") as results:
-            for result, encoded in run.frames(recorder):
+            for _, own, encoded in run.frames(recorder):
                 recorder.write(encoded)
-                results.append(result)
+                results.append(own)
             recorder.finish({})
             cost = meter.read()
-            results.finish(run.summary(), run.board.tables())
+            results.append(sum_lines(run.board.sums()))
+            results.finish(run.summary())
         return cost
 
 

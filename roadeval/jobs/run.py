@@ -13,6 +13,7 @@ from roadeval import logs
 from roadeval.config import RunConfig
 from roadeval.data import FrameResult, Role, VariantLayout
 from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.jobs import frame as runner
 from roadeval.jobs import learning
@@ -22,16 +23,16 @@ from roadeval.kernels.first_time import prepare
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import MisfitError, View
 from roadeval.recording import Layout
-from roadeval.results import tables
-from roadeval.results.folder import STREAMED
+from roadeval.results.lines import lines
+from roadeval.results.schema import streamed
 from roadeval.runtime.memory import OFTEN, give_back
 from roadeval.runtime.threads import ordered
 from roadeval.training import Model
 from roadeval.training.model import ModelError
 from roadeval.version import VERSION
 
-Processed = tuple[FrameResult, Any]
-"""A scored frame, and what the recorder made of it."""
+Processed = tuple[FrameResult, Mapping[str, str], Any]
+"""A scored frame, its lines of the tables, and what the recorder made of it."""
 
 
 def select(log: logs.Log, config: RunConfig) -> logs.Selection:
@@ -61,8 +62,8 @@ def span(config: RunConfig) -> logs.Span:
 class Encoder(Protocol):
     """Whatever turns a frame into what it will record, in any thread."""
 
-    def encode(self, result: FrameResult, position: int) -> Any:
-        """Encode the frame at ``position`` among those read, from 0."""
+    def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> Any:
+        """Encode the frame at ``position`` among those read, from 0, with its table lines."""
 
 
 class Run:
@@ -134,12 +135,13 @@ class Run:
             width,
             height,
             self._layouts(),
+            rates=tuple(METRICS),
             baseline=self.model.prior is not None,
             has_truth=self.selection.truth is not None,
             has_shadow_truth=self.selection.shadow is not None,
             first_frame=self._schedule.first,
             rate_hz=self.selection.image.rate_hz,
-            tables={name: tables.header(name) for name in STREAMED},
+            tables={name: table.header for name, table in streamed().items()},
             properties=self._properties(),
         )
 
@@ -207,6 +209,7 @@ class Run:
         ]
         variants += [runner.external_variant(name, mask) for name, mask in frame.external.items()]
         result = self.board.score(frame, role, tuple(variants))
-        encoded = recorder.encode(result, position)
+        own = lines(result)
+        encoded = recorder.encode(result, position, own)
         # Results wait for their turn, and would wait with some 15 bytes a pixel.
-        return result.without_layers(), encoded
+        return result.without_layers(), own, encoded

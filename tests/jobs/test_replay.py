@@ -13,8 +13,9 @@ from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import Run
 from roadeval.logs import open_log
 from roadeval.pipeline.paper import svm as classify
-from roadeval.results.folder import Results, summary_text
-from roadeval.results.tables import COLUMNS
+from roadeval.results.folder import Results
+from roadeval.results.schema import TABLES
+from roadeval.results.summary import summary_text
 from tests.jobs.making import FRAMES, NS, settings, write_log
 
 
@@ -122,7 +123,7 @@ def test_figures_are_written(once):
 
 def test_the_number_of_workers_changes_no_number(drive, once, tmp_path):
     run(drive, tmp_path, jobs=1)
-    for table in COLUMNS:
+    for table in TABLES:
         other = (tmp_path / "reports" / f"{table}.csv").read_bytes()
         assert other == (once[0] / "reports" / f"{table}.csv").read_bytes()
 
@@ -348,7 +349,7 @@ def test_a_variant_whose_preset_trains_otherwise_is_trained_like_the_rest_and_wa
     assert settings(preset="robust", variants={"v": {"preset": "robust"}}).ignored() == ()
 
 
-@pytest.mark.parametrize("table", COLUMNS)
+@pytest.mark.parametrize("table", TABLES)
 def test_a_table_is_the_same_in_the_folder_and_in_the_recording_bit_by_bit(once, table):
     folder, outcome = once
     recording, results = roadeval.Recording(outcome.recording), Results(folder / "reports")
@@ -473,12 +474,12 @@ def test_reduced_masks_do_not_go_beside_the_log(drive, tmp_path):
 
 def test_results_that_wait_have_lost_their_layers_but_not_their_masks(drive):
     class Seen:
-        def encode(self, result, position):
+        def encode(self, result, position, lines):
             return result
 
     options = settings(max_frames=14)
     with open_log(drive) as log:
-        *_, (lean, whole) = Run(log, options, ignore).frames(Seen())
+        *_, (lean, _, whole) = Run(log, options, ignore).frames(Seen())
     assert any(list(variant.layers()) for variant in whole.variants)
     assert not any(list(variant.layers()) for variant in lean.variants)
     assert lean.tallies == whole.tallies

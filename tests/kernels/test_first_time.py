@@ -46,7 +46,7 @@ def test_a_run_of_any_preset_needs_nothing_else():
 import sys
 import tempfile
 
-import arch.bootstrap, sklearn.svm
+import sklearn.svm
 import roadeval, roadeval.jobs.replay
 from roadeval.config import PRESETS
 from tests.jobs.making import settings
