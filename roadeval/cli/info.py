@@ -44,7 +44,7 @@ def info(
         sync_tolerance_ms=sync_tolerance,
         resize_truth=resize_truth,
     )
-    found = describe(drive, chosen.select, keep_corrupt=keep_corrupt)
+    found = describe(drive, chosen.topics(), chosen.labels(), keep_corrupt=keep_corrupt)
     if json:
         console.emit(dumps(found.as_dict(), indent=2, ensure_ascii=False))
     else:

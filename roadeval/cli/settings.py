@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from roadeval.cli.options import PresetName, color, split_mask, split_variant, usage
-from roadeval.config import Config, load_config
+from roadeval.config import Config, load_config, override
 from roadeval.config import preset as named
-from roadeval.logs import LabelValues
+from roadeval.logs import LabelSettings
 
 
 def configuration(preset: PresetName | None, file: Path | None) -> Config:
@@ -31,12 +31,14 @@ def labels(
     ignore: Sequence[int] | None,
     road_colors: Sequence[str] | None = None,
     ignore_colors: Sequence[str] | None = None,
-) -> LabelValues:
+) -> LabelSettings:
     """Check what the truth's values, or colours, are said to mean."""
+    given = {
+        "road": tuple(road or ()),
+        "ignore": tuple(ignore or ()),
+        "road_colors": tuple(map(color, road_colors or ())),
+        "ignore_colors": tuple(map(color, ignore_colors or ())),
+    }
     with usage():
-        return LabelValues(
-            tuple(road or ()),
-            tuple(ignore or ()),
-            tuple(map(color, road_colors or ())),
-            tuple(map(color, ignore_colors or ())),
-        )
+        settings: LabelSettings = override(LabelSettings(), given, "labels:")
+        return settings

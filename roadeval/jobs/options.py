@@ -101,29 +101,25 @@ class ReplayOptions:
 
     def select(self, log: logs.Log) -> logs.Selection:
         """Settle what of a log is replayed."""
-        tolerance = self.sync_tolerance_ms
-        return log.select(
-            image=self.image_topic,
-            truth=self.truth_topic,
-            shadow=self.shadow_topic,
-            masks=self.mask_topics,
-            labels=self.labels(),
-            sync_tolerance_ns=None if tolerance is None else round(tolerance * 1e6),
-            resize_truth=self.resize_truth,
-            scale=self.scale,
-        )
+        return log.select(self.topics(), self.labels(), scale=self.scale)
 
-    def labels(self) -> logs.LabelValues:
-        """Say what the truth's values, or colours, mean."""
-        return logs.LabelValues(
+    def topics(self) -> logs.TopicSettings:
+        """Return the topics."""
+        return logs.TopicSettings(
+            self.image_topic, self.truth_topic, self.shadow_topic, self.mask_topics,
+            self.sync_tolerance_ms, self.resize_truth,
+        )  # fmt: skip
+
+    def labels(self) -> logs.LabelSettings:
+        """Return what the truth's values, or colours, mean."""
+        return logs.LabelSettings(
             self.road_labels, self.ignore_labels, self.road_colors, self.ignore_colors
         )
 
     def span(self) -> logs.Span:
-        """Give the part of the log that is read."""
-        start = None if self.start is None else logs.parse_time(self.start)
-        end = None if self.end is None else logs.parse_time(self.end)
-        return logs.Span(start, end, self.every, self.max_frames)
+        """Return the part of the log that is read."""
+        settings = logs.FrameSettings(self.start, self.end, self.every, self.max_frames)
+        return logs.Span.of(settings)
 
     def all_variants(self) -> tuple[Variant, ...]:
         """Give every variant that is computed: the two by default, then the extra ones."""
