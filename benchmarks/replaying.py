@@ -18,7 +18,7 @@ from roadeval.config import RunConfig
 from roadeval.data import FrameResult
 from roadeval.data.packed import Packed
 from roadeval.jobs.progress import ignore
-from roadeval.jobs.run import Run, span
+from roadeval.jobs.run import Run
 from roadeval.recording import Rule, recorder_for
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.lines import lines, sum_lines
@@ -66,7 +66,9 @@ def hold(drive: Path, config: RunConfig) -> Held:
                 results.append(result)
                 encoded = recorder.encode(result, position, lines(result)).encoded
                 sizes.append(_layer_bytes(encoded.payloads))
-        files = [_files(logged) for logged in log.frames(run.selection, span(config))]
+        files = [
+            _files(logged) for logged in log.frames(run.selection, logs.Span.of(config.frames))
+        ]
         return Held(files, results, run.layout(), float(np.mean(sizes)))
 
 

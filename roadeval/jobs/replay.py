@@ -10,7 +10,6 @@ from typing import Any
 
 from roadeval import logs
 from roadeval.config import RunConfig
-from roadeval.evaluation import metrics
 from roadeval.jobs import summary
 from roadeval.jobs.outputs import AnyPath, Outputs, keep_apart
 from roadeval.jobs.progress import OnProgress, Progress, ignore
@@ -110,7 +109,7 @@ def _run(
 
 
 def _sidecar(path: Path | None) -> logs.SidecarWriter | logs.NoSidecar:
-    return logs.NoSidecar() if path is None else logs.SidecarWriter(path, metrics.of)
+    return logs.NoSidecar() if path is None else logs.SidecarWriter(path)
 
 
 def _texts(facts: Mapping[str, Any], sums: Mapping[str, str]) -> dict[str, str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -33,30 +32,6 @@ from roadeval.version import VERSION
 
 Processed = tuple[FrameResult, Mapping[str, str], Any]
 """A scored frame, its lines of the tables, and what the recorder made of it."""
-
-
-def select(log: logs.Log, config: RunConfig) -> logs.Selection:
-    """Settle what of a log is replayed."""
-    topics = config.topics
-    tolerance = topics.sync_tolerance_ms
-    return log.select(
-        image=topics.image,
-        truth=topics.truth,
-        shadow=topics.shadow,
-        masks=topics.masks,
-        labels=logs.LabelValues(**asdict(config.labels)),
-        sync_tolerance_ns=None if tolerance is None else round(tolerance * 1e6),
-        resize_truth=topics.resize_truth,
-        scale=config.frames.scale,
-    )
-
-
-def span(config: RunConfig) -> logs.Span:
-    """Return the part of the log that is read."""
-    frames = config.frames
-    start = None if frames.start is None else logs.parse_time(frames.start)
-    end = None if frames.end is None else logs.parse_time(frames.end)
-    return logs.Span(start, end, frames.every, frames.max_frames)
 
 
 class Encoder(Protocol):
@@ -89,8 +64,8 @@ class Run:
         self.config = config
         self._tell = on_progress
         self.variants = config.variants()
-        self.selection = select(log, config)
-        self.read = log.frames(self.selection, span(config))
+        self.selection = log.select(config.topics, config.labels, scale=config.frames.scale)
+        self.read = log.frames(self.selection, logs.Span.of(config.frames))
         self.total = len(self.read)
         self.model, self._schedule = self._learn()
         self._chains = self._bind()
@@ -111,7 +86,7 @@ class Run:
         labelled = self.selection.truth is not None and settings.source != "patch"
         total = min(settings.frames, self.total)
         return learning.from_log(
-            partial(self.log.frames, self.selection, span(self.config)),
+            partial(self.log.frames, self.selection, logs.Span.of(self.config.frames)),
             self.variants,
             settings,
             lambda done: self._tell(Progress(done, total, "training")),
