@@ -66,9 +66,8 @@ def hold(drive: Path, config: RunConfig) -> Held:
                 results.append(result)
                 encoded = recorder.encode(result, position, lines(result)).encoded
                 sizes.append(_layer_bytes(encoded.payloads))
-        files = [
-            _files(logged) for logged in log.frames(run.selection, logs.Span.of(config.frames))
-        ]
+        frames = log.frames(run.selection, logs.Span.of(config.frames))
+        files = [_files(logged) for logged in frames]
         return Held(files, results, run.layout(), float(np.mean(sizes)))
 
 
