@@ -15,7 +15,7 @@ from roadeval.evaluation.scoreboard import COMPARED
 from roadeval.jobs.looking import Looker, evenly, named, pipelines
 from roadeval.jobs.result import Opened
 from roadeval.report.findings import Findings, Heat, Versus
-from roadeval.results.lines import change_rows, heat_rows
+from roadeval.results.lines import change_rows, heat_rows, window_rows
 from roadeval.results.reading import table_of
 
 if TYPE_CHECKING:
@@ -90,7 +90,8 @@ def _windows(opened: Opened) -> tuple[pd.DataFrame, int]:
     if count <= ROWS and len(opened.windows):
         return opened.windows, size
     size *= -(-count // ROWS)
-    return analysis.rows(opened.frames, size), size
+    windows = analysis.windows(opened.frames, size)
+    return table_of("windows", window_rows(windows)), size
 
 
 def _versus(frames: pd.DataFrame, summary: dict[str, Any], changes: pd.DataFrame) -> list[Versus]:

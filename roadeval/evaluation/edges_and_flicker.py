@@ -59,7 +59,7 @@ class Flicker:
         }
 
 
-class Beyond:
+class EdgesAndFlicker:
     """Sums up boundary F and flicker of every final mask.
 
     Parameters

@@ -7,7 +7,7 @@ import pytest
 
 from roadeval.data import IGNORE, FrameResult, Role, TruthBits
 from roadeval.data.packed import Packed
-from roadeval.evaluation.beyond import Beyond, Flicker
+from roadeval.evaluation.edges_and_flicker import EdgesAndFlicker, Flicker
 from tests.evaluation.making import a_frame, a_variant, pixels
 
 TRUTH = pixels("##..", "##.?")
@@ -75,35 +75,35 @@ def a_result(score, number=0, role=Role.EVALUATED):
 
 
 def test_boundary_f_is_averaged_over_the_frames_that_have_one():
-    beyond = Beyond(5)
+    drive = EdgesAndFlicker(5)
     for score in (0.5, float("nan"), 1.0):
-        beyond.add(a_result(score))
-    told = beyond.totals()["net"]
+        drive.add(a_result(score))
+    told = drive.totals()["net"]
     assert told["boundary_F"] == pytest.approx(0.75)
     assert (told["frames"], told["width"], told["pairs"]) == (2, 5, 2)
 
 
 @pytest.mark.parametrize("role", [Role.TRAINING, Role.GAP, Role.UNLABELLED])
 def test_frames_that_are_not_evaluated_are_not_counted_and_interrupt_the_flicker(role):
-    beyond = Beyond(5)
+    drive = EdgesAndFlicker(5)
     for result in (a_result(1.0), replace(a_result(0.0), role=role), a_result(1.0)):
-        beyond.add(result)
-    assert beyond.totals()["net"]["boundary_F"] == 1
-    assert beyond.totals()["net"]["pairs"] == 0
+        drive.add(result)
+    assert drive.totals()["net"]["boundary_F"] == 1
+    assert drive.totals()["net"]["pairs"] == 0
 
 
 def test_a_lost_frame_interrupts_the_flicker():
-    beyond = Beyond(5)
-    beyond.add(a_result(1.0))
-    beyond.interrupt()
-    beyond.add(a_result(1.0))
-    assert beyond.totals()["net"]["pairs"] == 0
+    drive = EdgesAndFlicker(5)
+    drive.add(a_result(1.0))
+    drive.interrupt()
+    drive.add(a_result(1.0))
+    assert drive.totals()["net"]["pairs"] == 0
 
 
 def test_flicker_is_of_the_final_mask():
-    beyond = Beyond(5)
+    drive = EdgesAndFlicker(5)
     steady = a_variant("net", {"svm": 1 - TRUTH % 2, "post": TRUTH % 2})
     restless = a_variant("net", {"svm": TRUTH % 2, "post": TRUTH % 2})
     for variant in (steady, restless):
-        beyond.add(replace(a_result(1.0), variants=(variant,)))
-    assert beyond.totals()["net"]["flicker"] == 0
+        drive.add(replace(a_result(1.0), variants=(variant,)))
+    assert drive.totals()["net"]["flicker"] == 0
