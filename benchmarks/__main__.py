@@ -26,7 +26,7 @@ from roadeval.jobs import frame as runner
 from roadeval.jobs.options import ReplayOptions
 from roadeval.jobs.run import Run
 from roadeval.pipeline.stage import View
-from roadeval.recording import Rule, recorder_for
+from roadeval.recording import RecordRule, recorder_for
 from roadeval.runtime.threads import one_thread_each
 
 Rows = list[dict[str, Any]]
@@ -120,7 +120,7 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
     options = ReplayOptions(jobs=1)
     with logs.open_log(drive) as log, one_thread_each():
         run = Run(log, options, lambda _progress: None)
-        recorder = recorder_for(folder / "stages.rrd", run.layout(), Rule.parse("all"))
+        recorder = recorder_for(folder / "stages.rrd", run.layout(), RecordRule.parse("all"))
         with recorder:
             for position, logged in enumerate(log.frames(options.select(log))):
                 frame, seconds = timed(logged.decode)
@@ -133,7 +133,7 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
                 score = partial(run.board.score, frame, Role.EVALUATED, variants)
                 result, seconds = timed(score)
                 lap("score", seconds)
-                encoded, seconds = timed(partial(recorder.encode, result, position))
+                encoded, seconds = timed(partial(recorder.encode, result, position, {}))
                 lap("encode", seconds)
                 lap("write", timed(partial(recorder.write, encoded))[1])
             recorder.finish({})

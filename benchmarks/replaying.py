@@ -18,11 +18,11 @@ from roadeval.data import FrameResult
 from roadeval.data.packed import Packed
 from roadeval.jobs.options import ReplayOptions
 from roadeval.jobs.run import Run
-from roadeval.recording import Rule, recorder_for
+from roadeval.recording import RecordRule, recorder_for
 from roadeval.results.folder import ResultsWriter
 from roadeval.runtime.threads import ordered
 
-ALL: Final = Rule.parse("all")
+ALL: Final = RecordRule.parse("all")
 HELD_BYTES: Final = 400 << 20
 """Of layers computed beforehand and held for the floor, which goes round them."""
 
@@ -48,8 +48,8 @@ class Held:
 class Whole:
     """Stands where a recorder does, and hands out what it is given, layers and all."""
 
-    def encode(self, result: FrameResult, _position: int) -> FrameResult:
-        """Give the result."""
+    def encode(self, result: FrameResult, _position: int, _lines: Any) -> FrameResult:
+        """Return the result."""
         return result
 
 
@@ -62,7 +62,7 @@ def hold(drive: Path, options: ReplayOptions) -> Held:
         for position, (_, result) in enumerate(run.frames(Whole())):
             if position % max(1, -(-run.total * _bytes(result) // HELD_BYTES)) == 0:
                 results.append(result)
-                encoded = recorder.encode(result, position).encoded
+                encoded = recorder.encode(result, position, {})
                 sizes.append(_layer_bytes(encoded.payloads))
         files = [_files(logged) for logged in log.frames(options.select(log), options.span())]
         return Held(files, results, run.layout(), float(np.mean(sizes)))
@@ -92,7 +92,7 @@ def floor(held: Held, folder: Path, jobs: int) -> Cost:
         number, files, result = item
         for flags, data in zip((cv2.IMREAD_COLOR_RGB, *[-1] * 9), files, strict=False):
             cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-        return recorder.encode(result, number)
+        return recorder.encode(result, number, {})
 
     recorder = recorder_for(folder / "floor.rrd", held.layout, ALL)
     meter = Meter()

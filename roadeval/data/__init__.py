@@ -22,7 +22,6 @@ from roadeval.data.packed import Packed, TruthBits, everywhere, ones, pack, unpa
 from roadeval.data.result import (
     FrameResult,
     Health,
-    Pictures,
     StageResult,
     VariantLayout,
     VariantResult,
@@ -53,7 +52,6 @@ __all__ = [
     "LayerSpec",
     "Mask",
     "Packed",
-    "Pictures",
     "Rgb",
     "Role",
     "StageResult",

@@ -12,11 +12,11 @@ from roadeval import logs
 from roadeval.evaluation import rates
 from roadeval.jobs.options import Outcome, Progress, ReplayOptions, keep_apart
 from roadeval.jobs.run import Run
-from roadeval.recording import NullRecorder, Rule, recorder_for
+from roadeval.recording import NullRecorder, RecordRule, recorder_for
 from roadeval.report.figures.files import Example, write_figures
 from roadeval.results.folder import Results, ResultsWriter, summary_text
 from roadeval.results.tables import header
-from roadeval.runtime.memory import give_back
+from roadeval.runtime.memory import trim
 
 __all__ = ["Outcome", "Progress", "ReplayOptions", "replay"]
 
@@ -59,7 +59,7 @@ def replay(
         For whatever a user can mend: one line that says what, where, and what to do.
     """
     options, tell = options or ReplayOptions(), on_progress or _silent
-    rule = Rule.parse(options.record)
+    rule = RecordRule.parse(options.record)
     options.check_sidecar(mcap)
     with logs.open_log(drive, keep_corrupt=options.keep_corrupt) as log:
         path = Path(save or Path("recordings", f"{log.name}.rrd"))
@@ -67,7 +67,7 @@ def replay(
         keep_apart((drive, options.model), (path, mcap))
         outcome, examples = _run(log, _Outputs(path, rule, folder, mcap), options, tell)
         # What the run has learnt and held is gone: figures take its room.
-        give_back()
+        trim()
         figures = write_figures(folder, log.name, Results(folder).windows, examples)
         return replace(outcome, files=(*outcome.files, *figures))
 
@@ -76,7 +76,7 @@ class _Outputs(NamedTuple):
     """Where a run writes, and whose pictures it records."""
 
     recording: Path
-    rule: Rule
+    rule: RecordRule
     reports: Path
     mcap: str | Path | None
 
@@ -98,8 +98,8 @@ def _run(
             results.append(result)
             sidecar.write(result)
         tell(Progress(run.done, run.total, "writing"))
-        recorder.settle()
-        give_back()
+        recorder.flush()
+        trim()
         sums, summary = run.board.tables(), run.summary()
         recorder.finish(_texts(summary, sums))
         files = results.finish(summary, sums)

@@ -11,6 +11,7 @@ from roadeval import logs
 from roadeval.config import Variant
 from roadeval.data import FrameResult, Role, VariantLayout
 from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.rates import RATES
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.jobs import frame as runner
 from roadeval.jobs import learning, provenance
@@ -22,7 +23,7 @@ from roadeval.pipeline.stage import MisfitError, View
 from roadeval.recording import Layout
 from roadeval.results import tables
 from roadeval.results.folder import STREAMED
-from roadeval.runtime.memory import OFTEN, give_back
+from roadeval.runtime.memory import TRIM_EVERY, trim
 from roadeval.runtime.threads import ordered
 from roadeval.training import Model
 from roadeval.training.model import ModelError
@@ -35,8 +36,8 @@ Processed = tuple[FrameResult, Any]
 class Encoder(Protocol):
     """Whatever turns a frame into what it will record, in any thread."""
 
-    def encode(self, result: FrameResult, position: int) -> Any:
-        """Encode the frame at ``position`` among those read, from 0."""
+    def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> Any:
+        """Encode the frame at ``position`` among those read, from 0, with its tables' lines."""
 
 
 class Run:
@@ -68,7 +69,7 @@ class Run:
         self.total = len(self._frames)
         self.model, self._schedule = self._learn()
         self._chains = self._bind()
-        give_back()
+        trim()
         prior = None if self.model.prior is None else BlindPrior(self.model.prior)
         names = [layout.name for layout in self._layouts()]
         self.board = Scoreboard(options.config.evaluation, names, prior)
@@ -111,6 +112,7 @@ class Run:
             width,
             height,
             self._layouts(),
+            tuple(RATES),
             baseline=self.model.prior is not None,
             has_truth=self._selection.truth is not None,
             has_shadow_truth=self._selection.shadow is not None,
@@ -149,8 +151,8 @@ class Run:
         for processed in ordered(work, enumerate(self._frames), self._jobs):
             self.done += 1
             self._tell(Progress(self.done, self.total, "replaying"))
-            if self.done % OFTEN == 0:
-                give_back()
+            if self.done % TRIM_EVERY == 0:
+                trim()
             if processed is None:
                 self.board.lose()
             else:
@@ -182,7 +184,7 @@ class Run:
         ]
         variants += [runner.external_variant(name, mask) for name, mask in frame.external.items()]
         result = self.board.score(frame, role, tuple(variants))
-        encoded = recorder.encode(result, position)
+        encoded = recorder.encode(result, position, result.tables)
         # Results wait for their turn, and would wait with some 15 bytes a pixel.
         return result.without_layers(), encoded
 

@@ -19,7 +19,6 @@ from roadeval.errors import RoadevalError
 from roadeval.results import tables
 from roadeval.results.agreement import disagreement
 from roadeval.results.reading import read_table
-from roadeval.runtime import files as folders
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,9 +77,8 @@ class ResultsWriter:
         self._folder: Final = folder
         self._filled: Final = {SUMMARY}
         self._open: Final[dict[str, IO[str]]] = {}
-        self._made: Final[list[Path]] = []
         with self._explained():
-            self._made.extend(folders.make(folder))
+            folder.mkdir(parents=True, exist_ok=True)
             for table in STREAMED:
                 self._begin(f"{table}.csv", tables.header(table))
 
@@ -149,7 +147,6 @@ class ResultsWriter:
                 file.close()
             self._temporary(name).unlink(missing_ok=True)
         self._open.clear()
-        folders.remove(self._made)
 
     def _temporary(self, name: str) -> Path:
         return self._folder / f".{name}.partial"

@@ -507,7 +507,7 @@ def test_reduced_masks_do_not_go_beside_the_log(drive, tmp_path):
 
 def test_results_that_wait_have_lost_their_layers_but_not_their_masks(drive):
     class Seen:
-        def encode(self, result, position):
+        def encode(self, result, position, lines):
             return result
 
     options = ReplayOptions(max_frames=14)
