@@ -31,7 +31,9 @@ def show(found: Mapping[str, Any], out: Console) -> None:
     else:
         out.print("replay would pick")
         for pick in found["picks"]:
-            out.print(console.wrapped(with_flags(pick), out.width, indent=2, hang=2), soft_wrap=True)
+            out.print(
+                console.wrapped(with_flags(pick), out.width, indent=2, hang=2), soft_wrap=True
+            )
 
 
 def _extent(found: Mapping[str, Any]) -> str:

@@ -14,13 +14,13 @@ from roadeval.jobs import summary
 from roadeval.jobs.outputs import AnyPath, Outputs, keep_apart
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import Run
-from roadeval.recording import NullRecorder, Rule, recorder_for
+from roadeval.recording import NullRecorder, RecordRule, recorder_for
 from roadeval.report.figures.files import Example, write_figures
 from roadeval.results.folder import Results, ResultsWriter
 from roadeval.results.lines import sum_lines
 from roadeval.results.schema import TABLES
 from roadeval.results.summary import summary_text
-from roadeval.runtime.memory import give_back
+from roadeval.runtime.memory import trim
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ def replay(
         keep_apart((drive, config.training.model), (to.recording, to.mcap))
         outcome, examples = _run(log, config, to, on_progress)
         # The run's frames and models are released here: figures take their room.
-        give_back()
+        trim()
         figures = write_figures(to.reports, log.name, Results(to.reports).windows, examples)
         return replace(outcome, files=(*outcome.files, *figures))
 
@@ -88,15 +88,15 @@ def _run(
         ExitStack() as opened,
     ):
         run = Run(log, config, on_progress)
-        recorder = recorder_for(to.recording, run.layout(), Rule.parse(config.output.record))
+        recorder = recorder_for(to.recording, run.layout(), RecordRule.parse(config.output.record))
         opened.enter_context(recorder)
         for result, lines, encoded in run.frames(recorder):
             recorder.write(encoded)
             results.append(lines)
             sidecar.write(result)
         on_progress(Progress(run.done, run.total, "writing"))
-        recorder.settle()
-        give_back()
+        recorder.flush()
+        trim()
         sums = sum_lines(run.board.sums())
         results.append(sums)
         facts = summary.of(run) | {"tables": results.tables}

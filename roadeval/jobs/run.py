@@ -24,7 +24,7 @@ from roadeval.pipeline.stage import MisfitError, View
 from roadeval.recording import Layout
 from roadeval.results.lines import lines
 from roadeval.results.schema import streamed
-from roadeval.runtime.memory import OFTEN, give_back
+from roadeval.runtime.memory import TRIM_EVERY, trim
 from roadeval.runtime.threads import ordered
 from roadeval.training import Model
 from roadeval.training.model import ModelError
@@ -69,7 +69,7 @@ class Run:
         self.total = len(self.read)
         self.model, self._schedule = self._learn()
         self._chains = self._bind()
-        give_back()
+        trim()
         prior = None if self.model.prior is None else BlindPrior(self.model.prior)
         names = [layout.name for layout in self._layouts()]
         self.board = Scoreboard(config.evaluation, names, prior)
@@ -110,7 +110,7 @@ class Run:
             width,
             height,
             self._layouts(),
-            rates=tuple(METRICS),
+            tuple(METRICS),
             baseline=self.model.prior is not None,
             has_truth=self.selection.truth is not None,
             has_shadow_truth=self.selection.shadow is not None,
@@ -151,8 +151,8 @@ class Run:
         ):
             self.done += 1
             self._tell(Progress(self.done, self.total, "replaying"))
-            if self.done % OFTEN == 0:
-                give_back()
+            if self.done % TRIM_EVERY == 0:
+                trim()
             if processed is None:
                 self.board.lose()
             else:

@@ -200,25 +200,11 @@ def test_an_interrupted_run_leaves_the_earlier_results(tmp_path: Path) -> None:
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
-@pytest.mark.parametrize("path", ["new", "new/er"])
-def test_a_folder_made_for_a_run_that_came_to_nothing_is_gone(tmp_path: Path, path: str) -> None:
-    with suppress(ResultsError), ResultsWriter(tmp_path / path):
-        raise ResultsError
-    assert names(tmp_path) == set()
-
-
 def test_a_folder_that_was_there_stays(tmp_path: Path) -> None:
     (tmp_path / "old").mkdir()
     with suppress(ResultsError), ResultsWriter(tmp_path / "old"):
         raise ResultsError
     assert names(tmp_path) == {"old"}
-
-
-def test_a_folder_into_which_something_else_was_put_stays(tmp_path: Path) -> None:
-    with suppress(ResultsError), ResultsWriter(tmp_path / "new" / "er"):
-        (tmp_path / "new" / "other").touch()
-        raise ResultsError
-    assert names(tmp_path / "new") == {"other"}
 
 
 @pytest.mark.parametrize("table", TABLES)

@@ -13,7 +13,6 @@ import numpy.typing as npt
 from mcap.writer import Writer
 
 from roadeval.logs.errors import LogError
-from roadeval.runtime import files as folders
 from roadeval.version import VERSION
 
 FORMATS: Final = ("jpeg", "png", "webp")
@@ -25,8 +24,7 @@ class LogWriter:
     """Writes images to an MCAP file with Foxglove's protobuf schemas.
 
     The same calls give the same bytes. The file appears under its name when it is complete:
-    at the end of the ``with`` statement, and never if that ends by an exception. Then its folder
-    goes too if it was made for it.
+    at the end of the ``with`` statement, and never if that ends by an exception.
 
     Parameters
     ----------
@@ -45,8 +43,8 @@ class LogWriter:
         with self._explained():
             if self.path.is_dir():
                 raise LogError(f"{self.path}: is a folder; name a file in it, ending in .mcap")
-            with folders.made(self.path.parent) as self._made:
-                self._file = self._temporary.open("wb")
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = self._temporary.open("wb")
         self._writer = Writer(self._file)
         self._writer.start(library=f"roadeval {VERSION}")
         self._schemas: dict[str, int] = {}
@@ -186,7 +184,6 @@ class LogWriter:
         with suppress(OSError):
             self._file.close()
         self._temporary.unlink(missing_ok=True)
-        folders.remove(self._made)
 
     @contextmanager
     def _explained(self) -> Iterator[None]:

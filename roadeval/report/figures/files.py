@@ -14,7 +14,7 @@ from roadeval.errors import RoadevalError
 from roadeval.report.figures.masks import Example, road_masks
 from roadeval.report.figures.rates import error_rate, fp_fn_rate
 from roadeval.report.figures.style import RC
-from roadeval.runtime import files as folders
+from roadeval.runtime import files
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,8 +69,7 @@ def write_figures(
         "fig3b_fp_fn_rate": (lambda: fp_fn_rate(drive, windows)) if len(windows) else None,
     }
     try:
-        with folders.made(folder):
-            return [path for name, draw in drawings.items() for path in _write(folder / name, draw)]
+        return [path for name, draw in drawings.items() for path in _write(folder / name, draw)]
     except OSError as error:
         raise FiguresError(
             f"{error.filename or folder}: cannot write figures ({error.strerror}); "
@@ -94,5 +93,5 @@ def _write(stem: Path, draw: Callable[[], Figure] | None) -> list[Path]:
         for path, (kind, saving) in zip(paths, _SAVING.items(), strict=True):
             drawn = BytesIO()
             figure.savefig(drawn, format=kind, dpi=_DPI, **saving)
-            folders.put(path, drawn.getvalue())
+            files.put(path, drawn.getvalue())
     return paths

@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from roadeval.errors import RoadevalError
 from roadeval.report.blocks import Document
-from roadeval.runtime import files as folders
+from roadeval.runtime.files import put as put_file
 
 _TEMPLATE: Final = "document.typ"
 _CONTROL: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
@@ -75,7 +75,7 @@ def put(path: Path, content: bytes) -> Path:
         If it cannot be written.
     """
     try:
-        folders.put(path, content)
+        put_file(path, content)
     except OSError as error:
         raise ReportError(
             f"{path}: cannot be written ({error.strerror}); choose another place with -o"

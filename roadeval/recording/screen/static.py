@@ -1,63 +1,56 @@
-"""What stands in a recording once, whatever the frames: colours, names, documents."""
+"""Static data of a recording, logged once, whatever the frames: colours, names, documents."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import cycle
 from typing import Any, Final
 
 import rerun as rr
 
-from roadeval.data import BASELINE, FILTERED, UNFILTERED, Health, Role
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, Health, Role, colours
+from roadeval.data.colours import Colour
 from roadeval.recording import layout as at
 from roadeval.recording.codecs import Codec
 from roadeval.recording.layout import Layout
 from roadeval.recording.screen import guide
 
-Records = Iterator[tuple[str, list[Any]]]
+StaticData = Iterator[tuple[str, list[Any]]]
 """Entity paths, and the archetypes to log there."""
-Rgb = tuple[int, int, int]
 
-_KNOWN: Final[Mapping[str, Rgb]] = {
-    FILTERED: (0, 114, 178),
-    UNFILTERED: (230, 159, 0),
-    BASELINE: (153, 153, 153),
+_VARIANTS: Final[Mapping[str, Colour]] = {
+    FILTERED: colours.FILTERED,
+    UNFILTERED: colours.UNFILTERED,
+    BASELINE: colours.BLIND,
 }
-_FURTHER: Final[tuple[Rgb, ...]] = (
-    (0, 158, 115),
-    (204, 121, 167),
-    (86, 180, 233),
-    (213, 94, 0),
-    (240, 228, 66),
-)
-"""Okabe and Ito's colours, safe for the colour-blind, in the order in which they are given out."""
-_STAGES: Final = (_KNOWN[UNFILTERED], *_FURTHER)
-_LANES: Final[Mapping[str, Rgb]] = {
-    Health.OK: (0, 158, 115),
-    Health.DEGRADED: (230, 159, 0),
-    Health.FAILED: (213, 94, 0),
-    Role.EVALUATED: (86, 180, 233),
-    Role.TRAINING: (204, 121, 167),
-    Role.GAP: (90, 90, 90),
-    Role.UNLABELLED: (153, 153, 153),
+_STAGES: Final = (colours.ORANGE, *colours.EXTRA)
+_STATES: Final[Mapping[str, Colour]] = {
+    Health.OK: colours.GREEN,
+    Health.DEGRADED: colours.ORANGE,
+    Health.FAILED: colours.VERMILLION,
+    Role.EVALUATED: colours.SKY_BLUE,
+    Role.TRAINING: colours.PURPLE,
+    Role.GAP: colours.DARK_GREY,
+    Role.UNLABELLED: colours.GREY,
 }
-_OUTCOMES: Final[Mapping[str, Rgb]] = {
-    "TP": (0, 158, 115),
-    "TN": (86, 180, 233),
-    "FP": (213, 94, 0),
-    "FN": (204, 121, 167),
-    "N": (153, 153, 153),
+_COUNTS: Final[Mapping[str, Colour]] = {
+    "TP": colours.TP,
+    "TN": colours.TN,
+    "FP": colours.FP,
+    "FN": colours.FN,
+    "N": colours.GREY,
 }
 
 
-def _colours(layout: Layout) -> dict[str, Rgb]:
-    """Give every variant, the baseline included, its colour."""
-    further = (_FURTHER[i % len(_FURTHER)] for i in range(len(layout.variants)))
+def _colours(layout: Layout) -> dict[str, Colour]:
+    """Return the colour of every variant, the baseline included."""
+    extra = cycle(colours.EXTRA)
     names = [variant.name for variant in layout.variants]
-    return {name: _KNOWN.get(name) or next(further) for name in (*names, BASELINE)}
+    return {name: _VARIANTS.get(name) or next(extra) for name in (*names, BASELINE)}
 
 
-def records(layout: Layout, codecs: Mapping[str, Codec]) -> Records:
+def before_the_first_frame(layout: Layout, codecs: Mapping[str, Codec]) -> StaticData:
     """Yield what is known before the first frame."""
     for path, codec in codecs.items():
         yield path, list(codec.style())
@@ -72,9 +65,9 @@ def records(layout: Layout, codecs: Mapping[str, Codec]) -> Records:
     yield from _lines(layout)
 
 
-def timing(paths: Iterable[str]) -> Records:
+def timing_lines(paths: Iterable[str]) -> StaticData:
     """Yield the colours of every stage that is timed, in the order in which they run."""
-    stages: dict[str, Rgb] = {}
+    stages: dict[str, Colour] = {}
     for path in paths:
         if path.startswith("/timing/"):
             stage = path.rpartition("/")[2]
@@ -82,7 +75,7 @@ def timing(paths: Iterable[str]) -> Records:
             yield path, [_line(stage, colour)]
 
 
-def results(layout: Layout, texts: Mapping[str, str]) -> Records:
+def after_the_last_frame(layout: Layout, texts: Mapping[str, str]) -> StaticData:
     """Yield what is known after the last frame.
 
     The seconds that a run took are kept apart from its summary, among the timing: everything
@@ -102,23 +95,23 @@ def _markdown(text: str) -> rr.TextDocument:
     return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
 
 
-def _lanes(layout: Layout) -> Records:
+def _lanes(layout: Layout) -> StaticData:
     lanes: dict[str, tuple[str, ...]] = {at.ROLE: tuple(Role)}
     lanes |= {at.state_path(variant.name): tuple(Health) for variant in layout.variants}
     for path, states in lanes.items():
-        colours = [_LANES[state] for state in states]
+        colours = [_STATES[state] for state in states]
         yield path, [rr.StateConfiguration(values=states, colors=colours)]
 
 
-def _lines(layout: Layout) -> Records:
-    colours = _colours(layout)
-    lines = rr.SeriesLines(names=list(_OUTCOMES), colors=list(_OUTCOMES.values()))
+def _lines(layout: Layout) -> StaticData:
+    variants = _colours(layout)
+    lines = rr.SeriesLines(names=list(_COUNTS), colors=list(_COUNTS.values()))
     for variant, stage in layout.scored():
         for rate in layout.rates:
-            line = _line(variant, colours[variant])
+            line = _line(variant, variants[variant])
             yield at.scalar_path("metrics", variant, stage, rate), [line]
         yield at.scalar_path("counts", variant, stage), [lines]
 
 
-def _line(name: str, colour: Rgb) -> rr.SeriesLines:
+def _line(name: str, colour: Colour) -> rr.SeriesLines:
     return rr.SeriesLines(names=name, colors=colour, widths=2.0)

@@ -2,36 +2,33 @@
 
 import pytest
 
-from roadeval.recording.write.tracks import (
+from roadeval.recording.write.batching import (
     CHUNK_BYTES,
-    IMAGES_AND_WORDS,
+    IMAGES_AND_TEXT,
     NUMBERS,
-    Patience,
-    Tracks,
-    notes,
-    scalars,
-    states,
-    texts,
+    Batcher,
+    WaitLimits,
 )
+from roadeval.recording.write.columns import notes, scalars, states, texts
 
-WAIT = Patience(8, 64)
-
-
-def rows_of(track):
-    return track.chunk().to_record_batch().column("frame").to_pylist()
+WAIT = WaitLimits(8, 64)
 
 
-def run(frames, rows, patience=WAIT):
-    """Feed frames, each a row of ``rows(frame)`` by path; yield what is ended, and after which."""
-    tracks = Tracks(patience)
+def rows_of(pending):
+    return pending.chunk().to_record_batch().column("frame").to_pylist()
+
+
+def run(frames, rows, limits=WAIT):
+    """Feed frames, each a row of ``rows(frame)`` by path; yield what is due, and after which."""
+    batcher = Batcher(limits)
     for frame in range(frames):
         for path, columns, value in rows(frame):
-            tracks.add(path, columns, frame, frame, value)
-        for key in tracks.turn():
-            yield frame, key[0], rows_of(tracks[key])
-            del tracks[key]
-    for key in tracks:
-        yield frames, key[0], rows_of(tracks[key])
+            batcher.add(path, columns, frame, frame, value)
+        for key in batcher.end_frame():
+            yield frame, key[0], rows_of(batcher[key])
+            del batcher[key]
+    for key in batcher:
+        yield frames, key[0], rows_of(batcher[key])
 
 
 @pytest.mark.parametrize(("frames", "waits"), [(0, 8), (71, 8), (80, 10), (511, 63), (9999, 64)])
@@ -46,12 +43,12 @@ def test_every_row_comes_once_and_in_order_and_waits_no_longer_than_it_may():
         assert after - rows[0] + 1 == WAIT.after(after + 1)
 
 
-def test_tracks_end_together_whenever_they_began():
+def test_entities_are_due_together_whenever_they_began():
     ended = list(run(40, lambda frame: [("/a", states, "on")] if frame in (0, 9, 11) else []))
     assert ended == [(7, "/a", [0]), (15, "/a", [9, 11])]
 
 
-def test_a_track_is_full_by_its_bytes_and_others_wait_on():
+def test_an_entity_is_full_by_its_bytes_and_others_wait_on():
     half = "x" * (CHUNK_BYTES // 2)
     ended = list(run(8, lambda _: [("/large", texts, half), ("/small", texts, "x")]))
     assert [rows for _, path, rows in ended if path == "/large"] == [[0, 1], [2, 3], [4, 5], [6, 7]]
@@ -59,18 +56,18 @@ def test_a_track_is_full_by_its_bytes_and_others_wait_on():
 
 
 def test_the_bytes_that_wait_are_known():
-    tracks = Tracks(WAIT)
+    batcher = Batcher(WAIT)
     for frame, text in enumerate(("four", "five5")):
-        tracks.add("/a", texts, frame, frame, text)
-        tracks.add("/b", scalars, frame, frame, 0.5)
-        tracks.add("/c", notes, frame, frame, ("It rains.", "INFO"))
-    assert tracks.size == 9 + 2 * 13
-    del tracks["/a", texts]
-    assert tracks.size == 2 * 13
+        batcher.add("/a", texts, frame, frame, text)
+        batcher.add("/b", scalars, frame, frame, 0.5)
+        batcher.add("/c", notes, frame, frame, ("It rains.", "INFO"))
+    assert batcher.size == 9 + 2 * 13
+    del batcher["/a", texts]
+    assert batcher.size == 2 * 13
 
 
-@pytest.mark.parametrize(("patience", "most"), [(IMAGES_AND_WORDS, 320), (NUMBERS, 70)])
-def test_an_hour_of_small_rows_makes_few_chunks(patience, most):
-    ended = list(run(36_000, lambda _: [("/a", states, "on")], patience))
+@pytest.mark.parametrize(("limits", "most"), [(IMAGES_AND_TEXT, 320), (NUMBERS, 70)])
+def test_an_hour_of_small_rows_makes_few_chunks(limits, most):
+    ended = list(run(36_000, lambda _: [("/a", states, "on")], limits))
     assert sum(len(rows) for *_, rows in ended) == 36_000
     assert len(ended) < most
