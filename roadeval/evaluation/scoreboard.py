@@ -27,15 +27,17 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.beyond import Beyond
 from roadeval.evaluation.history import History
 from roadeval.evaluation.maps import Maps
-from roadeval.evaluation.rates import RATES
+from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import score_frame
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference, mean_difference
 from roadeval.evaluation.verdict import NO_PAIR, NOTHING_SCORED, verdict
 from roadeval.results import tables
 
-COMPARED: Final = ("ACC", "ERR", "FNR", "FPR")
-"""The rates whose paired differences are given; TPR and TNR only mirror two of them."""
+COMPARED: Final = tuple(
+    name for name, metric in METRICS.items() if name == "ACC" or metric.mirrors is None
+)
+"""The metrics whose paired differences are given: all but mirrors, and ACC."""
 
 
 class Scoreboard:
@@ -146,7 +148,7 @@ class Scoreboard:
         return {
             stage: {
                 rate: mean_difference(table[:, column], self._settings)
-                for column, rate in enumerate(RATES)
+                for column, rate in enumerate(METRICS)
                 if rate in COMPARED
             }
             for stage, table in self._paired()
@@ -174,7 +176,7 @@ class Scoreboard:
         return iter(sorted(self._histories.values(), key=lambda h: self._order.index(h.variant)))
 
     def _paired(self) -> Iterator[tuple[str, npt.NDArray[np.float64]]]:
-        """Yield each stage of both default variants with ``(n, 6)`` differences of its rates."""
+        """Yield each stage of both default variants with ``(n, m)`` differences of its rates."""
         for (variant, stage), treated in self._histories.items():
             control = self._histories.get((UNFILTERED, stage))
             if variant == FILTERED and control is not None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from roadeval import logs
-from roadeval.evaluation import rates
+from roadeval.evaluation import metrics
 from roadeval.jobs.options import Outcome, Progress, ReplayOptions, keep_apart
 from roadeval.jobs.run import Run
 from roadeval.recording import NullRecorder, Rule, recorder_for
@@ -110,7 +110,7 @@ def _run(
 
 
 def _sidecar(path: str | Path | None) -> logs.SidecarWriter | logs.NoSidecar:
-    return logs.NoSidecar() if path is None else logs.SidecarWriter(path, rates.of)
+    return logs.NoSidecar() if path is None else logs.SidecarWriter(path, metrics.of)
 
 
 def _texts(summary: dict[str, Any], sums: dict[str, str]) -> dict[str, str]:

@@ -11,6 +11,7 @@ from roadeval import logs
 from roadeval.config import Variant
 from roadeval.data import FrameResult, Role, VariantLayout
 from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.jobs import frame as runner
 from roadeval.jobs import learning, provenance
@@ -111,6 +112,7 @@ class Run:
             width,
             height,
             self._layouts(),
+            rates=tuple(METRICS),
             baseline=self.model.prior is not None,
             has_truth=self._selection.truth is not None,
             has_shadow_truth=self._selection.shadow is not None,

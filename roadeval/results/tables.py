@@ -12,19 +12,19 @@ from typing import Final
 
 from roadeval.data import Counts, Frame, Tally
 from roadeval.evaluation.maps import Maps
-from roadeval.evaluation.rates import RATES
+from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.windows import Window
 
 COUNT_COLUMNS: Final = ("TP", "TN", "FP", "FN", "N")
 COLUMNS: Final[dict[str, tuple[str, ...]]] = {
-    "frames": ("frame", "stamp_ns", "log_time_ns", "variant", "stage", *COUNT_COLUMNS, *RATES),
+    "frames": ("frame", "stamp_ns", "log_time_ns", "variant", "stage", *COUNT_COLUMNS, *METRICS),
     "regions": ("frame", "variant", "stage", "region", *COUNT_COLUMNS),
     "windows": (
         *("window", "first_frame", "last_frame", "frames", "variant", "stage"),
-        *RATES,
-        *(f"pooled_{name}" for name in RATES),
+        *METRICS,
+        *(f"pooled_{name}" for name in METRICS),
     ),
-    "oracles": ("frame", "variant", "oracle", "stage", *COUNT_COLUMNS, *RATES),
+    "oracles": ("frame", "variant", "oracle", "stage", *COUNT_COLUMNS, *METRICS),
     "changes": (
         *("from_variant", "from_stage", "to_variant", "to_stage"),
         *("repaired", "spoiled", "N"),

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from roadeval.evaluation import rates
+from roadeval.evaluation import metrics
 from roadeval.results.reading import RATES, TableError, read_table
 
 COLUMNS = ("frame", "variant", "TP", "ERR", "pooled_FPR")
@@ -50,7 +50,7 @@ def test_a_file_is_read_like_its_text(tmp_path):
 
 
 def test_the_rates_are_those_of_the_evaluation():
-    assert tuple(rates.RATES) == RATES
+    assert tuple(metrics.METRICS) == RATES
 
 
 @pytest.mark.parametrize(
