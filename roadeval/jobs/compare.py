@@ -15,8 +15,8 @@ from roadeval.evaluation import analysis, comparison
 from roadeval.evaluation.comparison import Side
 from roadeval.evaluation.conditions import Condition, judge
 from roadeval.jobs.result import Opened
-from roadeval.report.pdf.typeset import Paper, pdf, put
-from roadeval.report.sections.comparison import document, markdown
+from roadeval.report.comparison import document, markdown
+from roadeval.report.pdf.typeset import Paper, pdf, write_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -105,7 +105,7 @@ def write(compared: Compared, path: Path, *, paper: Paper = Paper.A4) -> Path:
     RoadevalError
         If the ending is another, or the file cannot be written.
     """
-    return put(path, writer(path)(compared, paper))
+    return write_file(path, writer(path)(compared, paper))
 
 
 def writer(path: Path) -> Callable[[Compared, Paper], bytes]:

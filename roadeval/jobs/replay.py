@@ -13,7 +13,8 @@ from roadeval.evaluation import metrics
 from roadeval.jobs.options import Outcome, Progress, ReplayOptions, keep_apart
 from roadeval.jobs.run import Run
 from roadeval.recording import NullRecorder, Rule, recorder_for
-from roadeval.report.figures.files import Example, write_figures
+from roadeval.report.figures.figure import ExampleFrame, FigureData
+from roadeval.report.figures.files import write_figures
 from roadeval.results.folder import Results, ResultsWriter, summary_text
 from roadeval.results.tables import header
 from roadeval.runtime.memory import give_back
@@ -68,7 +69,7 @@ def replay(
         outcome, examples = _run(log, _Outputs(path, rule, folder, mcap), options, tell)
         # What the run has learnt and held is gone: figures take its room.
         give_back()
-        figures = write_figures(folder, log.name, Results(folder).windows, examples)
+        figures = write_figures(folder, FigureData(log.name, Results(folder).windows, examples))
         return replace(outcome, files=(*outcome.files, *figures))
 
 
@@ -83,7 +84,7 @@ class _Outputs(NamedTuple):
 
 def _run(
     log: logs.Log, to: _Outputs, options: ReplayOptions, tell: Callable[[Progress], None]
-) -> tuple[Outcome, list[Example]]:
+) -> tuple[Outcome, list[ExampleFrame]]:
     """Run over the log into a recording and tables; give the frames for the figure of masks."""
     with (
         ResultsWriter(to.reports) as results,
@@ -106,7 +107,7 @@ def _run(
     saved = None if isinstance(recorder, NullRecorder) else recorder.path
     files += [sidecar.path] if sidecar.path else []
     outcome = Outcome(saved, to.reports, summary, run.warnings(), run.losses(), tuple(files))
-    return outcome, run.gallery.examples
+    return outcome, run.examples.kept
 
 
 def _sidecar(path: str | Path | None) -> logs.SidecarWriter | logs.NoSidecar:
