@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -12,11 +13,12 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from roadeval.report import figures as folder
 from roadeval.report.figures.fig2_masks import road_masks
 from roadeval.report.figures.fig3a_error_rate import error_rate
 from roadeval.report.figures.fig3b_fp_fn_rate import fp_fn_rate
-from roadeval.report.figures.figure import ExampleFrame, FigureData
-from roadeval.report.figures.files import FiguresError, write_figures
+from roadeval.report.figures.figure import ExampleFrame, FigureData, figures
+from roadeval.report.figures.files import FiguresError, svg_of, write_figures
 from roadeval.report.figures.rates_over_drive import CROWDED
 from roadeval.report.figures.style import looks
 
@@ -285,3 +287,31 @@ def test_a_folder_that_cannot_be_written_is_one_line_with_a_remedy(tmp_path: Pat
     with pytest.raises(FiguresError, match=r"cannot write figures.*output.reports") as caught:
         write_figures(tmp_path / "file", FigureData("drive", a_table(1)))
     assert "\n" not in str(caught.value)
+
+
+NEW_FIGURE = """
+from matplotlib.figure import Figure
+from roadeval.report.figures.figure import FigureSpec
+
+def draw(data):
+    figure = Figure()
+    figure.text(0, 0, f"{len(data.windows)} rows of {data.drive}")
+    return figure
+
+FIGURE = FigureSpec("fig1_rows", "Rows.", draw, in_report=True)
+"""
+
+
+def test_a_figure_is_one_file_in_the_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "fig1_rows.py").write_text(NEW_FIGURE)
+    monkeypatch.setattr(folder, "__path__", [*folder.__path__, str(tmp_path)])
+    data = FigureData("drive", a_table(3))
+    paths = write_figures(tmp_path / "reports", data)
+    assert [path.name for path in paths[:2]] == ["fig1_rows.png", "fig1_rows.pdf"]
+    first = next(figure for figure in figures() if figure.in_report)
+    picture = svg_of(first, data)
+    assert picture is not None
+    assert b"15 rows of drive" in picture.content
+    sys.modules.pop("roadeval.report.figures.fig1_rows")
