@@ -15,7 +15,8 @@ from roadeval.jobs.outputs import AnyPath, Outputs, keep_apart
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import Run
 from roadeval.recording import NullRecorder, RecordRule, recorder_for
-from roadeval.report.figures.files import Example, write_figures
+from roadeval.report.figures.figure import ExampleFrame, FigureData
+from roadeval.report.figures.files import write_figures
 from roadeval.results.folder import Results, ResultsWriter
 from roadeval.results.lines import sum_lines
 from roadeval.results.schema import TABLES
@@ -74,13 +75,14 @@ def replay(
         outcome, examples = _run(log, config, to, on_progress)
         # The run's frames and models are released here: figures take their room.
         trim()
-        figures = write_figures(to.reports, log.name, Results(to.reports).windows, examples)
+        windows = Results(to.reports).windows
+        figures = write_figures(to.reports, FigureData(log.name, windows, examples))
         return replace(outcome, files=(*outcome.files, *figures))
 
 
 def _run(
     log: logs.Log, config: RunConfig, to: Outputs, on_progress: OnProgress
-) -> tuple[Outcome, list[Example]]:
+) -> tuple[Outcome, list[ExampleFrame]]:
     """Run over the log into a recording and tables; return the frames for the figure of masks."""
     with (
         ResultsWriter(to.reports) as results,
@@ -105,7 +107,7 @@ def _run(
     saved = None if isinstance(recorder, NullRecorder) else recorder.path
     files += [sidecar.path] if sidecar.path else []
     warnings, losses = summary.warnings(run), summary.losses(run)
-    return Outcome(saved, to.reports, facts, warnings, losses, tuple(files)), run.gallery.examples
+    return Outcome(saved, to.reports, facts, warnings, losses, tuple(files)), run.examples.kept
 
 
 def _sidecar(path: Path | None) -> logs.SidecarWriter | logs.NoSidecar:

@@ -16,7 +16,7 @@ from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.jobs import frame as runner
 from roadeval.jobs import learning
-from roadeval.jobs.gallery import Gallery
+from roadeval.jobs.examples import ExampleFrames
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.kernels.first_time import prepare
 from roadeval.pipeline.chain import Chain
@@ -73,7 +73,7 @@ class Run:
         prior = None if self.model.prior is None else BlindPrior(self.model.prior)
         names = [layout.name for layout in self._layouts()]
         self.board = Scoreboard(config.evaluation, names, prior)
-        self.gallery = Gallery(self.total)
+        self.examples = ExampleFrames(self.total)
         self.done = 0
 
     def _learn(self) -> tuple[Model, learning.Schedule]:
@@ -157,7 +157,7 @@ class Run:
                 self.board.lose()
             else:
                 self.board.add(processed[0])
-                self.gallery.look(self.done, processed[0])
+                self.examples.offer(self.done, processed[0])
                 yield processed
 
     def _process(

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 from roadeval.data import FINAL_STAGE, FrameResult, Role
-from roadeval.jobs.gallery import SHOWN, Gallery
+from roadeval.jobs.examples import SHOWN, ExampleFrames
 from tests.evaluation.making import a_frame, a_variant
 
 
 def passed(total, roles, shape=(4, 6)):
-    """The gallery of a drive whose frames have these roles, and "lost" ones never came."""
-    gallery, mask = Gallery(total), np.ones(shape, np.uint8)
+    """The frames kept of a drive whose frames have these roles, and "lost" ones never came."""
+    examples, mask = ExampleFrames(total), np.ones(shape, np.uint8)
     for number, role in enumerate(roles):
         if role != "lost":
             variants = (a_variant("filtered", {FINAL_STAGE: mask}),)
-            gallery.look(number + 1, FrameResult(a_frame(mask, number), role, variants))
-    return gallery.examples
+            examples.offer(number + 1, FrameResult(a_frame(mask, number), role, variants))
+    return examples.kept
 
 
 def test_frames_lie_evenly_over_the_drive():

@@ -1,4 +1,4 @@
-"""Layers as pictures for a page: whatever a stage hands out, painted by its description."""
+"""Camera images and layers as pictures: each layer is coloured by its description."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import LayerKind, LayerSpec, Rgb
-from roadeval.report.blocks import Asset
+from roadeval.report.blocks import ImageFile
 
 WIDTH: Final = 420
 """Pixels across a picture, at most: about 200 an inch at a quarter of the page."""
 QUALITY: Final = 85
 DARKEN: Final = 0.75
-"""How much of the camera's brightness stays below an overlay."""
+"""Share of the camera's brightness that stays below an overlay."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shot:
-    """One layer on one frame.
+class LayerImage:
+    """One layer of one frame.
 
     Parameters
     ----------
@@ -39,28 +39,27 @@ class Shot:
     array: npt.NDArray[Any] | None = None
 
 
-def asset(shot: Shot, width: int = WIDTH) -> Asset:
-    """Paint a layer and encode the picture, at most ``width`` pixels across."""
+def jpeg(layer: LayerImage, width: int = WIDTH) -> ImageFile:
+    """Return the layer as a JPEG file of at most ``width`` pixels across."""
     import cv2
 
-    small = shrunk(paint(shot), width)
-    options = [cv2.IMWRITE_JPEG_QUALITY, QUALITY]
-    done, jpeg = cv2.imencode(".jpg", cv2.cvtColor(small, cv2.COLOR_RGB2BGR), options)
+    bgr = cv2.cvtColor(shrink(painted(layer), width), cv2.COLOR_RGB2BGR)
+    done, content = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
     assert done
-    return Asset(jpeg.tobytes())
+    return ImageFile(content.tobytes())
 
 
-def paint(shot: Shot) -> Rgb:
-    """Turn a layer into ``(H, W, 3)`` uint8 RGB."""
-    if shot.spec is None or shot.array is None:
-        return shot.image
-    match shot.spec.kind:
+def painted(layer: LayerImage) -> Rgb:
+    """Return the layer as ``(H, W, 3)`` uint8 RGB."""
+    if layer.spec is None or layer.array is None:
+        return layer.image
+    match layer.spec.kind:
         case LayerKind.RGB:
-            return shot.array.astype(np.uint8, copy=False)
+            return layer.array.astype(np.uint8, copy=False)
         case LayerKind.SCALAR:
-            return _coloured(shot.spec, shot.array)
+            return _coloured(layer.spec, layer.array)
         case LayerKind.MASK | LayerKind.LABELS:
-            return _overlaid(shot.image, shot.spec, shot.array)
+            return _overlaid(layer.image, layer.spec, layer.array)
 
 
 def _coloured(spec: LayerSpec, values: npt.NDArray[Any]) -> Rgb:
@@ -75,24 +74,27 @@ def _coloured(spec: LayerSpec, values: npt.NDArray[Any]) -> Rgb:
 
 
 def _overlaid(image: Rgb, spec: LayerSpec, labels: npt.NDArray[Any]) -> Rgb:
-    """Lay the classes' colours over the darkened image."""
+    """Draw the classes' colours over the darkened image."""
     table = np.zeros((256, 4), np.float32)
     for label in spec.classes:
         table[label.value] = label.rgba
     colours = table[labels]
     opacity = colours[..., 3:] / 255
     mixed = image * DARKEN * (1 - opacity) + colours[..., :3] * opacity
-    painted: Rgb = np.rint(mixed).astype(np.uint8)
-    return painted
+    overlaid: Rgb = np.rint(mixed).astype(np.uint8)
+    return overlaid
 
 
-def shrunk(image: Rgb, width: int) -> Rgb:
-    """Bring an image down to ``width`` pixels across, if it is wider."""
+def shrink(
+    image: npt.NDArray[np.uint8], width: int, *, labels: bool = False
+) -> npt.NDArray[np.uint8]:
+    """Reduce an image to ``width`` pixels across, if it is wider; of labels none is mixed."""
     import cv2
 
     height, wide = image.shape[:2]
     if wide <= width:
         return image
-    size = (width, max(round(height * width / wide), 1))
-    small: Rgb = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    size = width, max(round(height * width / wide), 1)
+    how = cv2.INTER_NEAREST if labels else cv2.INTER_AREA
+    small: npt.NDArray[np.uint8] = cv2.resize(image, size, interpolation=how)
     return small

@@ -3,9 +3,9 @@
 import pandas as pd
 import pytest
 
+from roadeval.report.comparison import document, headline, markdown
 from roadeval.report.pdf.typeset import pdf
-from roadeval.report.sections.comparison import document, headline, markdown
-from tests.report.documents import text
+from tests.report.making import text
 
 
 def told(mean, low=None, high=None):
