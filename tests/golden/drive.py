@@ -29,8 +29,8 @@ NO_ROAD = 33
 
 Plane = npt.NDArray[np.int64]
 
-ROWS: Plane = np.arange(HEIGHT)[:, None] + np.zeros((1, WIDTH), int)
-COLUMNS: Plane = np.arange(WIDTH)[None] + np.zeros((HEIGHT, 1), int)
+_y: Plane = np.arange(HEIGHT)[:, None] + np.zeros((1, WIDTH), int)
+_x: Plane = np.arange(WIDTH)[None] + np.zeros((HEIGHT, 1), int)
 
 
 def write(path: Path, *, truths: bool = True) -> Path:
@@ -52,15 +52,15 @@ def write(path: Path, *, truths: bool = True) -> Path:
 
 def road(number: int) -> npt.NDArray[np.bool_]:
     """A trapezoid that sways to and fro."""
-    middle = 32 + (number % 9 - 4) * (HEIGHT - ROWS) // 12
-    half = 3 + 4 * (ROWS - HORIZON) // 5
-    return (ROWS >= HORIZON) & (abs(COLUMNS - middle) <= half)
+    middle = 32 + (number % 9 - 4) * (HEIGHT - _y) // 12
+    half = 3 + 4 * (_y - HORIZON) // 5
+    return (_y >= HORIZON) & (abs(_x - middle) <= half)
 
 
 def shadow(number: int) -> npt.NDArray[np.bool_]:
     """The shadow of something beside the road, which comes nearer; on every third frame none."""
     top = 22 + number % 7
-    inside = (ROWS >= top) & (ROWS < top + 12) & (COLUMNS >= 22 + 3 * (number % 8))
+    inside = (_y >= top) & (_y < top + 12) & (_x >= 22 + 3 * (number % 8))
     return inside & (number % 3 != 2)
 
 
@@ -68,13 +68,13 @@ def truth(number: int) -> npt.NDArray[np.uint8]:
     """255 where there is road, 128 on the bonnet and on a car, which count nowhere, else 0."""
     labels = np.where(road(number) & (number != NO_ROAD), 255, 0)
     labels[-3:] = 128
-    labels[20 : 20 + number % 8, 50:] = 128
+    labels[27 : 28 + number % 8, 28:56] = 128
     return labels.astype(np.uint8)
 
 
 def guess(number: int) -> npt.NDArray[np.bool_]:
     """What a network would say: the road of two frames ago, with a hole."""
-    hole = (ROWS % 16 < 3) & (COLUMNS > 40)
+    hole = (_y % 16 < 3) & (_x > 40)
     return road(number - 2) & ~hole
 
 
@@ -84,9 +84,9 @@ def image(number: int) -> npt.NDArray[np.uint8]:
     scene[:] = (66, 104, 52)
     scene[:HORIZON] = (150, 180, 215)
     scene[road(number)] = (158, 156, 160)
-    tar = road(number) & (abs(ROWS - 30 - number % 11) <= 1)
+    tar = road(number) & (abs(_y - 30 - number % 11) <= 1)
     scene[tar] = (70, 72, 68)
-    path = ~road(number) & (ROWS > 22) & (abs(COLUMNS - 58 + number % 4) <= 2)
+    path = ~road(number) & (_y > 22) & (abs(_x - 58 + number % 4) <= 2)
     scene[path] = (150, 150, 152)
     scene[shadow(number)] = scene[shadow(number)] * (44, 48, 56) // 100
     return (scene + _grain(number)).clip(0, 255).astype(np.uint8)
@@ -94,7 +94,7 @@ def image(number: int) -> npt.NDArray[np.uint8]:
 
 def _grain(number: int) -> Plane:
     """Noise of -14 to 14 in each channel, by an integer hash of place, channel and frame."""
-    places = (ROWS * WIDTH + COLUMNS)[..., None] * 3 + np.arange(3) + 9241 * (number + 1)
+    places = (_y * WIDTH + _x)[..., None] * 3 + np.arange(3) + 9241 * (number + 1)
     mixed = places * 2654435761 % 2**32
     mixed = (mixed ^ (mixed >> 15)) * 2246822519 % 2**32
     return (mixed ^ (mixed >> 13)) % 29 - 14

@@ -24,7 +24,10 @@ def printed(told: Told, name: str) -> str:
     """What a command printed, and its exit code."""
     text = told.texts[name]
     parts = [f"$ roadeval {COMMANDS[name]}", f"=== exit code {text['code']}"]
-    parts += [f"=== {stream}\n{text[stream]}" for stream in ("out", "err") if text[stream]]
+    for stream in ("out", "err"):
+        # What machines read is compared with the file of the same content.
+        shown = "(JSON)" if text[stream].startswith("{") else text[stream]
+        parts += [f"=== {stream}\n{shown}"] if shown else []
     return "\n".join(parts)
 
 
@@ -39,29 +42,29 @@ def tables(told: Told) -> str:
 
 def figures(told: Told) -> str:
     """The words of the figures' files."""
-    paths = sorted(path for run in ("paper", "gated") for path in (told.folder / run).glob("fig*.pdf"))
+    paths = sorted(
+        path for run in ("paper", "printed") for path in (told.folder / run).glob("fig*.pdf")
+    )
     return "".join(f"=== {p.parent.name}/{p.name}\n{texts.pages(p)[0]}\n" for p in paths)
 
 
-PRINTED: Final = [name for name in COMMANDS if name != "replay_json"]
 GOLDEN: Final[dict[str, Callable[[Told], str]]] = {
-    **{f"{name}.txt": lambda told, name=name: steady(printed(told, name)) for name in PRINTED},
-    "replay_json.json": lambda told: steady_json(told.out("replay_json")),
+    **{f"{name}.txt": lambda told, name=name: steady(printed(told, name)) for name in COMMANDS},
     "summary.json": lambda told: steady_json((told.folder / "paper" / "summary.json").read_text()),
     "compared.md": lambda told: steady((told.folder / "compared.md").read_text()),
     "variants.md": lambda told: steady((told.folder / "variants.md").read_text()),
     "report.pdf.txt": lambda told: steady(texts.paged(told.folder / "paper.pdf")),
-    "report_folder.pdf.txt": lambda told: steady(texts.paged(told.folder / "gated/report.pdf")),
+    "report_folder.pdf.txt": lambda told: steady(texts.paged(told.folder / "printed/report.pdf")),
     "report_unlabelled.pdf.txt": lambda told: steady(texts.paged(told.folder / "unlabelled.pdf")),
     "compared.pdf.txt": lambda told: steady(texts.paged(told.folder / "compared.pdf")),
     "variants.pdf.txt": lambda told: steady(texts.paged(told.folder / "variants.pdf")),
     "figures.txt": lambda told: steady(figures(told)),
     "tables.txt": lambda told: steady(tables(told)),
     "recording.txt": lambda told: steady(texts.words(told.folder / "paper.rrd")),
-    "recording_net.txt": lambda told: steady(texts.words(told.folder / "gated.rrd")),
+    "recording_net.txt": lambda told: steady(texts.words(told.folder / "printed.rrd")),
     "recording_unlabelled.txt": lambda told: steady(texts.words(told.folder / "unlabelled.rrd")),
     "screen.txt": lambda told: steady(texts.screen(told.folder / "paper.rrd")),
-    "screen_net.txt": lambda told: steady(texts.screen(told.folder / "gated.rrd")),
+    "screen_net.txt": lambda told: steady(texts.screen(told.folder / "printed.rrd")),
     "screen_unlabelled.txt": lambda told: steady(texts.screen(told.folder / "unlabelled.rrd")),
 }
 
