@@ -139,11 +139,11 @@ def accounts(read: range, trained: int, gap: int) -> dict[str, int]:
         "decoded": len(decoded),
         # Labels are counted whether their image can be decoded or not.
         "labelled": len(set(read) - set(drive.UNLABELLED)),
-        "trained on": trained,
         "evaluated": len(usable) - trained - len(left_out),
         "outside the range": read[0],
         "not read (--every, --max-frames)": drive.FRAMES - 1 - read[-1],
         "undecodable": len(read) - len(decoded),
+        "trained on": trained,
         "gap after training": len(left_out),
         "unlabelled": len(decoded) - len(usable),
     }
