@@ -9,7 +9,7 @@ import pytest
 import sklearn.svm  # noqa: F401
 from hypothesis import settings
 
-from roadeval.kernels.first_time import prepare
+from roadeval.kernels import prepare
 
 # A compiled kernel takes seconds where it is compiled: no deadline for a single example.
 settings.register_profile("roadeval", deadline=None)

@@ -16,7 +16,7 @@ from roadeval.jobs import frame as runner
 from roadeval.jobs import learning, provenance
 from roadeval.jobs.gallery import Gallery
 from roadeval.jobs.options import OptionError, Progress, ReplayOptions
-from roadeval.kernels.first_time import prepare
+from roadeval.kernels import prepare
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import MisfitError, View
 from roadeval.recording import Layout

@@ -10,7 +10,7 @@ from roadeval import logs
 from roadeval.data import Frame
 from roadeval.jobs import learning
 from roadeval.jobs.options import Progress, ReplayOptions, keep_apart
-from roadeval.kernels.first_time import prepare
+from roadeval.kernels import prepare
 from roadeval.training import Model, save_model
 
 

@@ -155,7 +155,8 @@ def _columns(light: Values, slope: Values, found: Values) -> None:
     edge, dark = found
     np.sqrt(cv2.blur(slope, (5, 3)), out=edge)
     cv2.blur(light, (5, 5), dst=dark)
-    KERNELS.climb(edge, dark)
+    np.maximum.accumulate(edge[::-1], axis=0, out=edge[::-1])
+    np.minimum.accumulate(dark[::-1], axis=0, out=dark[::-1])
 
 
 @lru_cache(maxsize=8)

@@ -17,7 +17,6 @@ from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Mask, Rgb
-from roadeval.kernels import KERNELS
 from roadeval.pipeline.patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View
 
@@ -85,7 +84,7 @@ def _median(image: Rgb, channel: int, patch: Mask) -> float:
 def expose(image: Rgb, gain: npt.NDArray[np.float64]) -> Rgb:
     """Multiply the channels of an ``(H, W, 3)`` uint8 image by ``(3,)`` gains; rounded, clipped."""
     table = np.rint(np.arange(256)[:, None] * gain).clip(0, 255).astype(np.uint8)
-    exposed: Rgb = KERNELS.look_up_channels(image, table)
+    exposed: Rgb = cv2.LUT(image, table[None])
     return exposed
 
 
