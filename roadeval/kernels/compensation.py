@@ -1,30 +1,25 @@
 """Compiled loops over the pixels of components and their rings: what Eq. 10 and 11 need.
 
 A component's pixels are given by its runs, in the order of the rows, see `roadeval.kernels.runs`.
-Unsigned indices are not asked whether they count from the end, which in loops as short as these
-takes a third of the time.
+Indices are unsigned: Numba checks signed ones for counting from the end, which takes a third of
+the time in loops as short as these.
 """
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
-from numba import njit
 
-from roadeval.data.arrays import Bits, Floats, Image, Labels, Places, Planes, Runs, Sums, Table
+from roadeval.data.arrays import Bits, Image, Labels, Levels, Matrix, Places, Planes, Runs, Sums
+from roadeval.kernels.compiler import compiled, inlined, part
 from roadeval.kernels.words import lowest
-
-_compiled = njit(cache=True, nogil=True)
-_inlined = njit(cache=True, nogil=True, inline="always")
-
 
 _ONE, _TWO, _THREE = np.uintp(1), np.uintp(2), np.uintp(3)
 _WORD = np.uintp(64)
 _TABLED = 256
-"""Pixels from which on a table of what becomes of each level is quicker than the sum itself."""
+"""Pixels from which on a table of what becomes of each level is faster than computing it."""
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@compiled
 def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
     """See `plain.run_sums`."""
     reds, greens, blues = planes
@@ -45,7 +40,7 @@ def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
 # --- Labels ---------------------------------------------------------------------------------------
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@compiled
 def paint(runs: Runs, height: int, width: int) -> Labels:
     """See `plain.paint`."""
     labels = np.zeros((height, width), np.int32)
@@ -59,19 +54,28 @@ def paint(runs: Runs, height: int, width: int) -> Labels:
 # --- Rings ----------------------------------------------------------------------------------------
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@compiled
 def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
     """See `plain.ring_sums`.
 
-    A component reaches a row wherever it has runs in the rows within ``width``, each widened by
-    ``width`` on either side. They are taken from left to right, out of all those rows: what is new
-    of one then lies right of where its component got to.
+    The ring pixels of row y that belong to a component are those within ``width`` columns of one
+    of its runs in the rows ``y - width`` to ``y + width``. With a width of 1 and one component::
+
+        row y - 1      . . . # # # . . . . .
+        row y          . o o o o o o o o o .     o: columns 1 to 9
+        row y + 1      . . # # . . # # # . .
+
+    The widened runs overlap, and a pixel must count once. So the runs of all these rows are merged
+    from left to right by their first columns (``upcoming`` is the next one of each row), and
+    ``reached`` is the invariant: all of the component's pixels in row y left of that column have
+    been counted. A widened run adds what lies right of it, and moves it to its own end. It is kept
+    as ``y * columns + column``, so that what is left from an earlier row needs no clearing.
     """
     rows, columns = planes[0].shape
     sums = np.zeros((count, 7), np.int64)
     first = _first_runs(runs, rows, width)
     reached = np.zeros(count, np.int64)
-    # Of each row within reach: its next run, where that starts, and the run after its last.
+    # For each row within reach: its next run, where that starts, and the run after its last.
     upcoming, ends = np.empty(2 * width + 1, np.uintp), np.empty(2 * width + 1, np.uintp)
     starts = np.empty(2 * width + 1, np.int64)
     for y in range(rows):
@@ -79,12 +83,12 @@ def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) ->
             upcoming[v], ends[v] = first[y + v], first[y + v + 1]
             starts[v] = runs[upcoming[v], 1] if upcoming[v] < ends[v] else columns
         while True:
-            v = _least(starts)
-            if starts[v] == columns:
+            row = _least(starts)
+            if starts[row] == columns:
                 break
-            run, following = upcoming[v], upcoming[v] + _ONE
-            upcoming[v] = following
-            starts[v] = runs[following, 1] if following < ends[v] else columns
+            run, following = upcoming[row], upcoming[row] + _ONE
+            upcoming[row] = following
+            starts[row] = runs[following, 1] if following < ends[row] else columns
             label = np.uintp(runs[run, 3])
             start = max(runs[run, 1] - width, 0, reached[label] - y * columns)
             end = min(runs[run, 2] + width, columns)
@@ -94,18 +98,18 @@ def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) ->
     return sums
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@part
 def _first_runs(runs: Runs, rows: int, width: int) -> Places:
-    """Find each row's first run, and those of ``width`` empty rows above and below the image."""
+    """Return each row's first run, with ``width`` empty rows above and below the image."""
     first = np.zeros(rows + 2 * width + 1, np.int64)
     for run in range(len(runs)):
         first[runs[run, 0] + width + 1] += 1
     return np.cumsum(first)
 
 
-@_inlined  # type: ignore[untyped-decorator]
+@inlined
 def _least(values: Places) -> np.uintp:
-    """Find the place of the least value, the first of equals."""
+    """Return the place of the least value, the first of equals."""
     best = np.uintp(0)
     for each in range(1, len(values)):
         place = np.uintp(each)
@@ -114,7 +118,7 @@ def _least(values: Places) -> np.uintp:
     return best
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@part
 def _add(
     sums: Sums, label: np.uintp, planes: Planes, ring: Bits, stretch: tuple[int, int, int]
 ) -> None:
@@ -141,23 +145,18 @@ def _add(
 # --- Transfer -------------------------------------------------------------------------------------
 
 
-@_compiled  # type: ignore[untyped-decorator]
-def transfer(image: Image, runs: Runs, source: Floats, target: Floats, gain: Floats) -> Image:
+@compiled
+def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> Image:
     """See `plain.transfer`."""
     width = image.shape[1]
     # By one index each: to find a place from three takes as long as what is done there.
     before = image.ravel()
     after = before.copy()
-    pixels = np.zeros(len(source), np.int64)
-    for run in range(len(runs)):
-        pixels[runs[run, 3]] += runs[run, 2] - runs[run, 1]
-    # What a component makes of a level is the same for all its pixels: a large one is tabulated.
-    large = pixels > _TABLED
-    tables, place = _tables(large, source, target, gain).reshape(-1), np.cumsum(large) - 1
+    tables, place = _tables(runs, source, target, gain)
     for run in range(len(runs)):
         row, k = runs[run, 0] * width, np.uintp(runs[run, 3])
         at, end = np.uintp(3 * (row + runs[run, 1])), np.uintp(3 * (row + runs[run, 2]))
-        if large[k]:
+        if place[k] >= 0:
             red = np.uintp(768 * place[k])
             green, blue = red + np.uintp(256), red + np.uintp(512)
             while at < end:
@@ -173,20 +172,34 @@ def transfer(image: Image, runs: Runs, source: Floats, target: Floats, gain: Flo
     return after.reshape(image.shape)
 
 
-@_compiled  # type: ignore[untyped-decorator]
-def _tables(large: npt.NDArray[np.bool_], source: Floats, target: Floats, gain: Floats) -> Table:
-    """Tabulate what becomes of each level in each channel of the large components, in order."""
-    tables = np.empty((large.sum(), 3, 256), np.uint8)
-    place = 0
-    for k in range(len(large)):
-        if large[k]:
+@part
+def _tables(runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> tuple[Levels, Places]:
+    """Tabulate what becomes of each level, for the components that have many pixels.
+
+    Returns
+    -------
+    tables, place
+        ``(768 n,)`` uint8: by component, channel and level; and ``(count,)``: which of the n
+        tables is a component's, or -1.
+    """
+    pixels = np.zeros(len(source), np.int64)
+    for run in range(len(runs)):
+        pixels[runs[run, 3]] += runs[run, 2] - runs[run, 1]
+    place, count = np.full(len(source), -1), 0
+    for k in range(len(source)):
+        if pixels[k] > _TABLED:
+            place[k] = count
+            count += 1
+    tables = np.empty(768 * count, np.uint8)
+    for k in range(len(source)):
+        if place[k] >= 0:
             for c in range(3):
                 for level in range(256):
-                    tables[place, c, level] = _moved(level, source[k, c], target[k, c], gain[k, c])
-            place += 1
-    return tables
+                    moved = _moved(level, source[k, c], target[k, c], gain[k, c])
+                    tables[768 * place[k] + 256 * c + level] = moved
+    return tables, place
 
 
-@_inlined  # type: ignore[untyped-decorator]
+@inlined
 def _moved(level: int, source: float, target: float, gain: float) -> np.uint8:
     return np.uint8(min(max(np.rint(target + (level - source) * gain), 0.0), 255.0))

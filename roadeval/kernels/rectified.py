@@ -1,24 +1,24 @@
-"""Compiled loops of the machine on planes of features (`roadeval.pipeline.beyond.context`)."""
+"""Compiled sum of rectified planes: the decision of `roadeval.pipeline.beyond.context`."""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from roadeval.data.arrays import Values
+from roadeval.kernels.compiler import compiled, part
 
 _BLOCK = 512
 """Pixels at a time: with a dozen features each, they stay in the nearest cache."""
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@compiled
 def rectified_sum(
     features: tuple[Values, ...], planes: Values, bias: Values, weights: Values
 ) -> Values:
     """See `plain.rectified_sum`.
 
-    How many features there are belongs to the type of a tuple. So the compiler knows it, writes the
-    sum over them out, and runs the loop over the pixels in vector instructions; for that, a pixel's
+    The number of features is a part of a tuple's type. So the compiler knows it, unrolls the sum
+    over them, and runs the loop over the pixels in vector instructions; for that, a pixel's
     features lie at fixed distances from each other in one array.
     """
     pixels = len(features[0])
@@ -52,20 +52,9 @@ def rectified_sum(
     return result
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@part
 def _take(features: tuple[Values, ...], start: int, size: int, block: Values) -> None:
     """Lay the features of some pixels side by side."""
     for feature, values in enumerate(features):
         for pixel in range(size):
             block[feature * _BLOCK + pixel] = values[start + pixel]
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def climb(greatest: Values, least: Values) -> None:
-    """See `plain.climb`."""
-    height, width = greatest.shape
-    for y in range(height - 2, -1, -1):
-        for x in range(width):
-            greatest[y, x] = max(greatest[y, x], greatest[y + 1, x])
-        for x in range(width):
-            least[y, x] = min(least[y, x], least[y + 1, x])
