@@ -12,14 +12,22 @@ from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
 from types import ModuleType
+from typing import Final
 
 import pdoc
 
 import roadeval
 
+FOR_CHECKERS: Final = r"[\s\S]*(array\[int\]|pd\.Series\[float\]|DataclassInstance|PydanticDataclass)"
+"""Annotations that type checkers understand and Python 3.11 cannot evaluate."""
+
 
 def prepare(package: ModuleType) -> None:
-    """Show pdoc what it does not find by itself: names imported on first use, and sub-modules."""
+    """Make public names and sub-modules visible to pdoc.
+
+    It sees neither names that a package imports on first use nor modules that are missing in
+    ``__all__``.
+    """
     names = getattr(package, "__all__", None)
     for name in names or ():
         setattr(package, name, getattr(package, name))
@@ -32,9 +40,11 @@ def prepare(package: ModuleType) -> None:
 
 def main(folder: str = "build/api") -> None:
     """Write the pages into a folder."""
-    warnings.simplefilter("error")
     prepare(roadeval)
-    pdoc.render.configure(docformat="numpy", footer_text=f"roadeval {roadeval.__version__}")
+    warnings.simplefilter("error")
+    warnings.filterwarnings("ignore", FOR_CHECKERS, UserWarning)
+    footer = f"roadeval {roadeval.__version__}"
+    pdoc.render.configure(docformat="numpy", show_source=False, footer_text=footer)
     pdoc.pdoc("roadeval", output_directory=Path(folder))
 
 
