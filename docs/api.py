@@ -18,7 +18,9 @@ import pdoc
 
 import roadeval
 
-FOR_CHECKERS: Final = r"[\s\S]*(array\[int\]|pd\.Series\[float\]|DataclassInstance|PydanticDataclass)"
+FOR_CHECKERS: Final = (
+    r"[\s\S]*(array\[int\]|pd\.Series\[float\]|DataclassInstance|PydanticDataclass)"
+)
 """Annotations that type checkers understand and Python 3.11 cannot evaluate."""
 
 

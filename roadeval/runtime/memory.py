@@ -1,28 +1,24 @@
-"""Returning freed memory to the system, where the C library would keep it."""
+"""Memory that was freed goes back to the system, where the C library would keep it."""
 
 from __future__ import annotations
 
+import ctypes
 import sys
-from contextlib import suppress
 from typing import Final
 
 OFTEN: Final = 256
-"""Frames between two calls of `give_back`: a call takes ten milliseconds, in which no other thread
-can allocate memory."""
+"""Frames after which it is worth the ten milliseconds, in which nobody else gets memory."""
 
 
 def give_back() -> None:
-    """Return free memory to the system: between the phases of a run, and every `OFTEN` frames.
+    """Return what is free to the system: between the phases of a run, and every `OFTEN` frames.
 
-    Each phase allocates blocks of other sizes: those of training, kept for a replay that cannot use
-    them, made up an eighth of a run's peak. Fragments between the blocks that stay in use grow for
-    hours: by 100 MiB in 16,000 frames of 1280x720.
-
-    Only glibc, the C library of most Linux systems, keeps so much. Elsewhere this does nothing.
+    Each phase uses memory in pieces of other sizes: training's, kept for a replay that cannot use
+    it, made up an eighth of a run's peak. And what frames leave between the pieces that stay grows
+    for hours: by 100 MiB in 16,000 frames of 1280x720. Only glibc, the C library of most Linux
+    systems, has to be asked.
     """
     if sys.platform == "linux":
-        # Python may be built without ctypes, and another C library has no such function.
-        with suppress(ImportError, OSError, AttributeError):
-            import ctypes
-
-            ctypes.CDLL(None).malloc_trim(0)
+        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+        if trim is not None:
+            trim(0)

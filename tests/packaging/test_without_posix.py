@@ -1,15 +1,10 @@
 """Nothing at import needs POSIX, and what uses it does without where it is taken away."""
 
-import ctypes
 import subprocess
 import sys
 import threading
-from types import SimpleNamespace
-
-import pytest
 
 from roadeval.cli.app import main
-from roadeval.runtime import memory
 
 IMPORTS = """
 import builtins, os, signal, sys
@@ -59,56 +54,6 @@ def test_no_module_needs_posix_to_be_imported():
     )
     assert run.returncode == 0, run.stderr
     assert int(run.stdout) > 100
-
-
-class Library:
-    """A C library that notes what it is asked for."""
-
-    def __init__(self) -> None:
-        self.trimmed: list[int] = []
-
-    def malloc_trim(self, padding: int) -> int:
-        self.trimmed.append(padding)
-        return 1
-
-
-@pytest.fixture
-def library(monkeypatch) -> Library:
-    made = Library()
-    monkeypatch.setattr(sys, "platform", "linux")
-    monkeypatch.setattr(ctypes, "CDLL", lambda _name: made)
-    return made
-
-
-def test_free_memory_goes_back_to_linux(library):
-    memory.give_back()
-    assert library.trimmed == [0]
-
-
-@pytest.mark.parametrize("system", ["win32", "darwin"])
-def test_no_other_system_is_asked(library, monkeypatch, system):
-    monkeypatch.setattr(sys, "platform", system)
-    memory.give_back()
-    assert not library.trimmed
-
-
-def test_a_c_library_without_malloc_trim_keeps_the_memory(library, monkeypatch):
-    monkeypatch.setattr(ctypes, "CDLL", lambda _name: SimpleNamespace())
-    memory.give_back()
-
-
-def test_a_c_library_that_cannot_be_opened_keeps_the_memory(library, monkeypatch):
-    def refuse(_name):
-        raise OSError
-
-    monkeypatch.setattr(ctypes, "CDLL", refuse)
-    memory.give_back()
-
-
-def test_python_without_ctypes_keeps_the_memory(library, monkeypatch):
-    monkeypatch.setitem(sys.modules, "ctypes", None)
-    memory.give_back()
-    assert not library.trimmed
 
 
 def test_a_command_runs_in_a_thread_that_may_not_handle_signals(capsys):
