@@ -21,7 +21,8 @@ import roadeval
 ROOT = Path(__file__).resolve().parents[2]
 FENCED = re.compile(r"^`(?P<path>[^`\n]+)`\n\n```\w+\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
 FILES = {
-    found["path"]: found["text"] for found in FENCED.finditer((ROOT / "CONTRIBUTING.md").read_text())
+    found["path"]: found["text"]
+    for found in FENCED.finditer((ROOT / "CONTRIBUTING.md").read_text())
 }
 PERIOD_NS = 100_000_000
 FRAMES = 14

@@ -9,15 +9,19 @@ import roadeval
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = Path(roadeval.__file__).parent
-DOCUMENTS = ["CONTRIBUTING.md", *(f"docs/{path.name}" for path in ROOT.glob("docs/*.md"))]
+DOCUMENTS = [
+    "README.md",
+    "CONTRIBUTING.md",
+    *(f"docs/{path.name}" for path in ROOT.glob("docs/*.md")),
+]
 LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)[^)]*\)")
 QUOTED = re.compile(r"`((?:[\w.-]+/)+[\w.-]*)`")
 """A path in backticks: it has a slash."""
 MADE = re.compile(r"^`(\S+)`$", re.MULTILINE)
 """The head of a file that CONTRIBUTING.md adds."""
 ROOMS = {path.name for path in PACKAGE.iterdir() if path.is_dir()}
-WRITTEN = ("reports/", "recordings/", "build/", "shared/", "../")
-"""Where runs write, and what lies outside."""
+ELSEWHERE = ("reports/", "recordings/", "build/", "masks/", "images/", "../shared/")
+"""Where runs write, and what users bring."""
 
 
 def exists(path: str, document: Path) -> bool:
@@ -25,9 +29,7 @@ def exists(path: str, document: Path) -> bool:
 
     Tests may run where the package is installed and the checkout has none.
     """
-    if path.startswith("../roadeval/") or path.startswith("roadeval/"):
-        path = path.split("roadeval/", 1)[1]
-        return (PACKAGE / path).exists()
+    path = path.removeprefix("../roadeval/").removeprefix("roadeval/")
     return any((place / path).exists() for place in (document.parent, ROOT, PACKAGE))
 
 
@@ -39,7 +41,7 @@ def test_every_path_exists(name):
     missing = [
         path
         for path in sorted(paths)
-        if not path.startswith(WRITTEN[:-1]) and not exists(path, document)
+        if not path.startswith(ELSEWHERE) and not exists(path, document)
     ]
     assert paths
     assert not missing
