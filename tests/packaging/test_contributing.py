@@ -128,8 +128,7 @@ def test_the_stage_has_rows_in_the_table(workshop):
 
 def test_the_stage_has_its_mask_in_the_recording(recording):
     mask = recording.layer("bright", "brightness", FRAMES - 1)
-    image, truth = frame(FRAMES - 1)
-    np.testing.assert_array_equal(mask, truth == 255)
+    np.testing.assert_array_equal(mask, frame(FRAMES - 1)[1] == 255)
 
 
 def test_the_stage_is_in_the_report(report):
