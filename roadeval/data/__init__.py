@@ -18,7 +18,7 @@ from roadeval.data.layer import (
     LayerSpec,
     mask_spec,
 )
-from roadeval.data.names import BASELINE, CAMERA, FILTERED, FINAL_STAGE, NAMES, RESERVED, UNFILTERED
+from roadeval.data.names import BASELINE, CAMERA, FILTERED, FINAL_STAGE, RESERVED, UNFILTERED
 from roadeval.data.packed import Packed, TruthBits, everywhere, ones, pack, unpack
 from roadeval.data.result import (
     FrameResult,
@@ -36,7 +36,6 @@ __all__ = [
     "FILTERED",
     "FINAL_STAGE",
     "IGNORE",
-    "NAMES",
     "NON_ROAD",
     "RESERVED",
     "ROAD",

@@ -92,13 +92,11 @@ class Pictures(StrEnum):
 class FrameResult:
     """Everything known about one replayed frame: what is recorded and what is tabled.
 
-    ``tallies`` is empty unless the frame is evaluated. ``tables`` holds this frame's finished
-    lines of the tables that grow frame by frame (keys ``frames``, ``regions``, ``oracles``; no
-    header). ``truth_bits`` is what the masks were held against. ``changes`` are from
-    stage to stage and from final mask to final mask, ``contours`` the boundary F of each final
-    mask by variant, and ``oracles`` the counts of what the stages made once one was replaced by
-    the truth, by that one. ``notes`` are sentences for a person, ``pictures`` says what is
-    recorded beside the numbers.
+    ``tallies`` is empty unless the frame is evaluated. ``truth_bits`` is what the masks were held
+    against. ``changes`` are from stage to stage and from final mask to final mask, ``contours``
+    the boundary F of each final mask by variant, and ``oracles`` the counts of what the stages
+    made once one was replaced by the truth, by that one. ``notes`` are sentences for a person,
+    ``pictures`` says what is recorded beside the numbers.
     """
 
     frame: Frame
@@ -108,7 +106,6 @@ class FrameResult:
     tallies: tuple[Tally, ...] = ()
     health: Mapping[str, Health] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    tables: Mapping[str, str] = field(default_factory=dict)
     truth_bits: TruthBits | None = None
     changes: Mapping[Step, Change] = field(default_factory=dict)
     contours: Mapping[str, float] = field(default_factory=dict)

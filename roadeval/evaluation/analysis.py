@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED, Counts
-from roadeval.evaluation import rates, windows
+from roadeval.evaluation import metrics, windows
 from roadeval.evaluation.history import History
+from roadeval.evaluation.regions import partitions
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference, mean_difference
 from roadeval.evaluation.windows import Window
@@ -72,8 +73,7 @@ def totals(frames: pd.DataFrame) -> dict[str, dict[str, dict[str, Any]]]:
 
 def overlap(total: dict[str, Any]) -> dict[str, float]:
     """Compute IoU, F1 and precision of a total's pooled counts."""
-    counts = Counts(*(total[name] for name in OUTCOMES))
-    return {name: rate(counts) for name, rate in rates.OVERLAP_RATES.items()}
+    return metrics.overlap(Counts(*(total[name] for name in OUTCOMES)))
 
 
 def rows(frames: pd.DataFrame, size: int) -> pd.DataFrame:
@@ -111,12 +111,12 @@ def pairs(frames: pd.DataFrame, treated: str, control: str) -> pd.DataFrame:
         change of wrong pixels as ``wrong``.
     """
     last = finals(frames)
-    columns = ["stamp_ns", *OUTCOMES, *rates.RATES]
+    columns = ["stamp_ns", *OUTCOMES, *metrics.METRICS]
     mine, theirs = (
         last[last["variant"] == name].set_index("frame")[columns] for name in (treated, control)
     )
     mine, theirs = mine.align(theirs, join="inner", axis=0)
-    found = mine[[*rates.RATES]] - theirs[[*rates.RATES]]
+    found = mine[[*metrics.METRICS]] - theirs[[*metrics.METRICS]]
     found["wrong"] = mine[["FP", "FN"]].sum(axis=1) - theirs[["FP", "FN"]].sum(axis=1)
     found.insert(0, "stamp_ns", mine["stamp_ns"])
     return found
@@ -139,16 +139,15 @@ def by_region(regions: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         ``variant``, ``region``, the counts, ``ERR``, ``FPR``, ``FNR``, and ``pixels`` and
-        ``errors``: the region's share of all labelled pixels, and of all wrong ones. The whole is
-        ``boundary`` and ``interior`` together.
+        ``errors``: the region's share of all labelled pixels, and of all wrong ones.
     """
     sums = finals(regions).groupby(["variant", "region"], sort=False)[[*OUTCOMES]].sum()
     counts = [Counts(*row) for row in sums.to_numpy().tolist()]
     for name in ("ERR", "FPR", "FNR"):
-        sums[name] = [rates.RATES[name](each) for each in counts]
+        sums[name] = [metrics.METRICS[name].function(each) for each in counts]
     table = sums.reset_index()
     wrong, labelled = table["FP"] + table["FN"], table[[*OUTCOMES]].sum(axis=1)
-    halves = table["region"].isin(["boundary", "interior"])
+    halves = table["region"].isin(next(iter(partitions(table["region"].unique().tolist())), []))
     for column, share in (("pixels", labelled), ("errors", wrong)):
         whole = share[halves].groupby(table["variant"]).sum()
         table[column] = share / table["variant"].map(whole)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import analysis
-from roadeval.evaluation.rates import RATES
+from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import mean_difference
 from roadeval.jobs.asked import TELLING
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FORMAT: Final = {"name": "roadeval-comparison", "version": 1}
-COMPARED: Final = ("ERR", "FPR", "FNR")
-"""The rates whose differences are given; ACC, TNR and TPR only mirror them."""
+COMPARED: Final = tuple(name for name, metric in METRICS.items() if metric.mirrors is None)
+"""The metrics whose differences are given."""
 MOVED: Final = 5
 """Frames named of those that changed most, in each direction."""
 
@@ -177,7 +177,7 @@ class _Pair:
     def changes(self) -> Iterator[dict[str, Any]]:
         """Yield a row for each variant and stage that both have."""
         for variant, stage, rows in _by_mask(self._matched):
-            before = rows[["frame", *(f"{c}_base" for c in (*analysis.OUTCOMES, *RATES))]]
+            before = rows[["frame", *(f"{c}_base" for c in (*analysis.OUTCOMES, *METRICS))]]
             before = before.rename(columns=lambda name: name.removesuffix("_base"))
             rates = COMPARED if stage == self._last[variant] else COMPARED[:1]
             yield {
@@ -276,7 +276,7 @@ def _rates(rows: pd.DataFrame) -> dict[str, Any]:
     """Sum up rows of one variant and stage: mean and pooled rates, IoU, F1 and precision."""
     (history,) = analysis.histories(rows)
     total = history.totals()
-    named = {name: total[name] for name in (*RATES, *(f"pooled_{rate}" for rate in RATES))}
+    named = {name: total[name] for name in (*METRICS, *(f"pooled_{rate}" for rate in METRICS))}
     return named | analysis.overlap(total)
 
 

@@ -30,7 +30,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.rates import OVERLAP_RATES, RATES
+from roadeval.evaluation.metrics import METRICS, OVERLAP
 from roadeval.evaluation.settings import EvaluationSettings
 
 OPERATORS: Final[Mapping[str, Callable[[float, float], bool]]] = {
@@ -39,7 +39,7 @@ OPERATORS: Final[Mapping[str, Callable[[float, float], bool]]] = {
     "<": operator.lt,
     "<=": operator.le,
 }
-QUANTITIES: Final = (*RATES, *(f"pooled_{name}" for name in RATES), *OVERLAP_RATES)
+QUANTITIES: Final = (*METRICS, *(f"pooled_{name}" for name in METRICS), *OVERLAP)
 _GRAMMAR: Final = re.compile(
     r"\s*(?P<stage>[\w-]+)\.(?P<variant>[\w-]+)\.(?P<rate>\w+)"
     r"\s*(?P<operator>>=|<=|>|<)"

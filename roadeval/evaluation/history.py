@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Counts, Tally
-from roadeval.evaluation import rates
+from roadeval.evaluation import metrics
 
 
 @dataclass(slots=True)
@@ -58,8 +58,8 @@ class History:
 
     @property
     def rates(self) -> npt.NDArray[np.float64]:
-        """``(n, 6)`` float64: the rates in the order of `roadeval.evaluation.rates.RATES`."""
-        return rates.table(self.counts)
+        """``(n, m)`` float64: the rates in the order of `roadeval.evaluation.metrics.METRICS`."""
+        return metrics.table(self.counts)
 
     def totals(self) -> dict[str, Any]:
         """Sum up the drive: counts, mean rates (the paper's), pooled rates, undefined ones.
@@ -72,8 +72,8 @@ class History:
             "frames": len(self._positions),
             **columns(pooled),
             **means(table),
-            **{f"pooled_{name}": value for name, value in rates.of(pooled).items()},
-            "undefined": dict(zip(rates.RATES, undefined, strict=True)),
+            **{f"pooled_{name}": value for name, value in metrics.of(pooled).items()},
+            "undefined": dict(zip(metrics.METRICS, undefined, strict=True)),
         }
 
 
@@ -83,10 +83,10 @@ def columns(counts: Counts) -> dict[str, int]:
 
 
 def means(table: npt.NDArray[np.float64]) -> dict[str, float]:
-    """Average the six rates over frames, ``(n, 6)``; NaN where a rate is defined on none."""
+    """Average rates over frames, ``(n, m)``; NaN where a rate is defined on none."""
     defined = ~np.isnan(table)
     sums = np.where(defined, table, 0.0).sum(axis=0)
     average = np.divide(
         sums, defined.sum(axis=0), out=np.full(len(sums), np.nan), where=defined.any(axis=0)
     )
-    return dict(zip(rates.RATES, average.tolist(), strict=True))
+    return dict(zip(metrics.METRICS, average.tolist(), strict=True))

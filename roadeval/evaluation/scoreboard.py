@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from operator import attrgetter
 from typing import Any, Final
 
@@ -17,25 +17,37 @@ from roadeval.data import (
     FILTERED,
     FINAL_STAGE,
     UNFILTERED,
+    Change,
     Frame,
     FrameResult,
     Role,
+    Step,
     VariantResult,
 )
 from roadeval.evaluation import windows
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.beyond import Beyond
 from roadeval.evaluation.history import History
-from roadeval.evaluation.maps import Maps
-from roadeval.evaluation.rates import RATES
+from roadeval.evaluation.maps import HeatMap, Maps
+from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import score_frame
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference, mean_difference
 from roadeval.evaluation.verdict import NO_PAIR, NOTHING_SCORED, verdict
-from roadeval.results import tables
 
-COMPARED: Final = ("ACC", "ERR", "FNR", "FPR")
-"""The rates whose paired differences are given; TPR and TNR only mirror two of them."""
+COMPARED: Final = tuple(
+    name for name, metric in METRICS.items() if name == "ACC" or metric.mirrors is None
+)
+"""The metrics whose paired differences are given: all but mirrors, and ACC."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sums:
+    """What the drive's tables of sums hold: its windows, changes of masks, and heat maps."""
+
+    windows: Sequence[windows.Window]
+    changes: Mapping[Step, Change]
+    heat: Mapping[str, HeatMap]
 
 
 class Scoreboard:
@@ -102,14 +114,9 @@ class Scoreboard:
         """Say that a frame was read here and could not be decoded."""
         self._beyond.interrupt()
 
-    def tables(self) -> dict[str, str]:
-        """Give the lines of the tables that sum up the drive, by name; none without a score."""
-        texts = {
-            "windows": tables.window_lines(self.windows()),
-            "changes": tables.change_lines(self._maps),
-            "heat": tables.heat_lines(self._maps),
-        }
-        return {name: text for name, text in texts.items() if text}
+    def sums(self) -> Sums:
+        """Sum up the drive for its tables; nothing without a score."""
+        return Sums(tuple(self.windows()), self._maps.changes, self._maps.heat)
 
     def roles(self) -> dict[str, int]:
         """Count the frames added so far by role."""
@@ -146,7 +153,7 @@ class Scoreboard:
         return {
             stage: {
                 rate: mean_difference(table[:, column], self._settings)
-                for column, rate in enumerate(RATES)
+                for column, rate in enumerate(METRICS)
                 if rate in COMPARED
             }
             for stage, table in self._paired()
@@ -174,7 +181,7 @@ class Scoreboard:
         return iter(sorted(self._histories.values(), key=lambda h: self._order.index(h.variant)))
 
     def _paired(self) -> Iterator[tuple[str, npt.NDArray[np.float64]]]:
-        """Yield each stage of both default variants with ``(n, 6)`` differences of its rates."""
+        """Yield each stage of both default variants with ``(n, m)`` differences of its rates."""
         for (variant, stage), treated in self._histories.items():
             control = self._histories.get((UNFILTERED, stage))
             if variant == FILTERED and control is not None:

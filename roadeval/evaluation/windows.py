@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from roadeval.data import Counts
-from roadeval.evaluation import rates
+from roadeval.evaluation import metrics
 from roadeval.evaluation.history import History, means
 
 
@@ -67,5 +67,5 @@ def rows(history: History, frame_numbers: Sequence[int], size: int) -> Iterator[
             variant=history.variant,
             stage=history.stage,
             rates=means(table[here]),
-            pooled=rates.of(Counts(*counts[here].sum(axis=0).tolist())),
+            pooled=metrics.of(Counts(*counts[here].sum(axis=0).tolist())),
         )

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from io import StringIO
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, FILTERED, NAMES, UNFILTERED, TruthBits
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, TruthBits
 from roadeval.data.packed import Packed
 from roadeval.evaluation import analysis, counts, maps
 from roadeval.evaluation.scoreboard import COMPARED
 from roadeval.jobs.looking import Looker, evenly, named, pipelines
 from roadeval.jobs.result import Opened
 from roadeval.report.findings import Findings, Heat, Versus
-from roadeval.results import tables
+from roadeval.results.lines import change_rows, heat_rows
+from roadeval.results.reading import table_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -149,18 +149,12 @@ def _sums(opened: Opened, numbers: Sequence[int]) -> tuple[pd.DataFrame, pd.Data
     A run that was killed did not get to write them: they are made of the masks of evenly spread
     frames then.
     """
-    import pandas as pd
-
     changes, heat = opened.extra("changes"), opened.extra("heat")
     if len(changes) or len(heat):
         return changes, heat, opened.frames["frame"].nunique()
     sample = _sample(opened, numbers)
-    lines = {"changes": tables.change_lines(sample), "heat": tables.heat_lines(sample)}
-    made = {
-        name: pd.read_csv(StringIO(tables.header(name) + text), dtype=dict.fromkeys(NAMES, str))
-        for name, text in lines.items()
-    }
-    return made["changes"], made["heat"], sample.frames
+    changes = table_of("changes", change_rows(sample.changes))
+    return changes, table_of("heat", heat_rows(sample.heat)), sample.frames
 
 
 def _sample(opened: Opened, numbers: Sequence[int]) -> maps.Maps:

@@ -10,15 +10,16 @@ from typing import Any
 
 from roadeval import logs
 from roadeval.config import RunConfig
-from roadeval.evaluation import rates
 from roadeval.jobs import summary
 from roadeval.jobs.outputs import AnyPath, Outputs, keep_apart
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import Run
 from roadeval.recording import NullRecorder, Rule, recorder_for
 from roadeval.report.figures.files import Example, write_figures
-from roadeval.results.folder import Results, ResultsWriter, summary_text
-from roadeval.results.tables import header
+from roadeval.results.folder import Results, ResultsWriter
+from roadeval.results.lines import sum_lines
+from roadeval.results.schema import TABLES
+from roadeval.results.summary import summary_text
 from roadeval.runtime.memory import give_back
 
 
@@ -89,16 +90,18 @@ def _run(
         run = Run(log, config, on_progress)
         recorder = recorder_for(to.recording, run.layout(), Rule.parse(config.output.record))
         opened.enter_context(recorder)
-        for result, encoded in run.frames(recorder):
+        for result, lines, encoded in run.frames(recorder):
             recorder.write(encoded)
-            results.append(result)
+            results.append(lines)
             sidecar.write(result)
         on_progress(Progress(run.done, run.total, "writing"))
         recorder.settle()
         give_back()
-        sums, facts = run.board.tables(), summary.of(run)
+        sums = sum_lines(run.board.sums())
+        results.append(sums)
+        facts = summary.of(run) | {"tables": results.tables}
         recorder.finish(_texts(facts, sums))
-        files = results.finish(facts, sums)
+        files = results.finish(facts)
     saved = None if isinstance(recorder, NullRecorder) else recorder.path
     files += [sidecar.path] if sidecar.path else []
     warnings, losses = summary.warnings(run), summary.losses(run)
@@ -106,10 +109,10 @@ def _run(
 
 
 def _sidecar(path: Path | None) -> logs.SidecarWriter | logs.NoSidecar:
-    return logs.NoSidecar() if path is None else logs.SidecarWriter(path, rates.of)
+    return logs.NoSidecar() if path is None else logs.SidecarWriter(path)
 
 
 def _texts(facts: Mapping[str, Any], sums: Mapping[str, str]) -> dict[str, str]:
     """Return the results as the recording keeps them: the files' own text."""
-    tables = {name: header(name) + text for name, text in sums.items()}
+    tables = {name: TABLES[name].header + text for name, text in sums.items()}
     return {"summary": summary_text(facts), **tables}

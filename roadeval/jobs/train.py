@@ -12,7 +12,6 @@ from roadeval.data import Frame
 from roadeval.jobs import learning
 from roadeval.jobs.outputs import AnyPath, keep_apart
 from roadeval.jobs.progress import OnProgress, Progress, ignore
-from roadeval.jobs.run import select, span
 from roadeval.kernels.first_time import prepare
 from roadeval.training import Model, save_model
 
@@ -43,7 +42,8 @@ def train(
     frames: dict[Path, list[Frame]] = {}
     for drive in drives:
         with logs.open_log(drive, keep_corrupt=config.frames.keep_corrupt) as log:
-            there = partial(log.frames, select(log, config), span(config))
+            selection = log.select(config.topics, config.labels, scale=config.frames.scale)
+            there = partial(log.frames, selection, logs.Span.of(config.frames))
             prepare(lambda: on_progress(Progress(0, total, "compiling")))
             frames[log.path] = []
             for frame in learning.spread(there, settings.frames, labelled=by_truth):

@@ -1,4 +1,4 @@
-"""What can go wrong with a log, in one line each."""
+"""Errors of reading and writing logs."""
 
 from __future__ import annotations
 

@@ -11,7 +11,8 @@ from roadeval.evaluation import analysis
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results import tables
+from roadeval.results.lines import lines as lines_of
+from roadeval.results.schema import TABLES
 from tests.evaluation.making import a_frame, a_table, a_variant, pixels
 
 POST, SVM = ("filtered", "post"), ("filtered", "svm")
@@ -23,7 +24,7 @@ def scored() -> tuple[Scoreboard, pd.DataFrame]:
     settings = EvaluationSettings(window=5, boundary_width=1, bands=2)
     truth = pixels("##..", "##.?")
     board = Scoreboard(settings, ["filtered"], BlindPrior.of_truths([truth]))
-    lines = tables.header("frames")
+    lines = TABLES["frames"].header
     for number in range(12):
         mask = pixels("#..." if number % 3 else "###.", "....")
         masks = {"svm": truth % 2, "post": mask}
@@ -31,7 +32,7 @@ def scored() -> tuple[Scoreboard, pd.DataFrame]:
             a_frame(truth, number), Role.EVALUATED, (a_variant("filtered", masks),)
         )
         board.add(result)
-        lines += result.tables["frames"]
+        lines += lines_of(result)["frames"]
     return board, pd.read_csv(io.StringIO(lines))
 
 
@@ -111,7 +112,7 @@ def test_a_region_tells_its_share_of_the_pixels_and_of_the_errors():
             (0, "filtered", "post", "interior", 40, 45, 5, 0, 90),
             (0, "filtered", "post", "shadow", 0, 0, 0, 0, 0),
         ],
-        columns=list(tables.COLUMNS["regions"]),
+        columns=list(TABLES["regions"].names),
     )
     found = analysis.by_region(regions).set_index("region")
     assert found.loc["boundary", "ERR"] == 0.5

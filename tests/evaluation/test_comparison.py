@@ -9,7 +9,7 @@ from roadeval.evaluation.conditions import Condition, ConditionError, judge
 from roadeval.evaluation.settings import EvaluationSettings
 from tests.evaluation.making import a_table
 
-SETTINGS = EvaluationSettings(resamples=200)
+SETTINGS = EvaluationSettings()
 POST = ("filtered", "post")
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from roadeval.data import Counts
-from roadeval.evaluation import rates, windows
+from roadeval.evaluation import metrics, windows
 from roadeval.evaluation.history import History
 from tests.evaluation.making import a_tally
 
@@ -55,7 +55,7 @@ def test_windows_equal_a_groupby_of_pandas() -> None:
     rng = np.random.default_rng(0)
     table = rng.integers(0, 3, (37, 4))
     history = history_of(*map(tuple, table.tolist()))
-    frames = pd.DataFrame([rates.of(Counts(*row)) for row in table.tolist()])
+    frames = pd.DataFrame([metrics.of(Counts(*row)) for row in table.tolist()])
     counts = pd.DataFrame(table)
     groups = np.arange(37) // 10
     means = frames.groupby(groups).mean()
@@ -63,7 +63,7 @@ def test_windows_equal_a_groupby_of_pandas() -> None:
     for row in windows.rows(history, list(range(37)), size=10):
         assert row.rates == pytest.approx(means.loc[row.number].to_dict(), nan_ok=True)
         assert row.pooled == pytest.approx(
-            rates.of(Counts(*sums.loc[row.number].tolist())), nan_ok=True
+            metrics.of(Counts(*sums.loc[row.number].tolist())), nan_ok=True
         )
 
 

@@ -9,7 +9,7 @@ from typing import Final
 
 from roadeval.logs.errors import LogError
 from roadeval.logs.messages.video import import_av
-from roadeval.logs.topics.span import NS
+from roadeval.logs.times import NS
 
 VIDEO_SUFFIXES: Final = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".ts", ".mpg", ".mpeg")
 QUALITY: Final = 95

@@ -1,4 +1,4 @@
-"""Writing camera logs that Foxglove and Rerun open too."""
+"""The writer of camera logs, which Foxglove and Rerun open too."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final
 
 import numpy as np
@@ -181,20 +180,15 @@ class LogWriter:
     def __enter__(self) -> LogWriter:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_error: object) -> None:
         if kind is None:
             self.close()
         else:
             self._discard()
 
     def _discard(self) -> None:
-        """Leave nothing behind."""
-        # On a full disk closing fails as well, and what went wrong first is what counts.
+        """Remove the unfinished file, and its folder if it was made for it."""
+        # On a full disk closing fails as well, but the first error is the one to report.
         with suppress(OSError):
             self._file.close()
         self._temporary.unlink(missing_ok=True)

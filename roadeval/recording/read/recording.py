@@ -154,7 +154,7 @@ class Recording:
             text = "".join((self.layout.tables[name].rstrip(), "\n", *lines))
         else:
             text = self.result(name) or ""
-        return read_table(text, text.partition("\n")[0].split(",") if text else ())
+        return read_table(name, text, self.summary)
 
     def scalars(self, path: str) -> pd.Series[float]:
         """Give the numbers under an entity path, as ``/timing/filtered/svm``, by frame number."""

@@ -46,8 +46,8 @@ class Encoder:
         self._rates = frozenset(layout.rates)
         self._lanes = {variant.name: at.state_path(variant.name) for variant in layout.variants}
 
-    def __call__(self, result: FrameResult) -> Encoded:
-        """Encode one frame."""
+    def __call__(self, result: FrameResult, lines: Mapping[str, str]) -> Encoded:
+        """Encode one frame, with its lines of the tables."""
         level = "WARN" if set(result.health.values()) - {Health.OK} else "INFO"
         return Encoded(
             number=result.frame.number,
@@ -60,7 +60,7 @@ class Encoder:
                 **{path: result.health.get(name, "") for name, path in self._lanes.items()},
             },
             notes=tuple((note, level) for note in result.notes),
-            tables=result.tables,
+            tables=lines,
         )
 
     def _photo(self, frame: Frame) -> bytes:

@@ -127,11 +127,11 @@ class Keeper:
             finally:
                 self._recorder.__exit__(kind, error, trace)
 
-    def encode(self, result: FrameResult, position: int) -> Kept:
+    def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> Kept:
         """Encode the frame at ``position`` among those read, from 0; in any thread."""
         bad = badness(result)
         pictures = self._pictures(bad, position)
-        return Kept(self._recorder.encode(replace(result, pictures=pictures)), bad)
+        return Kept(self._recorder.encode(replace(result, pictures=pictures), lines), bad)
 
     def write(self, kept: Kept) -> None:
         """Append a frame. Frames come in order, from one thread."""

@@ -93,9 +93,9 @@ class Recorder:
             if error is None:
                 raise
 
-    def encode(self, result: FrameResult) -> Encoded:
-        """Encode a frame; the heavy part of the work, in any thread."""
-        return self._encoder(result)
+    def encode(self, result: FrameResult, lines: Mapping[str, str]) -> Encoded:
+        """Encode a frame and its table lines; the heavy part of the work, in any thread."""
+        return self._encoder(result, lines)
 
     def write(self, encoded: Encoded) -> None:
         """Append a frame. Frames come in order, from one thread.
@@ -264,7 +264,7 @@ class NullRecorder:
     def __exit__(self, *error: object) -> None:
         """Nothing is open."""
 
-    def encode(self, result: FrameResult, position: int) -> None:
+    def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> None:
         """Encode nothing."""
 
     def write(self, encoded: None) -> None:

@@ -1,12 +1,14 @@
-"""Finding the next record that makes sense in a damaged file."""
+"""The next record that makes sense in a damaged file."""
 
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Final
+from collections.abc import Collection
+from typing import Final
 
 from mcap.opcode import Opcode
 
+from roadeval.logs.container.readers import FileReader
 from roadeval.logs.container.records import (
     CHUNK_HEAD,
     HEAD,
@@ -21,11 +23,7 @@ from roadeval.logs.container.records import (
     parse_message_index,
     place_at,
 )
-from roadeval.logs.container.source import Source
 from roadeval.logs.errors import BadRecord
-
-if TYPE_CHECKING:
-    from roadeval.logs.container.scan import Scan
 
 BLOCK: Final = 1 << 20
 """Bytes to look through at a time."""
@@ -38,12 +36,22 @@ PLAUSIBLE: Final = re.compile(rb"(?=[\x03-\x07\x09\x0c\x0f].{4}\x00{4})", re.DOT
 _KNOWN_COMPRESSION: Final = ("", "zstd", "lz4")
 
 
-class Search:
-    """Tells whether a record is likely to begin at a byte, and looks for one."""
+class RecordFinder:
+    """Decides whether a record is likely to begin at a byte, and looks for one.
 
-    def __init__(self, source: Source, scan: Scan) -> None:
+    Parameters
+    ----------
+    channels, recent_ns
+        Numbers of the known channels, and log times of the last messages, as the walk through the
+        file finds them: both grow while this object is used.
+    """
+
+    def __init__(
+        self, source: FileReader, channels: Collection[int], recent_ns: Collection[int]
+    ) -> None:
         self._source = source
-        self._scan = scan
+        self._channels = channels
+        self._recent_ns = recent_ns
 
     def begins(self, offset: int) -> bool:
         """Whether a record can begin here: a head that fits, or the end of the file."""
@@ -70,9 +78,12 @@ class Search:
             return False
         head = self._source.peek(place.body, MESSAGE_HEAD.size)
         channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
-        recent = self._scan.recent_ns
+        recent = self._recent_ns
         near = not recent or any(abs(log_time - time) < DAY for time in recent)
-        return near and (channel_id in self._scan.channels or not self._scan.channels)
+        return near and self._is_known(channel_id)
+
+    def _is_known(self, channel_id: int) -> bool:
+        return channel_id in self._channels or not self._channels
 
     def disguised_chunk(self, offset: int) -> Place | None:
         """Find a chunk whose opcode or length alone is damaged."""
@@ -128,7 +139,6 @@ class Search:
         body = self._source.peek(place.body, length)
         if place.opcode == Opcode.MESSAGE_INDEX:
             channel_id, entries = parse_message_index(bytes(body))
-            known = channel_id in self._scan.channels or not self._scan.channels
-            return known and INDEX_HEAD.size + entries.nbytes == length
+            return self._is_known(channel_id) and INDEX_HEAD.size + entries.nbytes == length
         parse(place.opcode, body)
         return True

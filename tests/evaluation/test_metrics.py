@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sklearn import metrics
+from sklearn import metrics as theirs
 
 from roadeval.data import Counts
-from roadeval.evaluation.rates import OVERLAP_RATES, RATES, of, table
+from roadeval.evaluation.metric import Metric
+from roadeval.evaluation.metrics import ALL, METRICS, OVERLAP, of, table
 
 pixels = st.integers(0, 40)
 
@@ -23,6 +24,24 @@ def test_the_papers_six_by_hand() -> None:
         "TNR": 80 / 90,
         "FPR": 10 / 90,
     }
+
+
+def test_the_columns_keep_the_papers_order() -> None:
+    assert list(METRICS) == ["ACC", "ERR", "TPR", "FNR", "TNR", "FPR"]
+    assert list(OVERLAP) == ["IoU", "F1", "precision"]
+
+
+@pytest.mark.parametrize("metric", ALL.values(), ids=ALL)
+def test_a_metric_that_is_better_when_higher_rises_as_pixels_come_right(metric: Metric) -> None:
+    worse, better = (metric.function(Counts(10 + n, 10 + n, 5 - n, 5 - n)) for n in (0, 1))
+    assert (better > worse) is metric.higher_is_better
+
+
+@pytest.mark.parametrize("metric", METRICS.values(), ids=METRICS)
+def test_a_metric_mirrors_one_of_the_other_direction(metric: Metric) -> None:
+    if metric.mirrors is not None:
+        other, counts = METRICS[metric.mirrors], Counts(6, 80, 10, 4)
+        assert metric.function(counts) + other.function(counts) == pytest.approx(1)
 
 
 @pytest.mark.parametrize(
@@ -39,7 +58,7 @@ def test_a_rate_without_a_denominator_is_undefined(counts: Counts, undefined: se
 
 def test_overlap_is_undefined_where_there_is_nothing_to_overlap() -> None:
     nothing = Counts(tn=9)
-    assert all(math.isnan(rate(nothing)) for rate in OVERLAP_RATES.values())
+    assert all(math.isnan(metric.function(nothing)) for metric in OVERLAP.values())
 
 
 @given(pixels, pixels, pixels, pixels)
@@ -54,17 +73,17 @@ def test_rates_equal_scikit_learns(tp: int, tn: int, fp: int, fn: int) -> None:
     truth = np.repeat([1, 0, 0, 1], [tp, tn, fp, fn])
     mask = np.repeat([1, 0, 1, 0], [tp, tn, fp, fn])
     expected = {
-        "ACC": metrics.accuracy_score(truth, mask),
-        "ERR": metrics.zero_one_loss(truth, mask),
-        "TPR": metrics.recall_score(truth, mask),
-        "FNR": 1 - metrics.recall_score(truth, mask),
-        "TNR": metrics.recall_score(truth, mask, pos_label=0),
-        "FPR": 1 - metrics.recall_score(truth, mask, pos_label=0),
-        "IoU": metrics.jaccard_score(truth, mask),
-        "F1": metrics.f1_score(truth, mask),
-        "precision": metrics.precision_score(truth, mask),
+        "ACC": theirs.accuracy_score(truth, mask),
+        "ERR": theirs.zero_one_loss(truth, mask),
+        "TPR": theirs.recall_score(truth, mask),
+        "FNR": 1 - theirs.recall_score(truth, mask),
+        "TNR": theirs.recall_score(truth, mask, pos_label=0),
+        "FPR": 1 - theirs.recall_score(truth, mask, pos_label=0),
+        "IoU": theirs.jaccard_score(truth, mask),
+        "F1": theirs.f1_score(truth, mask),
+        "precision": theirs.precision_score(truth, mask),
     }
-    found = {name: rate(Counts(tp, tn, fp, fn)) for name, rate in (RATES | OVERLAP_RATES).items()}
+    found = {name: metric.function(Counts(tp, tn, fp, fn)) for name, metric in ALL.items()}
     assert found == pytest.approx(expected, abs=1e-12)
 
 

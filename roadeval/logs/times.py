@@ -1,4 +1,4 @@
-"""A part of a log: from, to, every how many, at most how many."""
+"""Moments of a log's clock, and how they are written."""
 
 from __future__ import annotations
 
@@ -28,34 +28,8 @@ class Instant:
         return start_ns + self.ns if self.relative else self.ns
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
-    """A part of a log, by log time.
-
-    Parameters
-    ----------
-    start, end
-        At or after, and before: None for the log's own.
-    every
-        Take the first frame of the range and every that many after it.
-    max_frames
-        Stop after that many frames were read.
-    """
-
-    start: Instant | None = None
-    end: Instant | None = None
-    every: int = 1
-    max_frames: int | None = None
-
-    def __post_init__(self) -> None:
-        if self.every < 1:
-            raise LogError(f"--every {self.every}: take every frame (1) or fewer (2, 3, ...)")
-        if self.max_frames is not None and self.max_frames < 1:
-            raise LogError(f"--max-frames {self.max_frames}: read at least one frame")
-
-
 def parse_time(text: str) -> Instant:
-    """Read a moment as people write it.
+    """Parse a moment as people write it.
 
     ``2.5`` and ``90`` are seconds after the log's first message; a whole number from 1000000000
     on is nanoseconds of the log's clock (below it lies the clock's first second); ``12s`` and

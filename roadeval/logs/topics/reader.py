@@ -1,4 +1,4 @@
-"""One topic of a log as a row of messages in the order of their log times."""
+"""The messages of one topic, in the order of their log times."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from mcap.records import Channel, Schema
 
-from roadeval.logs.container.file import OUTSIDE, Container
+from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError
 from roadeval.logs.messages.decoders import Decoder, decoder_for
@@ -22,34 +23,48 @@ UNREAD: Final = UNREADABLE - 1
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
-    """The channel of one file that carries the topic there."""
+class FileChannel:
+    """A channel of one file of the log."""
 
     container: Container
     channel_id: int
 
+    @property
+    def channel(self) -> Channel:
+        """The channel's record."""
+        return self.container.channels[self.channel_id]
 
-class Track:
+    @property
+    def schema(self) -> Schema | None:
+        """The schema of its messages, if it has one."""
+        return self.container.schemas.get(self.channel.schema_id)
+
+    @property
+    def log(self) -> ChannelLog:
+        """Where its messages lie."""
+        return self.container.logs.get(self.channel_id, ChannelLog(wanted=False))
+
+
+class TopicReader:
     """The messages of one topic, from all files and channels that carry it.
 
     Reading is for one thread at a time.
 
     Attributes
     ----------
-    name
-        The topic.
+    name, channels
+        The topic, and the channels that carry it.
     log_times
         ``(n,)`` int64 nanoseconds, ascending; equal ones in the order of the file.
     """
 
-    def __init__(self, name: str, sources: Sequence[Source]) -> None:
+    def __init__(self, name: str, channels: Sequence[FileChannel]) -> None:
         self.name = name
-        self._sources = sources
+        self.channels = channels
         self._decoders: dict[int, Decoder | BadMessage] = {}
         rows = [np.empty((0, 4), np.int64)]
-        for number, source in enumerate(sources):
-            log = source.container.logs.get(source.channel_id)
-            for chunk, entries in log.blocks if log else ():
+        for number, source in enumerate(channels):
+            for chunk, entries in source.log.blocks:
                 place = np.full((len(entries), 2), (number, chunk), np.int64)
                 rows.append(np.hstack([entries, place]))
         table = np.concatenate(rows)
@@ -82,7 +97,7 @@ class Track:
 
     def _read(self, position: int) -> Message | None:
         """Read a message, if it is the one that the index promises."""
-        source = self._sources[self._numbers[position]]
+        source = self.channels[self._numbers[position]]
         chunk, offset = int(self._chunks[position]), int(self._offsets[position])
         try:
             message: Message = source.container.message(chunk, offset)
@@ -96,7 +111,7 @@ class Track:
     def _correct(self, position: int) -> None:
         """Put right what a chunk's message index says, by looking into the chunk."""
         number, chunk = self._numbers[position], self._chunks[position]
-        source = self._sources[number]
+        source = self.channels[number]
         here = np.flatnonzero((self._numbers == number) & (self._chunks == chunk))
         promised = {(int(self.log_times[i]), int(self._offsets[i])): i for i in here}
         found = source.container.look(int(chunk), source.channel_id).tolist()
@@ -134,13 +149,13 @@ class Track:
 
     def expected(self) -> int:
         """How many messages there should be, by the files' own statistics."""
-        return sum(s.container.expected.get(s.channel_id, 0) for s in self._sources)
+        return sum(s.container.expected.get(s.channel_id, 0) for s in self.channels)
 
     def readable(self) -> int:
         """Messages that are in the log, less those in chunks found to be damaged."""
         lost = sum(
             source.container.is_bad(int(chunk)) * int(count)
-            for number, source in enumerate(self._sources)
+            for number, source in enumerate(self.channels)
             for chunk, count in zip(
                 *np.unique(self._chunks[self._numbers == number], return_counts=True), strict=True
             )
@@ -150,11 +165,9 @@ class Track:
     def _decoder(self, position: int) -> Decoder:
         number = int(self._numbers[position])
         if number not in self._decoders:
-            source = self._sources[number]
-            channel = source.container.channels[source.channel_id]
-            schema = source.container.schemas.get(channel.schema_id)
+            source = self.channels[number]
             try:
-                self._decoders[number] = decoder_for(channel, schema)
+                self._decoders[number] = decoder_for(source.channel, source.schema)
             except BadMessage as error:
                 self._decoders[number] = error
         decoder = self._decoders[number]
@@ -164,3 +177,12 @@ class Track:
 
     def _error(self, position: int, reason: str) -> FrameError:
         return FrameError(f"{self.name} message {position}: {reason}")
+
+
+def topic_readers(containers: Sequence[Container]) -> dict[str, TopicReader]:
+    """Return a reader for each topic, over the channels that carry it in the files' order."""
+    channels: dict[str, list[FileChannel]] = {}
+    for container in containers:
+        for channel_id, channel in sorted(container.channels.items()):
+            channels.setdefault(channel.topic, []).append(FileChannel(container, channel_id))
+    return {topic: TopicReader(topic, found) for topic, found in channels.items()}

@@ -1,10 +1,16 @@
-"""The heads of chunks: what a chunk claims, and whom to believe where claims differ."""
+"""Chunks that are damaged or cut off, as a recorder that was killed leaves its last one.
+
+Which of the lengths that a chunk and the file's summary claim is believed, and which records of
+the chunk can be read.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
 
+from roadeval.logs.container.compression import Spool
+from roadeval.logs.container.readers import ByteReader
 from roadeval.logs.container.records import (
     CHUNK_HEAD,
     Chunk,
@@ -60,3 +66,11 @@ def is_within(entries: Entries, chunk: Chunk) -> bool:
     return bool(
         chunk.start <= times.min() and times.max() <= chunk.end and offsets.max() < chunk.size
     )
+
+
+def records_before_damage(source: ByteReader, chunk: Chunk) -> ByteReader:
+    """Uncompress a chunk as far as it goes."""
+    spool = Spool()
+    with suppress(BadRecord):
+        spool.fill(source, chunk)
+    return spool

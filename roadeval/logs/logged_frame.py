@@ -1,9 +1,9 @@
-"""One frame as logged: decoded when it is wanted, in whatever thread wants it."""
+"""A frame as logged, which can be decoded in any thread."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +13,7 @@ from roadeval.data import IGNORE, Frame, Mask, Rgb, Truth
 from roadeval.logs.errors import BadMessage, FrameError
 from roadeval.logs.messages.pictures import CompressedPicture, Picture
 from roadeval.logs.messages.pixels import media_type, to_rgb
+from roadeval.logs.scaling import at_scale, nearest
 from roadeval.logs.topics.labels import LabelMap
 
 TRUTH: Final = "/truth"
@@ -22,7 +23,7 @@ SHADOW: Final = "/shadow"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Label:
-    """A label's picture, or why it cannot be read, and how to understand it."""
+    """A label's picture, or why it cannot be read, and what its values mean."""
 
     picture: Picture | FrameError
     labels: LabelMap
@@ -74,7 +75,7 @@ class LoggedFrame:
         return TRUTH in self._labels
 
     def decode(self) -> Frame:
-        """Decode image and labels; can be called from any thread, and mostly frees it.
+        """Decode image and labels; any thread may do so, and mostly releases the interpreter lock.
 
         Raises
         ------
@@ -119,43 +120,11 @@ class LoggedFrame:
             return truth
         if not self._resize:
             size = f"{truth.shape[1]}x{truth.shape[0]}"
-            raise FrameError(f"{topic} is {size}, its image {width}x{height}: see --resize-truth")
-        return _nearest(truth, (width, height))
-
-
-def scaled_size(size: tuple[int, int], scale: float) -> tuple[int, int]:
-    """Scale a width and height, to whole pixels."""
-    width, height = (max(1, round(length * scale)) for length in size)
-    return width, height
-
-
-def at_scale(frame: Frame, scale: float) -> Frame:
-    """Reduce a frame to a share of its width and height, at most 1.
-
-    Colours are averaged over the area of each new pixel; labels are the nearest pixel's. The
-    file that the log holds is no longer this image's, and only stands for its identity.
-    """
-    if scale == 1:
-        return frame
-    import cv2
-
-    size = scaled_size((frame.image.shape[1], frame.image.shape[0]), scale)
-    return replace(
-        frame,
-        image=cv2.resize(frame.image, size, interpolation=cv2.INTER_AREA),
-        media_type=None,
-        truth=None if frame.truth is None else _nearest(frame.truth, size),
-        shadow_truth=None if frame.shadow_truth is None else _nearest(frame.shadow_truth, size),
-        external={name: _nearest(mask, size) for name, mask in frame.external.items()},
-    )
-
-
-def _nearest(labels: Truth, size: tuple[int, int]) -> Truth:
-    """Bring labels to a width and height, by the nearest pixel."""
-    import cv2
-
-    how = cv2.INTER_NEAREST_EXACT
-    return np.asarray(cv2.resize(labels, size, interpolation=how), np.uint8)
+            raise FrameError(
+                f"{topic} is {size}, its image {width}x{height}: "
+                "scale the labels with topics.resize_truth"
+            )
+        return nearest(truth, (width, height))
 
 
 def _readable(picture: Picture | FrameError) -> Picture:
@@ -165,5 +134,5 @@ def _readable(picture: Picture | FrameError) -> Picture:
 
 
 def _as_mask(truth: npt.NDArray[Any]) -> Mask:
-    """Take what a mask leaves open for non-road: a mask has no third value."""
+    """Make ignored pixels non-road, because a mask has no third value."""
     return np.where(truth == IGNORE, 0, truth).astype(np.uint8)

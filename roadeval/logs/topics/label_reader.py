@@ -1,4 +1,4 @@
-"""The labels of a log's images, found by header stamps or whatever takes their place."""
+"""The labels that belong to images, found by header stamps or what takes their place."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.logs.errors import FrameError
-from roadeval.logs.logged import Label
+from roadeval.logs.logged_frame import Label
 from roadeval.logs.messages.pictures import Picture
-from roadeval.logs.messages.video import Pictures
+from roadeval.logs.messages.video import PictureSequence
 from roadeval.logs.topics.pairing import Pairing, Stamps
+from roadeval.logs.topics.reader import TopicReader
 from roadeval.logs.topics.selection import Clock, LabelTopic, Selection
-from roadeval.logs.topics.track import Track
 
 
 class _Times:
-    """Other numbers in the place of stamps, for logs whose stamps tell nothing."""
+    """Other numbers in place of stamps, for logs whose stamps are all zero or equal."""
 
     def __init__(self, times: Sequence[int] | npt.NDArray[np.int64]) -> None:
         self._times = times
@@ -29,8 +29,8 @@ class _Times:
         return int(self._times[position])
 
 
-def _clocks(images: Track, labels: Track, clock: Clock) -> tuple[Stamps, Stamps]:
-    """Give what tells which label belongs to which image."""
+def _clocks(images: TopicReader, labels: TopicReader, clock: Clock) -> tuple[Stamps, Stamps]:
+    """Return the times by which images and labels are paired."""
     if clock is Clock.STAMP:
         return images, labels
     if clock is Clock.LOG_TIME:
@@ -40,7 +40,7 @@ def _clocks(images: Track, labels: Track, clock: Clock) -> tuple[Stamps, Stamps]
     return _Times(range(len(images))), _Times(range(count))
 
 
-class LabelTrack:
+class LabelReader:
     """The labels of one topic, each found by its image's position.
 
     Attributes
@@ -51,33 +51,33 @@ class LabelTrack:
     """
 
     def __init__(
-        self, track: Track, label: LabelTopic, images: Track, selection: Selection
+        self, reader: TopicReader, label: LabelTopic, images: TopicReader, selection: Selection
     ) -> None:
-        self.track = track
+        self.reader = reader
         self.unused = 0
         self._images = images
         self._label = label
         self._last: int | None = None
-        clocks = _clocks(images, track, selection.clock)
+        clocks = _clocks(images, reader, selection.clock)
         self._pairing = Pairing(*clocks, selection.tolerance_ns)
 
     def of(self, image: int) -> Label | None:
         """Find the label of the image at a position."""
         if self._last is None:
             logged = self._images.log_times[image]
-            self._pairing.begin_near(int(np.searchsorted(self.track.log_times, logged)))
+            self._pairing.begin_near(int(np.searchsorted(self.reader.log_times, logged)))
         position = self._pairing.partner(image)
         if position is None:
             return None
         if self._last is not None:
             self.unused += max(position - self._last - 1, 0)
         self._last = position
-        return Label(read_or_error(self.track, position), self._label.labels, self.track.name)
+        return Label(read_or_error(self.reader, position), self._label.labels, self.reader.name)
 
 
-def read_or_error(track: Pictures, position: int) -> Picture | FrameError:
-    """Read a picture, or say why it cannot be."""
+def read_or_error(pictures: PictureSequence, position: int) -> Picture | FrameError:
+    """Return a picture, or the error that it cannot be read."""
     try:
-        return track.picture(position)
+        return pictures.picture(position)
     except FrameError as error:
         return error

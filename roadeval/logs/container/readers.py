@@ -15,7 +15,7 @@ GLANCE: Final = 1 << 10
 """Bytes read at once after a leap, as over the data of a chunk."""
 
 
-class Bytes(Protocol):
+class ByteReader(Protocol):
     """A row of bytes that need not lie in memory."""
 
     @property
@@ -32,7 +32,7 @@ class Bytes(Protocol):
         ...
 
 
-class Memory:
+class MemoryReader:
     """Bytes in memory, handed out without a copy."""
 
     def __init__(self, data: bytes) -> None:
@@ -46,7 +46,7 @@ class Memory:
     peek = read
 
 
-class Source:
+class FileReader:
     """A file.
 
     Nothing is mapped: pages of a mapped file count as memory of the program, and a file that
@@ -92,10 +92,10 @@ class Source:
         self._file.close()
 
 
-class Part:
+class PartReader:
     """A part of a file, as if it stood alone."""
 
-    def __init__(self, source: Source, offset: int, size: int) -> None:
+    def __init__(self, source: FileReader, offset: int, size: int) -> None:
         self._source = source
         self._offset = offset
         self.size = size

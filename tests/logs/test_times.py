@@ -1,8 +1,11 @@
 """Moments as people write them."""
 
-import pytest
+from typing import Any
 
-from roadeval.logs import Instant, LogError, Span, parse_time
+import pytest
+from pydantic import ValidationError
+
+from roadeval.logs import FrameSettings, Instant, LogError, parse_time
 
 SECOND = 1_000_000_000
 
@@ -34,8 +37,9 @@ def test_anything_else_is_refused(text: str) -> None:
         parse_time(text)
 
 
-def test_a_stride_or_limit_of_nothing_is_refused() -> None:
-    with pytest.raises(LogError, match="--every 0"):
-        Span(every=0)
-    with pytest.raises(LogError, match="--max-frames 0"):
-        Span(max_frames=0)
+@pytest.mark.parametrize(
+    "given", [{"start": "soon"}, {"end": "-3"}, {"every": 0}, {"max_frames": 0}]
+)
+def test_settings_of_frames_are_checked(given: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError, match=next(iter(given))):
+        FrameSettings(**given)
