@@ -4,7 +4,9 @@ import subprocess
 import sys
 import threading
 
+import roadeval
 from roadeval.cli.app import main
+from roadeval.synth import DriveSettings, write_drive
 
 IMPORTS = """
 import builtins, os, signal, sys
@@ -63,3 +65,15 @@ def test_a_command_runs_in_a_thread_that_may_not_handle_signals(capsys):
     thread.join()
     assert codes == [0]
     assert capsys.readouterr().out.startswith("roadeval ")
+
+
+def test_a_run_finds_its_workers_where_the_number_of_processors_is_unknown(monkeypatch, tmp_path):
+    monkeypatch.setattr("os.cpu_count", lambda: None)
+    write_drive(tmp_path / "drive.mcap", DriveSettings(frames=12, width=64, height=48))
+    outcome = roadeval.replay(
+        tmp_path / "drive.mcap",
+        roadeval.configure({"output": {"record": "none"}}),
+        save=tmp_path / "out.rrd",
+        reports=tmp_path / "reports",
+    )
+    assert outcome.summary["frames"]["evaluated"] == 2
