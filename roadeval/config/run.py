@@ -87,10 +87,10 @@ class RunConfig:
         for name in self.topics.masks:
             check_variant_name(name, names)
         if self.output.record != OutputSettings().record:
-            from roadeval.recording import Rule  # with it comes the viewer's library
+            from roadeval.recording import RecordRule  # with it comes the viewer's library
 
             try:
-                Rule.parse(self.output.record)
+                RecordRule.parse(self.output.record)
             except RoadevalError as error:
                 raise ConfigError(str(error)) from error
         if self.output.mcap is not None and self.frames.scale != 1:

@@ -80,14 +80,6 @@ class Health(StrEnum):
     FAILED = "failed"
 
 
-class Pictures(StrEnum):
-    """Which of a frame's pictures are recorded; its numbers always are."""
-
-    ALL = "all"
-    MASKS = "masks"
-    NONE = "none"
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameResult:
     """Everything known about one replayed frame: what is recorded and what is tabled.
@@ -95,8 +87,7 @@ class FrameResult:
     ``tallies`` is empty unless the frame is evaluated. ``truth_bits`` is what the masks were held
     against. ``changes`` are from stage to stage and from final mask to final mask, ``contours``
     the boundary F of each final mask by variant, and ``oracles`` the counts of what the stages
-    made once one was replaced by the truth, by that one. ``notes`` are sentences for a person,
-    ``pictures`` says what is recorded beside the numbers.
+    made once one was replaced by the truth, by that one. ``notes`` are sentences for a person.
     """
 
     frame: Frame
@@ -110,7 +101,6 @@ class FrameResult:
     changes: Mapping[Step, Change] = field(default_factory=dict)
     contours: Mapping[str, float] = field(default_factory=dict)
     oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)
-    pictures: Pictures = Pictures.ALL
 
     def without_layers(self) -> FrameResult:
         """Give what is left to sum up once the pictures, which take most memory, are encoded."""

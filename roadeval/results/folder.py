@@ -42,9 +42,8 @@ class ResultsWriter:
     def __init__(self, folder: Path) -> None:
         self._folder: Final = folder
         self._open: Final[dict[str, _Growing]] = {}
-        self._made: Final[list[Path]] = []
         with self._explained():
-            self._made.extend(files.make(folder))
+            folder.mkdir(parents=True, exist_ok=True)
             for name, table in TABLES.items():
                 self._open[name] = _Growing(folder, table)
 
@@ -99,7 +98,6 @@ class ResultsWriter:
         for table in self._open.values():
             table.discard()
         self._open.clear()
-        files.remove(self._made)
 
     @contextmanager
     def _explained(self) -> Iterator[None]:

@@ -11,7 +11,7 @@ import roadeval
 from roadeval import RoadevalError
 from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import Run
-from roadeval.logs import open_log
+from roadeval.logs import TopicSettings, open_log
 from roadeval.pipeline.paper import svm as classify
 from roadeval.results.folder import Results
 from roadeval.results.schema import TABLES
@@ -235,7 +235,7 @@ def test_results_become_a_log_with_the_images_own_times(drive, tmp_path):
     scored = pd.read_csv(tmp_path / "frames.csv").query("variant == 'filtered' and stage == 'post'")
     with open_log(tmp_path / "side.mcap") as side:
         counts = {topic.name: topic.count for topic in side.topics}
-        masks = side.select(image="/roadeval/filtered/post", truth="")
+        masks = side.select(TopicSettings(image="/roadeval/filtered/post", truth=""))
         stamps = [logged.stamp_ns for logged in side.frames(masks)]
     assert counts["/roadeval/unfiltered/svm"] == FRAMES
     assert counts["/roadeval/metrics/filtered/post"] == len(scored)

@@ -33,7 +33,7 @@ class ByteReader(Protocol):
 
 
 class MemoryReader:
-    """Bytes in memory, handed out without a copy."""
+    """Bytes in memory, returned without a copy."""
 
     def __init__(self, data: bytes) -> None:
         self._view = memoryview(data)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Truth
 from roadeval.kernels import KERNELS
-from roadeval.logs.errors import BadMessage, LogError
+from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.messages.pixels import to_labels, to_rgb
 from roadeval.logs.settings import Color, LabelSettings
@@ -94,6 +94,15 @@ class LabelMap:
         for color, meaning in self.meaning.items():
             truth[labels == color] = meaning
         return truth
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Label:
+    """A label's picture, or why it cannot be read, and what its values mean."""
+
+    picture: Picture | FrameError
+    labels: LabelMap
+    topic: str
 
 
 def pack_colors(colors: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint32]:

@@ -1,6 +1,6 @@
 """Pairs of images and labels by header stamp, in whole nanoseconds.
 
-Labels may be logged long after their images, so log times do not tell. Stamps are read only
+Labels may be logged long after their images, so log times do not pair them. Stamps are read only
 where they are needed: around the stamp that is looked for.
 """
 

@@ -27,7 +27,7 @@ class FieldReader:
 
     @classmethod
     def cdr(cls, data: Buffer) -> FieldReader:
-        """Begin after the encapsulation: its second byte tells order and version."""
+        """Begin after the encapsulation: its second byte names order and version."""
         if len(data) < 4:
             raise BadMessage("a message without a head")
         kind = data[1]
