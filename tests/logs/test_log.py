@@ -10,6 +10,8 @@ from roadeval.logs import FrameError, Instant, LabelValues, LogError, Span, open
 from roadeval.logs.container import chunks
 from roadeval.logs.container.records import Message
 from roadeval.logs.topics.pairing import UNREADABLE
+from tests.fixtures.make import make
+from tests.fixtures.shared import shared
 from tests.logs.making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
 
 START = 1_700_000_000_123_456_789
@@ -217,21 +219,46 @@ def test_another_systems_masks_and_true_shadow_come_along(tmp_path: Path) -> Non
     assert np.array_equal(frame.shadow_truth, 1 - mask // 255)
 
 
-@pytest.mark.parametrize(
-    ("drive_name", "labels", "road"),
-    [
-        ("camvid_0016E5_15hz", LabelValues((3,), (11,)), True),
-        ("camvid_0006R0_1hz", LabelValues(), True),
-        ("ford_shadows_unlabelled_raw", LabelValues(), False),
-    ],
-)
-def test_real_drives(data: Path, drive_name: str, labels: LabelValues, road: bool) -> None:
-    with open_log(data / "drives" / f"{drive_name}.mcap") as log:
+def check_drive(path: Path, labels: LabelValues, frames: int, *, labelled: bool) -> None:
+    """Every frame is labelled, or none, and the truth has all its values."""
+    with open_log(path) as log:
         stream = log.frames(log.select(labels=labels))
         frame = next(stream).decode()
         rest = list(stream)
-    assert len(rest) == (100 if road else 38)
-    assert all(f.labelled == road for f in rest)
-    if road:
+    assert len(rest) == frames - 1
+    assert all(each.labelled == labelled for each in rest)
+    if labelled:
         assert frame.truth is not None
         assert set(np.unique(frame.truth)) == {0, 1, 255}
+
+
+STREET = LabelValues((3,), (11,))
+
+
+@pytest.mark.parametrize(
+    ("name", "labels", "frames", "labelled"),
+    [
+        ("street", STREET, 30, True),
+        ("car_park", LabelValues(), 30, True),
+        ("unlabelled", LabelValues(), 15, False),
+    ],
+)
+def test_small_drives(
+    tmp_path: Path, name: str, labels: LabelValues, frames: int, labelled: bool
+) -> None:
+    check_drive(make(f"drives/{name}.mcap", tmp_path), labels, frames, labelled=labelled)
+
+
+@pytest.mark.parametrize("folder", shared("drives"))
+@pytest.mark.parametrize(
+    ("name", "labels", "frames", "labelled"),
+    [
+        ("camvid_0016E5_15hz", STREET, 101, True),
+        ("camvid_0006R0_1hz", LabelValues(), 101, True),
+        ("ford_shadows_unlabelled_raw", LabelValues(), 39, False),
+    ],
+)
+def test_real_drives(
+    folder: Path, name: str, labels: LabelValues, frames: int, labelled: bool
+) -> None:
+    check_drive(folder / f"{name}.mcap", labels, frames, labelled=labelled)
