@@ -43,7 +43,8 @@ def demo():
     found = messages(DEMO, Protobuf())
     masks = found["/truth/road"]
     truths = {n: np.where(decoded(m, cv2.IMREAD_GRAYSCALE), ROAD, OTHER) for n, m in masks.items()}
-    return {n: rgb(m) for n, m in found["/camera/image"].items()}, truths
+    # Its road's colours lie nearly on a line, so that single precision shows in a distance.
+    return {n: rgb(m) for n, m in found["/camera/image"].items()}, truths, 2e-5
 
 
 def street():
@@ -55,12 +56,12 @@ def street():
         rows = np.frombuffer(message.data, np.uint8).reshape(message.height, message.step)
         classes = rows[:, : message.width]
         truths[number] = np.select([classes == 3, classes == 11], [ROAD, IGNORED], OTHER)
-    return {n: rgb(m) for n, m in found["/camera/image_raw/compressed"].items()}, truths
+    return {n: rgb(m) for n, m in found["/camera/image_raw/compressed"].items()}, truths, 1e-6
 
 
 @pytest.fixture(scope="module", params=[demo, street] if shared() else [demo])
 def drive(request):
-    """The images and the truth of the frames in use, by frame number."""
+    """The images and the truth of the frames in use, by number, and a distance's precision."""
     return request.param()
 
 
@@ -79,7 +80,7 @@ def sample(images, truths, each=40):
 @pytest.mark.parametrize("filtered", [True, False], ids=["filtered", "unfiltered"])
 @pytest.mark.parametrize("preset", ["paper", "printed"])
 def test_every_layer_equals_the_plain_pipeline(drive, preset, filtered):
-    images, truths = drive
+    images, truths, precision = drive
     settings, printed = SETTINGS[preset], preset == "printed"
     names = ("shadow", "similarity", "svm", "post")[0 if filtered else 1 :]
     before = Chain(names[:1] if filtered else (), settings, {})
@@ -99,6 +100,6 @@ def test_every_layer_equals_the_plain_pipeline(drive, preset, filtered):
         assert list(layers) == list(expected)
         for name, array in layers.items():
             if name == "distance":
-                np.testing.assert_allclose(array, expected[name], rtol=1e-6)
+                np.testing.assert_allclose(array, expected[name], rtol=precision)
             else:
                 np.testing.assert_array_equal(array, expected[name], err_msg=f"{number} {name}")
