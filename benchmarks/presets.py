@@ -22,7 +22,7 @@ import cv2
 import numpy as np
 from arch.bootstrap import IIDBootstrap
 
-from roadeval.config import Config, preset
+from roadeval.config import RunConfig, configure
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.pipeline.chain import Chain
@@ -66,19 +66,20 @@ def counts(mask: np.ndarray, frame: Frame) -> np.ndarray:
     return np.array([part.sum() for part in sets])
 
 
-def variants() -> Iterator[tuple[str, Config]]:
-    """Give what is compared; ``unfiltered`` first."""
-    yield "unfiltered", preset("paper").without_filter()
+def variants() -> Iterator[tuple[str, RunConfig]]:
+    """Yield what is compared; ``unfiltered`` first."""
+    paper = configure()
+    yield "unfiltered", replace(paper, pipeline=paper.pipeline.without_filter())
     for name in ("paper", "gated", "robust"):
-        yield name, preset(name)
+        yield name, configure({"preset": name})
 
 
 def score(
-    name: str, config: Config, seed: int, train: list[Frame], test: dict[str, list[Frame]]
+    name: str, config: RunConfig, seed: int, train: list[Frame], test: dict[str, list[Frame]]
 ) -> np.ndarray:
     """Train a variant and count its outcomes on each drive, ``(drives, 6)``."""
-    model = fit(train, {name: config.plan()}, replace(config.training, seed=seed))
-    chain: Chain = config.bind(model.parameters[name])
+    model = fit(train, {name: config.pipeline}, replace(config.training, seed=seed))
+    chain: Chain = config.pipeline.bind(model.parameters[name])
     return np.array([sum(counts(last(chain, f), f) for f in frames) for frames in test.values()])
 
 

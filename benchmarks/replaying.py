@@ -14,10 +14,11 @@ import numpy as np
 import roadeval
 from benchmarks.timing import Cost, Meter
 from roadeval import logs
+from roadeval.config import RunConfig
 from roadeval.data import FrameResult
 from roadeval.data.packed import Packed
-from roadeval.jobs.options import ReplayOptions
-from roadeval.jobs.run import Run
+from roadeval.jobs.progress import ignore
+from roadeval.jobs.run import Run, span
 from roadeval.recording import Rule, recorder_for
 from roadeval.results.folder import ResultsWriter
 from roadeval.runtime.threads import ordered
@@ -53,10 +54,10 @@ class Whole:
         return result
 
 
-def hold(drive: Path, options: ReplayOptions) -> Held:
+def hold(drive: Path, config: RunConfig) -> Held:
     """Run the pipeline once, before any clock runs, and keep what the floor needs."""
     with logs.open_log(drive) as log:
-        run = Run(log, options, lambda _progress: None)
+        run = Run(log, config, ignore)
         results, sizes = [], []
         recorder = recorder_for(drive.with_suffix(".held.rrd"), run.layout(), ALL)
         for position, (_, result) in enumerate(run.frames(Whole())):
@@ -64,7 +65,7 @@ def hold(drive: Path, options: ReplayOptions) -> Held:
                 results.append(result)
                 encoded = recorder.encode(result, position).encoded
                 sizes.append(_layer_bytes(encoded.payloads))
-        files = [_files(logged) for logged in log.frames(options.select(log), options.span())]
+        files = [_files(logged) for logged in log.frames(run.selection, span(config))]
         return Held(files, results, run.layout(), float(np.mean(sizes)))
 
 
@@ -103,10 +104,10 @@ def floor(held: Held, folder: Path, jobs: int) -> Cost:
     return meter.read()
 
 
-def loop(drive: Path, options: ReplayOptions, folder: Path) -> Cost:
+def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
     """Do what `replay` does, without its training, its summary and its figures."""
     with logs.open_log(drive) as log:
-        run = Run(log, options, lambda _progress: None)
+        run = Run(log, config, ignore)
         recorder = recorder_for(folder / "loop.rrd", run.layout(), ALL)
         meter = Meter()
         with recorder, ResultsWriter(folder / "reports") as results:
@@ -119,8 +120,8 @@ def loop(drive: Path, options: ReplayOptions, folder: Path) -> Cost:
         return cost
 
 
-def whole(drive: Path, options: ReplayOptions, folder: Path) -> Cost:
+def whole(drive: Path, config: RunConfig, folder: Path) -> Cost:
     """Call `replay` as a user does: training, tables and figures too."""
     meter = Meter()
-    roadeval.replay(drive, save=folder / "out.rrd", reports=folder / "reports", options=options)
+    roadeval.replay(drive, config, save=folder / "out.rrd", reports=folder / "reports")
     return meter.read()

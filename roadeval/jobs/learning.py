@@ -106,7 +106,7 @@ class Memory:
 
 def plans_of(variants: Sequence[Variant]) -> dict[str, Plan]:
     """Give what training needs to know of each variant, by name."""
-    return {variant.name: variant.config.plan() for variant in variants}
+    return {v.name: Plan(v.pipeline.chain, v.pipeline.settings) for v in variants}
 
 
 def from_file(path: Path, variants: Sequence[Variant]) -> tuple[Model, Schedule]:

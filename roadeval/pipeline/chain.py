@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 from roadeval.data import LayerSpec, Rgb, Truth
@@ -142,3 +142,35 @@ def masks_of(names: Sequence[str]) -> tuple[str, ...]:
     """List a chain's road masks, in order, by the names that their stages are reported under."""
     stages = (STAGES[name] for name in names)
     return tuple(stage.reported for stage in stages if stage.yields_mask)
+
+
+@dataclass(frozen=True, slots=True)
+class Pipeline:
+    """Stages in the order they run, and the settings of each."""
+
+    chain: tuple[str, ...]
+    settings: Mapping[str, Any]
+
+    @property
+    def has_filter(self) -> bool:
+        """Whether some stage of the chain is a filter."""
+        return any(STAGES[name].is_filter for name in self.chain)
+
+    def without_filter(self) -> Pipeline:
+        """Return the pipeline without the filters of its chain."""
+        chain = tuple(name for name in self.chain if not STAGES[name].is_filter)
+        return Pipeline(chain, {name: self.settings[name] for name in chain})
+
+    def layers(self) -> tuple[LayerSpec, ...]:
+        return layers_of(self.chain, self.settings)
+
+    def masks(self) -> tuple[str, ...]:
+        return masks_of(self.chain)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the chain and its settings as plain data, in the shape of a TOML file."""
+        settings = {name: asdict(self.settings[name]) for name in self.chain}
+        return {"chain": list(self.chain), **settings}
+
+    def bind(self, parameters: Mapping[str, Any]) -> Chain:
+        return Chain(self.chain, self.settings, parameters)

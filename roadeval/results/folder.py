@@ -24,7 +24,7 @@ from roadeval.runtime import files as folders
 if TYPE_CHECKING:
     import pandas as pd
 
-FORMAT: Final = {"name": "roadeval-summary", "version": 1}
+FORMAT: Final = {"name": "roadeval-summary", "version": 2}
 SUMMARY: Final = "summary.json"
 STREAMED: Final = ("frames", "regions", "oracles")
 """The tables that grow frame by frame."""
@@ -33,7 +33,7 @@ SUMS: Final = ("windows", "changes", "heat")
 PARTS: Final = (
     *("format", "verdict", "drive", "frames", "totals", "beyond", "difference", "oracles"),
     *("windows", "health", "training", "seconds", "warnings", "losses"),
-    *("selection", "settings", "versions", "log"),
+    *("run", "settings", "versions", "log"),
 )
 """The parts of the summary, in the file's order."""
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.config import Config, variants_of
+from roadeval.config import RunConfig
 from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
 from roadeval.jobs import learning
@@ -13,7 +13,7 @@ from roadeval.jobs.learning import Schedule, from_drives, from_file, from_log, s
 from roadeval.training import TrainingError, TrainingSettings, save_model
 from tests.training.making import frame
 
-VARIANTS = variants_of(Config(), {})
+VARIANTS = RunConfig().variants()
 
 
 @dataclass

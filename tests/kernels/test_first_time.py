@@ -9,12 +9,11 @@ from subprocess import Popen
 import pytest
 
 import roadeval
-from roadeval import ReplayOptions
 from roadeval.kernels import compiled, first_time, pick, plain
 from roadeval.kernels.first_time import call_all, prepare
 from roadeval.runtime import processes as apart
 from tests.e2e.commands import DEMO
-from tests.jobs.test_replay import write_log
+from tests.jobs.making import settings, write_log
 
 
 class Calls(Counter):
@@ -49,7 +48,8 @@ import tempfile
 
 import arch.bootstrap, sklearn.svm
 import roadeval, roadeval.jobs.replay
-from roadeval.config import PRESETS, preset
+from roadeval.config import PRESETS
+from tests.jobs.making import settings
 from roadeval.kernels import compiled, first_time
 
 sys.modules["roadeval.jobs.replay"].write_figures = lambda *given: []
@@ -63,10 +63,8 @@ first_time.call_all(compiled)
 ahead = kinds()
 for name in PRESETS:
     with tempfile.TemporaryDirectory() as folder:
-        options = roadeval.ReplayOptions(
-            config=preset(name), max_frames=14, train_frames=4, scale=0.25, record="none"
-        )
-        roadeval.replay({str(DEMO)!r}, reports=folder, options=options)
+        config = settings(preset=name, max_frames=14, train_frames=4, scale=0.25, record="none")
+        roadeval.replay({str(DEMO)!r}, config, reports=folder)
 assert kinds() == ahead, [name for name, made in kinds().items() if made != ahead[name]]
 """
     subprocess.run([sys.executable, "-c", program], check=True)
@@ -105,8 +103,8 @@ def test_replay_and_train_compile_before_all_else(unmarked, tmp_path):
     assert list(dict.fromkeys(stages)) == ["compiling", "training"]
     (tmp_path / "mark").unlink()
     stages.clear()
-    learnt = ReplayOptions(model=tmp_path / "x.model", record="none")
-    roadeval.replay(drive, **folder, options=learnt, on_progress=lambda s: stages.append(s.stage))
+    learnt = settings(model=tmp_path / "x.model", record="none")
+    roadeval.replay(drive, learnt, **folder, on_progress=lambda s: stages.append(s.stage))
     assert list(dict.fromkeys(stages)) == ["compiling", "replaying", "writing"]
     assert len(unmarked) == 3
 
@@ -179,7 +177,7 @@ def test_a_mistake_is_told_before_anything_is_compiled(unmarked, tmp_path):
     drive, model = write_log(tmp_path / "drive.mcap"), tmp_path / "none.model"
     folder = {"save": tmp_path / "out.rrd", "reports": tmp_path / "reports"}
     with pytest.raises(roadeval.RoadevalError, match=r"none\.model"):
-        roadeval.replay(drive, **folder, options=ReplayOptions(model=model))
+        roadeval.replay(drive, settings(model=model), **folder)
     with pytest.raises(roadeval.RoadevalError, match="nosuch"):
         roadeval.train([tmp_path / "nosuch.mcap"], model)
     assert not unmarked

@@ -10,7 +10,7 @@ from sklearn.svm import SVC, LinearSVC
 
 from roadeval.pipeline import solvers
 from roadeval.runtime import processes as apart
-from tests.jobs.test_replay import write_log
+from tests.jobs.making import write_log
 
 RNG = np.random.default_rng(0)
 FEATURES = RNG.normal(0, 1, (200, 3))

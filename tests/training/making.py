@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from roadeval.config import Config
+from roadeval.config import RunConfig
 from roadeval.data import Frame
+from roadeval.training import Plan
 
 GREY, GREEN = (170, 170, 175), (40, 80, 35)
 
@@ -20,5 +21,4 @@ def frame(number: int = 0, *, labelled: bool = True) -> Frame:
 
 def plans():
     """Give the two default variants' plans."""
-    config = Config()
-    return {"filtered": config.plan(), "unfiltered": config.without_filter().plan()}
+    return {v.name: Plan(v.pipeline.chain, v.pipeline.settings) for v in RunConfig().variants()}

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import asdict
 from json import dumps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from roadeval.cli import console, messages, options
+from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
 
 if TYPE_CHECKING:
@@ -19,33 +19,33 @@ if TYPE_CHECKING:
 
 
 def inspect(
-    recording: options.Result,
+    recording: arguments.Result,
     *,
     listed: Annotated[
-        bool, options.option("--list", help="Print the worst frames with reasons.")
+        bool, typer.Option("--list", help="Print the worst frames with reasons.")
     ] = False,
     frame: Annotated[
-        int | None, options.option("--frame", metavar="N", min=0, help="Open at frame N.")
+        int | None, typer.Option("--frame", metavar="N", min=0, help="Open at frame N.")
     ] = None,
     worst: Annotated[
         int | None,
-        options.option("--worst", metavar="K", min=1, help="Open at the K-th worst frame."),
+        typer.Option("--worst", metavar="K", min=1, help="Open at the K-th worst frame."),
     ] = None,
     variant: Annotated[
         str | None,
-        options.option(
+        typer.Option(
             "--variant", metavar="NAME", help="Whose failures count. Default: the first variant's."
         ),
     ] = None,
     screenshot: Annotated[
         Path | None,
-        options.option(
+        typer.Option(
             "--screenshot",
             metavar="FILE.png",
             help="No window: draw it into a file instead. Without a frame, the worst pictured.",
         ),
     ] = None,
-    json: options.Json = False,
+    json: arguments.Json = False,
 ) -> int:
     """Open the viewer at a frame, or list the frames worth opening.
 
@@ -108,3 +108,6 @@ def _why(suspect: Suspect) -> str:
     terms = [f"{first[0]} {100 * first[1]:.1f}"]
     terms += [f"{name} {100 * value:+.1f}" for name, value in rest]
     return " ".join([f"{', '.join(terms)} pp.", *suspect.notes])
+
+
+COMMAND: Final = inspect

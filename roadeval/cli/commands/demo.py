@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 import typer
 
-from roadeval.cli import console, options, progress
+from roadeval.cli import arguments, console, progress
 from roadeval.cli.exit_codes import ExitCode
 
 DEFAULT: Final = Path("recordings", "demo.mcap")
@@ -18,14 +18,14 @@ def demo(
         Path, typer.Option("-o", "--output", metavar="DRIVE.mcap", help="Where the log lands.")
     ] = DEFAULT,
     seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Another drive.")] = 0,
-    quiet: options.Quiet = False,
+    quiet: arguments.Quiet = False,
 ) -> int:
     """Render the synthetic drive with known truth.
 
     100 frames, 640x480, 10 Hz; truth of the road and of shadow. The same seed gives the same
     drive.
     """
-    from roadeval.jobs.options import Progress
+    from roadeval.jobs.progress import Progress
     from roadeval.synth import DriveSettings, write_drive
 
     with progress.watched(quiet) as watch:
@@ -37,3 +37,6 @@ def demo(
     if not quiet:
         console.emit(str(output))
     return ExitCode.DONE
+
+
+COMMAND: Final = demo

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
-from roadeval.cli import console, messages, options
+from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
 
 
@@ -24,17 +24,17 @@ def pack(
     *,
     truth: Annotated[
         Path | None,
-        options.option("--truth", metavar="MASKS", help="A folder of masks, paired by name."),
+        typer.Option("--truth", metavar="MASKS", help="A folder of masks, paired by name."),
     ] = None,
     rate: Annotated[
         float | None,
-        options.option(
+        typer.Option(
             "--rate",
             metavar="HZ",
             help="Images a second. Default: the times in the names, a video's own, or 10.",
         ),
     ] = None,
-    quiet: options.Quiet = False,
+    quiet: arguments.Quiet = False,
 ) -> int:
     """Make a log of a folder of images or a video.
 
@@ -58,3 +58,6 @@ def _warn_of(names: tuple[str, ...], what: str) -> None:
     if names:
         some = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
         messages.warning(f"{what}: {some} ({len(names)} in all)")
+
+
+COMMAND: Final = pack

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
-from roadeval.cli import console, messages, options
+from roadeval.cli import arguments, console, messages
+from roadeval.cli.commands.report import PaperName
 from roadeval.cli.exit_codes import ExitCode
-from roadeval.cli.report import PaperName
 
 
 def _condition(texts: list[str] | None) -> list[str] | None:
     from roadeval.evaluation.conditions import Condition
 
-    with options.usage():
+    with arguments.usage():
         for text in texts or ():
             Condition.parse(text)
     return texts
@@ -40,7 +40,7 @@ def compare(
     *,
     variant: Annotated[
         list[str] | None,
-        options.option(
+        typer.Option(
             "--variant",
             metavar="NAME",
             help="Only this one; of a single result the first is the base. Repeatable.",
@@ -48,7 +48,7 @@ def compare(
     ] = None,
     fail_if: Annotated[
         list[str] | None,
-        options.option(
+        typer.Option(
             "--fail-if",
             metavar="CONDITION",
             callback=_condition,
@@ -57,7 +57,7 @@ def compare(
     ] = None,
     output: Annotated[
         list[Path] | None,
-        options.option(
+        typer.Option(
             "-o",
             "--output",
             metavar="FILE",
@@ -66,10 +66,10 @@ def compare(
         ),
     ] = None,
     paper: Annotated[
-        PaperName, options.option("--paper", metavar="a4|letter", help="Default: a4.")
+        PaperName, typer.Option("--paper", metavar="a4|letter", help="Default: a4.")
     ] = PaperName.A4,
-    json: options.Json = False,
-    quiet: options.Quiet = False,
+    json: arguments.Json = False,
+    quiet: arguments.Quiet = False,
 ) -> int:
     """Compare results of one drive, or the variants of one result.
 
@@ -94,3 +94,6 @@ def compare(
     for sentence in compared.held:
         messages.error(sentence)
     return ExitCode.CONDITION_HELD if compared.held else ExitCode.DONE
+
+
+COMMAND: Final = compare

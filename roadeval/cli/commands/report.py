@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
-from roadeval.cli import console, messages, options
+import typer
+
+from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
 
 
@@ -18,11 +20,11 @@ class PaperName(StrEnum):
 
 
 def report(
-    result: options.Result,
+    result: arguments.Result,
     *,
     output: Annotated[
         Path | None,
-        options.option(
+        typer.Option(
             "-o",
             "--output",
             metavar="FILE.pdf",
@@ -30,9 +32,9 @@ def report(
         ),
     ] = None,
     paper: Annotated[
-        PaperName, options.option("--paper", metavar="a4|letter", help="Default: a4.")
+        PaperName, typer.Option("--paper", metavar="a4|letter", help="Default: a4.")
     ] = PaperName.A4,
-    quiet: options.Quiet = False,
+    quiet: arguments.Quiet = False,
 ) -> int:
     """Write the report of a drive as a PDF.
 
@@ -50,3 +52,6 @@ def report(
     if not opened.complete:
         messages.warning(f"{result}: a partial recording; the report covers what can be read of it")
     return ExitCode.DONE
+
+
+COMMAND: Final = report
