@@ -12,6 +12,7 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from roadeval import Recording
 from tests.e2e.commands import DEMO, replay
+from tests.fixtures.make import make
 
 RERUN = Path(sys.executable).with_name("rerun")
 STAGES = ("shadow", "similarity", "svm", "post")
@@ -39,11 +40,11 @@ def truths_of(drive):
             yield np.ma.masked_array(labels == 255, labels == 128)
 
 
-def test_the_recorded_masks_scored_against_the_log_give_the_table(car_park, data):
-    truths = list(truths_of(data / "drives" / "camvid_0006R0_1hz.mcap"))
+def test_the_recorded_masks_scored_against_the_log_give_the_table(car_park, tmp_path):
+    truths = list(truths_of(make("drives/car_park.mcap", tmp_path)))
     recording = Recording(car_park.recording)
     rows = [row for row in car_park.table("frames") if row["variant"] != "blind"]
-    assert len(rows) == 91 * 6
+    assert len(rows) == 20 * 6
     for row in rows:
         frame = int(row["frame"])
         road, truth = recording.layer(row["variant"], row["stage"], frame) == 1, truths[frame]

@@ -1,5 +1,7 @@
 """Frames of whole drives, every layer against the plain pipeline."""
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
@@ -9,11 +11,11 @@ from mcap_ros2.decoder import DecoderFactory as Ros2
 
 from roadeval.pipeline.chain import STAGES, Chain
 from roadeval.pipeline.stage import TrainingSet, View
-from tests.fixtures.drives import DEMO
 from tests.fixtures.shared import shared
 from tests.pipeline import reference
 from tests.pipeline.test_chain import SETTINGS
 
+DEMO = Path(__file__).resolve().parents[2] / "recordings" / "demo.mcap"
 TRAINING, CHECKED = (0, 3, 6, 9), (12, 34, 56, 78)
 OTHER, ROAD, IGNORED = 0, 1, 2
 
