@@ -16,7 +16,7 @@ def worse(tmp_path_factory) -> Replayed:
     """The demo's first frames with a classifier that is known to fail."""
     folder = tmp_path_factory.mktemp("worse")
     (folder / "worse.toml").write_text('[svm]\nkernel = "linear"\n[post]\nfill = false\n')
-    words = ("--config", folder / "worse.toml", "--max-frames", 30, "--record", "none")
+    words = ("--config", folder / "worse.toml", "--max-frames", 20, "--record", "none")
     return replay(folder, DEMO, *words)
 
 

@@ -99,7 +99,7 @@ def test_the_window_opens_at_the_first_evaluated_frame_that_has_pictures(
         "roadeval.recording.screen.viewer.show", lambda path, frame: shown.append(frame)
     )
     if rule == "worst":
-        sparse = replay(tmp_path, DEMO, "--max-frames", 16, "--record", "worst:3")
+        sparse = replay(tmp_path, DEMO, "--max-frames", 24, "--record", "worst:3")
     assert main(["inspect", str(sparse.recording)]) == 0
     opened = Opened(sparse.recording)
     assert opened.recording.layout.first_frame not in opened.pictured

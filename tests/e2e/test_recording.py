@@ -1,5 +1,6 @@
 """What the recording holds is what the tables say."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -85,8 +86,19 @@ def test_two_runs_give_the_same_tables(twice, table):
     assert one == two
 
 
+def plain_summary(reports):
+    """Return a summary without what took how long, and without how many workers there were."""
+    summary = json.loads((reports / "summary.json").read_text())
+    return {key: value for key, value in summary.items() if key not in ("seconds", "run")}
+
+
+def test_two_runs_give_the_same_summary_but_for_the_clock_and_what_was_asked(twice):
+    two, one = (plain_summary(reports) for _, reports in twice)
+    assert one == two
+
+
 def test_two_runs_give_the_same_recording_but_for_the_clock(twice, tmp_path):
-    dropped = [word for path in CLOCKED for word in ("--drop-entity", path)]
+    dropped = [word for path in (*CLOCKED, "/results/summary") for word in ("--drop-entity", path)]
     for number, (recording, _) in enumerate(twice):
         code, said = rerun("filter", *dropped, recording, "-o", tmp_path / f"{number}.rrd")
         assert code == 0, said
