@@ -1,4 +1,4 @@
-"""What the variants made of a frame, stage by stage, and how it was scored."""
+"""Results of a frame: what each variant's stages computed, and its score."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class StageResult:
     seconds: float
 
     def without_layers(self) -> StageResult:
-        """Give what is left to sum up once the pictures are encoded."""
+        """Return the result without layers, as it is summed up once they are encoded."""
         return StageResult(self.stage, (), self.mask, {}, self.facts, self.seconds)
 
 
@@ -57,7 +57,7 @@ class VariantResult:
             yield from result.layers
 
     def final(self) -> Mask:
-        """Give the pixels of the last stage's mask, ``(H, W)`` uint8."""
+        """Return the pixels of the last stage's mask, ``(H, W)`` uint8."""
         *_, (_, mask) = self.masks()
         return mask.pixels()
 
@@ -113,7 +113,7 @@ class FrameResult:
     pictures: Pictures = Pictures.ALL
 
     def without_layers(self) -> FrameResult:
-        """Give what is left to sum up once the pictures, which take most memory, are encoded."""
+        """Return the result without layers, which take most memory, for summing up."""
         variants = tuple(
             VariantResult(v.variant, tuple(stage.without_layers() for stage in v.stages))
             for v in self.variants

@@ -82,7 +82,7 @@ def score_frame(
 def tally(
     names: Sequence[Name], masks: Bits, truth: TruthBits, found: Mapping[str, Bits]
 ) -> tuple[Tally, ...]:
-    """Count named masks in the regions ``found``, and prove that no pixel was lost.
+    """Count named masks in the regions ``found``, and check that no pixel was lost.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def tally(
 
 
 def prove(names: Sequence[Name], counted: Sums, found: Sequence[str], labelled: int) -> None:
-    """Prove ``TP + TN + FP + FN = N = pixels - ignored``, and that the regions are parts of it.
+    """Check that ``TP + TN + FP + FN = N = pixels - ignored``, and that the regions add up.
 
     Where regions that together are the frame are among those ``found``, as the row bands are,
     their counts must add up to the whole's. ``counted`` is as `roadeval.evaluation.counts.count`
