@@ -79,7 +79,7 @@ def error_of_mean(series: Series) -> MeanError:
 
 
 def autocovariance(series: Series) -> Series:
-    """Compute the autocovariances at lags 0 to n-1, each a sum of products over n (not n minus lag).
+    """Compute the autocovariances at lags 0 to n-1, each a sum of products over n, not n - lag.
 
     Parameters
     ----------

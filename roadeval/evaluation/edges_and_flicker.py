@@ -50,7 +50,7 @@ class Flicker:
         self._before = None
 
     def totals(self, name: str) -> dict[str, Any]:
-        """Return ``flicker``, ``truth_flicker`` and the number of ``pairs``; None without a pair."""
+        """Return ``flicker`` and ``truth_flicker``, None without a pair, and the ``pairs``."""
         labelled = self._labelled[name]
         return {
             "flicker": self._changed[name] / labelled if labelled else None,

@@ -11,7 +11,7 @@ Rates = Mapping[str, float]
 
 
 def judge(rates: Rates, blind: Rates | None, settings: EvaluationSettings) -> Health:
-    """Return a variant's health by the rates of its final mask and those of the baseline, if there is one.
+    """Return a variant's health by its final mask's rates and the baseline's, if there is one.
 
     An undefined rate counts neither for nor against it. The thresholds and their reasons stand in
     `EvaluationSettings`.

@@ -91,7 +91,7 @@ def tally(
         whole.
     """
     counted = counts.count(masks, truth, list(found.values()))
-    prove(names, counted, list(found), ones(truth.labelled))
+    check_conserved(names, counted, list(found), ones(truth.labelled))
     tallies = []
     for (variant, stage), rows in zip(names, counted.tolist(), strict=True):
         whole, *parts = (Counts(*row) for row in rows)
@@ -100,7 +100,9 @@ def tally(
     return tuple(tallies)
 
 
-def prove(names: Sequence[Name], counted: Sums, found: Sequence[str], labelled: int) -> None:
+def check_conserved(
+    names: Sequence[Name], counted: Sums, found: Sequence[str], labelled: int
+) -> None:
     """Check that ``TP + TN + FP + FN = N = pixels - ignored``, and that the regions add up.
 
     Where regions that together are the frame are among those ``found``, as the row bands are,

@@ -42,7 +42,7 @@ COMPARED: Final = tuple(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sums:
+class DriveSums:
     """What the drive's tables of sums hold: its windows, changes of masks, and heat maps."""
 
     windows: Sequence[windows.Window]
@@ -112,9 +112,9 @@ class Scoreboard:
         """Note that a frame was read here and could not be decoded."""
         self._beyond.interrupt()
 
-    def sums(self) -> Sums:
+    def sums(self) -> DriveSums:
         """Sum up the drive for its tables; nothing without a score."""
-        return Sums(tuple(self.windows()), self._maps.changes, self._maps.heat)
+        return DriveSums(tuple(self.windows()), self._maps.changes, self._maps.heat)
 
     def roles(self) -> dict[str, int]:
         """Count the frames added so far by role."""
