@@ -27,7 +27,7 @@ from roadeval.jobs import frame as runner
 from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import Run
 from roadeval.pipeline.stage import View
-from roadeval.recording import Rule, recorder_for
+from roadeval.recording import RecordRule, recorder_for
 from roadeval.results.lines import lines
 from roadeval.runtime.threads import one_thread_each
 
@@ -122,7 +122,7 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
     config = configure({"run": {"jobs": 1}})
     with logs.open_log(drive) as log, one_thread_each():
         run = Run(log, config, ignore)
-        recorder = recorder_for(folder / "stages.rrd", run.layout(), Rule.parse("all"))
+        recorder = recorder_for(folder / "stages.rrd", run.layout(), RecordRule.parse("all"))
         with recorder:
             for position, logged in enumerate(log.frames(run.selection)):
                 frame, seconds = timed(logged.decode)

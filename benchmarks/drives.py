@@ -48,9 +48,8 @@ class Source:
         """Decode the first frames that have a truth."""
         config = configure({"labels": {"road": self.road, "ignore": self.ignore}})
         with logs.open_log(self.path) as log:
-            readable = (
-                f for f in log.frames(log.select(config.topics, config.labels)) if f.labelled
-            )
+            selection = log.select(config.topics, config.labels)
+            readable = (frame for frame in log.frames(selection) if frame.labelled)
             return [each.decode() for each in islice(readable, count)]
 
 

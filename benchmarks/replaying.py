@@ -19,12 +19,12 @@ from roadeval.data import FrameResult
 from roadeval.data.packed import Packed
 from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import Run
-from roadeval.recording import Rule, recorder_for
+from roadeval.recording import RecordRule, recorder_for
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.lines import lines, sum_lines
 from roadeval.runtime.threads import ordered
 
-ALL: Final = Rule.parse("all")
+ALL: Final = RecordRule.parse("all")
 HELD_BYTES: Final = 400 << 20
 """Of layers computed beforehand and held for the floor, which goes round them."""
 
@@ -51,7 +51,7 @@ class Whole:
     """Stands where a recorder does, and hands out what it is given, layers and all."""
 
     def encode(self, result: FrameResult, _position: int, _lines: Any) -> FrameResult:
-        """Give the result."""
+        """Return the result."""
         return result
 
 
@@ -64,11 +64,10 @@ def hold(drive: Path, config: RunConfig) -> Held:
         for position, (_, _, result) in enumerate(run.frames(Whole())):
             if position % max(1, -(-run.total * _bytes(result) // HELD_BYTES)) == 0:
                 results.append(result)
-                encoded = recorder.encode(result, position, lines(result)).encoded
+                encoded = recorder.encode(result, position, lines(result))
                 sizes.append(_layer_bytes(encoded.payloads))
-        files = [
-            _files(logged) for logged in log.frames(run.selection, logs.Span.of(config.frames))
-        ]
+        frames = log.frames(run.selection, logs.Span.of(config.frames))
+        files = [_files(logged) for logged in frames]
         return Held(files, results, run.layout(), float(np.mean(sizes)))
 
 

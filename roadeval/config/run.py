@@ -87,10 +87,10 @@ class RunConfig:
         for name in self.topics.masks:
             check_variant_name(name, names)
         if self.output.record != OutputSettings().record:
-            from roadeval.recording import Rule  # with it comes the viewer's library
+            from roadeval.recording import RecordRule  # with it comes the viewer's library
 
             try:
-                Rule.parse(self.output.record)
+                RecordRule.parse(self.output.record)
             except RoadevalError as error:
                 raise ConfigError(str(error)) from error
         if self.output.mcap is not None and self.frames.scale != 1:
@@ -102,6 +102,10 @@ class RunConfig:
     def variants(self) -> tuple[Variant, ...]:
         """Return every variant that is computed: the two by default, then the extra ones."""
         return variants_of(self.pipeline, self.extra)
+
+    def pipelines(self) -> dict[str, Pipeline]:
+        """Return the pipeline of every variant, by name."""
+        return {variant.name: variant.pipeline for variant in self.variants()}
 
     def override(self, tables: Mapping[str, Any], where: str = "") -> RunConfig:
         """Return the configuration with the values of some tables in place.

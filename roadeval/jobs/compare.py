@@ -16,8 +16,8 @@ from roadeval.evaluation.compared import Comparison, Judgement, as_dict
 from roadeval.evaluation.comparison import Side
 from roadeval.evaluation.conditions import Condition, judge
 from roadeval.jobs.result import Opened
-from roadeval.report.pdf.typeset import Paper, pdf, put
-from roadeval.report.sections.comparison import document, markdown
+from roadeval.report.comparison import document, markdown
+from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.lines import window_rows
 from roadeval.results.reading import table_of
 from roadeval.results.summary import plain
@@ -26,20 +26,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 ASKED: Final = {
-    "image_topic": "topics.image",
-    "truth_topic": "topics.truth",
-    "shadow_topic": "topics.shadow",
-    "mask_topics": "topics.masks",
-    "road_labels": "labels.road",
-    "ignore_labels": "labels.ignore",
-    "road_colors": "labels.road_colors",
-    "ignore_colors": "labels.ignore_colors",
-    "every": "frames.every",
-    "sync_tolerance_ms": "topics.sync_tolerance_ms",
-    "resize_truth": "topics.resize_truth",
-    "scale": "frames.scale",
+    "topics": ("image", "truth", "shadow", "masks", "sync_tolerance_ms", "resize_truth"),
+    "labels": ("road", "ignore", "road_colors", "ignore_colors"),
+    "frames": ("every", "scale"),
 }
-"""Settings that change a frame's numbers or which are seen, by their names in older summaries."""
+"""Settings that change a frame's numbers, or which frames are seen."""
 ROWS: Final = 60
 """Points of the figure over the drive, at most."""
 
@@ -131,7 +122,7 @@ def write(compared: Compared, path: Path, *, paper: Paper = Paper.A4) -> Path:
     RoadevalError
         If the ending is another, or the file cannot be written.
     """
-    return put(path, writer(path)(compared, paper))
+    return write_file(path, writer(path)(compared, paper))
 
 
 def writer(path: Path) -> Callable[[Compared, Paper], bytes]:
@@ -159,14 +150,13 @@ def as_json(compared: Compared) -> str:
 
 def _asked(summary: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a result's log was asked for that changes a frame's numbers, by the settings."""
-    if run := summary.get("run"):
-        return {
-            f"{section}.{name}": run[section][name]
-            for section, name in (setting.split(".") for setting in ASKED.values())
-            if name in run.get(section, {})
-        }
-    selection = summary.get("selection") or {}
-    return {setting: selection[name] for name, setting in ASKED.items() if name in selection}
+    run = summary.get("run", {})
+    return {
+        f"{table}.{key}": run[table][key]
+        for table, keys in ASKED.items()
+        for key in keys
+        if key in run.get(table, {})
+    }
 
 
 def _digest(opened: Opened) -> str | None:

@@ -15,19 +15,19 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.jobs import frame as runner
-from roadeval.jobs import learning
-from roadeval.jobs.gallery import Gallery
+from roadeval.jobs.examples import ExampleFrames
 from roadeval.jobs.progress import OnProgress, Progress
-from roadeval.kernels.first_time import prepare
+from roadeval.kernels import prepare
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import MisfitError, View
 from roadeval.recording import Layout
 from roadeval.results.lines import lines
 from roadeval.results.schema import streamed
-from roadeval.runtime.memory import OFTEN, give_back
+from roadeval.runtime.memory import TRIM_EVERY, trim
 from roadeval.runtime.threads import ordered
-from roadeval.training import Model
+from roadeval.training import Model, learning
 from roadeval.training.model import ModelError
+from roadeval.training.schedule import Schedule
 from roadeval.version import VERSION
 
 Processed = tuple[FrameResult, Mapping[str, str], Any]
@@ -69,17 +69,17 @@ class Run:
         self.total = len(self.read)
         self.model, self._schedule = self._learn()
         self._chains = self._bind()
-        give_back()
+        trim()
         prior = None if self.model.prior is None else BlindPrior(self.model.prior)
         names = [layout.name for layout in self._layouts()]
         self.board = Scoreboard(config.evaluation, names, prior)
-        self.gallery = Gallery(self.total)
+        self.examples = ExampleFrames(self.total)
         self.done = 0
 
-    def _learn(self) -> tuple[Model, learning.Schedule]:
+    def _learn(self) -> tuple[Model, Schedule]:
         settings = self.config.training
         if settings.model is not None:
-            learnt = learning.from_file(Path(settings.model), self.variants)
+            learnt = learning.from_file(Path(settings.model), self.config.pipelines())
             self._compile()
             return learnt
         self._compile()
@@ -87,7 +87,7 @@ class Run:
         total = min(settings.frames, self.total)
         return learning.from_log(
             partial(self.log.frames, self.selection, logs.Span.of(self.config.frames)),
-            self.variants,
+            self.config.pipelines(),
             settings,
             lambda done: self._tell(Progress(done, total, "training")),
             labelled=labelled,
@@ -110,7 +110,7 @@ class Run:
             width,
             height,
             self._layouts(),
-            rates=tuple(METRICS),
+            tuple(METRICS),
             baseline=self.model.prior is not None,
             has_truth=self.selection.truth is not None,
             has_shadow_truth=self.selection.shadow is not None,
@@ -151,13 +151,13 @@ class Run:
         ):
             self.done += 1
             self._tell(Progress(self.done, self.total, "replaying"))
-            if self.done % OFTEN == 0:
-                give_back()
+            if self.done % TRIM_EVERY == 0:
+                trim()
             if processed is None:
                 self.board.lose()
             else:
                 self.board.add(processed[0])
-                self.gallery.look(self.done, processed[0])
+                self.examples.offer(self.done, processed[0])
                 yield processed
 
     def _process(

@@ -26,11 +26,11 @@ class Accounting:
     in_range
         Those inside the span, before its stride and its limit.
     read
-        Frames handed out so far.
+        Frames returned so far.
     labelled
-        Of these, the ones with truth.
+        Of these, those with truth.
     undecodable
-        Of these, the ones that could not be decoded: number and reason.
+        Of these, those that could not be decoded: number and reason.
     truth_in_log, truth_unused
         Truth messages, and those between the first and last paired one that belong to no image
         (counted only if every frame is read).
@@ -95,14 +95,15 @@ class FrameStream:
         self.accounting.labelled += TRUTH in labels
         if TRUTH in self._labels and self._span.every == 1:
             self.accounting.truth_unused = self._labels[TRUTH].unused
+        # Reading a message corrects its log time where the file's index is wrong.
         picture = read_or_error(self._pictures, number)
         log_time = int(self._images.log_times[number])
         return LoggedFrame(
-            number,
-            self._stamp(number, log_time),
-            log_time,
-            picture,
-            labels,
+            number=number,
+            stamp_ns=self._stamp(number, log_time),
+            log_time_ns=log_time,
+            picture=picture,
+            labels=labels,
             resize=self._selection.resize_truth,
             scale=self._selection.scale,
             report=self.accounting.undecodable.__setitem__,

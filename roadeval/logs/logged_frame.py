@@ -14,7 +14,7 @@ from roadeval.logs.errors import BadMessage, FrameError
 from roadeval.logs.messages.pictures import CompressedPicture, Picture
 from roadeval.logs.messages.pixels import media_type, to_rgb
 from roadeval.logs.scaling import at_scale, nearest
-from roadeval.logs.topics.labels import LabelMap
+from roadeval.logs.topics.labels import Label
 
 TRUTH: Final = "/truth"
 SHADOW: Final = "/shadow"
@@ -22,57 +22,38 @@ SHADOW: Final = "/shadow"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Label:
-    """A label's picture, or why it cannot be read, and what its values mean."""
-
-    picture: Picture | FrameError
-    labels: LabelMap
-    topic: str
-
-
 class LoggedFrame:
-    """One frame as logged, not decoded yet.
+    """A frame as logged, not decoded yet.
 
-    Attributes
+    Parameters
     ----------
     number
         Position in the image topic by log time, from 0, undecodable messages included.
     stamp_ns, log_time_ns
         Header stamp (the log time where the log has no stamps) and log time.
-    labelled
-        Whether the log has truth for it.
+    picture
+        The image, or why it cannot be read.
+    labels
+        The labels that belong to it: `TRUTH`, `SHADOW`, and masks by their name.
+    resize, scale
+        Whether labels are resized to the image, and the scale of both together.
+    report
+        Called with the number and the reason if it cannot be decoded.
     """
 
-    __slots__ = (
-        *("_labels", "_picture", "_report", "_resize", "_scale"),
-        *("log_time_ns", "number", "stamp_ns"),
-    )
-
-    def __init__(
-        self,
-        number: int,
-        stamp_ns: int,
-        log_time_ns: int,
-        picture: Picture | FrameError,
-        labels: Mapping[str, Label],
-        *,
-        resize: bool,
-        scale: float = 1.0,
-        report: Callable[[int, str], None],
-    ) -> None:
-        self.number = number
-        self.stamp_ns = stamp_ns
-        self.log_time_ns = log_time_ns
-        self._picture = picture
-        self._labels = labels
-        self._resize = resize
-        self._scale = scale
-        self._report = report
+    number: int
+    stamp_ns: int
+    log_time_ns: int
+    picture: Picture | FrameError
+    labels: Mapping[str, Label]
+    resize: bool
+    scale: float
+    report: Callable[[int, str], None]
 
     @property
     def labelled(self) -> bool:
         """Whether the log has truth for it."""
-        return TRUTH in self._labels
+        return TRUTH in self.labels
 
     def decode(self) -> Frame:
         """Decode image and labels; any thread may do so, and mostly releases the interpreter lock.
@@ -83,16 +64,16 @@ class LoggedFrame:
             If the image or a label of it cannot be decoded.
         """
         try:
-            return at_scale(self._decode(), self._scale)
+            return at_scale(self._decode(), self.scale)
         except (BadMessage, FrameError) as error:
             reason = f"frame {self.number}: {error}"
-            self._report(self.number, str(error))
+            self.report(self.number, str(error))
             raise FrameError(reason) from error
 
     def _decode(self) -> Frame:
-        picture = _readable(self._picture)
+        picture = _readable(self.picture)
         image = to_rgb(picture)
-        labels = {name: self._label(label, image) for name, label in self._labels.items()}
+        labels = {name: self._label(label, image) for name, label in self.labels.items()}
         truth, shadow = labels.pop(TRUTH, None), labels.pop(SHADOW, None)
         media = media_type(picture.data) if isinstance(picture, CompressedPicture) else None
         return Frame(
@@ -118,7 +99,7 @@ class LoggedFrame:
         height, width = image.shape[:2]
         if truth.shape == (height, width):
             return truth
-        if not self._resize:
+        if not self.resize:
             size = f"{truth.shape[1]}x{truth.shape[0]}"
             raise FrameError(
                 f"{topic} is {size}, its image {width}x{height}: "

@@ -22,11 +22,15 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+RUN: Final = "run.toml"
+"""The file that makes the run again."""
+
+
 class ResultsWriter:
     """Writes a results folder while frames arrive; to be used as a context.
 
-    Leaving the context without `finish` removes what was begun, the folder too if it was made for
-    it, and leaves earlier results as they were.
+    Leaving the context without `finish` removes what was begun and leaves earlier results as they
+    were.
 
     Parameters
     ----------
@@ -42,9 +46,8 @@ class ResultsWriter:
     def __init__(self, folder: Path) -> None:
         self._folder: Final = folder
         self._open: Final[dict[str, _Growing]] = {}
-        self._made: Final[list[Path]] = []
         with self._explained():
-            self._made.extend(files.make(folder))
+            folder.mkdir(parents=True, exist_ok=True)
             for name, table in TABLES.items():
                 self._open[name] = _Growing(folder, table)
 
@@ -70,7 +73,7 @@ class ResultsWriter:
         """What the summary states of each table with rows so far: ``rows`` and ``sha256``."""
         return {name: table.stated for name, table in self._open.items() if table.rows}
 
-    def finish(self, summary: Mapping[str, Any]) -> list[Path]:
+    def finish(self, summary: Mapping[str, Any], run_toml: str) -> list[Path]:
         """Rename all files to their own names, the summary last.
 
         A table without rows is not there, nor is that of an earlier run: it would not belong to
@@ -80,6 +83,8 @@ class ResultsWriter:
         ----------
         summary
             See `roadeval.results.summary.summary_text`.
+        run_toml
+            The configuration of the run, as the text of a TOML file.
 
         Returns
         -------
@@ -92,14 +97,14 @@ class ResultsWriter:
             path.unlink(missing_ok=True)
             written = [table.path for table in self._open.values() if table.complete()]
             self._open.clear()
+            files.put(self._folder / RUN, run_toml.encode())
             files.put(path, text.encode())
-        return [*written, path]
+        return [*written, self._folder / RUN, path]
 
     def _discard(self) -> None:
         for table in self._open.values():
             table.discard()
         self._open.clear()
-        files.remove(self._made)
 
     @contextmanager
     def _explained(self) -> Iterator[None]:

@@ -71,7 +71,7 @@ with ResultsWriter(folder / "out") as writer:
     writer.append(lines(result))
     writer.append(sum_lines(board.sums()))
     unknown = set(PARTS) - summary.keys() - {"format"} - LATER
-    writer.finish(summary | {part: {} for part in unknown})
+    writer.finish(summary | {part: {} for part in unknown}, "")
 read = Results(folder / "out")
 assert read.frames["FDR"].tolist() == [0.25]
 assert read.windows["FDR"].tolist() == read.windows["pooled_FDR"].tolist() == [0.25]

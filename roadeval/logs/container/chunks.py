@@ -26,14 +26,14 @@ class ChunkReader:
     Parameters
     ----------
     keep_corrupt
-        Whether to hand out what is left of a chunk that cannot be trusted.
+        Whether to read what is left of a chunk whose checksum is wrong.
 
     Attributes
     ----------
     bad
         Why a chunk could not be read, by its offset.
     kept
-        Why a chunk should not have been, if it was all the same.
+        What is wrong with a chunk that was read nevertheless, by its offset.
     """
 
     def __init__(self, source: FileReader, *, keep_corrupt: bool = False) -> None:

@@ -23,11 +23,11 @@ class Damage:
     lossy
         Whether messages are, or may be, lost or wrong by it.
     start_ns, end_ns
-        Log times of the messages before and after what is lost, None where nothing tells.
+        Log times of the messages before and after what is lost, None where unknown.
     lost
         Topics and numbers of messages that are known to be lost.
     log_start_ns
-        From where a sentence counts its seconds.
+        Log time from which the sentence counts seconds.
     """
 
     path: Path

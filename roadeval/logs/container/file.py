@@ -25,7 +25,7 @@ from roadeval.logs.container.records import (
     parse,
     walk,
 )
-from roadeval.logs.container.scan import Scan
+from roadeval.logs.container.scan import IsWhole, Scan
 from roadeval.logs.container.summary import read_summary
 from roadeval.logs.errors import BadRecord
 
@@ -40,7 +40,7 @@ class ChannelLog:
     """Where the messages of one channel lie.
 
     ``blocks`` holds chunk numbers and entries in the order of the file; it stays empty for a
-    channel that nobody will read, of which only count and time range are kept.
+    channel that is not wanted, of which only count and time range are kept.
     """
 
     wanted: bool
@@ -61,7 +61,7 @@ class ChannelLog:
 
 
 class Container:
-    """One MCAP file, in whatever state it is.
+    """One MCAP file, damaged or not.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class Container:
         self,
         path: Path,
         wanted: Callable[[Channel, Schema | None], bool],
-        is_whole: Callable[[Channel, Schema | None, Message], bool],
+        is_whole: IsWhole,
         *,
         keep_corrupt: bool = False,
     ) -> None:
@@ -104,14 +104,7 @@ class Container:
         self._wanted = wanted
         self.reader = ChunkReader(self.source, keep_corrupt=keep_corrupt)
         self.summary = read_summary(self.source)
-
-        def whole(scan: Scan, message: Message) -> bool:
-            channel = scan.channels.get(message.channel_id)
-            return channel is not None and is_whole(
-                channel, scan.schemas.get(channel.schema_id), message
-            )
-
-        self.scan = Scan(self.source, self.summary, whole)
+        self.scan = Scan(self.source, self.summary, is_whole)
         self.schemas, self.channels = self.scan.schemas, self.scan.channels
         self.data_is_right: bool | None = None
         self.saved_ns: int | None = None
@@ -130,7 +123,7 @@ class Container:
         return statistics.channel_message_counts if statistics else {}
 
     def topic(self, channel_id: int) -> str:
-        """Name the topic of a channel, or at least the channel."""
+        """Return the topic of a channel, or its number where it is not defined."""
         channel = self.channels.get(channel_id)
         return channel.topic if channel else f"channel {channel_id}"
 

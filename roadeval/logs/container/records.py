@@ -42,6 +42,9 @@ PADDING: Final = 4
 LONGEST_NAME: Final = 64
 """No compression has a longer name; a chunk that claims so is damaged."""
 
+LONGEST_CHUNK_HEAD: Final = CHUNK_HEAD.size + LONGEST_NAME + 8
+"""Bytes of a chunk's body in which its head ends, whatever the compression."""
+
 Entries = npt.NDArray[np.int64]
 """``(n, 2)``: log times of messages, and offsets of their records in the chunk."""
 
@@ -70,9 +73,9 @@ class Chunk(NamedTuple):
 
     ``offset`` is the record's, ``data_offset`` and ``data_size`` the compressed data's, all in
     the file; ``size`` and ``crc`` are of the uncompressed records (CRC 0: not given); ``start``
-    and ``end`` are the log times of its messages, both closed. ``crc`` is None where it cannot
-    be told from damage. A chunk that is ``cut`` goes on beyond the end of the file; the head of
-    one that is ``repaired`` was damaged, and the file's summary told what it said.
+    and ``end`` are the log times of its messages, both closed. ``crc`` is None where it may
+    be damaged. A chunk that is ``cut`` continues beyond the end of the file; the head of one that
+    is ``repaired`` was damaged, and is taken from the file's summary.
     """
 
     offset: int
@@ -88,7 +91,7 @@ class Chunk(NamedTuple):
 
 
 class ChunkIndex(NamedTuple):
-    """The summary's word on a chunk: its head without the checksum, and where its record ends.
+    """A chunk in the file's summary: its head without the checksum, and where its record ends.
 
     ``index_offsets`` are packed pairs of a channel and the offset of its message index.
     """
@@ -167,7 +170,7 @@ def parse_chunk(place: Place, head: Buffer) -> Chunk:
 
 
 def parse_chunk_index(body: Buffer) -> ChunkIndex:
-    """Read what the summary says of a chunk.
+    """Read a chunk's index in the summary.
 
     Raises
     ------

@@ -20,11 +20,10 @@ from mcap.records import Channel, Schema
 
 from roadeval.logs.container.readers import FileReader
 from roadeval.logs.container.records import (
-    CHUNK_HEAD,
     HEAD,
     INDEX_HEAD,
     LARGEST,
-    LONGEST_NAME,
+    LONGEST_CHUNK_HEAD,
     MAGIC,
     MESSAGE_HEAD,
     PADDING,
@@ -42,7 +41,6 @@ from roadeval.logs.container.recovery.next_record import RecordFinder
 from roadeval.logs.container.summary import Summary
 from roadeval.logs.errors import BadRecord
 
-CHUNK_HEAD_MAX: Final = CHUNK_HEAD.size + LONGEST_NAME + 8
 _DEFINITIONS: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
 _SKIPPED: Final = (Opcode.ATTACHMENT, Opcode.METADATA)
 _AFTER_DATA: Final = (
@@ -56,14 +54,18 @@ _AFTER_DATA: Final = (
     Opcode.FOOTER,
 )
 RECENT: Final = 8
-"""Messages whose log times tell whether another one's is likely."""
+"""Messages with whose log times another one's is compared."""
 PRIVATE: Final = 0x80
-"""From here on, opcodes are an application's own."""
+"""Opcodes from here on belong to applications."""
+
+
+IsWhole = Callable[[Channel, Schema | None, Message], bool]
+"""Whether a message, with its channel and schema, is as long as its own fields say."""
 
 
 @dataclass(slots=True)
 class Gap:
-    """Bytes from ``offset`` to ``end`` that make no sense, and the log times around them."""
+    """Bytes that make no sense, to ``end`` (excluded), and the log times around them."""
 
     offset: int
     end: int
@@ -95,9 +97,7 @@ class Scan:
         Its checksum, 0 if not given.
     """
 
-    def __init__(
-        self, source: FileReader, summary: Summary, is_whole: Callable[[Scan, Message], bool]
-    ) -> None:
+    def __init__(self, source: FileReader, summary: Summary, is_whole: IsWhole) -> None:
         self.chunks: list[Chunk] = []
         self.indexes: list[dict[int, Entries] | None] = []
         self.loose: dict[int, array[int]] = {}
@@ -186,7 +186,7 @@ class Scan:
 
     def _chunk(self, place: Place) -> int:
         index = self._known.get(place.offset)
-        head = bytes(self._source.peek(place.body, CHUNK_HEAD_MAX))
+        head = bytes(self._source.peek(place.body, LONGEST_CHUNK_HEAD))
         if index is None:
             chunk = by_own_head(place, head, self._source.size, self._finder.is_likely)
         else:
@@ -263,7 +263,7 @@ class Scan:
         if chunk is not None:
             return self._chunk(chunk)
         begin, seek = offset, offset + 1
-        if last is not None and self._is_intact(last[0]):
+        if last is not None and self._is_intact(*last):
             # A length that is too long by less than the padding does not show in the message.
             seek = offset - PADDING + 1
         elif last is not None:
@@ -276,10 +276,14 @@ class Scan:
         self._gap(begin, end, reason, lossy=lossy)
         return end
 
-    def _is_intact(self, place: Place) -> bool:
+    def _is_intact(self, place: Place, channel_id: int) -> bool:
         """Whether a message is as long as its own fields say."""
+        channel = self.channels.get(channel_id)
+        if channel is None:
+            return False
         try:
-            return self._is_whole(self, message_at(self._source, place.offset))
+            message = message_at(self._source, place.offset)
+            return self._is_whole(channel, self.schemas.get(channel.schema_id), message)
         except BadRecord:
             return False
 

@@ -1,4 +1,4 @@
-"""The summary at the end of an MCAP file: a second witness of what lies before it."""
+"""The summary at the end of an MCAP file, which repeats much of what lies before it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _CHECKED: Final = HEAD.size + 16
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What the summary says.
+    """The contents of the summary.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Summary:
     checked
         Whether its checksum is given, and right.
     problem
-        Why there is no summary to rely on, or empty; then all else is empty too.
+        Why the summary cannot be relied on, or empty; then all else is empty too.
     """
 
     schemas: dict[int, Schema] = field(default_factory=dict)

@@ -80,25 +80,21 @@ def picture_in(message: Any) -> Picture:
         If it has not the fields of an image.
     """
     try:
-        return _picture_in(message)
+        stamp_ns = _stamp_ns(message)
+        if not hasattr(message, "height") or hasattr(message, "pts"):
+            name = message.format if hasattr(message, "format") else message.encoding
+            return CompressedPicture(stamp_ns, name, message.data)
+        return RawPicture(
+            stamp_ns,
+            int(message.width),
+            int(message.height),
+            message.encoding,
+            int(getattr(message, "step", 0)),
+            bool(getattr(message, "is_bigendian", False)),
+            message.data,
+        )
     except (AttributeError, StopIteration, TypeError, ValueError, LogError) as error:
         raise BadMessage("it has not the fields of an image") from error
-
-
-def _picture_in(message: Any) -> Picture:
-    stamp_ns = _stamp_ns(message)
-    if not hasattr(message, "height") or hasattr(message, "pts"):
-        name = message.format if hasattr(message, "format") else message.encoding
-        return CompressedPicture(stamp_ns, name, message.data)
-    return RawPicture(
-        stamp_ns,
-        int(message.width),
-        int(message.height),
-        message.encoding,
-        int(getattr(message, "step", 0)),
-        bool(getattr(message, "is_bigendian", False)),
-        message.data,
-    )
 
 
 def _stamp_ns(message: Any) -> int:

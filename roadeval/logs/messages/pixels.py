@@ -86,7 +86,7 @@ def _grey(colours: Rgb) -> Array:
 
 
 def _indices(picture: CompressedPicture) -> Array:
-    """Read a PNG's palette indices, which OpenCV does not hand out."""
+    """Read a PNG's palette indices, which OpenCV replaces by colours."""
     from PIL import Image
 
     try:

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.logs.errors import FrameError
-from roadeval.logs.logged_frame import Label
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.messages.video import PictureSequence
+from roadeval.logs.topics.labels import Label
 from roadeval.logs.topics.pairing import Pairing, Stamps
 from roadeval.logs.topics.reader import TopicReader
 from roadeval.logs.topics.selection import Clock, LabelTopic, Selection

@@ -1,6 +1,6 @@
 """Pairs of images and labels by header stamp, in whole nanoseconds.
 
-Labels may be logged long after their images, so log times do not tell. Stamps are read only
+Labels may be logged long after their images, so log times do not pair them. Stamps are read only
 where they are needed: around the stamp that is looked for.
 """
 
@@ -45,7 +45,7 @@ class Pairing:
         self._near_label = 0
 
     def begin_near(self, label: int) -> None:
-        """Look for the next partner around a label; saves reading the way there."""
+        """Search for the next partner around a label, without reading the stamps before it."""
         self._near_label = min(label, max(len(self._labels) - 1, 0))
 
     def partner(self, image: int) -> int | None:

@@ -109,7 +109,7 @@ class TopicReader:
         return message if same_time and message.channel_id == source.channel_id else None
 
     def _correct(self, position: int) -> None:
-        """Put right what a chunk's message index says, by looking into the chunk."""
+        """Correct the places of a chunk's messages by looking into the chunk."""
         number, chunk = self._numbers[position], self._chunks[position]
         source = self.channels[number]
         here = np.flatnonzero((self._numbers == number) & (self._chunks == chunk))

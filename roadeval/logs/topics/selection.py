@@ -63,12 +63,12 @@ class Selection:
     tolerance_ns
         Largest difference of the header stamps of an image and its label.
     clock
-        What pairs images and labels: header stamps if they tell the images apart, else log
-        times, else their order.
+        By what images and labels are paired: header stamps if they differ, else log times, else
+        their order.
     resize_truth
         Whether label images of another size are scaled to the image's (nearest neighbour).
     scale
-        Of the frames that are handed out, relative to the camera's; at most 1.
+        Scale of the frames that are read, relative to the camera's; at most 1.
     notes
         Sentences for a person: every choice that was made, and why.
     """
@@ -86,7 +86,7 @@ class Selection:
 
     @property
     def size(self) -> tuple[int, int] | None:
-        """Width and height of the frames as they are handed out, if the log tells."""
+        """Width and height of the frames that are read, if known."""
         return None if self.image.size is None else scaled_size(self.image.size, self.scale)
 
     @property
@@ -151,14 +151,21 @@ def _label_topic(
     *,
     resize: bool,
 ) -> LabelTopic | None:
-    """Look into a chosen topic of label images, if there is one."""
-    topic = choice.topic
+    """Look at some images of the chosen topic: their size must fit, and their values be known."""
+    topic, labels = choice.topic, labels or LabelSettings()
     if topic is None:
         return None
-    meaning = look_at_labels(
-        readers[topic.name], topic, image, labels or LabelSettings(), resize=resize
-    )
-    return LabelTopic(topic, meaning, choice.why)
+    if not resize and topic.size and image.size and topic.size != image.size:
+        sizes = ["x".join(map(str, size)) for size in (topic.size, image.size)]
+        raise LogError(
+            f"{topic.name} is {sizes[0]}, but {image.name} is {sizes[1]}: "
+            "scale the labels with topics.resize_truth"
+        )
+    seen: set[int] = set()
+    for picture in _samples(readers[topic.name]):
+        with suppress(BadMessage):
+            seen |= seen_in(picture, labels, topic.name)
+    return LabelTopic(topic, understand(labels, seen, topic.name), choice.why)
 
 
 def _notes(truth: Choice, clock: Clock) -> tuple[str, ...]:
@@ -185,31 +192,6 @@ def check_readable(reader: TopicReader, topic: TopicInfo) -> None:
             to_rgb(picture)
             return
     raise LogError(f"nothing of {topic.name} can be decoded: {topic.problem}")
-
-
-def look_at_labels(
-    reader: TopicReader, topic: TopicInfo, image: TopicInfo, labels: LabelSettings, *, resize: bool
-) -> LabelMap:
-    """Look at some label images: their size must fit, and their values have a meaning.
-
-    Raises
-    ------
-    LogError
-        If the size differs and ``resize`` is off, or the values cannot be understood.
-    """
-    if not resize and None not in (topic.size, image.size) and topic.size != image.size:
-        theirs, ours = ("x".join(map(str, size or ())) for size in (topic.size, image.size))
-        raise LogError(
-            f"{topic.name} is {theirs}, but {image.name} is {ours}: "
-            "scale the labels with topics.resize_truth"
-        )
-    seen: set[int] = set()
-    for picture in _samples(reader):
-        try:
-            seen |= seen_in(picture, labels, topic.name)
-        except BadMessage:
-            continue
-    return understand(labels, seen, topic.name)
 
 
 def clock_of(reader: TopicReader) -> Clock:

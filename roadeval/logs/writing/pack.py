@@ -78,7 +78,7 @@ def pack(
         Images a second. By default a video's own; of images, the times in their names if every
         name is a time (seconds, or milli-, micro- or nanoseconds since 1970), else 10.
     start_ns
-        Stamp of the first image, unless the names tell.
+        Stamp of the first image, unless the names hold times.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Chunks that are damaged or cut off, as a recorder that was killed leaves its last one.
 
-Which of the lengths that a chunk and the file's summary claim is believed, and which records of
-the chunk can be read.
+A chunk gives its length twice, and the file's summary a third time: the functions here decide which
+is right, and read the records that are left.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def by_own_head(
 ) -> Chunk:
     """Read a chunk by its own head, which gives its length twice.
 
-    Where the two differ, that one is believed after which a record is likely to begin; where
+    Where the two differ, the one is used after which a record is likely to begin; where
     both lie beyond the end of the file, the chunk is cut off.
 
     Raises
@@ -49,7 +49,7 @@ def by_own_head(
 
 
 def by_summary(place: Place, head: bytes, index: ChunkIndex) -> Chunk:
-    """Read a chunk by the summary's word; its own head gives the checksum."""
+    """Read a chunk as the summary describes it; its own head gives the checksum."""
     with suppress(BadRecord):
         own = parse_chunk(place, head)
         if own._replace(crc=None) == index.chunk:

@@ -10,11 +10,10 @@ from mcap.opcode import Opcode
 
 from roadeval.logs.container.readers import FileReader
 from roadeval.logs.container.records import (
-    CHUNK_HEAD,
     HEAD,
     INDEX_HEAD,
     LARGEST,
-    LONGEST_NAME,
+    LONGEST_CHUNK_HEAD,
     MAGIC,
     MESSAGE_HEAD,
     Place,
@@ -89,7 +88,7 @@ class RecordFinder:
         """Find a chunk whose opcode or length alone is damaged."""
         try:
             place = place_at(self._source, offset)
-            head = self._source.peek(place.body, CHUNK_HEAD.size + LONGEST_NAME + 8)
+            head = self._source.peek(place.body, LONGEST_CHUNK_HEAD)
             chunk = parse_chunk(place, head)
         except BadRecord:
             return None
@@ -128,7 +127,7 @@ class RecordFinder:
     def _adds_up(self, place: Place) -> bool:
         length = place.end - place.body
         if place.opcode == Opcode.CHUNK:
-            head = self._source.peek(place.body, CHUNK_HEAD.size + LONGEST_NAME + 8)
+            head = self._source.peek(place.body, LONGEST_CHUNK_HEAD)
             chunk = parse_chunk(place, head)
             known = chunk.compression in _KNOWN_COMPRESSION
             return known and chunk.data_offset + chunk.data_size == place.end
