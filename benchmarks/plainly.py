@@ -15,8 +15,8 @@ import rerun as rr
 
 from roadeval.data import FILTERED, UNFILTERED, Frame, VariantResult
 from roadeval.jobs.options import ReplayOptions
-from roadeval.pipeline.chain import Chain
-from roadeval.pipeline.stage import TrainingSet
+from roadeval.pipeline.chain import Pipeline
+from roadeval.pipeline.training_set import TrainingSet
 from roadeval.training.sampling import sample
 from tests.pipeline import reference
 
@@ -33,9 +33,9 @@ class PlainWay:
         where = pixels.frame, pixels.row, pixels.column, pixels.road
         self.models = {}
         for variant in options.all_variants():
-            plan = variant.config.plan()
-            filters = [name for name in plan.chain if name == "shadow"]
-            chain = Chain(filters, plan.settings, {})
+            pipeline = variant.config.pipeline
+            filters = tuple(name for name in pipeline.chain if name == "shadow")
+            chain = Pipeline(filters, pipeline.settings).bind({})
             images = tuple(chain.filtered(frame.image) for frame in first)
             colours = TrainingSet(images, *where).colours()
             self.models[variant.name] = reference.train(colours, pixels.road)

@@ -77,7 +77,7 @@ def score(
     name: str, config: Config, seed: int, train: list[Frame], test: dict[str, list[Frame]]
 ) -> np.ndarray:
     """Train a variant and count its outcomes on each drive, ``(drives, 6)``."""
-    model = fit(train, {name: config.plan()}, replace(config.training, seed=seed))
+    model = fit(train, {name: config.pipeline}, replace(config.training, seed=seed))
     chain: Chain = config.bind(model.parameters[name])
     return np.array([sum(counts(last(chain, f), f) for f in frames) for frames in test.values()])
 

@@ -16,26 +16,22 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
 from pydantic import ValidationError
 
-from roadeval.data import FILTERED, FINAL_STAGE, RESERVED, UNFILTERED, LayerSpec, VariantLayout
+from roadeval.data import FILTERED, FINAL_STAGE, RESERVED, UNFILTERED, VariantLayout
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.pipeline.chain import STAGES, Chain, layers_of, masks_of
-from roadeval.training import Plan, TrainingSettings
+from roadeval.pipeline.chain import STAGES, Chain, Pipeline
+from roadeval.training import TrainingSettings
 
 
 class ConfigError(RoadevalError):
     """A setting that cannot be used: which file, which key, and what is allowed."""
-
-
-def _defaults(chain: tuple[str, ...]) -> dict[str, Any]:
-    return {name: STAGES[name].settings() for name in chain}
 
 
 PAPER_CHAIN: Final = ("shadow", "similarity", "svm", "post")
@@ -59,31 +55,30 @@ class Config:
 
     preset: str = "paper"
     chain: tuple[str, ...] = PAPER_CHAIN
-    stages: Mapping[str, Any] = field(default_factory=lambda: _defaults(PAPER_CHAIN))
+    stages: Mapping[str, Any] = field(
+        default_factory=lambda: Pipeline.default(PAPER_CHAIN).settings
+    )
     training: TrainingSettings = field(default_factory=TrainingSettings)
     evaluation: EvaluationSettings = field(default_factory=EvaluationSettings)
 
     @property
     def has_filter(self) -> bool:
         """Whether some stage of the chain is a filter."""
-        return any(STAGES[name].is_filter for name in self.chain)
+        return self.pipeline.has_filter
 
     def without_filter(self) -> Config:
         """Give the same configuration with the filters taken out of its chain."""
-        chain = tuple(name for name in self.chain if not STAGES[name].is_filter)
-        return replace(self, chain=chain, stages={name: self.stages[name] for name in chain})
+        pipeline = self.pipeline.without_filter()
+        return replace(self, chain=pipeline.chain, stages=pipeline.settings)
 
-    def plan(self) -> Plan:
-        """Give what training needs to know."""
-        return Plan(self.chain, self.stages)
+    @property
+    def pipeline(self) -> Pipeline:
+        """The stages and their settings."""
+        return Pipeline(self.chain, self.stages)
 
     def bind(self, parameters: Mapping[str, Any]) -> Chain:
-        """Make the chain ready to run with what its stages have learnt, by stage."""
-        return Chain(self.chain, self.stages, parameters)
-
-    def layers(self) -> tuple[LayerSpec, ...]:
-        """List the layers the chain will hand out."""
-        return layers_of(self.chain, self.stages)
+        """Return the chain that runs with what its stages have learnt, by stage."""
+        return self.pipeline.bind(parameters)
 
     def as_dict(self) -> dict[str, Any]:
         """Give every effective setting as plain data, in the shape of a TOML file."""
@@ -188,7 +183,7 @@ def _chain(names: Any, where: str) -> tuple[str, ...]:
             )
     if len(set(names)) < len(names):
         raise ConfigError(f"{where}: chain: a stage can occur only once")
-    masks = masks_of(names)
+    masks = Pipeline(tuple(names), {}).masks()
     if len(set(masks)) < len(masks):
         twice = next(mask for mask in masks if masks.count(mask) > 1)
         both = [name for name in names if STAGES[name].reported == twice]
@@ -259,9 +254,14 @@ class Variant:
         return VariantLayout(
             self.name,
             f"with {', '.join(titles)}" if titles else "without the filter",
-            masks_of(self.config.chain),
-            self.config.layers(),
+            self.config.pipeline.masks(),
+            self.config.pipeline.layers(),
         )
+
+
+def pipelines_of(variants: Iterable[Variant]) -> dict[str, Pipeline]:
+    """Return each variant's stages and settings, by the variant's name."""
+    return {variant.name: variant.config.pipeline for variant in variants}
 
 
 def variants_of(config: Config, extra: Mapping[str, Config]) -> tuple[Variant, ...]:

@@ -4,9 +4,6 @@ import os
 from pathlib import Path
 
 import pytest
-
-# Dozens of replays of a few frames need not each start a process that imports it.
-import sklearn.svm  # noqa: F401
 from hypothesis import settings
 
 from roadeval.kernels import prepare

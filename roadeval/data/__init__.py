@@ -23,6 +23,7 @@ from roadeval.data.packed import Packed, TruthBits, everywhere, ones, pack, unpa
 from roadeval.data.result import (
     FrameResult,
     Health,
+    Output,
     Pictures,
     StageResult,
     VariantLayout,
@@ -54,6 +55,7 @@ __all__ = [
     "LayerKind",
     "LayerSpec",
     "Mask",
+    "Output",
     "Packed",
     "Pictures",
     "Rgb",

@@ -44,7 +44,7 @@ def detected(variants: Iterable[VariantResult]) -> dict[str, Packed]:
     found: dict[str, Packed] = {}
     for variant in variants:
         for result in variant.stages:
-            for name, mask in result.regions.items():
+            for name, mask in result.output.regions.items():
                 found.setdefault(name, mask)
     return found
 

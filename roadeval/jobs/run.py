@@ -8,12 +8,12 @@ from functools import partial
 from typing import Any, Protocol
 
 from roadeval import logs
-from roadeval.config import Variant
+from roadeval.config import Variant, pipelines_of
 from roadeval.data import FrameResult, Role, VariantLayout
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.jobs import frame as runner
-from roadeval.jobs import learning, provenance
+from roadeval.jobs import provenance
 from roadeval.jobs.gallery import Gallery
 from roadeval.jobs.options import OptionError, Progress, ReplayOptions
 from roadeval.kernels import prepare
@@ -24,8 +24,9 @@ from roadeval.results import tables
 from roadeval.results.folder import STREAMED
 from roadeval.runtime.memory import OFTEN, give_back
 from roadeval.runtime.threads import ordered
-from roadeval.training import Model
+from roadeval.training import Model, learning
 from roadeval.training.model import ModelError
+from roadeval.training.schedule import Schedule
 
 Tell = Callable[[Progress], None]
 Processed = tuple[FrameResult, Any]
@@ -75,12 +76,12 @@ class Run:
         self.gallery = Gallery(self.total)
         self.done = 0
 
-    def _learn(self) -> tuple[Model, learning.Schedule]:
+    def _learn(self) -> tuple[Model, Schedule]:
         options, settings = self._options, self._options.training()
         if options.model is not None:
             if options.train_frames is not None or options.train_gap is not None:
                 raise OptionError("--train-frames and --train-gap do not go with --model")
-            learnt = learning.from_file(options.model, self._variants)
+            learnt = learning.from_file(options.model, pipelines_of(self._variants))
             self._compile()
             return learnt
         self._compile()
@@ -88,7 +89,7 @@ class Run:
         total = min(settings.frames, self.total)
         return learning.from_log(
             partial(self.log.frames, self._selection, options.span()),
-            self._variants,
+            pipelines_of(self._variants),
             settings,
             lambda done: self._tell(Progress(done, total, "training")),
             labelled=labelled,

@@ -7,11 +7,12 @@ from functools import partial
 from pathlib import Path
 
 from roadeval import logs
+from roadeval.config import pipelines_of
 from roadeval.data import Frame
-from roadeval.jobs import learning
 from roadeval.jobs.options import Progress, ReplayOptions, keep_apart
 from roadeval.kernels import prepare
-from roadeval.training import Model, save_model
+from roadeval.training import Model, TrainingError, learning, save_model
+from roadeval.training.held import HeldFrames
 
 
 def train(
@@ -36,7 +37,7 @@ def train(
     keep_apart(drives, (output,))
     settings = options.training()
     total, by_truth = settings.frames * len(drives), settings.source != "patch"
-    memory = learning.Memory()
+    held = HeldFrames()
     frames: dict[Path, list[Frame]] = {}
     for drive in drives:
         with logs.open_log(drive, keep_corrupt=options.keep_corrupt) as log:
@@ -44,9 +45,13 @@ def train(
             prepare(lambda: tell(Progress(0, total, "compiling")))
             frames[log.path] = []
             for frame in learning.spread(there, settings.frames, labelled=by_truth):
-                frames[log.path].append(memory.hold(frame))
-                tell(Progress(memory.frames, total, "training"))
-    model = learning.from_drives(frames, options.all_variants(), settings)
+                if not held.add(frame):
+                    raise TrainingError(
+                        f"{held.full()}; lower training.frames, or reduce them with frames.scale"
+                    )
+                frames[log.path].append(frame)
+                tell(Progress(len(held.frames), total, "training"))
+    model = learning.from_drives(frames, pipelines_of(options.all_variants()), settings)
     save_model(model, Path(output))
     return model
 

@@ -83,12 +83,12 @@ def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) ->
             upcoming[v], ends[v] = first[y + v], first[y + v + 1]
             starts[v] = runs[upcoming[v], 1] if upcoming[v] < ends[v] else columns
         while True:
-            v = _least(starts)
-            if starts[v] == columns:
+            row = _least(starts)
+            if starts[row] == columns:
                 break
-            run, following = upcoming[v], upcoming[v] + _ONE
-            upcoming[v] = following
-            starts[v] = runs[following, 1] if following < ends[v] else columns
+            run, following = upcoming[row], upcoming[row] + _ONE
+            upcoming[row] = following
+            starts[row] = runs[following, 1] if following < ends[row] else columns
             label = np.uintp(runs[run, 3])
             start = max(runs[run, 1] - width, 0, reached[label] - y * columns)
             end = min(runs[run, 2] + width, columns)

@@ -11,8 +11,7 @@ from collections.abc import Callable
 from inspect import signature
 from typing import Any, Final, TypeVar
 
-from numba import njit
-from numba.core import types
+from numba import njit, types
 
 F = TypeVar("F", bound=Callable[..., Any])
 

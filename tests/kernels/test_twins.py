@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 
 from roadeval import kernels
 from roadeval.data.packed import Packed, pack, unpack
-from roadeval.kernels import compensation, plain
+from roadeval.kernels import compensation as loops
 from roadeval.kernels import compiled as fast
-from roadeval.pipeline.paper import shadow, similarity
+from roadeval.kernels import plain
+from roadeval.pipeline.paper import compensation, shadow_mask, similarity
 from tests.pipeline.images import IMAGES, images, noise
 
 RNG = np.random.default_rng(0)
@@ -21,10 +22,10 @@ WHITENING = similarity.whitening(np.cov(RNG.normal(0, 30, (3, 50))))
 
 
 def segments(image, width):
-    codes, histogram = plain.look_up_sum_min(cv2.split(image), shadow.NDI_CODES)
-    mask = shadow.shadow_mask(codes, shadow.otsu_threshold(histogram), inclusive=False)
+    codes, histogram = plain.look_up_sum_min(cv2.split(image), shadow_mask.NDI_CODES)
+    mask = shadow_mask.shadow_mask(codes, shadow_mask.otsu_threshold(histogram), inclusive=False)
     runs, count = plain.components(pack(mask), mask.shape[1], 8)
-    return runs, shadow.buffer_ring(Packed.of(mask), width).bits, count + 1
+    return runs, compensation.buffer_ring(Packed.of(mask), width).bits, count + 1
 
 
 def every_kernel(image, width):
@@ -36,7 +37,7 @@ def every_kernel(image, width):
     gain = RNG.uniform(0, 9, (count, 3))
     planes = cv2.split(image)
     return {
-        "look_up_sum_min": (planes, shadow.NDI_CODES),
+        "look_up_sum_min": (planes, shadow_mask.NDI_CODES),
         "run_sums": (planes, runs, count),
         "ring_sums": (planes, runs, ring, count, width),
         "paint": (runs, *shape),
@@ -111,7 +112,7 @@ def test_rounding_goes_to_even_and_ends_at_0_and_255():
 def test_every_component_has_its_own_transfer_whether_it_is_tabulated_or_not():
     image = noise(20, 50)
     labels = np.repeat(np.repeat([[1, 2, 3]], [20, 10, 20], axis=1), 20, axis=0).astype(np.int32)
-    assert (np.bincount(labels.ravel())[1:] > compensation._TABLED).tolist() == [True, False, True]
+    assert (np.bincount(labels.ravel())[1:] > loops._TABLED).tolist() == [True, False, True]
     source, target = RNG.uniform(0, 255, (2, 4, 3))
     given = image, plain.label_runs(labels), source, target, RNG.uniform(0.5, 2, (4, 3))
     assert_same(fast.transfer(*given), plain.transfer(*given))
@@ -197,7 +198,7 @@ def test_rings_are_summed_up_alike_across_words(width, reach):
     image = noise(40, width)
     mask = (cv2.blur(image[..., 1], (5, 5)) < 110).astype(np.uint8)
     runs, count = plain.components(pack(mask), width, 8)
-    ring = shadow.buffer_ring(Packed.of(mask), reach).bits
+    ring = compensation.buffer_ring(Packed.of(mask), reach).bits
     given = cv2.split(image), runs, ring, count + 1, reach
     sums = fast.ring_sums(*given)
     assert count > 3

@@ -5,15 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.config import Config, variants_of
 from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
-from roadeval.jobs import learning
-from roadeval.jobs.learning import Schedule, from_drives, from_file, from_log, spread
-from roadeval.training import TrainingError, TrainingSettings, save_model
-from tests.training.making import frame
+from roadeval.training import TrainingError, TrainingSettings, held, save_model
+from roadeval.training.learning import from_drives, from_file, from_log, spread
+from roadeval.training.schedule import Schedule
+from tests.training.making import frame, pipelines
 
-VARIANTS = variants_of(Config(), {})
+PIPELINES = pipelines()
 
 
 @dataclass
@@ -48,7 +47,7 @@ def roles(frames, schedule: Schedule) -> str:
 
 def learn(logged, *, labelled: bool = True, **settings):
     wanted = TrainingSettings(**settings)
-    return from_log(lambda: logged, VARIANTS, wanted, lambda done: None, labelled=labelled)
+    return from_log(lambda: logged, PIPELINES, wanted, lambda done: None, labelled=labelled)
 
 
 def test_the_first_labelled_frames_train_and_the_rest_is_evaluated():
@@ -93,20 +92,20 @@ def test_who_insists_on_truth_is_not_given_the_patch():
 
 def test_training_frames_are_bounded_in_memory(monkeypatch):
     # A frame of 24x32 takes three images of 2304 bytes, a truth of 768, and its payload of 2304.
-    monkeypatch.setattr(learning, "GREATEST_MEMORY", 3 * 9984)
+    monkeypatch.setattr(held, "GREATEST_MEMORY", 3 * 9984)
     assert not learn(log(6), frames=3)[0].warnings
     frames = log(6)
     model, schedule = learn(frames, frames=5, gap=1)
     assert roles(frames, schedule) == "tttgee"
     assert "trained on 3 of 5 frames: training holds its frames decoded" in model.warnings[0]
-    monkeypatch.setattr(learning, "GREATEST_MEMORY", 9000)
-    with pytest.raises(TrainingError, match=r"more than 0 of them would take .*--scale"):
+    monkeypatch.setattr(held, "GREATEST_MEMORY", 9000)
+    with pytest.raises(TrainingError, match=r"more than 0 of them would take .*frames.scale"):
         learn(log(6), frames=3)
 
 
 @pytest.mark.parametrize(("frames", "gap"), [(4, 0), (2, 2), (9, 0)])
 def test_leaving_no_frame_to_evaluate_is_an_error(frames, gap):
-    with pytest.raises(TrainingError, match="none is left to evaluate; lower --train-frames"):
+    with pytest.raises(TrainingError, match=r"none is left to evaluate; lower training\.frames"):
         learn(log(4), frames=frames, gap=gap)
 
 
@@ -121,7 +120,7 @@ def test_a_model_from_a_file_leaves_its_own_frames_out(tmp_path):
     frames = log(6)
     model, _ = learn(frames, frames=2)
     save_model(model, tmp_path / "m.model")
-    _, schedule = from_file(tmp_path / "m.model", VARIANTS)
+    _, schedule = from_file(tmp_path / "m.model", PIPELINES)
     assert roles(frames, schedule) == "tteeee"
 
 
@@ -154,7 +153,7 @@ BARE = [frame(n, labelled=False) for n in range(2, 4)]
 
 def of_drives(source: str, **frames):
     drives = {Path(name): own for name, own in frames.items()}
-    return from_drives(drives, VARIANTS, TrainingSettings(source=source))
+    return from_drives(drives, PIPELINES, TrainingSettings(source=source))
 
 
 def test_drives_without_truth_train_by_the_patch_and_this_is_said():

@@ -1,4 +1,4 @@
-"""The colour of a road in the sun and in the shade, learnt from the truth; and where it occurs.
+"""The colour of a road in the sun and in the shade, learnt from the truth, and its likeness.
 
 A shadowed road is lit by the sky alone: darker, and bluer than the road beside it. In the plane of
 log-chromaticities ``(ln R - ln G, ln B - ln G)``, where brightness cancels, lit road is a cloud and
@@ -60,7 +60,7 @@ class RoadLight:
 
 
 def chromaticity(rgb: npt.NDArray[np.uint8]) -> tuple[Map, Map]:
-    """``ln R - ln G`` and ``ln B - ln G`` of ``(H, W, 3)`` uint8 RGB, ``(H, W)`` float32 each."""
+    """Return ``ln R - ln G`` and ``ln B - ln G`` of ``(H, W, 3)`` uint8, ``(H, W)`` float32."""
     logs = cv2.LUT(rgb, LOGS)
     return logs[..., 0] - logs[..., 1], logs[..., 2] - logs[..., 1]
 
@@ -115,7 +115,7 @@ def likeness(image: Rgb, road: RoadLight) -> Likeness:
 
 
 def brightness(image: Rgb) -> npt.NDArray[np.uint16]:
-    """``R + G + B`` of ``(H, W, 3)`` uint8 RGB, ``(H, W)`` uint16."""
+    """Return ``R + G + B`` of ``(H, W, 3)`` uint8 RGB, ``(H, W)`` uint16."""
     red, green, blue = cv2.split(image)
     total: npt.NDArray[np.uint16] = cv2.add(
         cv2.add(red, green, dtype=cv2.CV_16U), blue, dtype=cv2.CV_16U
@@ -124,7 +124,7 @@ def brightness(image: Rgb) -> npt.NDArray[np.uint16]:
 
 
 def excess_green(image: Rgb, total: npt.NDArray[np.uint16]) -> Map:
-    """``(2 G - R - B) / (R + G + B)``, ``(H, W)`` float32: high on leaves, 0 for black."""
+    """Return ``(2 G - R - B) / (R + G + B)``, ``(H, W)`` float32: high on leaves, 0 for black."""
     green = image[..., 1].astype(np.float32)
     whole = total.astype(np.float32)
     index: Map = cv2.divide(3 * green - whole, np.maximum(whole, 1))
@@ -132,6 +132,6 @@ def excess_green(image: Rgb, total: npt.NDArray[np.uint16]) -> Map:
 
 
 def quantile(values: npt.NDArray[np.uint16], mask: Mask, share: float) -> int:
-    """Least value that ``share`` of the masked pixels do not exceed; 0 if there are none."""
+    """Return the least value that ``share`` of the masked pixels do not exceed; 0 without any."""
     counted = np.cumsum(np.bincount(values[mask > 0], minlength=1))
     return int(np.searchsorted(counted, share * counted[-1])) if counted[-1] else 0

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roadeval.pipeline.patch import ReferencePatch, patch_mask
+from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from tests.pipeline.images import mask
 
 shares = st.floats(0, 1)

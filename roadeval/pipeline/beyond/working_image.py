@@ -1,4 +1,4 @@
-"""The working image: decisions about texture mean the same for every camera, and cost the same."""
+"""The working image: a reduced one, on which texture means the same for every camera."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def reduced(image: Rgb, width: int) -> Rgb:
 
 
 def enlarged(mask: Mask, shape: tuple[int, ...]) -> Mask:
-    """Bring a mask or label image to the height and width of ``shape``, to the nearest pixel."""
+    """Resize a mask or label image to the height and width of ``shape``, to the nearest pixel."""
     large: Mask = cv2.resize(mask, (shape[1], shape[0]), interpolation=cv2.INTER_NEAREST_EXACT)
     return large
 
 
 def stretched(values: npt.NDArray[np.float32], shape: tuple[int, ...]) -> npt.NDArray[np.float32]:
-    """Bring float32 values to the height and width of ``shape``, interpolated linearly."""
+    """Resize float32 values to the height and width of ``shape``, interpolated linearly."""
     large: npt.NDArray[np.float32] = cv2.resize(values, (shape[1], shape[0]))
     return large

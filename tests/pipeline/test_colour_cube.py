@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from roadeval.pipeline import cube
+from roadeval.pipeline import colour_cube as cube
 
 RNG = np.random.default_rng(0)
 CENTRES = RNG.uniform(0, 255, (7, 3))

@@ -3,8 +3,8 @@
 A kernel machine whose features are a pixel's three colours alone is a function on the colour
 cube, 256 levels a channel. Its value is a sum over support vectors of products (RBF) or of sums
 (linear) of three factors, one a channel, so that all colours of one red level are a product of
-matrices. Along a channel a factor changes slowly: polynomials through a few nodes give it at
-every level, and since there are few factors, how far they are off is looked up, not estimated.
+matrices. Along a channel a factor changes slowly: polynomials through a few nodes interpolate it at
+every level, and since there are few factors, their error is measured, not estimated.
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ class Slabs:
 
 
 def sums_of_terms(terms: Floats, offset: float) -> Slabs:
-    """Values ``terms[0, R] + terms[1, G] + terms[2, B] + offset`` for ``(3, 256)`` terms."""
+    """Return values ``terms[0, R] + terms[1, G] + terms[2, B] + offset`` for ``(3, 256)`` terms."""
     plane = terms[1][:, None] + terms[2][None, :] + offset
     largest = float(np.abs(terms).max(axis=1).sum()) + abs(offset)
     return Slabs(lambda red: plane + terms[0, red], 4 * EPS * largest)
 
 
 def sums_of_products(weights: Floats, factor: Factor, offset: float, *, rounding: float) -> Slabs:
-    """Values ``sum_i weights[i] f_i(0, R) f_i(1, G) f_i(2, B) + offset``.
+    """Return the values ``sum_i weights[i] f_i(0, R) f_i(1, G) f_i(2, B) + offset``.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def _interpolation(factor: Factor, tolerance: float, rounding: float) -> _Interp
 
 
 def _chebyshev(count: int) -> tuple[Floats, Floats]:
-    """``(count,)`` Chebyshev nodes in 0..255; ``(256, count)`` from values there to all levels."""
+    """Return ``(count,)`` Chebyshev nodes in 0..255; ``(256, count)`` from there to each level."""
     nodes = chebpts1(count)
     at_nodes, at_levels = (chebvander(x, count - 1) for x in (nodes, LEVELS / 127.5 - 1.0))
     matrix = np.linalg.solve(at_nodes.T, at_levels.T).T

@@ -1,4 +1,4 @@
-"""What is a shadow on the road and what is not: candidates, components, rings, and the gates.
+"""Gates that tell a shadow on the road from everything else: candidates, components, rings.
 
 Steps 1 to 3 of the gated filter (`gated`), all on its working image. Each gate is a setting, and a
 component that does not pass one is rejected for that reason.
@@ -17,9 +17,9 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Mask, Rgb
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.beyond import shade
-from roadeval.pipeline.beyond.shade import RoadLight
-from roadeval.pipeline.paper.hsi import planes
+from roadeval.pipeline.beyond import road_light
+from roadeval.pipeline.beyond.road_light import RoadLight
+from roadeval.pipeline.channels import split
 from roadeval.pipeline.paper.shadow import RING_COLOUR, SHADOW_COLOUR
 
 Floats = npt.NDArray[np.float64]
@@ -146,14 +146,16 @@ class Scene:
 
 def look(image: Rgb, road: RoadLight, settings: GatedSettings) -> Scene:
     """Find the candidates and the lit road of an ``(h, w, 3)`` uint8 RGB image."""
-    total = shade.brightness(image)
-    like = shade.likeness(image, road)
-    possible = shade.excess_green(image, total) < settings.max_green
+    total = road_light.brightness(image)
+    like = road_light.likeness(image, road)
+    possible = road_light.excess_green(image, total) < settings.max_green
     possible &= total > 3 * settings.min_level
     possible[: round(settings.horizon * len(image))] = False
     near = np.float32(settings.colour_distance**2)
     lit = possible & (like.lit < near)
-    limit = settings.darkness * shade.quantile(total, lit.view(np.uint8), settings.lit_quantile)
+    limit = settings.darkness * road_light.quantile(
+        total, lit.view(np.uint8), settings.lit_quantile
+    )
     dark = (possible & (like.shaded < near) & (total < limit)).view(np.uint8)
     square = np.ones((3, 3), np.uint8)
     dark = cv2.morphologyEx(cv2.morphologyEx(dark, cv2.MORPH_OPEN, square), cv2.MORPH_CLOSE, square)
@@ -166,7 +168,7 @@ def look(image: Rgb, road: RoadLight, settings: GatedSettings) -> Scene:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Components:
-    """What there is to say about each component; entry 0 is the background.
+    """The measurements of each component; entry 0 is the background.
 
     Parameters
     ----------
@@ -216,11 +218,11 @@ def eroded(mask: Mask, pixels: int) -> npt.NDArray[np.bool_]:
 
 
 def _rings(scene: Scene, labels: Labels, settings: GatedSettings) -> Labels:
-    """Give each pixel of lit road at a ring's distance to the component nearest to it."""
+    """Assign each pixel of lit road at a ring's distance to the component nearest to it."""
     distance, nearest = cv2.distanceTransformWithLabels(
         1 - scene.candidates, cv2.DIST_C, 5, labelType=cv2.DIST_LABEL_CCOMP
     )
-    # The library numbers components in its own way here.
+    # OpenCV's distance transform numbers the components in another order.
     own = np.zeros(nearest.max() + 1, np.int32)
     inside = labels > 0
     own[nearest[inside]] = labels[inside]
@@ -230,10 +232,8 @@ def _rings(scene: Scene, labels: Labels, settings: GatedSettings) -> Labels:
 
 
 def _sums(image: Rgb, labels: Labels, count: int) -> npt.NDArray[np.int64]:
-    """Pixels and sums of R, G, B by label, ``(count, 7)``, see `kernels.plain.run_sums`."""
-    runs = KERNELS.label_runs(labels)
-    sums: npt.NDArray[np.int64] = KERNELS.run_sums(planes(image), runs, count)
-    return sums
+    """Return pixels and sums of R, G, B by label, ``(count, 7)``, see `kernels.plain.run_sums`."""
+    return KERNELS.run_sums(split(image), KERNELS.label_runs(labels), count)
 
 
 _LOG_TOTAL: Final = np.log(np.arange(3 * 255 + 1) / 3 + 4).astype(np.float32)
@@ -248,7 +248,7 @@ def _texture(total: npt.NDArray[np.uint16], core: Labels, count: int) -> Floats:
 
 
 def judge(found: Components, settings: GatedSettings) -> npt.NDArray[np.uint8]:
-    """Say of each component what it is: ``(count,)`` uint8, a value of `VERDICTS`.
+    """Return the verdict on each component: ``(count,)`` uint8, a value of `VERDICTS`.
 
     The first gate that it does not pass is the reason; the background is 0.
     """
