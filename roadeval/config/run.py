@@ -37,6 +37,7 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.logs.settings import FrameSettings, LabelSettings, TopicSettings
 from roadeval.pipeline.chain import Pipeline
+from roadeval.recording import RecordRule
 from roadeval.training.settings import TrainingSettings
 
 
@@ -86,13 +87,10 @@ class RunConfig:
         names = {variant.name for variant in self.variants()}
         for name in self.topics.masks:
             check_variant_name(name, names)
-        if self.output.record != OutputSettings().record:
-            from roadeval.recording import RecordRule  # with it comes the viewer's library
-
-            try:
-                RecordRule.parse(self.output.record)
-            except RoadevalError as error:
-                raise ConfigError(str(error)) from error
+        try:
+            RecordRule.parse(self.output.record)
+        except RoadevalError as error:
+            raise ConfigError(str(error)) from error
         if self.output.mcap is not None and self.frames.scale != 1:
             raise ConfigError(
                 "output.mcap and frames.scale do not go together: reduced masks would not lie over "

@@ -15,7 +15,7 @@ from roadeval.evaluation import analysis, comparison
 from roadeval.evaluation.compared import Comparison, Judgement, as_dict
 from roadeval.evaluation.comparison import Side
 from roadeval.evaluation.conditions import Condition, judge
-from roadeval.jobs.result import Opened
+from roadeval.jobs.result import Result
 from roadeval.report.comparison import document, markdown
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.lines import window_rows
@@ -90,7 +90,7 @@ def compare(
         judged.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    opened = [Opened(path) for path in results]
+    opened = [Result(path) for path in results]
     across = len(opened) == 1
     if across:
         (only,) = opened
@@ -159,12 +159,12 @@ def _asked(summary: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _digest(opened: Opened) -> str | None:
+def _digest(opened: Result) -> str | None:
     digest = opened.summary.get("log", {}).get("sha256")
     return str(digest) if digest else None
 
 
-def _chosen(opened: Opened, variants: Sequence[str] | None) -> pd.DataFrame:
+def _chosen(opened: Result, variants: Sequence[str] | None) -> pd.DataFrame:
     frames = opened.frames
     if not variants:
         return frames

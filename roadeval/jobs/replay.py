@@ -18,7 +18,7 @@ from roadeval.jobs.run import Run
 from roadeval.recording import NullRecorder, RecordRule, recorder_for
 from roadeval.report.figures.figure import ExampleFrame, FigureData
 from roadeval.report.figures.files import write_figures
-from roadeval.results.folder import Results, ResultsWriter
+from roadeval.results.folder import ResultsFolder, ResultsWriter
 from roadeval.results.lines import sum_lines
 from roadeval.results.schema import TABLES
 from roadeval.results.summary import summary_text
@@ -77,7 +77,7 @@ def replay(
         outcome, examples = _run(log, config, to, on_progress)
         # The run's frames and models are released here: figures take their room.
         trim()
-        windows = Results(to.reports).windows
+        windows = ResultsFolder(to.reports).windows
         figures = write_figures(to.reports, FigureData(log.name, windows, examples))
         return replace(outcome, files=(*outcome.files, *figures))
 

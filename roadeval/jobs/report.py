@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from roadeval.jobs.report_findings import collect
-from roadeval.jobs.result import Opened
+from roadeval.jobs.result import Result
 from roadeval.report.drive import document
 from roadeval.report.findings import Commands
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
@@ -14,7 +14,7 @@ __all__ = ["collect", "report"]
 
 
 def report(
-    result: str | Path | Opened,
+    result: str | Path | Result,
     output: str | Path | None = None,
     *,
     paper: Paper = Paper.A4,
@@ -44,7 +44,7 @@ def report(
     RoadevalError
         If there is nothing to read there, or the file cannot be written.
     """
-    opened = result if isinstance(result, Opened) else Opened(result)
+    opened = result if isinstance(result, Result) else Result(result)
     beside = opened.path / "report.pdf"
     usual = beside if opened.recording is None else Path("reports", f"{opened.path.stem}.pdf")
     return write_file(Path(output or usual), pdf(document(collect(opened, commands)), paper))

@@ -13,7 +13,7 @@ from roadeval.data.packed import Packed
 from roadeval.evaluation import analysis, counts, maps
 from roadeval.evaluation.scoreboard import COMPARED
 from roadeval.jobs.report_frames import FramePicker, evenly, str_keys, variants_but_baseline
-from roadeval.jobs.result import Opened
+from roadeval.jobs.result import Result
 from roadeval.report.findings import Commands, ErrorHeatmap, Findings, PairedComparison
 from roadeval.results.lines import change_rows, heat_rows, window_rows
 from roadeval.results.reading import table_of
@@ -30,7 +30,7 @@ THUMBNAILS: Final = 8
 """Frames in figure 2 and on the first page."""
 
 
-def collect(result: Opened, commands: Commands | None = None) -> Findings:
+def collect(result: Result, commands: Commands | None = None) -> Findings:
     """Collect everything that the report of a result shows."""
     frames, summary = result.frames, result.summary
     pictured = _pictured(result)
@@ -74,7 +74,7 @@ def collect(result: Opened, commands: Commands | None = None) -> Findings:
     )
 
 
-def _pictured(result: Opened) -> list[int]:
+def _pictured(result: Result) -> list[int]:
     """Return the evaluated frames that have pictures, or without truth all that have."""
     evaluated = set(result.frames["frame"]) or set(result.pictured)
     return [number for number in result.pictured if number in evaluated]
@@ -83,7 +83,7 @@ def _pictured(result: Opened) -> list[int]:
 # --- Tables ---------------------------------------------------------------------------------------
 
 
-def _windows(result: Opened) -> tuple[pd.DataFrame, int]:
+def _windows(result: Result) -> tuple[pd.DataFrame, int]:
     """Return the drive's windows and their size; longer ones where the drive is long."""
     size = analysis.settings_of(result.summary).window
     count = -(-result.frames["frame"].nunique() // size)
@@ -142,7 +142,7 @@ def _stage_changes(changes: pd.DataFrame) -> pd.DataFrame:
 # --- Masks ----------------------------------------------------------------------------------------
 
 
-def _mask_sums(result: Opened, numbers: Sequence[int]) -> tuple[pd.DataFrame, pd.DataFrame, int]:
+def _mask_sums(result: Result, numbers: Sequence[int]) -> tuple[pd.DataFrame, pd.DataFrame, int]:
     """Return the tables ``changes`` and ``heat``, and the number of frames that they sum up.
 
     A run that was killed did not get to write them: they are made of the masks of evenly spread
@@ -156,7 +156,7 @@ def _mask_sums(result: Opened, numbers: Sequence[int]) -> tuple[pd.DataFrame, pd
     return changes, table_of("heat", heat_rows(sample.heat)), sample.frames
 
 
-def _sample(result: Opened, numbers: Sequence[int]) -> maps.Maps:
+def _sample(result: Result, numbers: Sequence[int]) -> maps.Maps:
     """Sum up the masks of evenly spread frames."""
     sums, recording = maps.Maps(), result.recording
     if recording is None or not len(result.frames):
@@ -186,7 +186,7 @@ def _heatmap(variant: str, cells: pd.DataFrame) -> ErrorHeatmap:
     return ErrorHeatmap(variant, shares[0], shares[1])
 
 
-def _coverage(result: Opened, numbers: Sequence[int]) -> pd.DataFrame:
+def _coverage(result: Result, numbers: Sequence[int]) -> pd.DataFrame:
     """Return without truth how much of the image each final mask covers."""
     import pandas as pd
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data import BASELINE, ERRORS, FILTERED, TRUTH, UNFILTERED, LayerKind
 from roadeval.evaluation import analysis
-from roadeval.jobs.result import Opened
+from roadeval.jobs.result import Result
 from roadeval.recording import Recording
 from roadeval.report.figures.figure import ExampleFrame
 from roadeval.report.findings import NotableFrame, PairedComparison
@@ -47,7 +47,7 @@ def str_keys(values: Mapping[Any, Any]) -> dict[str, Any]:
 class FramePicker:
     """Picks frames of a result and collects their pictures and facts."""
 
-    def __init__(self, result: Opened) -> None:
+    def __init__(self, result: Result) -> None:
         self._result = result
         self._recording = result.recording
         self._frames = result.frames

@@ -13,14 +13,14 @@ from roadeval.evaluation import analysis
 from roadeval.evaluation.scoreboard import COMPARED
 from roadeval.evaluation.verdict import NO_PAIR, NOTHING_SCORED, verdict
 from roadeval.recording import Recording, RecordingError
-from roadeval.results.folder import Results
+from roadeval.results.folder import ResultsFolder
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import pandas as pd
 
 
-class Opened:
+class Result:
     """What ``roadeval replay`` left, from an ``.rrd`` or a results folder.
 
     Parameters
@@ -37,7 +37,7 @@ class Opened:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self.recording = None if self.path.is_dir() else Recording(self.path)
-        self._tables: Results | Recording = self.recording or Results(self.path)
+        self._tables: ResultsFolder | Recording = self.recording or ResultsFolder(self.path)
 
     @property
     def complete(self) -> bool:

@@ -10,7 +10,7 @@ from roadeval import Recording
 from roadeval.cli.app import main
 from roadeval.errors import RoadevalError
 from roadeval.jobs import inspect as inspecting
-from roadeval.jobs.result import Opened
+from roadeval.jobs.result import Result
 from roadeval.recording.screen import viewer
 from tests.e2e.commands import DEMO, here, replay, roadeval
 
@@ -79,7 +79,7 @@ def test_without_a_frame_the_worst_is_drawn_and_named(demo, told):
 
 
 def test_the_frame_that_is_drawn_is_the_worst_of_those_that_have_pictures(sparse, told):
-    pictured = Opened(sparse.recording).pictured
+    pictured = Result(sparse.recording).pictured
     assert worst(sparse) not in pictured
     rows = [
         (float(row["ERR"]), int(row["frame"]))
@@ -101,7 +101,7 @@ def test_the_window_opens_at_the_first_evaluated_frame_that_has_pictures(
     if rule == "worst":
         sparse = replay(tmp_path, DEMO, "--max-frames", 24, "--record", "worst:3")
     assert main(["inspect", str(sparse.recording)]) == 0
-    opened = Opened(sparse.recording)
+    opened = Result(sparse.recording)
     assert opened.recording.layout.first_frame not in opened.pictured
     assert shown == [min(set(opened.pictured) & {int(r["frame"]) for r in sparse.table("frames")})]
 
@@ -148,17 +148,17 @@ def test_a_frame_without_pictures_is_drawn_with_a_warning(
 
 
 def test_of_a_recording_by_an_earlier_version_the_viewer_may_show_another_frame(sparse):
-    opened, bad = Opened(sparse.recording), worst(sparse)
+    opened, bad = Result(sparse.recording), worst(sparse)
     opened.recording.format = 1
-    assert inspecting.unpictured(opened, bad) == (
+    assert inspecting.without_pictures(opened, bad) == (
         f"the recording has no pictures of frame {bad}, and its views may show an earlier "
         "frame's: an earlier version made it"
     )
-    assert inspecting.unpictured(opened, opened.pictured[-1]) == ""
+    assert inspecting.without_pictures(opened, opened.pictured[-1]) == ""
 
 
 def test_the_worst_of_nothing_is_none_unless_a_variant_is_asked_for(unlabelled):
-    opened = Opened(unlabelled.recording)
+    opened = Result(unlabelled.recording)
     assert inspecting.worst(opened) is None
     with pytest.raises(RoadevalError, match="nothing was scored"):
         inspecting.worst(opened, "filtered")

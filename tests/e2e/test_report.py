@@ -14,7 +14,7 @@ import pytest
 from pypdf import PdfReader
 
 from roadeval.jobs.report import report as report_of
-from roadeval.jobs.result import Opened
+from roadeval.jobs.result import Result
 from roadeval.logs import LogWriter
 from roadeval.report.words import DASH
 from tests.e2e.commands import DEMO, here, roadeval
@@ -179,7 +179,7 @@ def test_a_killed_run_of_sparse_truth_shows_no_scored_frame_whose_truth_is_missi
             log.image("/camera", stamp * 10**8, cv2.imencode(".jpg", image)[1].tobytes(), "jpeg")
             if stamp % 3 == 1:
                 log.mask("/road_mask", stamp * 10**8, road)
-    opened = Opened(killed(tmp_path / "drive.mcap", 42, tmp_path))
+    opened = Result(killed(tmp_path / "drive.mcap", 42, tmp_path))
     seen = set(opened.pictured)
     scored = set(opened.frames["frame"])
     assert len(seen & scored) > 1

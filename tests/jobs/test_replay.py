@@ -13,7 +13,7 @@ from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import Run
 from roadeval.logs import TopicSettings, open_log
 from roadeval.pipeline.paper import svm
-from roadeval.results.folder import Results
+from roadeval.results.folder import ResultsFolder
 from roadeval.results.schema import TABLES
 from roadeval.results.summary import summary_text
 from tests.fixtures.make import make
@@ -353,7 +353,7 @@ def test_a_variant_whose_preset_trains_otherwise_is_trained_like_the_rest_and_wa
 @pytest.mark.parametrize("table", TABLES)
 def test_a_table_is_the_same_in_the_folder_and_in_the_recording_bit_by_bit(once, table):
     folder, outcome = once
-    recording, results = roadeval.Recording(outcome.recording), Results(folder / "reports")
+    recording, results = roadeval.Recording(outcome.recording), ResultsFolder(folder / "reports")
     written = results.table(table)
     assert len(written)
     pd.testing.assert_frame_equal(recording.table(table), written, check_exact=True)
@@ -383,7 +383,7 @@ def test_the_summary_holds_the_run_s_configuration(drive, tmp_path):
 def test_changes_are_what_the_recorded_masks_show(once):
     folder, outcome = once
     recording = roadeval.Recording(outcome.recording)
-    changes = Results(folder / "reports").table("changes")
+    changes = ResultsFolder(folder / "reports").table("changes")
     step = changes.query("from_stage == 'similarity' and to_variant == 'unfiltered'").iloc[0]
     repaired = spoiled = 0
     for number in frames_of(folder).frame.unique():
@@ -399,7 +399,9 @@ def test_changes_are_what_the_recorded_masks_show(once):
 
 def test_heat_maps_add_up_to_the_tables(once):
     folder, _ = once
-    heat = Results(folder / "reports").table("heat").groupby("variant")[["labelled", "FP", "FN"]]
+    heat = (
+        ResultsFolder(folder / "reports").table("heat").groupby("variant")[["labelled", "FP", "FN"]]
+    )
     final = frames_of(folder).query("stage == 'post'").groupby("variant")[["N", "FP", "FN"]]
     for variant, sums in heat.sum().iterrows():
         assert sums.tolist() == final.sum().loc[variant].tolist()
@@ -407,7 +409,7 @@ def test_heat_maps_add_up_to_the_tables(once):
 
 def test_a_perfect_svm_is_counted_on_evaluated_frames_alone_and_in_no_other_table(once):
     folder, outcome = once
-    oracles = Results(folder / "reports").table("oracles")
+    oracles = ResultsFolder(folder / "reports").table("oracles")
     assert set(zip(oracles.variant, oracles.oracle, oracles.stage, strict=True)) == {
         (variant, "svm", "post") for variant in ("filtered", "unfiltered")
     }

@@ -56,7 +56,7 @@ from roadeval.data import Role
 from roadeval.evaluation import analysis, regions
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.folder import Results, ResultsWriter
+from roadeval.results.folder import ResultsFolder, ResultsWriter
 from roadeval.results.lines import lines, sum_lines
 from roadeval.results.schema import documentation
 from roadeval.results.summary import LATER, PARTS
@@ -72,7 +72,7 @@ with ResultsWriter(folder / "out") as writer:
     writer.append(sum_lines(board.sums()))
     unknown = set(PARTS) - summary.keys() - {"format"} - LATER
     writer.finish(summary | {part: {} for part in unknown}, "")
-read = Results(folder / "out")
+read = ResultsFolder(folder / "out")
 assert read.frames["FDR"].tolist() == [0.25]
 assert read.windows["FDR"].tolist() == read.windows["pooled_FDR"].tolist() == [0.25]
 assert read.summary["totals"]["net"]["post"]["pooled_FDR"] == 0.25

@@ -16,7 +16,7 @@ from roadeval.data.packed import Packed
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.folder import Results, ResultsWriter
+from roadeval.results.folder import ResultsFolder, ResultsWriter
 from roadeval.results.lines import lines, sum_lines
 from roadeval.results.reading import ResultsError
 from roadeval.results.schema import TABLES
@@ -91,17 +91,17 @@ def test_an_undefined_rate_is_an_empty_cell_and_reads_back_as_undefined(tmp_path
     write(tmp_path)
     line = (tmp_path / "frames.csv").read_text().splitlines()[3]
     assert line == "6,600000000,600000007,filtered,post,0,4,4,0,8,0.5,0.5,,,0.5,0.5"
-    assert math.isnan(Results(tmp_path).frames.loc[2, "TPR"])
+    assert math.isnan(ResultsFolder(tmp_path).frames.loc[2, "TPR"])
 
 
 def test_numbers_read_back_bit_by_bit(tmp_path: Path) -> None:
     board = a_board()
     tallies = [tally for result in scored(board) for tally in result.tallies]
     write(tmp_path)
-    frames = Results(tmp_path).frames
+    frames = ResultsFolder(tmp_path).frames
     assert frames["ERR"].tolist() == [tally.rates["ERR"] for tally in tallies]
     assert frames["TP"].tolist() == [tally.counts.tp for tally in tallies]
-    windows = Results(tmp_path).windows
+    windows = ResultsFolder(tmp_path).windows
     assert windows["pooled_ACC"].tolist() == [row.pooled["ACC"] for row in board.windows()]
 
 
@@ -113,12 +113,12 @@ def test_a_variant_named_like_a_number_keeps_its_name(tmp_path: Path) -> None:
         board.add(result)
         writer.append(lines(result))
         writer.finish(the_rest(board), RUN_TOML)
-    assert Results(tmp_path).frames["variant"].tolist() == ["007"]
+    assert ResultsFolder(tmp_path).frames["variant"].tolist() == ["007"]
 
 
 def test_the_sums_over_the_drive_read_back(tmp_path: Path) -> None:
     write(tmp_path)
-    results = Results(tmp_path)
+    results = ResultsFolder(tmp_path)
     between = results.table("changes").set_index(["from_variant", "to_variant"])
     assert between["N"].to_dict() == {("filtered", "blind"): 23, ("blind", "filtered"): 23}
     heat, frames = results.table("heat"), results.frames
@@ -130,7 +130,7 @@ def test_oracles_have_a_row_per_frame_variant_oracle_and_stage_and_read_back(
     tmp_path: Path,
 ) -> None:
     write(tmp_path)
-    told = Results(tmp_path).table("oracles")
+    told = ResultsFolder(tmp_path).table("oracles")
     assert told[["frame", "variant", "oracle", "stage"]].to_numpy().tolist() == [
         [number, "filtered", "svm", "post"] for number in (5, 6, 7)
     ]
@@ -152,15 +152,15 @@ def test_a_table_that_nothing_was_counted_for_is_not_written_and_an_earlier_one_
     assert names(tmp_path) == {
         *("frames.csv", "regions.csv", "windows.csv", "heat.csv", "run.toml", "summary.json"),
     }
-    assert Results(tmp_path).table("oracles").empty
+    assert ResultsFolder(tmp_path).table("oracles").empty
 
 
 def test_regions_have_a_row_per_frame_variant_stage_and_region(tmp_path: Path) -> None:
     write(tmp_path)
-    regions = Results(tmp_path).regions
+    regions = ResultsFolder(tmp_path).regions
     assert len(regions) == 3 * 2 * 5
     assert set(regions["region"]) == {"shadow", "boundary", "interior", "band_0", "band_1"}
-    whole = Results(tmp_path).frames
+    whole = ResultsFolder(tmp_path).frames
     bands = regions[regions["region"].str.startswith("band_")]
     summed = bands.groupby(["frame", "variant"])["FP"].sum().to_dict()
     assert summed == whole.groupby(["frame", "variant"])["FP"].sum().to_dict()
@@ -215,7 +215,7 @@ def test_a_table_that_was_cut_at_the_end_of_a_line_is_refused(tmp_path: Path, ta
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(lines[:-1]))
     with pytest.raises(ResultsError) as caught:
-        Results(tmp_path).table(table)
+        ResultsFolder(tmp_path).table(table)
     assert str(caught.value) == (
         f"{path}: does not agree with its summary ({len(lines) - 2} of {len(lines) - 1} rows); "
         "make the results anew with roadeval replay"
@@ -227,7 +227,7 @@ def test_a_table_with_one_number_changed_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "heat.csv"
     path.write_text(path.read_text().replace("filtered,0,0,1,3", "filtered,0,0,1,4"))
     with pytest.raises(ResultsError, match=r"summary \(its content is another\)"):
-        Results(tmp_path).table("heat")
+        ResultsFolder(tmp_path).table("heat")
 
 
 @pytest.mark.parametrize("table", TABLES)
@@ -235,7 +235,7 @@ def test_a_table_that_was_taken_away_is_missed(tmp_path: Path, table: str) -> No
     write(tmp_path)
     (tmp_path / f"{table}.csv").unlink()
     with pytest.raises(ResultsError, match=r"\.csv: does not agree with its summary \(0 of"):
-        Results(tmp_path).table(table)
+        ResultsFolder(tmp_path).table(table)
 
 
 def test_a_table_of_which_the_summary_knows_nothing_is_refused(tmp_path: Path) -> None:
@@ -244,17 +244,17 @@ def test_a_table_of_which_the_summary_knows_nothing_is_refused(tmp_path: Path) -
     del summary["tables"]["frames"]
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     with pytest.raises(ResultsError, match=r"6 of 0 rows"):
-        Results(tmp_path).table("frames")
+        ResultsFolder(tmp_path).table("frames")
 
 
 def test_the_summary_states_what_sha256sum_says(tmp_path: Path) -> None:
     write(tmp_path)
-    stated = Results(tmp_path).summary["tables"]
+    stated = ResultsFolder(tmp_path).summary["tables"]
     assert list(stated) == list(TABLES)
     for name, told in stated.items():
         content = (tmp_path / f"{name}.csv").read_bytes()
         assert told["sha256"] == hashlib.sha256(content).hexdigest()
-        assert told["rows"] == len(Results(tmp_path).table(name))
+        assert told["rows"] == len(ResultsFolder(tmp_path).table(name))
 
 
 @pytest.mark.parametrize("table", TABLES)
@@ -263,9 +263,9 @@ def test_results_of_an_earlier_version_are_read_unchecked(tmp_path: Path, table:
     summary = json.loads((tmp_path / "summary.json").read_text())
     del summary["tables"]
     (tmp_path / "summary.json").write_text(json.dumps(summary))
-    assert len(Results(tmp_path).table(table))
+    assert len(ResultsFolder(tmp_path).table(table))
     (tmp_path / f"{table}.csv").unlink()
-    assert Results(tmp_path).table(table).empty
+    assert ResultsFolder(tmp_path).table(table).empty
 
 
 def test_masks_that_are_missing_on_some_frames_agree_with_the_summary(tmp_path: Path) -> None:
@@ -280,7 +280,7 @@ def test_masks_that_are_missing_on_some_frames_agree_with_the_summary(tmp_path: 
             writer.append(lines(result))
         writer.append(sum_lines(board.sums()))
         writer.finish(the_rest(board), RUN_TOML)
-    tables = {name: Results(tmp_path).table(name) for name in TABLES}
+    tables = {name: ResultsFolder(tmp_path).table(name) for name in TABLES}
     assert len(tables["frames"]) == 3 * 2 + 1 + 1
     assert not {("net", "late"), ("late", "net")} & set(
         zip(tables["changes"]["from_variant"], tables["changes"]["to_variant"], strict=True)
@@ -293,8 +293,8 @@ def test_a_run_that_scored_nothing_writes_no_tables_and_leaves_no_older_ones(
     write(tmp_path)
     assert [path.name for path in write(tmp_path, Role.TRAINING)] == ["run.toml", "summary.json"]
     assert names(tmp_path) == {"run.toml", "summary.json"}
-    assert Results(tmp_path).frames.empty
-    assert "ERR" in Results(tmp_path).frames
+    assert ResultsFolder(tmp_path).frames.empty
+    assert "ERR" in ResultsFolder(tmp_path).frames
 
 
 def test_a_folder_that_cannot_be_written_is_one_line_with_a_remedy(tmp_path: Path) -> None:
@@ -306,14 +306,14 @@ def test_a_folder_that_cannot_be_written_is_one_line_with_a_remedy(tmp_path: Pat
 
 def test_a_folder_without_results_says_how_to_make_some(tmp_path: Path) -> None:
     with pytest.raises(ResultsError, match=r"no results here.*roadeval replay"):
-        Results(tmp_path)
+        ResultsFolder(tmp_path)
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"format": {"name": "roadeval-summary"}}'])
 def test_a_file_that_is_no_summary_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "summary.json").write_text(text)
     with pytest.raises(ResultsError, match="not a summary"):
-        Results(tmp_path)
+        ResultsFolder(tmp_path)
 
 
 def test_the_summary_writes_undefined_as_null_and_keeps_its_order() -> None:

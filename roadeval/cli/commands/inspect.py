@@ -15,7 +15,7 @@ from roadeval.cli.exit_codes import ExitCode
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from roadeval.jobs.inspect import Suspect
+    from roadeval.jobs.inspect import WorstFrame
 
 
 def inspect(
@@ -53,25 +53,25 @@ def inspect(
     is listed.
     """
     from roadeval.jobs import inspect as inspecting
-    from roadeval.jobs.result import Opened
+    from roadeval.jobs.result import Result
 
     if frame is not None and worst is not None:
         raise typer.BadParameter("give --frame or --worst, not both")
     if listed and (frame is not None or screenshot is not None):
         raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
-    opened = Opened(recording)
+    opened = Result(recording)
     if listed:
-        _list(inspecting.suspects(opened, worst or inspecting.LISTED, variant), as_json=json)
+        _list(inspecting.worst_frames(opened, worst or inspecting.LISTED, variant), as_json=json)
         return ExitCode.DONE
     chosen = ""
     if worst is not None:
-        ranked = inspecting.suspects(opened, worst, variant)
+        ranked = inspecting.worst_frames(opened, worst, variant)
         frame = ranked[-1].frame
     elif frame is None and screenshot is not None and (bad := inspecting.worst(opened, variant)):
-        (first,) = inspecting.suspects(opened, 1, variant)
+        (first,) = inspecting.worst_frames(opened, 1, variant)
         which = "the worst" if bad.frame == first.frame else "the worst that has pictures"
         frame, chosen = bad.frame, f", {which} (--frame N or --worst K takes another)"
-    if frame is not None and (said := inspecting.unpictured(opened, frame)):
+    if frame is not None and (said := inspecting.without_pictures(opened, frame)):
         messages.warning(said)
     shown = inspecting.view(opened, frame, screenshot)
     if screenshot is not None:
@@ -79,14 +79,14 @@ def inspect(
     return ExitCode.DONE
 
 
-def _list(found: list[Suspect], *, as_json: bool) -> None:
+def _list(found: list[WorstFrame], *, as_json: bool) -> None:
     if as_json:
         console.emit(dumps([asdict(each) for each in found], indent=2, ensure_ascii=False))
     else:
         console.results().print(_table(found))
 
 
-def _table(found: list[Suspect]) -> Table:
+def _table(found: list[WorstFrame]) -> Table:
     """Tabulate the frames: rates, where ERR comes from, and the recording's notes."""
     from rich import box
     from rich.table import Table
@@ -103,7 +103,7 @@ def _table(found: list[Suspect]) -> Table:
     return table
 
 
-def _why(suspect: Suspect) -> str:
+def _why(suspect: WorstFrame) -> str:
     first, *rest = suspect.parts.items()
     terms = [f"{first[0]} {100 * first[1]:.1f}"]
     terms += [f"{name} {100 * value:+.1f}" for name, value in rest]

@@ -46,14 +46,14 @@ def report(
     from the recording alone, or from a results folder, then without pictures.
     """
     from roadeval.jobs.report import report as write
-    from roadeval.jobs.result import Opened
+    from roadeval.jobs.result import Result
     from roadeval.report.pdf.typeset import Paper
 
-    opened = Opened(result)
-    path = write(opened, output, paper=Paper(paper), commands=_commands(result))
+    read = Result(result)
+    path = write(read, output, paper=Paper(paper), commands=_commands(result))
     if not quiet:
         console.emit(str(path))
-    if not opened.complete:
+    if not read.complete:
         messages.warning(f"{result}: a partial recording; the report covers what can be read of it")
     return ExitCode.DONE
 
