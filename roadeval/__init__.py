@@ -1,15 +1,16 @@
 """Logged-replay evaluation and visualisation of road recognition.
 
-For a notebook::
+A drive is replayed, and its recording read, without the terminal:
 
-    import roadeval
-
-    outcome = roadeval.replay("drive.mcap", save="out.rrd")
-    outcome.summary["totals"]["filtered"]["post"]["ERR"]
-
-    recording = roadeval.Recording("out.rrd")
-    recording.frames.groupby("variant").ERR.mean()
-    recording.layer("filtered", "ndi", frame=40)
+>>> import roadeval
+>>> outcome = roadeval.replay("drive.mcap", save="out.rrd")
+>>> 0 <= outcome.summary["totals"]["filtered"]["post"]["ERR"] <= 1
+True
+>>> recording = roadeval.Recording("out.rrd")
+>>> sorted(recording.frames.groupby("variant").ERR.mean().index)
+['blind', 'filtered', 'unfiltered']
+>>> recording.layer("filtered", "ndi", frame=12).shape
+(48, 64)
 """
 
 from importlib import import_module
@@ -18,11 +19,11 @@ from typing import TYPE_CHECKING, Any, Final
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
-    from roadeval.config import Config, load_config, preset
+    from roadeval.config import RunConfig, configure, load_config
     from roadeval.errors import RoadevalError
     from roadeval.jobs.frame import run_frame
-    from roadeval.jobs.options import Outcome, Progress, ReplayOptions
-    from roadeval.jobs.replay import replay
+    from roadeval.jobs.progress import Progress
+    from roadeval.jobs.replay import Outcome, replay
     from roadeval.jobs.train import train
     from roadeval.recording import Recording
     from roadeval.training import Model, load_model, save_model
@@ -30,16 +31,15 @@ if TYPE_CHECKING:
 __version__ = VERSION
 
 __all__ = [
-    "Config",
     "Model",
     "Outcome",
     "Progress",
     "Recording",
-    "ReplayOptions",
     "RoadevalError",
+    "RunConfig",
+    "configure",
     "load_config",
     "load_model",
-    "preset",
     "replay",
     "run_frame",
     "save_model",
@@ -47,10 +47,10 @@ __all__ = [
 ]
 
 _HOMES: Final = {
-    **dict.fromkeys(("Config", "load_config", "preset"), "config"),
-    **dict.fromkeys(("Outcome", "Progress", "ReplayOptions"), "jobs.options"),
+    **dict.fromkeys(("RunConfig", "configure", "load_config"), "config"),
+    **dict.fromkeys(("Outcome", "replay"), "jobs.replay"),
+    "Progress": "jobs.progress",
     **dict.fromkeys(("Model", "load_model", "save_model"), "training"),
-    "replay": "jobs.replay",
     "train": "jobs.train",
     "Recording": "recording",
     "RoadevalError": "errors",

@@ -17,11 +17,12 @@ from roadeval.data.layer import (
     LayerSpec,
     mask_spec,
 )
-from roadeval.data.names import BASELINE, CAMERA, FILTERED, FINAL_STAGE, NAMES, RESERVED, UNFILTERED
+from roadeval.data.names import BASELINE, CAMERA, FILTERED, FINAL_STAGE, RESERVED, UNFILTERED
 from roadeval.data.packed import Packed, TruthBits, everywhere, ones, pack, unpack
 from roadeval.data.result import (
     FrameResult,
     Health,
+    Output,
     StageResult,
     VariantLayout,
     VariantResult,
@@ -34,7 +35,6 @@ __all__ = [
     "FILTERED",
     "FINAL_STAGE",
     "IGNORE",
-    "NAMES",
     "NON_ROAD",
     "RESERVED",
     "ROAD",
@@ -51,6 +51,7 @@ __all__ = [
     "LayerKind",
     "LayerSpec",
     "Mask",
+    "Output",
     "Packed",
     "Rgb",
     "Role",

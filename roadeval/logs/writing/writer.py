@@ -1,4 +1,4 @@
-"""Writing camera logs that Foxglove and Rerun open too."""
+"""The writer of camera logs, which Foxglove and Rerun open too."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final
 
 import numpy as np
@@ -17,6 +16,8 @@ from roadeval.logs.errors import LogError
 from roadeval.version import VERSION
 
 FORMATS: Final = ("jpeg", "png", "webp")
+FRAME_ID: Final = "camera"
+"""The camera's coordinate frame, by name."""
 
 
 class LogWriter:
@@ -57,21 +58,16 @@ class LogWriter:
         data: bytes,
         format: str,  # noqa: A002
         *,
-        frame_id: str = "camera",
         log_time_ns: int | None = None,
     ) -> None:
         """Write an image file as it is.
 
         Parameters
         ----------
-        topic
-            Where to.
-        stamp_ns
-            Header stamp.
+        topic, stamp_ns
+            Topic and header stamp.
         data, format
             The file's bytes, and ``jpeg``, ``png`` or ``webp``.
-        frame_id
-            The camera's coordinate frame.
         log_time_ns
             Log time; the stamp by default.
 
@@ -84,7 +80,7 @@ class LogWriter:
 
         if format not in FORMATS:
             raise LogError(f"{topic}: format {format!r} is none of {', '.join(FORMATS)}")
-        message = CompressedImage(frame_id=frame_id, data=data, format=format)
+        message = CompressedImage(frame_id=FRAME_ID, data=data, format=format)
         message.timestamp.FromNanoseconds(stamp_ns)
         channel = self._channels.get(topic) or self._protobuf_channel(topic, CompressedImage)
         data = message.SerializeToString(deterministic=True)
@@ -96,7 +92,6 @@ class LogWriter:
         stamp_ns: int,
         mask: npt.NDArray[np.uint8],
         *,
-        frame_id: str = "camera",
         log_time_ns: int | None = None,
     ) -> None:
         """Write a ``(H, W)`` mask, or an image in RGB or RGBA, uint8, as a PNG without loss.
@@ -111,9 +106,7 @@ class LogWriter:
         codes = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
         stored = mask if mask.ndim == 2 else cv2.cvtColor(mask, codes[mask.shape[2]])
         _, png = cv2.imencode(".png", stored)
-        self.image(
-            topic, stamp_ns, png.tobytes(), "png", frame_id=frame_id, log_time_ns=log_time_ns
-        )
+        self.image(topic, stamp_ns, png.tobytes(), "png", log_time_ns=log_time_ns)
 
     def json(
         self,
@@ -160,7 +153,7 @@ class LogWriter:
         return self._channels[topic]
 
     def close(self) -> None:
-        """Complete the file and give it its name.
+        """Complete the file and move it to its path.
 
         Raises
         ------
@@ -179,20 +172,15 @@ class LogWriter:
     def __enter__(self) -> LogWriter:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_error: object) -> None:
         if kind is None:
             self.close()
         else:
             self._discard()
 
     def _discard(self) -> None:
-        """Leave nothing behind."""
-        # On a full disk closing fails as well, and what went wrong first is what counts.
+        """Remove the unfinished file, and its folder if it was made for it."""
+        # On a full disk closing fails as well, but the first error is the one to report.
         with suppress(OSError):
             self._file.close()
         self._temporary.unlink(missing_ok=True)
