@@ -28,8 +28,12 @@ from roadeval.data import (
     mask_spec,
 )
 from roadeval.data.packed import Packed
+from roadeval.evaluation.metrics import METRICS
 from roadeval.recording import Layout, Recorder, Recording
 from roadeval.recording.read.rrd_file import RrdFile
+from roadeval.results.lines import lines
+from roadeval.results.schema import TABLES
+from roadeval.results.summary import FORMAT
 
 HEIGHT, WIDTH = 6, 8
 
@@ -46,16 +50,30 @@ RINGS = LayerSpec(
 )
 POST = mask_spec("post", "Road")
 VARIANT = VariantLayout("filtered", "with the filter", ("post",), (NDI, RINGS, POST))
-FRAMES_HEADER = "frame,variant,stage,ERR\n"
-SUMMARY = {"verdict": "It helps.", "totals": {}, "seconds": {"filtered": {"post": 0.5}}}
-RESULTS = {"summary": json.dumps(SUMMARY), "windows": "window,ERR\n0,0.25\n"}
+SUMMARY = {"format": FORMAT, "totals": {}, "seconds": {"filtered": {"post": 0.5}}}
+"""Of which the viewer and the reader use a few parts only."""
+WINDOW = {"window": 0, "first_frame": 2, "last_frame": 18, "frames": 17} | {
+    **dict.fromkeys(TABLES["windows"].names[6:], 0.25),
+    "variant": "filtered",
+    "stage": "post",
+}
+WINDOWS = ",".join(str(WINDOW[name]) for name in TABLES["windows"].names)
+RESULTS = {
+    "summary": json.dumps(SUMMARY),
+    "windows": f"{TABLES['windows'].header}{WINDOWS}\n",
+}
 RERUN = Path(sys.executable).with_name("rerun")
 
 
 def layout(**changes):
     """The layout of the drive that `result` makes frames of."""
     plain = Layout(
-        "street", WIDTH, HEIGHT, (VARIANT,), ("ERR", "FNR"), tables={"frames": FRAMES_HEADER}
+        "street",
+        WIDTH,
+        HEIGHT,
+        (VARIANT,),
+        ("ERR", "FNR"),
+        tables={"frames": TABLES["frames"].header},
     )
     return replace(plain, **changes)
 
@@ -81,7 +99,12 @@ def result(number, *, err=0.25, fnr=0.5, **changes):
     filtering = StageResult("shadow", found, 0.004)
     packed = Packed.of(mask)
     final = StageResult("post", Output((Layer(POST, packed),), mask=packed), 0.002)
-    tally = Tally("filtered", "post", Counts(1, 2, 3, 4), rates={"ERR": err, "FNR": fnr})
+    tally = Tally(
+        "filtered",
+        "post",
+        Counts(1, 2, 3, 4),
+        rates=dict.fromkeys(METRICS, 0.5) | {"ERR": err, "FNR": fnr},
+    )
     plain = FrameResult(
         shown,
         Role.EVALUATED,
@@ -96,12 +119,6 @@ def result(number, *, err=0.25, fnr=0.5, **changes):
 def unscored(number, role=Role.TRAINING):
     """A frame that is recorded, but not counted."""
     return result(number, role=role, errors={}, tallies=(), health={})
-
-
-def lines(result):
-    """The frame's line of the table: one if it was scored."""
-    rows = (f"{result.frame.number},filtered,post,{t.rates['ERR']}\n" for t in result.tallies)
-    return {"frames": "".join(rows)} if result.tallies else {}
 
 
 def rows_of(recording, path, component):

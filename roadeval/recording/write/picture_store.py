@@ -5,9 +5,9 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
-from zipfile import BadZipFile, ZipFile
 
 from roadeval.recording.layout import RecordingError
 from roadeval.recording.write.encoding import EncodedFrame
@@ -24,7 +24,8 @@ class PictureStore:
 
     def __init__(self, folder: Path) -> None:
         self._folder: Final = folder
-        self._stamps: Final[dict[int, int]] = {}
+        self._sizes: Final[dict[int, tuple[EncodedFrame, dict[str, int]]]] = {}
+        """Of each frame, all but its images, and the bytes of each of these by path."""
 
     def put(self, encoded: EncodedFrame) -> None:
         """Put a frame's images here; its numbers and texts are left out.
@@ -36,16 +37,15 @@ class PictureStore:
         """
         with self._explained():
             self._folder.mkdir(exist_ok=True)
-            with ZipFile(self._file(encoded.number), "w") as file:
-                for path, payload in encoded.payloads.items():
-                    file.writestr(path, payload)
-        self._stamps[encoded.number] = encoded.stamp_ns
+            self._file(encoded.number).write_bytes(b"".join(encoded.payloads.values()))
+        sizes = {path: len(payload) for path, payload in encoded.payloads.items()}
+        self._sizes[encoded.number] = EncodedFrame(encoded.number, encoded.stamp_ns, {}), sizes
 
     def drop(self, number: int) -> None:
         """Remove a frame."""
         with self._explained():
             self._file(number).unlink()
-        del self._stamps[number]
+        del self._sizes[number]
 
     def get(self, number: int) -> EncodedFrame:
         """Return a frame that was put here and not dropped, with its images alone.
@@ -55,9 +55,9 @@ class PictureStore:
         RecordingError
             If they cannot be read.
         """
-        with self._explained(), ZipFile(self._file(number)) as file:
-            payloads = {path: file.read(path) for path in file.namelist()}
-        return EncodedFrame(number, self._stamps[number], payloads)
+        bare, sizes = self._sizes[number]
+        with self._explained(), self._file(number).open("rb") as file:
+            return replace(bare, payloads={path: file.read(size) for path, size in sizes.items()})
 
     def clear(self) -> None:
         """Remove the folder, also one that a killed run has left.
@@ -73,7 +73,7 @@ class PictureStore:
     def _explained(self) -> Iterator[None]:
         try:
             yield
-        except (OSError, BadZipFile) as error:
+        except OSError as error:
             raise RecordingError(
                 f"{self._folder}: the images put aside cannot be written or read ({error}); "
                 "is the disk full?"

@@ -12,6 +12,7 @@ from roadeval.recording import Recorder, Recording, RecordingError
 from roadeval.recording.codecs import codecs_of
 from roadeval.recording.read.rrd_file import RrdFile
 from roadeval.recording.write.encoding import Images
+from roadeval.results.lines import lines
 from tests.recording.making import (
     HEIGHT,
     RESULTS,
@@ -19,7 +20,6 @@ from tests.recording.making import (
     WIDTH,
     frame,
     layout,
-    lines,
     record,
     rerun,
     result,
@@ -93,7 +93,7 @@ def test_frames_without_pictures_end_what_is_shown_and_are_not_among_those_that_
 
 def test_the_tables_lines_come_back_as_a_table(recording):
     assert list(recording.frames.frame) == list(range(2, 19))
-    assert list(recording.frames.columns) == ["frame", "variant", "stage", "ERR"]
+    assert recording.frames.ERR.tolist() == [0.25] * 17
 
 
 def test_a_drive_without_rows_gives_an_empty_table_with_its_columns(tmp_path):

@@ -32,11 +32,9 @@ def test_nothing_is_left_when_it_is_cleared(store, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("content", [None, b"whatever"])
-def test_images_that_were_lost_or_damaged_are_one_line(content, store, tmp_path):
+def test_images_that_were_lost_are_one_line(store, tmp_path):
     store.put(EncodedFrame(7, 70, PAYLOADS))
-    path = tmp_path / "images" / "7"
-    path.unlink() if content is None else path.write_bytes(content)
+    (tmp_path / "images" / "7").unlink()
     with pytest.raises(RecordingError, match=ONE_LINE):
         store.get(7)
 

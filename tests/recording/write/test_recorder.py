@@ -16,11 +16,11 @@ from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError
 from roadeval.recording.read.rrd_file import RrdFile
 from roadeval.recording.write.batching import CHUNK_BYTES, PendingRows
 from roadeval.recording.write.recorder import LEAST_FREE, UNWRITTEN
+from roadeval.results.lines import lines
 from tests.recording.making import (
     RESULTS,
     SUMMARY,
     layout,
-    lines,
     record,
     rerun,
     result,
@@ -130,7 +130,8 @@ def test_who_stops_a_run_while_a_chunk_is_made_loses_no_frame_of_it(
 KILLED = """
     import os, pathlib, signal, sys
     from roadeval.recording import Recorder
-    from tests.recording.making import layout, lines, result
+    from tests.recording.making import layout, result
+    from roadeval.results.lines import lines
     with Recorder(pathlib.Path(sys.argv[1]), layout()) as recorder:
         for number in range(int(sys.argv[2])):
             recorder.write(recorder.encode(result(number), lines(result(number))))
