@@ -15,9 +15,10 @@ from typing import Any, Final
 from unittest import mock
 
 import pandas as pd
+from matplotlib.figure import Figure
 
 from roadeval.cli.app import main
-from tests.golden import drive
+from tests.golden import drawings, drive
 
 DONE: Final = "told.json"
 RANGE: Final = "--start 0.25 --train-frames 5"
@@ -55,7 +56,7 @@ class Told:
 
     @cached_property
     def texts(self) -> dict[str, dict[str, Any]]:
-        """What each command printed: ``code``, ``out`` and ``err``."""
+        """What each command printed and drew: ``code``, ``out``, ``err`` and ``figures``."""
         return json.loads((self.folder / DONE).read_text(encoding="utf-8"))
 
     def out(self, name: str) -> str:
@@ -91,9 +92,29 @@ def terminal(folder: Path) -> Iterator[None]:
 
 
 def run(name: str) -> dict[str, Any]:
-    """Run a command where everything lies; return its exit code and what it printed."""
+    """Run a command where everything lies; return its exit code, and what it printed and drew."""
     out, err = io.StringIO(), io.StringIO()
     look = {"FORCE_COLOR": "1", "TERM": "xterm"} if name in AT_TERMINAL else {}
-    with mock.patch.dict(os.environ, look), redirect_stdout(out), redirect_stderr(err):
+    with (
+        mock.patch.dict(os.environ, look),
+        redirect_stdout(out),
+        redirect_stderr(err),
+        _drawn() as figures,
+    ):
         code = main(COMMANDS[name].split())
-    return {"code": code, "out": out.getvalue(), "err": err.getvalue()}
+    return {"code": code, "out": out.getvalue(), "err": err.getvalue(), "figures": figures}
+
+
+@contextmanager
+def _drawn() -> Iterator[list[str]]:
+    """Describe every figure that is saved as vectors meanwhile."""
+    figures: list[str] = []
+    save = Figure.savefig
+
+    def saved(figure: Figure, *given: Any, **options: Any) -> None:
+        save(figure, *given, **options)
+        if options.get("format") != "png":
+            figures.append(drawings.described(figure))
+
+    with mock.patch.object(Figure, "savefig", saved):
+        yield figures
