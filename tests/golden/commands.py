@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 from collections.abc import Iterator
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -14,9 +15,10 @@ from typing import Any, Final
 from unittest import mock
 
 import pandas as pd
+from matplotlib.figure import Figure
 
 from roadeval.cli.app import main
-from tests.golden import drive
+from tests.golden import drawings, drive
 
 DONE: Final = "told.json"
 RANGE: Final = "--start 0.25 --train-frames 5"
@@ -41,6 +43,9 @@ COMMANDS: Final = {
     "--end 2.0 --record none --json",
 }
 """By name, in the order in which they run."""
+AT_TERMINAL: Final = ("replay_net", "compare_variants")
+"""Those that run at a terminal with colours; what they say on stderr is an animation there."""
+_STYLES: Final = re.compile(r"\x1b\[[\d;]*m")
 
 
 @dataclass(frozen=True)
@@ -51,11 +56,12 @@ class Told:
 
     @cached_property
     def texts(self) -> dict[str, dict[str, Any]]:
-        """What each command printed: ``code``, ``out`` and ``err``."""
+        """What each command printed and drew: ``code``, ``out``, ``err`` and ``figures``."""
         return json.loads((self.folder / DONE).read_text(encoding="utf-8"))
 
     def out(self, name: str) -> str:
-        return self.texts[name]["out"]
+        """What a command printed on stdout, without its styles."""
+        return _STYLES.sub("", self.texts[name]["out"])
 
     def summary(self, run: str = "paper") -> dict[str, Any]:
         return json.loads((self.folder / run / "summary.json").read_text(encoding="utf-8"))
@@ -70,13 +76,13 @@ def run_all(folder: Path) -> None:
     drive.write(folder / "tiny.mcap")
     drive.write(folder / "unlabelled.mcap", truths=False)
     (folder / "rbf.toml").write_text('[svm]\nkernel = "rbf"\n', encoding="utf-8")
-    with _terminal(folder):
-        texts = {name: _run(words.split()) for name, words in COMMANDS.items()}
+    with terminal(folder):
+        texts = {name: run(name) for name in COMMANDS}
     (folder / DONE).write_text(json.dumps(texts), encoding="utf-8")
 
 
 @contextmanager
-def _terminal(folder: Path) -> Iterator[None]:
+def terminal(folder: Path) -> Iterator[None]:
     """Stand in the folder, so that every path printed is a short one, at a plain terminal."""
     plain = {"COLUMNS": "80", "LINES": "25", "TERM": "dumb"}
     gone = ("FORCE_COLOR", "NO_COLOR", "TTY_COMPATIBLE", "ROADEVAL_DEBUG")
@@ -85,8 +91,30 @@ def _terminal(folder: Path) -> Iterator[None]:
         yield
 
 
-def _run(words: list[str]) -> dict[str, Any]:
+def run(name: str) -> dict[str, Any]:
+    """Run a command where everything lies; return its exit code, and what it printed and drew."""
     out, err = io.StringIO(), io.StringIO()
-    with redirect_stdout(out), redirect_stderr(err):
-        code = main(words)
-    return {"code": code, "out": out.getvalue(), "err": err.getvalue()}
+    look = {"FORCE_COLOR": "1", "TERM": "xterm"} if name in AT_TERMINAL else {}
+    with (
+        mock.patch.dict(os.environ, look),
+        redirect_stdout(out),
+        redirect_stderr(err),
+        _drawn() as figures,
+    ):
+        code = main(COMMANDS[name].split())
+    return {"code": code, "out": out.getvalue(), "err": err.getvalue(), "figures": figures}
+
+
+@contextmanager
+def _drawn() -> Iterator[list[str]]:
+    """Describe every figure that is saved as vectors meanwhile."""
+    figures: list[str] = []
+    save = Figure.savefig
+
+    def saved(figure: Figure, *given: Any, **options: Any) -> None:
+        save(figure, *given, **options)
+        if options.get("format") != "png":
+            figures.append(drawings.described(figure))
+
+    with mock.patch.object(Figure, "savefig", saved):
+        yield figures

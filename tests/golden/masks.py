@@ -38,6 +38,9 @@ RULES: Final[Mapping[str, tuple[str, str | Callable[[re.Match[str]], str]]]] = {
     # How often progress is told depends on the machine's speed; each step's first line stays.
     "progress, later lines": (r"(?m)^(compiling|(training|replaying): (?!1 of).*)\n", ""),
     "progress, the pace": (r", \d+\.\d frames/s(, \d+ s left)?", ""),
+    # These belong to no machine, but would hide from the eye what is bold.
+    "bold that goes on": (r"\x1b\[0m( *)\x1b\[1m(?=.)", r"\1"),
+    "bold": (r"\x1b\[[01]m", "**"),
     # The leaders of a table of contents: as many dots as a line has room for.
     "leaders": (r"(?: \.){4,}", " ..."),
     "spaces at a line's end": (r"(?m)[ \t]+$", ""),

@@ -13,7 +13,7 @@ from typing import Final
 import pytest
 
 from tests.golden import texts
-from tests.golden.commands import COMMANDS, Told
+from tests.golden.commands import AT_TERMINAL, COMMANDS, Told
 from tests.golden.masks import steady, steady_json
 
 ROWS: Final = 9
@@ -24,7 +24,7 @@ def printed(told: Told, name: str) -> str:
     """What a command printed, and its exit code."""
     text = told.texts[name]
     parts = [f"$ roadeval {COMMANDS[name]}", f"=== exit code {text['code']}"]
-    for stream in ("out", "err"):
+    for stream in ("out",) if name in AT_TERMINAL else ("out", "err"):
         # What machines read is compared with the file of the same content.
         shown = "(JSON)" if text[stream].startswith("{") else text[stream]
         parts += [f"=== {stream}\n{shown}"] if shown else []
@@ -40,14 +40,20 @@ def tables(told: Told) -> str:
     return "\n".join(parts)
 
 
-def figures(told: Told) -> str:
-    """The words of the figures' files."""
-    paths = sorted(
-        path for run in ("paper", "printed") for path in (told.folder / run).glob("fig*.pdf")
-    )
-    return "".join(f"=== {p.parent.name}/{p.name}\n{texts.pages(p)[0]}\n" for p in paths)
+def figures(told: Told, name: str) -> str:
+    """What a command drew."""
+    return "\n\n".join([f"$ roadeval {COMMANDS[name]}", *told.texts[name]["figures"]])
 
 
+def words_of_figures(told: Told) -> str:
+    """The words that can be searched for in a figure's file."""
+    paths = sorted((told.folder / "paper").glob("fig*.pdf"))
+    return "".join(f"=== {path.name}\n{texts.pages(path)[0]}\n" for path in paths)
+
+
+DRAWING: Final = (
+    *("replay", "report", "report_folder", "report_unlabelled", "compare", "compare_variants"),
+)
 GOLDEN: Final[dict[str, Callable[[Told], str]]] = {
     **{f"{name}.txt": lambda told, name=name: steady(printed(told, name)) for name in COMMANDS},
     "summary.json": lambda told: steady_json((told.folder / "paper" / "summary.json").read_text()),
@@ -58,7 +64,11 @@ GOLDEN: Final[dict[str, Callable[[Told], str]]] = {
     "report_unlabelled.pdf.txt": lambda told: steady(texts.paged(told.folder / "unlabelled.pdf")),
     "compared.pdf.txt": lambda told: steady(texts.paged(told.folder / "compared.pdf")),
     "variants.pdf.txt": lambda told: steady(texts.paged(told.folder / "variants.pdf")),
-    "figures.txt": lambda told: steady(figures(told)),
+    "figures.pdf.txt": lambda told: steady(words_of_figures(told)),
+    **{
+        f"figures_{name}.txt": lambda told, name=name: steady(figures(told, name))
+        for name in DRAWING
+    },
     "tables.txt": lambda told: steady(tables(told)),
     "recording.txt": lambda told: steady(texts.words(told.folder / "paper.rrd")),
     "recording_net.txt": lambda told: steady(texts.words(told.folder / "printed.rrd")),
