@@ -1,7 +1,7 @@
 """Build the API pages from the docstrings: ``python docs/api.py [FOLDER]``, build/api by default.
 
-Every warning is an error: a name in ``__all__`` that does not exist, an annotation that cannot be
-resolved, a module that cannot be imported.
+Every warning is an error, `UNRESOLVED` excepted: a name in ``__all__`` that does not exist, an
+annotation that cannot be resolved, a module that cannot be imported.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ import pdoc
 
 import roadeval
 
-FOR_CHECKERS: Final = (
-    r"[\s\S]*(array\[int\]|pd\.Series\[float\]|DataclassInstance|PydanticDataclass)"
+UNRESOLVED: Final = (
+    r".*(array\[int\]|Series\[float\]|DataclassInstance|PydanticDataclass|ForwardRef)"
 )
-"""Annotations that type checkers understand and Python 3.11 cannot evaluate."""
+"""Annotations that type checkers understand and Python 3.11 cannot evaluate, and those of named
+tuples' constructors, which do not know the module that they were written in."""
 
 
 def prepare(package: ModuleType) -> None:
@@ -44,7 +45,7 @@ def main(folder: str = "build/api") -> None:
     """Write the pages into a folder."""
     prepare(roadeval)
     warnings.simplefilter("error")
-    warnings.filterwarnings("ignore", FOR_CHECKERS, UserWarning)
+    warnings.filterwarnings("ignore", UNRESOLVED, UserWarning)
     footer = f"roadeval {roadeval.__version__}"
     pdoc.render.configure(docformat="numpy", show_source=False, footer_text=footer)
     pdoc.pdoc("roadeval", output_directory=Path(folder))
