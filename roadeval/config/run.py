@@ -103,6 +103,10 @@ class RunConfig:
         """Return every variant that is computed: the two by default, then the extra ones."""
         return variants_of(self.pipeline, self.extra)
 
+    def pipelines(self) -> dict[str, Pipeline]:
+        """Return the pipeline of every variant, by name."""
+        return {variant.name: variant.pipeline for variant in self.variants()}
+
     def override(self, tables: Mapping[str, Any], where: str = "") -> RunConfig:
         """Return the configuration with the values of some tables in place.
 

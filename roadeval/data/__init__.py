@@ -22,6 +22,7 @@ from roadeval.data.packed import Packed, TruthBits, everywhere, ones, pack, unpa
 from roadeval.data.result import (
     FrameResult,
     Health,
+    Output,
     StageResult,
     VariantLayout,
     VariantResult,
@@ -50,6 +51,7 @@ __all__ = [
     "LayerKind",
     "LayerSpec",
     "Mask",
+    "Output",
     "Packed",
     "Rgb",
     "Role",

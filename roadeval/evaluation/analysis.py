@@ -6,7 +6,7 @@ that was killed is understood as well as a complete one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Final
 
@@ -28,13 +28,12 @@ FILTER: Final = "filter"
 """Stands among the stages for what the shadow filter changed in the mask of a stage after it."""
 
 
-def settings_of(summary: dict[str, Any]) -> EvaluationSettings:
-    """Return the settings that a summary was made with; the defaults where it says nothing.
+def settings_of(summary: Mapping[str, Any]) -> EvaluationSettings:
+    """Return the settings that a summary was made with; the defaults where it states none.
 
-    They hold for the run. Earlier versions wrote them with every variant's settings, all alike.
+    A setting that this version does not know is left out.
     """
-    of_variants: dict[str, Any] = next(iter(summary.get("settings", {}).values()), {})
-    given: dict[str, Any] = summary.get("run", of_variants).get("evaluation", {})
+    given = summary.get("run", {}).get("evaluation", {})
     known = {field.name for field in fields(EvaluationSettings)}
     return EvaluationSettings(**{name: given[name] for name in known & given.keys()})
 

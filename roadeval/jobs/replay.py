@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from roadeval import logs
-from roadeval.config import RunConfig
+from roadeval.config import OutputSettings, RunConfig
+from roadeval.config.toml import run_toml
 from roadeval.jobs import summary
 from roadeval.jobs.outputs import AnyPath, Outputs, keep_apart
 from roadeval.jobs.progress import OnProgress, Progress, ignore
@@ -22,6 +23,7 @@ from roadeval.results.lines import sum_lines
 from roadeval.results.schema import TABLES
 from roadeval.results.summary import summary_text
 from roadeval.runtime.memory import trim
+from roadeval.version import VERSION
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +104,8 @@ def _run(
         sums = sum_lines(run.board.sums())
         results.append(sums)
         facts = summary.of(run) | {"tables": results.tables}
-        recorder.finish(_texts(facts, sums))
-        files = results.finish(facts)
+        recorder.finish(_texts(run, facts, sums))
+        files = results.finish(facts, run_toml(config, log.name, VERSION))
     saved = None if isinstance(recorder, NullRecorder) else recorder.path
     files += [sidecar.path] if sidecar.path else []
     warnings, losses = summary.warnings(run), summary.losses(run)
@@ -114,7 +116,14 @@ def _sidecar(path: Path | None) -> logs.SidecarWriter | logs.NoSidecar:
     return logs.NoSidecar() if path is None else logs.SidecarWriter(path)
 
 
-def _texts(facts: Mapping[str, Any], sums: Mapping[str, str]) -> dict[str, str]:
-    """Return the results as the recording keeps them: the files' own text."""
-    tables = {name: TABLES[name].header + text for name, text in sums.items()}
-    return {"summary": summary_text(facts), **tables}
+def _texts(run: Run, facts: Mapping[str, Any], sums: Mapping[str, str]) -> dict[str, str]:
+    """Return the results as the recording keeps them: the files' own text.
+
+    Where they were written is left out, so that the same input gives the same recording.
+    """
+    config = replace(run.config, output=OutputSettings(record=run.config.output.record))
+    return {
+        "summary": summary_text({**facts, "run": config.as_dict()}),
+        "run": run_toml(config, run.log.name, VERSION),
+        **{name: TABLES[name].header + text for name, text in sums.items()},
+    }

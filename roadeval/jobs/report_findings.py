@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final
@@ -15,7 +14,7 @@ from roadeval.evaluation import analysis, counts, maps
 from roadeval.evaluation.scoreboard import COMPARED
 from roadeval.jobs.report_frames import FramePicker, evenly, str_keys, variants_but_baseline
 from roadeval.jobs.result import Opened
-from roadeval.report.findings import ErrorHeatmap, Findings, PairedComparison
+from roadeval.report.findings import Commands, ErrorHeatmap, Findings, PairedComparison
 from roadeval.results.lines import change_rows, heat_rows, window_rows
 from roadeval.results.reading import table_of
 
@@ -31,7 +30,7 @@ THUMBNAILS: Final = 8
 """Frames in figure 2 and on the first page."""
 
 
-def collect(result: Opened) -> Findings:
+def collect(result: Opened, commands: Commands | None = None) -> Findings:
     """Collect everything that the report of a result shows."""
     frames, summary = result.frames, result.summary
     pictured = _pictured(result)
@@ -42,8 +41,7 @@ def collect(result: Opened) -> Findings:
     return Findings(
         source=str(result.path),
         complete=result.complete,
-        again=_again(summary),
-        inspect=lambda frame: f"roadeval inspect {shlex.quote(str(result.path))} --frame {frame}",
+        commands=commands,
         pictured=len(pictured),
         summary=summary,
         properties=result.properties,
@@ -80,11 +78,6 @@ def _pictured(result: Opened) -> list[int]:
     """Return the evaluated frames that have pictures, or without truth all that have."""
     evaluated = set(result.frames["frame"]) or set(result.pictured)
     return [number for number in result.pictured if number in evaluated]
-
-
-def _again(summary: dict[str, Any]) -> str:
-    log = summary.get("log")
-    return shlex.join(["roadeval", "replay", log["path"], "--config", "run.toml"]) if log else ""
 
 
 # --- Tables ---------------------------------------------------------------------------------------

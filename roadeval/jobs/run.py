@@ -15,10 +15,9 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.jobs import frame as runner
-from roadeval.jobs import learning
 from roadeval.jobs.examples import ExampleFrames
 from roadeval.jobs.progress import OnProgress, Progress
-from roadeval.kernels.first_time import prepare
+from roadeval.kernels import prepare
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import MisfitError, View
 from roadeval.recording import Layout
@@ -26,8 +25,9 @@ from roadeval.results.lines import lines
 from roadeval.results.schema import streamed
 from roadeval.runtime.memory import TRIM_EVERY, trim
 from roadeval.runtime.threads import ordered
-from roadeval.training import Model
+from roadeval.training import Model, learning
 from roadeval.training.model import ModelError
+from roadeval.training.schedule import Schedule
 from roadeval.version import VERSION
 
 Processed = tuple[FrameResult, Mapping[str, str], Any]
@@ -76,10 +76,10 @@ class Run:
         self.examples = ExampleFrames(self.total)
         self.done = 0
 
-    def _learn(self) -> tuple[Model, learning.Schedule]:
+    def _learn(self) -> tuple[Model, Schedule]:
         settings = self.config.training
         if settings.model is not None:
-            learnt = learning.from_file(Path(settings.model), self.variants)
+            learnt = learning.from_file(Path(settings.model), self.config.pipelines())
             self._compile()
             return learnt
         self._compile()
@@ -87,7 +87,7 @@ class Run:
         total = min(settings.frames, self.total)
         return learning.from_log(
             partial(self.log.frames, self.selection, logs.Span.of(self.config.frames)),
-            self.variants,
+            self.config.pipelines(),
             settings,
             lambda done: self._tell(Progress(done, total, "training")),
             labelled=labelled,

@@ -19,7 +19,7 @@ class LogDescription:
     Parameters
     ----------
     path, bytes
-        Where it lies, and the size of its files.
+        The log, and the size of its files.
     start_ns, end_ns
         Log times of its first and last message.
     topics

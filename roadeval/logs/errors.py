@@ -10,7 +10,7 @@ class LogError(RoadevalError):
 
 
 class FrameError(RoadevalError):
-    """One frame that cannot be decoded. It costs that frame, never the run."""
+    """One frame that cannot be decoded; a run continues without it."""
 
 
 class BadRecord(Exception):  # noqa: N818  (never leaves this room)

@@ -1,4 +1,4 @@
-"""What a run asks of a log: topics, labels, and which frames are read."""
+"""Settings of a log: its topics, the meaning of its labels, and which frames are read."""
 
 from __future__ import annotations
 

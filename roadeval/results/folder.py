@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+RUN: Final = "run.toml"
+"""The file that makes the run again."""
+
+
 class ResultsWriter:
     """Writes a results folder while frames arrive; to be used as a context.
 
@@ -69,7 +73,7 @@ class ResultsWriter:
         """What the summary states of each table with rows so far: ``rows`` and ``sha256``."""
         return {name: table.stated for name, table in self._open.items() if table.rows}
 
-    def finish(self, summary: Mapping[str, Any]) -> list[Path]:
+    def finish(self, summary: Mapping[str, Any], run_toml: str) -> list[Path]:
         """Give all files their names, the summary last.
 
         A table without rows is not there, nor is that of an earlier run: it would not belong to
@@ -79,6 +83,8 @@ class ResultsWriter:
         ----------
         summary
             See `roadeval.results.summary.summary_text`.
+        run_toml
+            The configuration of the run, as the text of a TOML file.
 
         Returns
         -------
@@ -91,8 +97,9 @@ class ResultsWriter:
             path.unlink(missing_ok=True)
             written = [table.path for table in self._open.values() if table.complete()]
             self._open.clear()
+            files.put(self._folder / RUN, run_toml.encode())
             files.put(path, text.encode())
-        return [*written, path]
+        return [*written, self._folder / RUN, path]
 
     def _discard(self) -> None:
         for table in self._open.values():

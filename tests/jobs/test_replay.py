@@ -12,7 +12,7 @@ from roadeval import RoadevalError
 from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import Run
 from roadeval.logs import TopicSettings, open_log
-from roadeval.pipeline.paper import svm as classify
+from roadeval.pipeline.paper import svm
 from roadeval.results.folder import Results
 from roadeval.results.schema import TABLES
 from roadeval.results.summary import summary_text
@@ -155,8 +155,8 @@ def test_the_variants_of_a_model_file_are_bound_once(drive, tmp_path, monkeypatc
         bound.append(machine)
         return made(machine, settings)
 
-    made = classify.colour_table
-    monkeypatch.setattr(classify, "colour_table", table)
+    made = svm.colour_table
+    monkeypatch.setattr(svm, "colour_table", table)
     run(drive, tmp_path, model=tmp_path / "m.model", max_frames=3)
     assert len(bound) == len({id(machine) for machine in bound}) == 2
 
@@ -187,7 +187,7 @@ def test_a_log_without_truth_trains_a_model_for_others(drive, tmp_path):
 
 def test_the_memory_of_training_is_bounded_over_all_drives(drive, tmp_path, monkeypatch):
     other = write_log(tmp_path / "other.mcap")
-    monkeypatch.setattr("roadeval.jobs.learning.GREATEST_MEMORY", 15 * 10_000)
+    monkeypatch.setattr("roadeval.training.held.GREATEST_MEMORY", 15 * 10_000)
     with pytest.raises(RoadevalError, match=r"more than 1\d of them would take"):
         roadeval.train([drive, other], tmp_path / "m.model")
 

@@ -19,6 +19,7 @@ from roadeval.data import (
     Layer,
     LayerKind,
     LayerSpec,
+    Output,
     Role,
     StageResult,
     Tally,
@@ -76,11 +77,10 @@ def result(number, *, err=0.25, fnr=0.5, **changes):
     rings = draw.integers(0, 3, (HEIGHT, WIDTH), np.uint8)
     mask = draw.integers(0, 2, (HEIGHT, WIDTH), np.uint8)
     errors = draw.integers(0, 5, (HEIGHT, WIDTH), np.uint8)
-    filtering = StageResult(
-        "shadow", (Layer(NDI, ndi), Layer(RINGS, rings)), None, {}, {"components": 3.0}, 0.004
-    )
+    found = Output((Layer(NDI, ndi), Layer(RINGS, rings)), facts={"components": 3.0})
+    filtering = StageResult("shadow", found, 0.004)
     packed = Packed.of(mask)
-    final = StageResult("post", (Layer(POST, packed),), packed, {}, {}, 0.002)
+    final = StageResult("post", Output((Layer(POST, packed),), mask=packed), 0.002)
     tally = Tally("filtered", "post", Counts(1, 2, 3, 4), rates={"ERR": err, "FNR": fnr})
     plain = FrameResult(
         shown,

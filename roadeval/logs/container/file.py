@@ -61,7 +61,7 @@ class ChannelLog:
 
 
 class Container:
-    """One MCAP file, in whatever state it is.
+    """One MCAP file, damaged or not.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class Container:
         return statistics.channel_message_counts if statistics else {}
 
     def topic(self, channel_id: int) -> str:
-        """Name the topic of a channel, or at least the channel."""
+        """Return the topic of a channel, or its number where it is not defined."""
         channel = self.channels.get(channel_id)
         return channel.topic if channel else f"channel {channel_id}"
 

@@ -16,11 +16,11 @@ GLANCE: Final = 1 << 10
 
 
 class ByteReader(Protocol):
-    """A row of bytes that need not lie in memory."""
+    """Bytes that need not lie in memory."""
 
     @property
     def size(self) -> int:
-        """How many."""
+        """Number of bytes."""
         ...
 
     def read(self, offset: int, length: int) -> Buffer:
@@ -93,7 +93,7 @@ class FileReader:
 
 
 class PartReader:
-    """A part of a file, as if it stood alone."""
+    """A part of a file, with positions of its own."""
 
     def __init__(self, source: FileReader, offset: int, size: int) -> None:
         self._source = source

@@ -56,7 +56,7 @@ _AFTER_DATA: Final = (
 RECENT: Final = 8
 """Messages with whose log times another one's is compared."""
 PRIVATE: Final = 0x80
-"""From here on, opcodes are an application's own."""
+"""Opcodes from here on belong to applications."""
 
 
 IsWhole = Callable[[Channel, Schema | None, Message], bool]

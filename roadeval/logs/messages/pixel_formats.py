@@ -15,7 +15,7 @@ from roadeval.logs.messages.pictures import RawPicture
 Array = npt.NDArray[Any]
 
 LARGEST: Final = 1 << 28
-"""Pixels: more is a damaged head, not a camera."""
+"""Most pixels of an image; one that claims more is damaged."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Truth
-from roadeval.kernels import KERNELS
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.messages.pixels import to_labels, to_rgb
@@ -79,9 +78,9 @@ class LabelMap:
             If a value is unknown.
         """
         if labels.dtype == np.uint8:
-            # A loop is compiled for plain arrays; those of raw pictures are parts of a message.
-            own = np.require(labels, requirements=["C", "W"])
-            truth: Truth = KERNELS.look_up_levels(own, self._table[:256])
+            import cv2
+
+            truth: Truth = cv2.LUT(np.ascontiguousarray(labels), self._table[:256])
         else:
             truth = self._table[labels]
         if self.others == UNKNOWN and (truth == UNKNOWN).any():

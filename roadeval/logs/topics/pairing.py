@@ -45,7 +45,7 @@ class Pairing:
         self._near_label = 0
 
     def begin_near(self, label: int) -> None:
-        """Look for the next partner around a label; saves reading the way there."""
+        """Search for the next partner around a label, without reading the stamps before it."""
         self._near_label = min(label, max(len(self._labels) - 1, 0))
 
     def partner(self, image: int) -> int | None:

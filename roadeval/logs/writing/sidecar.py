@@ -89,7 +89,7 @@ class SidecarWriter:
         self._log.json(topic, frame.stamp_ns, message, schema, log_time_ns=frame.log_time_ns)
 
     def close(self) -> None:
-        """Complete the file and give it its name."""
+        """Complete the file and move it to its path."""
         self._log.close()
 
     def __enter__(self) -> SidecarWriter:

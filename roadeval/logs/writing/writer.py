@@ -153,7 +153,7 @@ class LogWriter:
         return self._channels[topic]
 
     def close(self) -> None:
-        """Complete the file and give it its name.
+        """Complete the file and move it to its path.
 
         Raises
         ------

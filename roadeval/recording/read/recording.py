@@ -19,6 +19,7 @@ from roadeval.recording.read.payloads import PayloadCache
 from roadeval.recording.read.rrd_file import RrdFile
 from roadeval.recording.write.batching import IMAGES_AND_TEXT
 from roadeval.results.reading import read_table
+from roadeval.results.summary import parse_summary
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,7 +114,8 @@ class Recording:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The content of ``summary.json``."""
-        summary = dict(json.loads(self.result(at.SUMMARY) or "{}"))
+        text = self.result(at.SUMMARY)
+        summary = {} if text is None else parse_summary(text, self.path)
         seconds = json.loads(self._file.document(at.SECONDS) or "{}")
         return summary | ({"seconds": seconds} if seconds else {})
 

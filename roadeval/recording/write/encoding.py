@@ -106,7 +106,7 @@ class FrameEncoder:
             for stage in variant.stages:
                 where = variant.variant, stage.stage
                 yield at.scalar_path("timing", *where), stage.seconds * 1e3
-                for name, value in stage.facts.items():
+                for name, value in stage.output.facts.items():
                     yield at.scalar_path("facts", *where, name), value
 
 

@@ -15,6 +15,7 @@ from roadeval.data import (
     Frame,
     FrameResult,
     Layer,
+    Output,
     Role,
     StageResult,
     Tally,
@@ -30,7 +31,7 @@ STAMP, LOGGED = 1_700_000_000_000_000_005, 1_700_000_000_007_000_000
 
 def result() -> FrameResult:
     frame = Frame(3, STAMP, LOGGED, np.zeros((1, 2, 3), np.uint8), b"")
-    stage = StageResult("post", (), Packed.of(MASK), {}, {}, 0.0)
+    stage = StageResult("post", Output(mask=Packed.of(MASK)), 0.0)
     return FrameResult(
         frame,
         Role.EVALUATED,

@@ -1,7 +1,7 @@
 """Chunks that are damaged or cut off, as a recorder that was killed leaves its last one.
 
-Which of the lengths that a chunk and the file's summary claim is believed, and which records of
-the chunk can be read.
+A chunk gives its length twice, and the file's summary a third time: the functions here decide which
+is right, and read the records that are left.
 """
 
 from __future__ import annotations

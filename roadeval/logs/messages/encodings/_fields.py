@@ -14,7 +14,15 @@ _CODES: Final = {"u1": "B", "u4": "I", "i4": "i", "u8": "Q"}
 
 
 class FieldReader:
-    """Reads one field after the other."""
+    """Reads one field after the other.
+
+    Parameters
+    ----------
+    order, start
+        Byte order as `struct` names it, and the position of the first field.
+    aligned, widest
+        Whether numbers stand at multiples of their size, and the largest such size.
+    """
 
     def __init__(
         self, data: Buffer, order: str, start: int, *, aligned: bool, widest: int = 8
@@ -24,17 +32,6 @@ class FieldReader:
         self._start = self._at = start
         self._aligned = aligned
         self._widest = widest
-
-    @classmethod
-    def cdr(cls, data: Buffer) -> FieldReader:
-        """Begin after the encapsulation: its second byte names order and version."""
-        if len(data) < 4:
-            raise BadMessage("a message without a head")
-        kind = data[1]
-        order = "<" if kind & 1 else ">"
-        version_2 = kind >= 6
-        delimited = kind in (8, 9)
-        return cls(data, order, 8 if delimited else 4, aligned=True, widest=4 if version_2 else 8)
 
     @property
     def left(self) -> int:
