@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
@@ -15,6 +16,7 @@ from types import ModuleType
 from typing import Final
 
 import pdoc
+from pdoc import docstrings
 
 import roadeval
 
@@ -41,9 +43,15 @@ def prepare(package: ModuleType) -> None:
             prepare(import_module(f"{package.__name__}.{module.name}"))
 
 
+def in_markdown(convert: Callable[[str], str]) -> Callable[[str], str]:
+    """Return a converter that takes the ``::`` before a literal block, too, which pdoc prints."""
+    return lambda text: convert(text.replace("::\n", ":\n"))
+
+
 def main(folder: str = "build/api") -> None:
     """Write the pages into a folder."""
     prepare(roadeval)
+    docstrings.numpy = in_markdown(docstrings.numpy)
     warnings.simplefilter("error")
     warnings.filterwarnings("ignore", UNRESOLVED, UserWarning)
     footer = f"roadeval {roadeval.__version__}"
