@@ -72,5 +72,5 @@ def test_replay_and_train_compile_before_all_else(tmp_path, monkeypatch):
     roadeval.train([drive], tmp_path / "x.model", on_progress=note)
     assert seen() == ["compiling", "training"]
     learnt = settings(model=tmp_path / "x.model", record="none")
-    roadeval.replay(drive, **folder, on_progress=note)
+    roadeval.replay(drive, learnt, **folder, on_progress=note)
     assert seen() == ["compiling", "replaying", "writing"]
