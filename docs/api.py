@@ -1,13 +1,14 @@
 """Build the API pages from the docstrings: ``python docs/api.py [FOLDER]``, build/api by default.
 
-Every warning is an error: a name in ``__all__`` that does not exist, an annotation that cannot be
-resolved, a module that cannot be imported.
+Every warning is an error, `UNRESOLVED` excepted: a name in ``__all__`` that does not exist, an
+annotation that cannot be resolved, a module that cannot be imported.
 """
 
 from __future__ import annotations
 
 import sys
 import warnings
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
@@ -15,13 +16,15 @@ from types import ModuleType
 from typing import Final
 
 import pdoc
+from pdoc import docstrings
 
 import roadeval
 
-FOR_CHECKERS: Final = (
-    r"[\s\S]*(array\[int\]|pd\.Series\[float\]|DataclassInstance|PydanticDataclass)"
+UNRESOLVED: Final = (
+    r".*(array\[int\]|Series\[float\]|DataclassInstance|PydanticDataclass|ForwardRef)"
 )
-"""Annotations that type checkers understand and Python 3.11 cannot evaluate."""
+"""Annotations that type checkers understand and Python 3.11 cannot evaluate, and those of named
+tuples' constructors, which do not know the module that they were written in."""
 
 
 def prepare(package: ModuleType) -> None:
@@ -40,11 +43,17 @@ def prepare(package: ModuleType) -> None:
             prepare(import_module(f"{package.__name__}.{module.name}"))
 
 
+def in_markdown(convert: Callable[[str], str]) -> Callable[[str], str]:
+    """Return a converter that takes the ``::`` before a literal block, too, which pdoc prints."""
+    return lambda text: convert(text.replace("::\n", ":\n"))
+
+
 def main(folder: str = "build/api") -> None:
     """Write the pages into a folder."""
     prepare(roadeval)
+    docstrings.numpy = in_markdown(docstrings.numpy)
     warnings.simplefilter("error")
-    warnings.filterwarnings("ignore", FOR_CHECKERS, UserWarning)
+    warnings.filterwarnings("ignore", UNRESOLVED, UserWarning)
     footer = f"roadeval {roadeval.__version__}"
     pdoc.render.configure(docformat="numpy", show_source=False, footer_text=footer)
     pdoc.pdoc("roadeval", output_directory=Path(folder))

@@ -10,6 +10,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 import roadeval
+from roadeval.data import colours
 
 DRIVE = Path("recordings", "demo.mcap")
 OUT = Path("reports", "api")
@@ -17,15 +18,12 @@ OUT = Path("reports", "api")
 # %% [markdown]
 # ## Replay
 #
-# The first ten frames train the two variants and are never evaluated; the next ten are scored.
+# The first ten frames train the two variants and are never evaluated; the next ten are scored. A
+# configuration has the shape of a TOML file: `roadeval config` prints all that can stand in it.
 
 # %%
-outcome = roadeval.replay(
-    DRIVE,
-    save=OUT / "demo.rrd",
-    reports=OUT,
-    options=roadeval.ReplayOptions(max_frames=20),
-)
+config = roadeval.configure({"preset": "paper", "frames": {"max_frames": 20}})
+outcome = roadeval.replay(DRIVE, config, save=OUT / "demo.rrd", reports=OUT)
 for variant, stages in outcome.summary["totals"].items():
     print(f"{variant:10} ERR of the final mask: {stages['post']['ERR']:.1%}")
 
@@ -42,7 +40,9 @@ errors = final.pivot(index="frame", columns="variant", values="ERR")
 print(errors.describe().loc[["mean", "min", "max"]])
 
 # %%
-axes = errors.mul(100).plot(marker="o", ylabel="ERR, %", figsize=(7, 3))
+palette = {"filtered": colours.FILTERED, "unfiltered": colours.UNFILTERED, "blind": colours.BLIND}
+shades = [colours.hex_of(palette[variant]) for variant in errors]
+axes = errors.mul(100).plot(marker="o", color=shades, ylabel="ERR, %", figsize=(7, 3))
 axes.figure.savefig(OUT / "errors.png", bbox_inches="tight")
 
 # %% [markdown]
@@ -72,9 +72,8 @@ figure.savefig(OUT / "layers.png")
 # A model that was trained before runs on any image of the same camera; no log is needed.
 
 # %%
-options = roadeval.ReplayOptions(max_frames=20)
-model = roadeval.train([DRIVE], OUT / "demo.model", options=options)
+model = roadeval.train([DRIVE], OUT / "demo.model", config)
 result = roadeval.run_frame(recording.image(worst), model, variant="unfiltered")
 for stage in result.stages:
-    names = ", ".join(layer.spec.name for layer in stage.layers)
+    names = ", ".join(layer.spec.name for layer in stage.output.layers)
     print(f"{stage.stage:10} {1000 * stage.seconds:6.2f} ms: {names}")

@@ -166,6 +166,10 @@ def test_the_metric_is_in_the_recording(recording, workshop):
     assert "BACC" in recording.frames
 
 
+def test_the_metric_is_in_the_report(report):
+    assert "BACC" in report
+
+
 def test_the_metric_is_compared_by_its_direction(workshop):
     compared = json.loads(workshop.done("compare", "out.rrd", "--json"))
     final = [change for change in compared["changes"] if change["final"]]

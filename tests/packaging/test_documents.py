@@ -17,6 +17,8 @@ DOCUMENTS = [
 LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)[^)]*\)")
 QUOTED = re.compile(r"`((?:[\w.-]+/)+[\w.-]*)`")
 """A path in backticks: it has a slash."""
+NAMED = re.compile(r"`([\w/]+\.py)`, `(\w+)`")
+"""A file, and a name that it defines."""
 MADE = re.compile(r"^`(\S+)`$", re.MULTILINE)
 """The head of a file that CONTRIBUTING.md adds."""
 ROOMS = {path.name for path in PACKAGE.iterdir() if path.is_dir()}
@@ -45,6 +47,14 @@ def test_every_path_exists(name):
     ]
     assert paths
     assert not missing
+
+
+def test_every_name_is_defined_in_the_file_it_follows():
+    named = NAMED.findall((ROOT / "docs" / "architecture.md").read_text())
+    assert named
+    for path, name in named:
+        defined = rf"^(def|class) {name}\b|^{name}\b.*="
+        assert re.search(defined, (PACKAGE / path).read_text(), re.MULTILINE), f"{path}: {name}"
 
 
 def test_every_room_is_in_the_architecture():

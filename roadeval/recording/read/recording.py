@@ -50,13 +50,11 @@ class Recording:
 
     Examples
     --------
-    A recording of frames of 8 x 6 pixels:
-
     >>> recording = Recording("out.rrd")
-    >>> float(recording.frames.query("stage == 'post'").ERR.mean())
-    0.25
-    >>> recording.layer("filtered", "post", frame=3).shape
-    (6, 8)
+    >>> round(float(recording.frames.query("stage == 'post'").ERR.mean()), 2)
+    0.05
+    >>> recording.layer("filtered", "post", frame=12).shape
+    (48, 64)
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
