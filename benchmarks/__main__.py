@@ -27,7 +27,8 @@ from roadeval.jobs import frame as runner
 from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import Run
 from roadeval.pipeline.stage import View
-from roadeval.recording import Rule, recorder_for
+from roadeval.recording import RecordRule, recorder_for
+from roadeval.results.lines import lines
 from roadeval.runtime.threads import one_thread_each
 
 Rows = list[dict[str, Any]]
@@ -121,7 +122,7 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
     config = configure({"run": {"jobs": 1}})
     with logs.open_log(drive) as log, one_thread_each():
         run = Run(log, config, ignore)
-        recorder = recorder_for(folder / "stages.rrd", run.layout(), Rule.parse("all"))
+        recorder = recorder_for(folder / "stages.rrd", run.layout(), RecordRule.parse("all"))
         with recorder:
             for position, logged in enumerate(log.frames(run.selection)):
                 frame, seconds = timed(logged.decode)
@@ -134,7 +135,7 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
                 score = partial(run.board.score, frame, Role.EVALUATED, variants)
                 result, seconds = timed(score)
                 lap("score", seconds)
-                encoded, seconds = timed(partial(recorder.encode, result, position))
+                encoded, seconds = timed(partial(recorder.encode, result, position, lines(result)))
                 lap("encode", seconds)
                 lap("write", timed(partial(recorder.write, encoded))[1])
             recorder.finish({})
@@ -150,7 +151,7 @@ def _plain(
         frames = [each.decode() for each in log.frames(run.selection)]
         step = max(1, len(frames) // options.plain_frames)
         chosen = range(len(frames))[step // 2 :: step][: options.plain_frames]
-        results = [r for i, (_, r) in enumerate(run.frames(Whole())) if i in chosen]
+        results = [r for i, (_, _, r) in enumerate(run.frames(Whole())) if i in chosen]
     plain = PlainWay(frames, config)
     for name, parameters in run.model.parameters.items():
         plain.require_same_machine(name, parameters["svm"])

@@ -18,7 +18,6 @@ from mcap_ros2.writer import Writer
 from roadeval import logs
 from roadeval.config import configure
 from roadeval.data import Frame
-from roadeval.jobs.run import select
 from roadeval.logs import LogWriter
 
 PERIOD_NS: Final = 100_000_000
@@ -49,7 +48,8 @@ class Source:
         """Decode the first frames that have a truth."""
         config = configure({"labels": {"road": self.road, "ignore": self.ignore}})
         with logs.open_log(self.path) as log:
-            readable = (f for f in log.frames(select(log, config)) if f.labelled)
+            selection = log.select(config.topics, config.labels)
+            readable = (frame for frame in log.frames(selection) if frame.labelled)
             return [each.decode() for each in islice(readable, count)]
 
 

@@ -15,8 +15,8 @@ import rerun as rr
 
 from roadeval.config import RunConfig
 from roadeval.data import FILTERED, UNFILTERED, Frame, VariantResult
-from roadeval.pipeline.chain import Chain
-from roadeval.pipeline.stage import TrainingSet
+from roadeval.pipeline.chain import Pipeline
+from roadeval.pipeline.training_set import TrainingSet
 from roadeval.training.sampling import sample
 from tests.pipeline import reference
 
@@ -33,9 +33,9 @@ class PlainWay:
         where = pixels.frame, pixels.row, pixels.column, pixels.road
         self.models = {}
         for variant in config.variants():
-            plan = variant.pipeline
-            filters = [name for name in plan.chain if name == "shadow"]
-            chain = Chain(filters, plan.settings, {})
+            pipeline = variant.pipeline
+            filters = tuple(name for name in pipeline.chain if name == "shadow")
+            chain = Pipeline(filters, pipeline.settings).bind({})
             images = tuple(chain.filtered(frame.image) for frame in first)
             colours = TrainingSet(images, *where).colours()
             self.models[variant.name] = reference.train(colours, pixels.road)

@@ -20,7 +20,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from arch.bootstrap import IIDBootstrap
 
 from roadeval.config import RunConfig, configure
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame
@@ -114,7 +113,8 @@ def difference(rate, new: np.ndarray, base: np.ndarray) -> str:
     def of(a: np.ndarray, b: np.ndarray) -> float:
         return rate(a.sum(axis=0)) - rate(b.sum(axis=0))
 
-    low, high = IIDBootstrap(new, base, seed=0).conf_int(of, 1000, method="percentile").ravel()
+    draws = np.random.default_rng(0).integers(len(new), size=(1000, len(new)))
+    low, high = np.percentile([of(new[drawn], base[drawn]) for drawn in draws], [2.5, 97.5])
     return f"{of(new, base):+6.1f} [{low:+5.1f}, {high:+5.1f}]"
 
 

@@ -18,12 +18,13 @@ from roadeval.config import RunConfig
 from roadeval.data import FrameResult
 from roadeval.data.packed import Packed
 from roadeval.jobs.progress import ignore
-from roadeval.jobs.run import Run, span
-from roadeval.recording import Rule, recorder_for
+from roadeval.jobs.run import Run
+from roadeval.recording import RecordRule, recorder_for
 from roadeval.results.folder import ResultsWriter
+from roadeval.results.lines import lines, sum_lines
 from roadeval.runtime.threads import ordered
 
-ALL: Final = Rule.parse("all")
+ALL: Final = RecordRule.parse("all")
 HELD_BYTES: Final = 400 << 20
 """Of layers computed beforehand and held for the floor, which goes round them."""
 
@@ -49,8 +50,8 @@ class Held:
 class Whole:
     """Stands where a recorder does, and hands out what it is given, layers and all."""
 
-    def encode(self, result: FrameResult, _position: int) -> FrameResult:
-        """Give the result."""
+    def encode(self, result: FrameResult, _position: int, _lines: Any) -> FrameResult:
+        """Return the result."""
         return result
 
 
@@ -60,12 +61,13 @@ def hold(drive: Path, config: RunConfig) -> Held:
         run = Run(log, config, ignore)
         results, sizes = [], []
         recorder = recorder_for(drive.with_suffix(".held.rrd"), run.layout(), ALL)
-        for position, (_, result) in enumerate(run.frames(Whole())):
+        for position, (_, _, result) in enumerate(run.frames(Whole())):
             if position % max(1, -(-run.total * _bytes(result) // HELD_BYTES)) == 0:
                 results.append(result)
-                encoded = recorder.encode(result, position).encoded
+                encoded = recorder.encode(result, position, lines(result))
                 sizes.append(_layer_bytes(encoded.payloads))
-        files = [_files(logged) for logged in log.frames(run.selection, span(config))]
+        frames = log.frames(run.selection, logs.Span.of(config.frames))
+        files = [_files(logged) for logged in frames]
         return Held(files, results, run.layout(), float(np.mean(sizes)))
 
 
@@ -93,7 +95,7 @@ def floor(held: Held, folder: Path, jobs: int) -> Cost:
         number, files, result = item
         for flags, data in zip((cv2.IMREAD_COLOR_RGB, *[-1] * 9), files, strict=False):
             cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-        return recorder.encode(result, number)
+        return recorder.encode(result, number, lines(result))
 
     recorder = recorder_for(folder / "floor.rrd", held.layout, ALL)
     meter = Meter()
@@ -111,12 +113,13 @@ def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
         recorder = recorder_for(folder / "loop.rrd", run.layout(), ALL)
         meter = Meter()
         with recorder, ResultsWriter(folder / "reports") as results:
-            for result, encoded in run.frames(recorder):
+            for _, own, encoded in run.frames(recorder):
                 recorder.write(encoded)
-                results.append(result)
+                results.append(own)
             recorder.finish({})
             cost = meter.read()
-            results.finish(run.summary(), run.board.tables())
+            results.append(sum_lines(run.board.sums()))
+            results.finish(run.summary())
         return cost
 
 

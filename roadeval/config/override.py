@@ -38,8 +38,9 @@ def override(settings: Any, tables: Mapping[str, Any], table: str, where: str = 
     try:
         return type(settings)(**_merged(dataclasses.asdict(settings), values))
     except ValidationError as error:
-        begin = f"{where}: [{table}] " if where else f"{table}."
-        raise ConfigError(begin + _first(error, settings)) from error
+        key, message = _first(error, settings)
+        name = f"{where}: [{table}] {key}" if where else f"{table}.{key}" if key else ""
+        raise ConfigError(f"{name}{': ' if key else ''}{message}") from error
 
 
 def either(names: Iterable[str]) -> str:
@@ -58,14 +59,16 @@ def _merged(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any
     return merged
 
 
-def _first(error: ValidationError, settings: Any) -> str:
-    """Explain in one line what is wrong with the first bad key."""
+def _first(error: ValidationError, settings: Any) -> tuple[str, str]:
+    """Return the first bad key and what is wrong with it; no key where several do not fit."""
     problem = error.errors(include_url=False)[0]
-    key = ".".join(str(part) for part in problem["loc"]) or "settings"
+    key = ".".join(str(part) for part in problem["loc"])
     if problem["type"] == "unexpected_keyword_argument":
         names = [entry.name for entry in dataclasses.fields(settings)]
-        return f"{key}: there is no such setting; choose {either(names)}"
+        return key, f"there is no such setting; choose {either(names)}"
     message = problem["msg"].removeprefix("Value error, ")
+    if not key:
+        return key, message
     given = problem["input"]
     shown = "" if isinstance(given, Mapping) else f" (given: {given!r})"
-    return f"{key}: {message[0].lower()}{message[1:]}{shown}"
+    return key, f"{message[0].lower()}{message[1:]}{shown}"

@@ -35,7 +35,6 @@ from roadeval.config.variants import (
 )
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.logs import LabelValues, parse_time
 from roadeval.logs.settings import FrameSettings, LabelSettings, TopicSettings
 from roadeval.pipeline.chain import Pipeline
 from roadeval.training.settings import TrainingSettings
@@ -87,16 +86,13 @@ class RunConfig:
         names = {variant.name for variant in self.variants()}
         for name in self.topics.masks:
             check_variant_name(name, names)
-        try:
-            LabelValues(**dataclasses.asdict(self.labels))
-            for text in filter(None, (self.frames.start, self.frames.end)):
-                parse_time(text)
-            if self.output.record != OutputSettings().record:
-                from roadeval.recording import Rule  # with it comes the viewer's library
+        if self.output.record != OutputSettings().record:
+            from roadeval.recording import RecordRule  # with it comes the viewer's library
 
-                Rule.parse(self.output.record)
-        except RoadevalError as error:
-            raise ConfigError(str(error)) from error
+            try:
+                RecordRule.parse(self.output.record)
+            except RoadevalError as error:
+                raise ConfigError(str(error)) from error
         if self.output.mcap is not None and self.frames.scale != 1:
             raise ConfigError(
                 "output.mcap and frames.scale do not go together: reduced masks would not lie over "
@@ -106,6 +102,10 @@ class RunConfig:
     def variants(self) -> tuple[Variant, ...]:
         """Return every variant that is computed: the two by default, then the extra ones."""
         return variants_of(self.pipeline, self.extra)
+
+    def pipelines(self) -> dict[str, Pipeline]:
+        """Return the pipeline of every variant, by name."""
+        return {variant.name: variant.pipeline for variant in self.variants()}
 
     def override(self, tables: Mapping[str, Any], where: str = "") -> RunConfig:
         """Return the configuration with the values of some tables in place.

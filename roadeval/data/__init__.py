@@ -10,7 +10,6 @@ from roadeval.data.frame import IGNORE, NON_ROAD, ROAD, Frame, Mask, Rgb, Role, 
 from roadeval.data.layer import (
     ERRORS,
     ROAD_CLASSES,
-    TRANSPARENT,
     TRUTH,
     LabelClass,
     Layer,
@@ -18,12 +17,12 @@ from roadeval.data.layer import (
     LayerSpec,
     mask_spec,
 )
-from roadeval.data.names import BASELINE, CAMERA, FILTERED, FINAL_STAGE, NAMES, RESERVED, UNFILTERED
+from roadeval.data.names import BASELINE, CAMERA, FILTERED, FINAL_STAGE, RESERVED, UNFILTERED
 from roadeval.data.packed import Packed, TruthBits, everywhere, ones, pack, unpack
 from roadeval.data.result import (
     FrameResult,
     Health,
-    Pictures,
+    Output,
     StageResult,
     VariantLayout,
     VariantResult,
@@ -36,12 +35,10 @@ __all__ = [
     "FILTERED",
     "FINAL_STAGE",
     "IGNORE",
-    "NAMES",
     "NON_ROAD",
     "RESERVED",
     "ROAD",
     "ROAD_CLASSES",
-    "TRANSPARENT",
     "TRUTH",
     "UNFILTERED",
     "Change",
@@ -54,8 +51,8 @@ __all__ = [
     "LayerKind",
     "LayerSpec",
     "Mask",
+    "Output",
     "Packed",
-    "Pictures",
     "Rgb",
     "Role",
     "StageResult",

@@ -9,8 +9,10 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from roadeval.data import colours
 from roadeval.data.arrays import FN, FP, IGNORED, TN, TP
-from roadeval.data.frame import IGNORE
+from roadeval.data.colours import CLEAR, with_opacity
+from roadeval.data.frame import IGNORE, NON_ROAD, ROAD
 from roadeval.data.packed import Packed
 
 
@@ -83,27 +85,27 @@ class Layer:
         return self.content.pixels() if isinstance(self.content, Packed) else self.content
 
 
-TRANSPARENT: Final = (0, 0, 0, 0)
 ROAD_CLASSES: Final = (
-    LabelClass(0, "non-road", TRANSPARENT),
-    LabelClass(1, "road", (0, 158, 115, 160)),
+    LabelClass(NON_ROAD, "non-road", CLEAR),
+    LabelClass(ROAD, "road", with_opacity(colours.ROAD, 160)),
 )
+IGNORED_CLASS: Final = LabelClass(IGNORE, "ignored", with_opacity(colours.IGNORE, 160))
 TRUTH: Final = LayerSpec(
     "truth",
     LayerKind.MASK,
     "Ground truth",
-    (*ROAD_CLASSES, LabelClass(IGNORE, "ignored", (128, 128, 128, 160))),
+    (*ROAD_CLASSES, IGNORED_CLASS),
 )
 ERRORS: Final = LayerSpec(
     "errors",
     LayerKind.MASK,
     "Errors of the final mask",
     (
-        LabelClass(TN, "TN", TRANSPARENT),
-        LabelClass(TP, "TP", (0, 158, 115, 160)),
-        LabelClass(FP, "FP", (213, 94, 0, 220)),
-        LabelClass(FN, "FN", (204, 121, 167, 220)),
-        LabelClass(IGNORED, "ignored", (128, 128, 128, 160)),
+        LabelClass(TN, "TN", CLEAR),
+        LabelClass(TP, "TP", with_opacity(colours.TP, 160)),
+        LabelClass(FP, "FP", with_opacity(colours.FP, 220)),
+        LabelClass(FN, "FN", with_opacity(colours.FN, 220)),
+        LabelClass(IGNORED, "ignored", with_opacity(colours.IGNORE, 160)),
     ),
 )
 

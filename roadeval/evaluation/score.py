@@ -1,4 +1,4 @@
-"""One frame against its truth: counts, rates, error maps, health, notes and table lines."""
+"""One frame against its truth: counts, rates, error maps, health and notes."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from roadeval.data import (
 )
 from roadeval.data.arrays import Bits, Sums
 from roadeval.data.packed import Packed, ones
-from roadeval.evaluation import contours, counts, health, maps, rates, regions
+from roadeval.evaluation import contours, counts, health, maps, metrics, regions
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.maps import Name
+from roadeval.evaluation.region import LabelledFrame
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results import tables
 
 
 class CountsNotConservedError(RuntimeError):
@@ -59,14 +59,11 @@ def score_frame(
     truth = TruthBits.of(frame.truth)
     masks = _masks(variants, prior, truth.shape)
     bits = truth.bits_of(masks.values())
-    found = regions.of_frame(
-        frame, truth, variants, boundary_width=settings.boundary_width, bands=settings.bands
-    )
+    found = regions.of_frame(LabelledFrame(frame, truth, variants, settings))
     tallies = tally(list(masks), bits, truth, found)
     final_bits = {variant: mask for (variant, _), mask in zip(masks, bits, strict=True)}
     finals = {result.variant: result.rates for result in tallies}
     blind = finals.pop(BASELINE, None)
-    oracles = _oracles(variants, truth)
     return FrameResult(
         frame,
         role,
@@ -75,15 +72,10 @@ def score_frame(
         tallies=tallies,
         health={name: health.judge(own, blind, settings) for name, own in finals.items()},
         notes=health.notes(finals, blind, settings),
-        tables={
-            "frames": tables.frame_lines(frame, tallies),
-            "regions": tables.region_lines(frame, tallies),
-            **({"oracles": tables.oracle_lines(frame, oracles)} if oracles else {}),
-        },
         truth_bits=truth,
         changes=maps.changes(list(masks), bits, truth),
         contours=contours.boundary_f(final_bits, truth, settings.boundary_width),
-        oracles=oracles,
+        oracles=_oracles(variants, truth),
     )
 
 
@@ -104,22 +96,21 @@ def tally(
     for (variant, stage), rows in zip(names, counted.tolist(), strict=True):
         whole, *parts = (Counts(*row) for row in rows)
         by_region = dict(zip(found, parts, strict=True))
-        tallies.append(Tally(variant, stage, whole, by_region, rates.of(whole)))
+        tallies.append(Tally(variant, stage, whole, by_region, metrics.of(whole)))
     return tuple(tallies)
 
 
 def prove(names: Sequence[Name], counted: Sums, found: Sequence[str], labelled: int) -> None:
     """Prove ``TP + TN + FP + FN = N = pixels - ignored``, and that the regions are parts of it.
 
-    The row bands together are the frame, and so are ``boundary`` and ``interior``; where they are
-    among the regions ``found``, their counts must add up to the whole's. ``counted`` is as
-    `roadeval.evaluation.counts.count` gives it.
+    Where regions that together are the frame are among those ``found``, as the row bands are,
+    their counts must add up to the whole's. ``counted`` is as `roadeval.evaluation.counts.count`
+    returns it.
     """
     whole = counted[:, 0]
     lost = (whole.sum(axis=1) != labelled) | (whole < 0).any(axis=1)
-    bands = [place for place, name in enumerate(found, 1) if name.startswith("band_")]
-    halves = [place for place, name in enumerate(found, 1) if name in ("boundary", "interior")]
-    for places in filter(None, (bands, halves)):
+    for family in regions.partitions(found):
+        places = [found.index(name) + 1 for name in family]
         lost |= (counted[:, places].sum(axis=1) != whole).any(axis=1)
     if lost.any():
         first = int(np.argmax(lost))

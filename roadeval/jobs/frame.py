@@ -12,6 +12,7 @@ from roadeval.data import (
     FINAL_STAGE,
     Layer,
     Mask,
+    Output,
     Rgb,
     StageResult,
     Truth,
@@ -39,9 +40,6 @@ def run_variant(
 ) -> VariantResult:
     """Run a chain on a frame and time each of its stages.
 
-    To take the image's channels apart is counted to the stage that first asks for them, of all
-    variants that share the view.
-
     Given the truth, run it also with each stage that has an oracle replaced by that, untimed;
     ``known`` is what the frame's variants share of it, see `Chain.oracles`.
     """
@@ -49,9 +47,7 @@ def run_variant(
     start = perf_counter()
     for stage, output in chain.run(view):
         seconds = perf_counter() - start
-        results.append(
-            StageResult(stage, output.layers, output.mask, output.regions, output.facts, seconds)
-        )
+        results.append(StageResult(stage, output, seconds))
         outputs.append(output)
         start = perf_counter()
     oracles = {}
@@ -69,7 +65,7 @@ def external_layout(name: str, topic: str) -> VariantLayout:
 def external_variant(name: str, mask: Mask) -> VariantResult:
     """Present a mask that the log carries as a variant with the final stage alone."""
     road = Packed.of(mask)
-    stage = StageResult(FINAL_STAGE, (Layer(EXTERNAL, road),), road, {}, {}, 0.0)
+    stage = StageResult(FINAL_STAGE, Output((Layer(EXTERNAL, road),), mask=road), 0.0)
     return VariantResult(name, (stage,))
 
 
@@ -101,8 +97,13 @@ def run_frame(
 
     Examples
     --------
-    >>> result = roadeval.run_frame(image, roadeval.load_model("city.model"))  # doctest: +SKIP
-    >>> {layer.spec.name: layer.array.shape for layer in result.layers()}  # doctest: +SKIP
+    >>> import roadeval
+    >>> image = roadeval.Recording("out.rrd").image(frame=12)
+    >>> result = roadeval.run_frame(image, roadeval.load_model("city.model"))
+    >>> [stage.stage for stage in result.stages]
+    ['shadow', 'similarity', 'svm', 'post']
+    >>> {layer.spec.name: layer.array.shape for layer in result.layers()}["compensated"]
+    (48, 64, 3)
     """
     chains = bind((config or RunConfig()).variants(), model)
     if variant not in chains:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 from roadeval import logs
 from roadeval.config import RunConfig
 from roadeval.jobs.outputs import AnyPath
-from roadeval.jobs.run import select
 
 
 def info(drive: AnyPath, config: RunConfig | None = None) -> logs.LogDescription:
@@ -20,5 +17,5 @@ def info(drive: AnyPath, config: RunConfig | None = None) -> logs.LogDescription
     """
     config = config or RunConfig()
     return logs.describe(
-        drive, partial(select, config=config), keep_corrupt=config.frames.keep_corrupt
+        drive, config.topics, config.labels, keep_corrupt=config.frames.keep_corrupt
     )

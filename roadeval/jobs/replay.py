@@ -9,17 +9,21 @@ from pathlib import Path
 from typing import Any
 
 from roadeval import logs
-from roadeval.config import RunConfig
-from roadeval.evaluation import rates
+from roadeval.config import OutputSettings, RunConfig
+from roadeval.config.toml import run_toml
 from roadeval.jobs import summary
 from roadeval.jobs.outputs import AnyPath, Outputs, keep_apart
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import Run
-from roadeval.recording import NullRecorder, Rule, recorder_for
-from roadeval.report.figures.files import Example, write_figures
-from roadeval.results.folder import Results, ResultsWriter, summary_text
-from roadeval.results.tables import header
-from roadeval.runtime.memory import give_back
+from roadeval.recording import NullRecorder, RecordRule, recorder_for
+from roadeval.report.figures.figure import ExampleFrame, FigureData
+from roadeval.report.figures.files import write_figures
+from roadeval.results.folder import Results, ResultsWriter
+from roadeval.results.lines import sum_lines
+from roadeval.results.schema import TABLES
+from roadeval.results.summary import summary_text
+from roadeval.runtime.memory import trim
+from roadeval.version import VERSION
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,14 +76,15 @@ def replay(
         keep_apart((drive, config.training.model), (to.recording, to.mcap))
         outcome, examples = _run(log, config, to, on_progress)
         # The run's frames and models are released here: figures take their room.
-        give_back()
-        figures = write_figures(to.reports, log.name, Results(to.reports).windows, examples)
+        trim()
+        windows = Results(to.reports).windows
+        figures = write_figures(to.reports, FigureData(log.name, windows, examples))
         return replace(outcome, files=(*outcome.files, *figures))
 
 
 def _run(
     log: logs.Log, config: RunConfig, to: Outputs, on_progress: OnProgress
-) -> tuple[Outcome, list[Example]]:
+) -> tuple[Outcome, list[ExampleFrame]]:
     """Run over the log into a recording and tables; return the frames for the figure of masks."""
     with (
         ResultsWriter(to.reports) as results,
@@ -87,29 +92,38 @@ def _run(
         ExitStack() as opened,
     ):
         run = Run(log, config, on_progress)
-        recorder = recorder_for(to.recording, run.layout(), Rule.parse(config.output.record))
+        recorder = recorder_for(to.recording, run.layout(), RecordRule.parse(config.output.record))
         opened.enter_context(recorder)
-        for result, encoded in run.frames(recorder):
+        for result, lines, encoded in run.frames(recorder):
             recorder.write(encoded)
-            results.append(result)
+            results.append(lines)
             sidecar.write(result)
         on_progress(Progress(run.done, run.total, "writing"))
-        recorder.settle()
-        give_back()
-        sums, facts = run.board.tables(), summary.of(run)
-        recorder.finish(_texts(facts, sums))
-        files = results.finish(facts, sums)
+        recorder.flush()
+        trim()
+        sums = sum_lines(run.board.sums())
+        results.append(sums)
+        facts = summary.of(run) | {"tables": results.tables}
+        recorder.finish(_texts(run, facts, sums))
+        files = results.finish(facts, run_toml(config, log.name, VERSION))
     saved = None if isinstance(recorder, NullRecorder) else recorder.path
     files += [sidecar.path] if sidecar.path else []
     warnings, losses = summary.warnings(run), summary.losses(run)
-    return Outcome(saved, to.reports, facts, warnings, losses, tuple(files)), run.gallery.examples
+    return Outcome(saved, to.reports, facts, warnings, losses, tuple(files)), run.examples.kept
 
 
 def _sidecar(path: Path | None) -> logs.SidecarWriter | logs.NoSidecar:
-    return logs.NoSidecar() if path is None else logs.SidecarWriter(path, rates.of)
+    return logs.NoSidecar() if path is None else logs.SidecarWriter(path)
 
 
-def _texts(facts: Mapping[str, Any], sums: Mapping[str, str]) -> dict[str, str]:
-    """Return the results as the recording keeps them: the files' own text."""
-    tables = {name: header(name) + text for name, text in sums.items()}
-    return {"summary": summary_text(facts), **tables}
+def _texts(run: Run, facts: Mapping[str, Any], sums: Mapping[str, str]) -> dict[str, str]:
+    """Return the results as the recording keeps them: the files' own text.
+
+    Where they were written is left out, so that the same input gives the same recording.
+    """
+    config = replace(run.config, output=OutputSettings(record=run.config.output.record))
+    return {
+        "summary": summary_text({**facts, "run": config.as_dict()}),
+        "run": run_toml(config, run.log.name, VERSION),
+        **{name: TABLES[name].header + text for name, text in sums.items()},
+    }

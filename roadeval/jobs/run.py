@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -13,56 +12,33 @@ from roadeval import logs
 from roadeval.config import RunConfig
 from roadeval.data import FrameResult, Role, VariantLayout
 from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.jobs import frame as runner
-from roadeval.jobs import learning
-from roadeval.jobs.gallery import Gallery
+from roadeval.jobs.examples import ExampleFrames
 from roadeval.jobs.progress import OnProgress, Progress
-from roadeval.kernels.first_time import prepare
+from roadeval.kernels import prepare
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import MisfitError, View
 from roadeval.recording import Layout
-from roadeval.results import tables
-from roadeval.results.folder import STREAMED
-from roadeval.runtime.memory import OFTEN, give_back
+from roadeval.results.lines import lines
+from roadeval.results.schema import streamed
+from roadeval.runtime.memory import TRIM_EVERY, trim
 from roadeval.runtime.threads import ordered
-from roadeval.training import Model
+from roadeval.training import Model, learning
 from roadeval.training.model import ModelError
+from roadeval.training.schedule import Schedule
 from roadeval.version import VERSION
 
-Processed = tuple[FrameResult, Any]
-"""A scored frame, and what the recorder made of it."""
-
-
-def select(log: logs.Log, config: RunConfig) -> logs.Selection:
-    """Settle what of a log is replayed."""
-    topics = config.topics
-    tolerance = topics.sync_tolerance_ms
-    return log.select(
-        image=topics.image,
-        truth=topics.truth,
-        shadow=topics.shadow,
-        masks=topics.masks,
-        labels=logs.LabelValues(**asdict(config.labels)),
-        sync_tolerance_ns=None if tolerance is None else round(tolerance * 1e6),
-        resize_truth=topics.resize_truth,
-        scale=config.frames.scale,
-    )
-
-
-def span(config: RunConfig) -> logs.Span:
-    """Return the part of the log that is read."""
-    frames = config.frames
-    start = None if frames.start is None else logs.parse_time(frames.start)
-    end = None if frames.end is None else logs.parse_time(frames.end)
-    return logs.Span(start, end, frames.every, frames.max_frames)
+Processed = tuple[FrameResult, Mapping[str, str], Any]
+"""A scored frame, its lines of the tables, and what the recorder made of it."""
 
 
 class Encoder(Protocol):
     """Whatever turns a frame into what it will record, in any thread."""
 
-    def encode(self, result: FrameResult, position: int) -> Any:
-        """Encode the frame at ``position`` among those read, from 0."""
+    def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> Any:
+        """Encode the frame at ``position`` among those read, from 0, with its table lines."""
 
 
 class Run:
@@ -88,30 +64,30 @@ class Run:
         self.config = config
         self._tell = on_progress
         self.variants = config.variants()
-        self.selection = select(log, config)
-        self.read = log.frames(self.selection, span(config))
+        self.selection = log.select(config.topics, config.labels, scale=config.frames.scale)
+        self.read = log.frames(self.selection, logs.Span.of(config.frames))
         self.total = len(self.read)
         self.model, self._schedule = self._learn()
         self._chains = self._bind()
-        give_back()
+        trim()
         prior = None if self.model.prior is None else BlindPrior(self.model.prior)
         names = [layout.name for layout in self._layouts()]
         self.board = Scoreboard(config.evaluation, names, prior)
-        self.gallery = Gallery(self.total)
+        self.examples = ExampleFrames(self.total)
         self.done = 0
 
-    def _learn(self) -> tuple[Model, learning.Schedule]:
+    def _learn(self) -> tuple[Model, Schedule]:
         settings = self.config.training
         if settings.model is not None:
-            learnt = learning.from_file(Path(settings.model), self.variants)
+            learnt = learning.from_file(Path(settings.model), self.config.pipelines())
             self._compile()
             return learnt
         self._compile()
         labelled = self.selection.truth is not None and settings.source != "patch"
         total = min(settings.frames, self.total)
         return learning.from_log(
-            partial(self.log.frames, self.selection, span(self.config)),
-            self.variants,
+            partial(self.log.frames, self.selection, logs.Span.of(self.config.frames)),
+            self.config.pipelines(),
             settings,
             lambda done: self._tell(Progress(done, total, "training")),
             labelled=labelled,
@@ -134,12 +110,13 @@ class Run:
             width,
             height,
             self._layouts(),
+            tuple(METRICS),
             baseline=self.model.prior is not None,
             has_truth=self.selection.truth is not None,
             has_shadow_truth=self.selection.shadow is not None,
             first_frame=self._schedule.first,
             rate_hz=self.selection.image.rate_hz,
-            tables={name: tables.header(name) for name in STREAMED},
+            tables={name: table.header for name, table in streamed().items()},
             properties=self._properties(),
         )
 
@@ -174,13 +151,13 @@ class Run:
         ):
             self.done += 1
             self._tell(Progress(self.done, self.total, "replaying"))
-            if self.done % OFTEN == 0:
-                give_back()
+            if self.done % TRIM_EVERY == 0:
+                trim()
             if processed is None:
                 self.board.lose()
             else:
                 self.board.add(processed[0])
-                self.gallery.look(self.done, processed[0])
+                self.examples.offer(self.done, processed[0])
                 yield processed
 
     def _process(
@@ -207,6 +184,7 @@ class Run:
         ]
         variants += [runner.external_variant(name, mask) for name, mask in frame.external.items()]
         result = self.board.score(frame, role, tuple(variants))
-        encoded = recorder.encode(result, position)
+        own = lines(result)
+        encoded = recorder.encode(result, position, own)
         # Results wait for their turn, and would wait with some 15 bytes a pixel.
-        return result.without_layers(), encoded
+        return result.without_layers(), own, encoded

@@ -9,12 +9,11 @@ from pathlib import Path
 from roadeval import logs
 from roadeval.config import RunConfig
 from roadeval.data import Frame
-from roadeval.jobs import learning
 from roadeval.jobs.outputs import AnyPath, keep_apart
 from roadeval.jobs.progress import OnProgress, Progress, ignore
-from roadeval.jobs.run import select, span
-from roadeval.kernels.first_time import prepare
-from roadeval.training import Model, save_model
+from roadeval.kernels import prepare
+from roadeval.training import Model, TrainingError, learning, save_model
+from roadeval.training.held import HeldFrames
 
 
 def train(
@@ -39,16 +38,21 @@ def train(
     keep_apart(drives, (output,))
     settings = config.training
     total, by_truth = settings.frames * len(drives), settings.source != "patch"
-    memory = learning.Memory()
+    held = HeldFrames()
     frames: dict[Path, list[Frame]] = {}
     for drive in drives:
         with logs.open_log(drive, keep_corrupt=config.frames.keep_corrupt) as log:
-            there = partial(log.frames, select(log, config), span(config))
+            selection = log.select(config.topics, config.labels, scale=config.frames.scale)
+            there = partial(log.frames, selection, logs.Span.of(config.frames))
             prepare(lambda: on_progress(Progress(0, total, "compiling")))
             frames[log.path] = []
             for frame in learning.spread(there, settings.frames, labelled=by_truth):
-                frames[log.path].append(memory.hold(frame))
-                on_progress(Progress(memory.frames, total, "training"))
-    model = learning.from_drives(frames, config.variants(), settings)
+                if not held.add(frame):
+                    raise TrainingError(
+                        f"{held.full()}; lower training.frames, or reduce them with frames.scale"
+                    )
+                frames[log.path].append(frame)
+                on_progress(Progress(len(held.frames), total, "training"))
+    model = learning.from_drives(frames, config.pipelines(), settings)
     save_model(model, Path(output))
     return model

@@ -1,6 +1,6 @@
-"""What a document is made of: plain blocks, which `roadeval.report.pdf.typeset` sets on pages.
+"""Blocks that a document is made of; `roadeval.report.pdf.typeset` sets them on pages.
 
-Text is text, never markup: whatever a log, a topic or a path is called is printed as it is.
+Text is text, never markup: the name of a log, a topic or a path is printed as it is.
 """
 
 from __future__ import annotations
@@ -10,35 +10,35 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Final
 
-SUFFIXES: Final = {b"<?xml": "svg", b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
+_SUFFIXES: Final = {b"<?xml": "svg", b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
 
 
 @dataclass(frozen=True, slots=True)
-class Asset:
-    """A picture: the bytes of an SVG, PNG or JPEG file."""
+class ImageFile:
+    """The bytes of an SVG, PNG or JPEG file."""
 
     content: bytes = field(repr=False)
 
     @property
     def name(self) -> str:
-        """File name inside the document: equal pictures have equal names."""
-        suffix = next(s for head, s in SUFFIXES.items() if self.content.startswith(head))
+        """File name inside the document: equal files have equal names."""
+        suffix = next(s for head, s in _SUFFIXES.items() if self.content.startswith(head))
         return f"{hashlib.blake2b(self.content, digest_size=8).hexdigest()}.{suffix}"
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Anything that stands on a page; its fields are all that the page is told of it."""
+    """A part of a page."""
 
-    def plain(self) -> dict[str, Any]:
-        """Give the block as JSON has it: its kind, and its fields; a picture by its name."""
-        own = {each.name: _plain(getattr(self, each.name)) for each in fields(self)}
+    def as_json(self) -> dict[str, Any]:
+        """Return the block's kind and its fields as JSON has them; an image file by its name."""
+        own = {each.name: _as_json(getattr(self, each.name)) for each in fields(self)}
         return {"kind": type(self).__name__.lower(), **own}
 
-    def assets(self) -> Iterator[Asset]:
-        """Yield the pictures in it."""
+    def images(self) -> Iterator[ImageFile]:
+        """Yield the image files in the block and in those it holds."""
         for each in fields(self):
-            yield from _assets(getattr(self, each.name))
+            yield from _images(getattr(self, each.name))
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ class Command(Block):
 
 
 @dataclass(frozen=True, slots=True)
-class Points(Block):
+class BulletList(Block):
     """A titled list of sentences; ``tone`` is ``plain`` or ``warning``."""
 
     title: str
@@ -84,26 +84,29 @@ class Cell(Block):
 
 @dataclass(frozen=True, slots=True)
 class Table(Block):
-    """A table. Columns of numbers stand right, of words left.
+    """A table.
 
     Parameters
     ----------
     columns
-        Titles; one that begins with ``<`` heads a column of words.
+        Titles.
     rows
         As many cells each as there are columns.
+    text_columns
+        Positions of the columns of words, which are aligned left; numbers are aligned right.
     breaks
-        Rows above which a thin rule stands.
+        Rows above which a thin rule is drawn.
     groups
         Titles above several columns, each with its number of columns; together all columns.
     caption
-        Stands above the table.
+        Printed above the table.
     small
         Whether it is set in small type.
     """
 
     columns: Sequence[str]
     rows: Sequence[Sequence[Cell | str]]
+    text_columns: Sequence[int] = (0,)
     breaks: Sequence[int] = ()
     groups: Sequence[tuple[str, int]] = ()
     caption: str = ""
@@ -114,32 +117,32 @@ class Table(Block):
 class Figure(Block):
     """A picture across ``width`` of the text (0..1), with its caption below."""
 
-    picture: Asset
+    picture: ImageFile
     caption: str
     width: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Strip(Block):
+class ImageGrid(Block):
     """Pictures of equal size in rows of ``columns``, each with a few words below it.
 
-    ``skip`` leaves as many places of the first row free.
+    The first ``skip`` places of the first row stay free.
     """
 
-    pictures: Sequence[tuple[str, Asset]]
+    pictures: Sequence[tuple[str, ImageFile]]
     columns: int
     skip: int = 0
 
 
 @dataclass(frozen=True, slots=True)
-class Together(Block):
-    """Blocks that no page break may part."""
+class KeepTogether(Block):
+    """Blocks with no page break between them."""
 
     blocks: Sequence[Block]
 
 
 @dataclass(frozen=True, slots=True)
-class Columns(Block):
+class TwoColumns(Block):
     """Two stacks of blocks side by side; the left one takes ``share`` of the width."""
 
     left: Sequence[Block]
@@ -148,21 +151,21 @@ class Columns(Block):
 
 
 @dataclass(frozen=True, slots=True)
-class Contents(Block):
+class TableOfContents(Block):
     """The document's headings with their pages."""
 
 
 @dataclass(frozen=True, slots=True)
-class Break(Block):
-    """What follows begins on a new page."""
+class PageBreak(Block):
+    """The end of a page."""
 
 
 @dataclass(frozen=True, slots=True)
 class Document(Block):
-    """A document: its titles, its blocks, and the words that a search finds it by.
+    """A document: its titles, its blocks, and the keywords of the file.
 
-    ``kicker`` is the line above the title, ``subtitle`` the one below; ``footer`` stands at the
-    foot of every page.
+    ``kicker`` is the line above the title, ``subtitle`` the one below; ``footer`` is printed at
+    the foot of every page.
     """
 
     kicker: str
@@ -173,28 +176,28 @@ class Document(Block):
     keywords: Sequence[str] = ()
 
     def files(self) -> Mapping[str, bytes]:
-        """Give every picture's bytes by its name."""
-        return {asset.name: asset.content for asset in self.assets()}
+        """Return every image file's bytes by its name."""
+        return {image.name: image.content for image in self.images()}
 
 
-def _plain(value: Any) -> Any:
+def _as_json(value: Any) -> Any:
     match value:
-        case Asset():
+        case ImageFile():
             return value.name
         case Block():
-            return value.plain()
-        case list() | tuple():
-            return [_plain(item) for item in value]
+            return value.as_json()
+        case list() | tuple() | range():
+            return [_as_json(item) for item in value]
         case _:
             return value
 
 
-def _assets(value: Any) -> Iterator[Asset]:
+def _images(value: Any) -> Iterator[ImageFile]:
     match value:
-        case Asset():
+        case ImageFile():
             yield value
         case Block():
-            yield from value.assets()
+            yield from value.images()
         case list() | tuple():
             for item in value:
-                yield from _assets(item)
+                yield from _images(item)

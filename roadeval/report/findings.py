@@ -1,16 +1,16 @@
-"""What a report is made of: facts that others found, in plain tables."""
+"""What a report says about one drive: tables, frames and facts that a job has collected."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.report.figures.files import Example
-from roadeval.report.pictures import Shot
+from roadeval.report.figures.figure import ExampleFrame, FigureData
+from roadeval.report.images import LayerImage
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,7 +20,7 @@ Totals = Mapping[str, Mapping[str, Mapping[str, Any]]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Versus:
+class PairedComparison:
     """One variant's final mask against another's, frame by frame.
 
     Parameters
@@ -43,7 +43,7 @@ class Versus:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Heat:
+class ErrorHeatmap:
     """How often a pixel was a false positive and a false negative; NaN if never labelled."""
 
     variant: str
@@ -52,7 +52,7 @@ class Heat:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Case:
+class NotableFrame:
     """A frame worth looking at.
 
     Parameters
@@ -62,17 +62,17 @@ class Case:
     rates
         Of each variant's final mask: ERR, FPR, FNR.
     parts
-        How the ERR of ``variant`` came about, by stage, see `Findings.parts`.
+        The parts of the ERR of ``variant``, by stage, see `Findings.error_parts`.
     variant
         Whose failure or change it is.
     change
         The filter's change of ERR, or None.
     notes
         The recording's own sentences.
-    shots
-        The image, the truth and the errors; none where the recording is not at hand.
-    rows
-        A row a variant: its layers as they came about.
+    images
+        The camera, the truth and the errors; none where the recording is not at hand.
+    layers
+        A row a variant: its layers in the order of the stages.
     """
 
     frame: int
@@ -82,13 +82,25 @@ class Case:
     parts: Mapping[str, float] = field(default_factory=dict)
     change: float | None = None
     notes: Sequence[str] = ()
-    shots: Sequence[Shot] = ()
-    rows: Sequence[Sequence[Shot]] = ()
+    images: Sequence[LayerImage] = ()
+    layers: Sequence[Sequence[LayerImage]] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Commands:
+    """Commands for a terminal, as they are typed.
+
+    ``again`` makes the results again from the log, whose path it is given; ``inspect`` opens the
+    viewer at a frame, whose number it is given.
+    """
+
+    again: Callable[[str], str]
+    inspect: Callable[[int], str]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Findings:
-    """Everything that a report of one drive tells.
+    """Everything that a report of one drive shows.
 
     Parameters
     ----------
@@ -96,41 +108,43 @@ class Findings:
         The recording or folder, as it was named.
     complete
         Whether the run reached its end.
+    commands
+        What to type for more; None where the report is not made at a terminal.
     pictured
-        Frames to evaluate, or without truth all, whose pictures are at hand.
+        Number of frames with pictures, of those evaluated, or without truth of all.
     summary
-        As ``summary.json``; of an incomplete run, what could be made of its tables.
+        As ``summary.json``; of an incomplete run, what its tables allow to compute.
     properties
-        What the recording says of its origin.
+        The recording's own, about its origin.
     finals
         Each scored variant's final stage.
     windows
-        As ``windows.csv``, or coarser rows for a long drive.
-    rows
-        Evaluated frames in a row of ``windows``.
-    versus
+        As ``windows.csv``, or longer windows for a long drive.
+    window_size
+        Evaluated frames in a window.
+    paired
         With the filter against without first, if both were run; then against the baseline.
     regions
-        As `roadeval.evaluation.analysis.by_region` gives.
+        See `roadeval.evaluation.analysis.by_region`.
     overlap
         IoU, F1 and precision by variant and stage, pooled.
     changes
         ``variant``, ``before``, ``after``, and ``repaired`` and ``spoiled`` as shares of labelled
         pixels.
-    parts
-        How the mean ERR of each variant came about, by stage.
-    heat
-        For each variant.
+    error_parts
+        The parts of each variant's mean ERR by stage, see `roadeval.evaluation.analysis.causes`.
+    heatmaps
+        One a variant.
     oracles
-        As `roadeval.evaluation.analysis.oracles` gives; empty if the run counted none.
+        See `roadeval.evaluation.analysis.oracles`; empty if the run counted none.
     beyond
         Boundary F and flicker of each final mask, as in ``summary.json``.
     sampled
-        Frames that ``heat`` and ``changes`` were counted on; 0 if they are not there.
+        Frames that ``heatmaps`` and ``changes`` were counted on; 0 if there are none.
     examples
         Frames for figure 2.
     thumbnails
-        The drive at a glance.
+        A few frames, evenly over the drive.
     worst, helped, harmed
         Frames to look at.
     coverage
@@ -139,27 +153,38 @@ class Findings:
 
     source: str
     complete: bool
+    commands: Commands | None
     pictured: int
     summary: Mapping[str, Any]
     properties: Mapping[str, Any]
     finals: Mapping[str, str]
     windows: pd.DataFrame
-    rows: int
-    versus: Sequence[Versus]
+    window_size: int
+    paired: Sequence[PairedComparison]
     regions: pd.DataFrame
     overlap: Mapping[str, Mapping[str, Mapping[str, float]]]
     changes: pd.DataFrame
-    parts: Mapping[str, Mapping[str, float]]
-    heat: Sequence[Heat]
+    error_parts: Mapping[str, Mapping[str, float]]
+    heatmaps: Sequence[ErrorHeatmap]
     oracles: pd.DataFrame
     beyond: Mapping[str, Mapping[str, Any]]
     sampled: int
-    examples: Sequence[Example]
-    thumbnails: Sequence[Shot]
-    worst: Sequence[Case]
-    helped: Sequence[Case]
-    harmed: Sequence[Case]
+    examples: Sequence[ExampleFrame]
+    thumbnails: Sequence[LayerImage]
+    worst: Sequence[NotableFrame]
+    helped: Sequence[NotableFrame]
+    harmed: Sequence[NotableFrame]
     coverage: pd.DataFrame
+
+    @property
+    def drive(self) -> str:
+        """The drive's name."""
+        return str(self.summary["drive"]["name"])
+
+    @property
+    def figure_data(self) -> FigureData:
+        """What the figures of the results folder are drawn from."""
+        return FigureData(self.drive, self.windows, self.examples)
 
     @property
     def totals(self) -> Totals:
@@ -168,5 +193,5 @@ class Findings:
         return totals
 
     def total(self, variant: str) -> Mapping[str, Any]:
-        """Give the counts and rates of a variant's final mask."""
+        """Return the counts and rates of a variant's final mask."""
         return self.totals[variant][self.finals[variant]]

@@ -1,8 +1,9 @@
-"""Numbers and times as a person reads them: percent, percentage points, seconds."""
+"""Numbers, times and lists as a person reads them."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, Final, TypeGuard
 
@@ -13,25 +14,33 @@ _YEAR_NS: Final = 365 * 24 * 3600 * 1_000_000_000
 
 
 def defined(number: float | None) -> TypeGuard[float]:
-    """Tell whether a rate or an end of an interval has a value."""
+    """Return whether a number has a value: it is neither None nor NaN."""
     return number is not None and not math.isnan(number)
 
 
 def percent(fraction: float | None, digits: int = 2) -> str:
-    """Write a fraction in percent, without the sign: ``24.16``."""
+    """Return a fraction in percent, without the sign.
+
+    >>> percent(0.2416)
+    '24.16'
+    """
     return f"{100 * fraction:.{digits}f}" if defined(fraction) else DASH
 
 
-def points(fraction: float | None, digits: int = 2) -> str:
-    """Write a difference of two fractions in percentage points: ``+7.90``."""
-    if not defined(fraction):
+def points(difference: float | None, digits: int = 2) -> str:
+    """Return a difference of two fractions in percentage points, with its sign.
+
+    >>> points(0.079)
+    '+7.90'
+    """
+    if not defined(difference):
         return DASH
-    text = f"{100 * fraction:+.{digits}f}"
+    text = f"{100 * difference:+.{digits}f}"
     return text[1:] if float(text) == 0 else text.replace("-", MINUS)
 
 
-def interval(difference: dict[str, Any], digits: int = 2) -> str:
-    """Write the interval of a difference as ``summary.json`` has it."""
+def interval(difference: Mapping[str, Any], digits: int = 2) -> str:
+    """Return the interval of a difference, given as in ``summary.json``."""
     low, high = difference["low"], difference["high"]
     if not defined(low) or not defined(high):
         return "none given"
@@ -39,18 +48,30 @@ def interval(difference: dict[str, Any], digits: int = 2) -> str:
 
 
 def number(value: int) -> str:
-    """Write a count with thousands apart: ``15,222,322``."""
+    """Return a count with a separator between thousands.
+
+    >>> number(15222322)
+    '15,222,322'
+    """
     return f"{value:,}"
 
 
-def moment(stamp_ns: int) -> str:
-    """Write a stamp: the date and time where it is one, else seconds."""
+def timestamp(stamp_ns: int) -> str:
+    """Return a stamp as date and time, or in seconds where it is less than a year.
+
+    >>> timestamp(12_345_000_000)
+    '12.345 s'
+    """
     if stamp_ns < _YEAR_NS:
         return f"{stamp_ns / 1e9:.3f} s"
     at = datetime.fromtimestamp(stamp_ns // 1_000_000_000, UTC)
     return f"{at:%Y-%m-%d %H:%M:%S}.{stamp_ns % 1_000_000_000 // 1_000_000:03d} UTC"
 
 
-def listing(words: list[str]) -> str:
-    """Join words: ``a, b and c``."""
+def listing(words: Sequence[str]) -> str:
+    """Return words joined by commas and a last "and".
+
+    >>> listing(["a", "b", "c"])
+    'a, b and c'
+    """
     return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]])) if words else ""

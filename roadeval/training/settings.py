@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.pipeline.patch import ReferencePatch
+from roadeval.pipeline.reference_patch import ReferencePatch
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))

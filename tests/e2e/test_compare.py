@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from tests.e2e.commands import DEMO, Replayed, here, replay, roadeval
-from tests.report.documents import text
+from tests.report.making import text
 
 LIMIT = ("--fail-if", "post.filtered.ERR > +0.5pp")
 

@@ -18,7 +18,7 @@ from roadeval.jobs.result import Opened
 from roadeval.logs import LogWriter
 from roadeval.report.words import DASH
 from tests.e2e.commands import DEMO, here, roadeval
-from tests.report.documents import text
+from tests.report.making import text
 
 SECTIONS = (
     "Summary",
@@ -118,6 +118,11 @@ def test_boundary_f_and_flicker_are_those_of_the_summary(words, demo):
 
 def test_the_log_is_named_by_its_hash(words, demo):
     assert demo.summary["log"]["sha256"] in words
+
+
+def test_the_command_that_makes_the_results_again_is_given(words, demo):
+    path = demo.summary["log"]["path"]
+    assert f"roadeval replay {path} --config run.toml" in words
 
 
 def test_a_results_folder_gives_the_same_numbers_without_pictures(demo, words, tmp_path):
@@ -246,20 +251,3 @@ def test_the_same_result_gives_the_same_file_and_nothing_is_left_beside_nor_fetc
     again = report_of("drive.rrd", "again.pdf")
     assert again.read_bytes() == report.read_bytes()
     assert sorted(file.name for file in tmp_path.iterdir()) == ["again.pdf", "drive.rrd"]
-
-
-def test_the_command_that_makes_the_results_again_names_gap_and_variants():
-    from types import SimpleNamespace
-
-    from roadeval.report.sections.origin import _replay
-
-    plain = {"training": {"gap": 3}}
-    summary = {
-        "settings": {"filtered": plain, "unfiltered": plain, "wide": plain},
-        "training": {"model": None, "frames": 5},
-    }
-    found = SimpleNamespace(properties={"preset": "paper"}, summary=summary)
-    assert _replay(found, "d.mcap") == (
-        "roadeval replay d.mcap --preset paper --variant wide=wide.toml "
-        "--train-frames 5 --train-gap 3"
-    )

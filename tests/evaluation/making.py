@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from roadeval.data import Counts, Frame, Mask, StageResult, Tally, Truth, VariantResult
+from roadeval.data import Counts, Frame, Mask, Output, StageResult, Tally, Truth, VariantResult
 from roadeval.data.arrays import Bits
 from roadeval.data.packed import Packed
-from roadeval.evaluation import rates
+from roadeval.evaluation import metrics
 
 
 def pixels(*rows: str) -> npt.NDArray[np.uint8]:
@@ -38,7 +38,7 @@ def a_variant(
     """A variant with a mask a stage; its first stage found the regions."""
     found = {region: Packed.of(mask) for region, mask in (regions or {}).items()}
     stages = [
-        StageResult(stage, (), Packed.of(mask), found if place == 0 else {}, {}, 0.002)
+        StageResult(stage, Output(mask=Packed.of(mask), regions={} if place else found), 0.002)
         for place, (stage, mask) in enumerate(masks.items())
     ]
     return VariantResult(name, tuple(stages))
@@ -47,7 +47,7 @@ def a_variant(
 def a_tally(tp: int, tn: int, fp: int, fn: int, variant: str = "filtered") -> Tally:
     """A tally of the final mask with these counts."""
     counts = Counts(tp, tn, fp, fn)
-    return Tally(variant, "post", counts, {}, rates.of(counts))
+    return Tally(variant, "post", counts, {}, metrics.of(counts))
 
 
 def a_table(errors: Mapping[tuple[str, str], Sequence[int]], hertz: float = 10) -> pd.DataFrame:
@@ -72,7 +72,7 @@ def a_table(errors: Mapping[tuple[str, str], Sequence[int]], hertz: float = 10) 
                         "FP": counts.fp,
                         "FN": counts.fn,
                         "N": counts.n,
-                        **rates.of(counts),
+                        **metrics.of(counts),
                     }
                 )
     return pd.DataFrame(rows)

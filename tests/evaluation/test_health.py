@@ -3,7 +3,7 @@
 import pytest
 
 from roadeval.data import Counts, Health
-from roadeval.evaluation import rates
+from roadeval.evaluation import metrics
 from roadeval.evaluation.health import Rates, judge, notes
 from roadeval.evaluation.settings import EvaluationSettings
 
@@ -14,7 +14,7 @@ SETTINGS = EvaluationSettings(
 
 def with_error(percent: int, road: int = 50) -> Rates:
     """Rates of a frame of 100 pixels, of which ``percent`` are called road wrongly."""
-    return rates.of(Counts(tp=road, tn=100 - road - percent, fp=percent, fn=0))
+    return metrics.of(Counts(tp=road, tn=100 - road - percent, fp=percent, fn=0))
 
 
 def test_few_errors_are_fine() -> None:
@@ -27,13 +27,13 @@ def test_many_errors_degrade_and_more_fail(percent: int, health: Health) -> None
 
 
 def test_finding_next_to_no_road_fails_however_little_there_is() -> None:
-    missed = rates.of(Counts(tp=0, tn=95, fp=0, fn=5))
+    missed = metrics.of(Counts(tp=0, tn=95, fp=0, fn=5))
     assert judge(missed, None, SETTINGS) is Health.FAILED
 
 
 def test_a_frame_without_road_fails_by_its_errors_only() -> None:
-    assert judge(rates.of(Counts(tn=100)), None, SETTINGS) is Health.OK
-    assert judge(rates.of(Counts(tn=70, fp=30)), None, SETTINGS) is Health.FAILED
+    assert judge(metrics.of(Counts(tn=100)), None, SETTINGS) is Health.OK
+    assert judge(metrics.of(Counts(tn=70, fp=30)), None, SETTINGS) is Health.FAILED
 
 
 @pytest.mark.parametrize(("blind", "health"), [(7, Health.OK), (5, Health.DEGRADED)])
@@ -59,7 +59,7 @@ def test_a_large_effect_of_the_filter_is_noted(filtered: int, unfiltered: int, n
 
 
 def test_a_failure_is_noted_with_its_reason() -> None:
-    missed = rates.of(Counts(tp=1, tn=80, fp=0, fn=19))
+    missed = metrics.of(Counts(tp=1, tn=80, fp=0, fn=19))
     assert notes({"net": missed}, None, SETTINGS) == ("net finds 5.0 % of the road.",)
     wrong = notes({"net": with_error(30)}, None, SETTINGS)
     assert wrong == ("net gets 30.0 % of the pixels wrong.",)

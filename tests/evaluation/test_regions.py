@@ -4,46 +4,51 @@ import numpy as np
 
 from roadeval.data import TruthBits
 from roadeval.evaluation import regions
+from roadeval.evaluation.region import LabelledFrame
+from roadeval.evaluation.regions.bands import row_bands
+from roadeval.evaluation.regions.boundary import boundary
+from roadeval.evaluation.settings import EvaluationSettings
 from tests.evaluation.making import a_frame, a_variant, pixels, unpacked
 
 
-def boundary(truth, width):
-    return unpacked(regions.boundary(TruthBits.of(truth), width), truth.shape[1])
+def boundary_of(truth, width):
+    return unpacked(boundary(TruthBits.of(truth), width), truth.shape[1])
 
 
-def row_bands(shape, bands):
-    packed = regions.row_bands(shape, bands).items()
+def bands_of(shape, bands):
+    packed = row_bands(shape, bands).items()
     return {name: unpacked(bits, shape[1]) for name, bits in packed}
 
 
-def of_frame(frame, bands):
-    truth = TruthBits.of(frame.truth)
-    found = regions.of_frame(frame, truth, [], boundary_width=1, bands=bands).items()
+def of_frame(frame, bands, variants=()):
+    settings = EvaluationSettings(boundary_width=1, bands=bands)
+    labelled = LabelledFrame(frame, TruthBits.of(frame.truth), variants, settings)
+    found = regions.of_frame(labelled).items()
     return {name: unpacked(bits, frame.truth.shape[1]) for name, bits in found}
 
 
 def test_the_boundary_lies_within_its_width_on_both_sides_of_the_edge() -> None:
     truth = pixels("...####", "...####")
-    assert (boundary(truth, 1) == pixels("..##...", "..##...")).all()
-    assert (boundary(truth, 2) == pixels(".####..", ".####..")).all()
+    assert (boundary_of(truth, 1) == pixels("..##...", "..##...")).all()
+    assert (boundary_of(truth, 2) == pixels(".####..", ".####..")).all()
 
 
 def test_the_boundary_turns_corners() -> None:
     truth = pixels("....", ".#..", "....", "....")
-    assert (boundary(truth, 1) == pixels("###.", "###.", "###.", "....")).all()
+    assert (boundary_of(truth, 1) == pixels("###.", "###.", "###.", "....")).all()
 
 
 def test_road_that_meets_ignored_pixels_has_no_edge_there() -> None:
     truth = pixels("##???..", "##???..")
-    assert not boundary(truth, 1).any()
+    assert not boundary_of(truth, 1).any()
 
 
 def test_a_frame_of_one_class_has_no_boundary() -> None:
-    assert not boundary(pixels("###", "###"), 2).any()
+    assert not boundary_of(pixels("###", "###"), 2).any()
 
 
 def test_bands_go_from_top_to_bottom_and_share_the_rows() -> None:
-    bands = row_bands((7, 2), 5)
+    bands = bands_of((7, 2), 5)
     assert list(bands) == ["band_0", "band_1", "band_2", "band_3", "band_4"]
     assert sum(bands.values()).tolist() == [[1, 1]] * 7
     rows = [int(np.count_nonzero(band[:, 0])) for band in bands.values()]
@@ -53,7 +58,7 @@ def test_bands_go_from_top_to_bottom_and_share_the_rows() -> None:
 
 
 def test_more_bands_than_rows_leave_some_empty() -> None:
-    bands = row_bands((2, 3), 5)
+    bands = bands_of((2, 3), 5)
     assert sum(bands.values()).tolist() == [[1, 1, 1]] * 2
 
 
@@ -61,9 +66,11 @@ def test_a_region_is_the_same_for_all_variants() -> None:
     mask, first, second = pixels("#."), pixels("##"), pixels("..")
     with_filter = a_variant("filtered", {"post": mask}, {"shadow": first})
     another = a_variant("gated", {"post": mask}, {"shadow": second, "lit": second})
-    found = regions.detected([a_variant("unfiltered", {"post": mask}), with_filter, another])
-    pixels_of = {name: mask.pixels().tolist() for name, mask in found.items()}
-    assert pixels_of == {"shadow": first.tolist(), "lit": second.tolist()}
+    unfiltered = a_variant("unfiltered", {"post": mask})
+    found = of_frame(a_frame(mask), 1, (unfiltered, with_filter, another))
+    assert list(found)[:2] == ["shadow", "lit"]
+    assert (found["shadow"] == first).all()
+    assert (found["lit"] == second).all()
 
 
 def test_a_frame_has_true_shadow_only_if_the_log_has_it() -> None:
@@ -80,3 +87,23 @@ def test_a_frame_has_true_shadow_only_if_the_log_has_it() -> None:
 def test_interior_is_what_the_boundary_leaves() -> None:
     found = of_frame(a_frame(pixels("...###")), 1)
     assert (found["interior"] == pixels("##..##")).all()
+
+
+def test_regions_have_titles_in_the_reports_order():
+    names = ["band_0", "band_1", "band_2", "lit", "boundary", "wet_road"]
+    assert regions.titles(names, height=8) == {
+        "lit": "in light",
+        "boundary": "near the road's edge",
+        "band_0": "image rows 0\N{EN DASH}2, the top",
+        "band_1": "image rows 3\N{EN DASH}5",
+        "band_2": "image rows 6\N{EN DASH}7, the bottom",
+        "wet_road": "wet road",
+    }
+    assert regions.titles(["band_0"])["band_0"].startswith("image rows, band 0")
+
+
+def test_the_regions_that_make_up_a_frame_do_so_family_by_family():
+    found = of_frame(a_frame(pixels("##..", "#...")), 2, ())
+    for family in regions.partitions(found):
+        assert (sum(found[name] for name in family) == 1).all()
+    assert regions.partitions(found) == [["boundary", "interior"], ["band_0", "band_1"]]

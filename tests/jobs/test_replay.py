@@ -11,10 +11,11 @@ import roadeval
 from roadeval import RoadevalError
 from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import Run
-from roadeval.logs import open_log
-from roadeval.pipeline.paper import svm as classify
-from roadeval.results.folder import Results, summary_text
-from roadeval.results.tables import COLUMNS
+from roadeval.logs import TopicSettings, open_log
+from roadeval.pipeline.paper import svm
+from roadeval.results.folder import Results
+from roadeval.results.schema import TABLES
+from roadeval.results.summary import summary_text
 from tests.fixtures.make import make
 from tests.jobs.making import FRAMES, NS, settings, write_log
 
@@ -123,7 +124,7 @@ def test_figures_are_written(once):
 
 def test_the_number_of_workers_changes_no_number(drive, once, tmp_path):
     run(drive, tmp_path, jobs=1)
-    for table in COLUMNS:
+    for table in TABLES:
         other = (tmp_path / "reports" / f"{table}.csv").read_bytes()
         assert other == (once[0] / "reports" / f"{table}.csv").read_bytes()
 
@@ -155,8 +156,8 @@ def test_the_variants_of_a_model_file_are_bound_once(drive, tmp_path, monkeypatc
         bound.append(machine)
         return made(machine, settings)
 
-    made = classify.colour_table
-    monkeypatch.setattr(classify, "colour_table", table)
+    made = svm.colour_table
+    monkeypatch.setattr(svm, "colour_table", table)
     run(drive, tmp_path, model=tmp_path / "m.model", max_frames=3)
     assert len(bound) == len({id(machine) for machine in bound}) == 2
 
@@ -187,7 +188,7 @@ def test_a_log_without_truth_trains_a_model_for_others(drive, tmp_path):
 
 def test_the_memory_of_training_is_bounded_over_all_drives(drive, tmp_path, monkeypatch):
     other = write_log(tmp_path / "other.mcap")
-    monkeypatch.setattr("roadeval.jobs.learning.GREATEST_MEMORY", 15 * 10_000)
+    monkeypatch.setattr("roadeval.training.held.GREATEST_MEMORY", 15 * 10_000)
     with pytest.raises(RoadevalError, match=r"more than 1\d of them would take"):
         roadeval.train([drive, other], tmp_path / "m.model")
 
@@ -235,7 +236,7 @@ def test_results_become_a_log_with_the_images_own_times(drive, tmp_path):
     scored = pd.read_csv(tmp_path / "frames.csv").query("variant == 'filtered' and stage == 'post'")
     with open_log(tmp_path / "side.mcap") as side:
         counts = {topic.name: topic.count for topic in side.topics}
-        masks = side.select(image="/roadeval/filtered/post", truth="")
+        masks = side.select(TopicSettings(image="/roadeval/filtered/post", truth=""))
         stamps = [logged.stamp_ns for logged in side.frames(masks)]
     assert counts["/roadeval/unfiltered/svm"] == FRAMES
     assert counts["/roadeval/metrics/filtered/post"] == len(scored)
@@ -349,7 +350,7 @@ def test_a_variant_whose_preset_trains_otherwise_is_trained_like_the_rest_and_wa
     assert settings(preset="robust", variants={"v": {"preset": "robust"}}).ignored() == ()
 
 
-@pytest.mark.parametrize("table", COLUMNS)
+@pytest.mark.parametrize("table", TABLES)
 def test_a_table_is_the_same_in_the_folder_and_in_the_recording_bit_by_bit(once, table):
     folder, outcome = once
     recording, results = roadeval.Recording(outcome.recording), Results(folder / "reports")
@@ -474,12 +475,12 @@ def test_reduced_masks_do_not_go_beside_the_log(drive, tmp_path):
 
 def test_results_that_wait_have_lost_their_layers_but_not_their_masks(drive):
     class Seen:
-        def encode(self, result, position):
+        def encode(self, result, position, lines):
             return result
 
     options = settings(max_frames=14)
     with open_log(drive) as log:
-        *_, (lean, whole) = Run(log, options, ignore).frames(Seen())
+        *_, (lean, _, whole) = Run(log, options, ignore).frames(Seen())
     assert any(list(variant.layers()) for variant in whole.variants)
     assert not any(list(variant.layers()) for variant in lean.variants)
     assert lean.tallies == whole.tallies

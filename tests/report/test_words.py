@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from roadeval.report.words import DASH, MINUS, interval, listing, moment, percent, points
+from roadeval.report.words import DASH, MINUS, interval, listing, number, percent, points, timestamp
 
 
 @pytest.mark.parametrize(
@@ -28,8 +28,13 @@ def test_an_interval_is_given_or_not():
 
 
 def test_a_stamp_is_a_date_where_it_can_be_one():
-    assert moment(1_700_000_041_250_000_000) == "2023-11-14 22:14:01.250 UTC"
-    assert moment(12_345_000_000) == "12.345 s"
+    assert timestamp(1_700_000_041_250_000_000) == "2023-11-14 22:14:01.250 UTC"
+    assert timestamp(12_345_000_000) == "12.345 s"
+
+
+def test_a_count_has_its_thousands_apart():
+    assert number(15_222_322) == "15,222,322"
+    assert number(999) == "999"
 
 
 def test_words_are_joined():

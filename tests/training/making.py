@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from roadeval.config import RunConfig
 from roadeval.data import Frame
-from roadeval.training import Plan
+from roadeval.pipeline.chain import Pipeline
 
 GREY, GREEN = (170, 170, 175), (40, 80, 35)
 
@@ -19,6 +18,7 @@ def frame(number: int = 0, *, labelled: bool = True) -> Frame:
     return Frame(number, number, number, image, image.tobytes(), truth=truth if labelled else None)
 
 
-def plans():
-    """Give the two default variants' plans."""
-    return {v.name: Plan(v.pipeline.chain, v.pipeline.settings) for v in RunConfig().variants()}
+def pipelines():
+    """The pipelines of the two default variants."""
+    pipeline = Pipeline.default(("shadow", "similarity", "svm", "post"))
+    return {"filtered": pipeline, "unfiltered": pipeline.without_filter()}

@@ -27,7 +27,7 @@ def replay(
     config = arguments.configuration(given)
     from roadeval.cli import outcome
     from roadeval.jobs.replay import replay as run
-    from roadeval.results.folder import summary_text
+    from roadeval.results.summary import summary_text
 
     with progress.watched(quiet) as watch:
         found = run(drive, config, on_progress=watch)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import shlex
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
+
+if TYPE_CHECKING:
+    from roadeval.report.findings import Commands
 
 
 class PaperName(StrEnum):
@@ -46,12 +50,21 @@ def report(
     from roadeval.report.pdf.typeset import Paper
 
     opened = Opened(result)
-    path = write(opened, output, paper=Paper(paper))
+    path = write(opened, output, paper=Paper(paper), commands=_commands(result))
     if not quiet:
         console.emit(str(path))
     if not opened.complete:
         messages.warning(f"{result}: a partial recording; the report covers what can be read of it")
     return ExitCode.DONE
+
+
+def _commands(result: Path) -> Commands:
+    from roadeval.report.findings import Commands
+
+    return Commands(
+        lambda log: shlex.join(["roadeval", "replay", log, "--config", "run.toml"]),
+        lambda frame: shlex.join(["roadeval", "inspect", str(result), "--frame", str(frame)]),
+    )
 
 
 COMMAND: Final = report

@@ -1,32 +1,32 @@
-"""The paper's figures as files: PNG to look at, PDF to print. No screen is needed.
+"""Figures as files: PNG, PDF and SVG. No screen is needed.
 
-Equal results give equal files, byte for byte.
+Equal figures give equal files, byte for byte.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.errors import RoadevalError
-from roadeval.report.figures.masks import Example, road_masks
-from roadeval.report.figures.rates import error_rate, fp_fn_rate
+from roadeval.report.blocks import ImageFile
+from roadeval.report.figures.figure import FigureData, FigureSpec, figures
 from roadeval.report.figures.style import RC
-from roadeval.runtime import files as folders
+from roadeval.runtime import files
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
-__all__ = ["Example", "FiguresError", "write_figures"]
-
-_SAVING: Final[dict[str, dict[str, Any]]] = {
+_SAVING: Final[Mapping[str, Mapping[str, Any]]] = {
     # This packs twice as fast as Pillow's own choice, into files 4 % larger.
     "png": {"metadata": {"Software": None}, "pil_kwargs": {"compress_level": 4}},
     "pdf": {"metadata": {"CreationDate": None, "Producer": None, "Creator": "roadeval"}},
+    "svg": {"metadata": {"Date": None}},
 }
+_WRITTEN: Final = ("png", "pdf")
 _DPI: Final = 200
 
 
@@ -34,24 +34,18 @@ class FiguresError(RoadevalError):
     """The figures cannot be written."""
 
 
-def write_figures(
-    folder: Path, drive: str, windows: pd.DataFrame, examples: Sequence[Example]
-) -> list[Path]:
-    """Write ``fig2_masks``, ``fig3a_error_rate`` and ``fig3b_fp_fn_rate`` as PNG and PDF.
+def write_figures(folder: Path, data: FigureData) -> list[Path]:
+    """Write every figure as PNG and PDF.
 
-    A figure that would be empty is not written, and one of that name from an earlier run is
-    removed: rates need a row of ``windows``, masks an example.
+    A figure with nothing to draw is not written, and one of that name from an earlier run is
+    removed.
 
     Parameters
     ----------
     folder
         Made if it does not exist.
-    drive
-        Stands in the titles.
-    windows
-        As ``windows.csv``, any number of variants.
-    examples
-        Frames for figure 2.
+    data
+        What is drawn.
 
     Returns
     -------
@@ -63,36 +57,53 @@ def write_figures(
     FiguresError
         If the folder cannot be written to.
     """
-    drawings: dict[str, Callable[[], Figure] | None] = {
-        "fig2_masks": (lambda: road_masks(drive, examples)) if examples else None,
-        "fig3a_error_rate": (lambda: error_rate(drive, windows)) if len(windows) else None,
-        "fig3b_fp_fn_rate": (lambda: fp_fn_rate(drive, windows)) if len(windows) else None,
-    }
     try:
-        with folders.made(folder):
-            return [path for name, draw in drawings.items() for path in _write(folder / name, draw)]
+        return [path for figure in figures() for path in _write(folder, figure, data)]
     except OSError as error:
         raise FiguresError(
             f"{error.filename or folder}: cannot write figures ({error.strerror}); "
-            "choose another folder with --reports"
+            "choose another folder with output.reports"
         ) from error
 
 
-def _write(stem: Path, draw: Callable[[], Figure] | None) -> list[Path]:
-    """Draw a figure and write it in both formats; without a drawing, remove what is there."""
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
+def svg(draw: Callable[[], Figure]) -> ImageFile:
+    """Return a figure as SVG.
 
-    paths = [stem.with_suffix(f".{kind}") for kind in _SAVING]
-    if draw is None:
-        for path in paths:
-            path.unlink(missing_ok=True)
-        return []
+    Text stays text, in the font that `roadeval.report.pdf.typeset` finds with Matplotlib, so that
+    the document embeds each font once and its figures can be searched.
+    """
+    with _style():
+        return ImageFile(_encoded(draw(), "svg"))
+
+
+def svg_of(spec: FigureSpec, data: FigureData) -> ImageFile | None:
+    """Return a figure of the results folder as SVG; None if there is nothing to draw."""
+    with _style():
+        figure = spec.draw(data)
+        return None if figure is None else ImageFile(_encoded(figure, "svg"))
+
+
+def _write(folder: Path, spec: FigureSpec, data: FigureData) -> Iterator[Path]:
+    paths = {kind: folder / f"{spec.name}.{kind}" for kind in _WRITTEN}
+    with _style():
+        figure = spec.draw(data)
+        for kind, path in paths.items():
+            if figure is None:
+                path.unlink(missing_ok=True)
+            else:
+                files.put(path, _encoded(figure, kind))
+                yield path
+
+
+@contextmanager
+def _style() -> Iterator[None]:
+    import matplotlib as mpl
+
     with mpl.rc_context(RC):  # type: ignore[arg-type]
-        figure = draw()
-        FigureCanvasAgg(figure)
-        for path, (kind, saving) in zip(paths, _SAVING.items(), strict=True):
-            drawn = BytesIO()
-            figure.savefig(drawn, format=kind, dpi=_DPI, **saving)
-            folders.put(path, drawn.getvalue())
-    return paths
+        yield
+
+
+def _encoded(figure: Figure, kind: str) -> bytes:
+    content = BytesIO()
+    figure.savefig(content, format=kind, dpi=_DPI, **_SAVING[kind])
+    return content.getvalue()

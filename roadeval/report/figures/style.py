@@ -1,12 +1,15 @@
-"""How figures look: colours that the colour-blind can tell apart, and shapes that need none."""
+"""How figures look: fonts, colours and the marks that tell variants apart."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.data import BASELINE, FILTERED, UNFILTERED
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, colours
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 RC: Final[dict[str, Any]] = {
     "font.family": "DejaVu Sans",
@@ -29,18 +32,22 @@ RC: Final[dict[str, Any]] = {
     "legend.frameon": False,
     "legend.fontsize": 9,
     "pdf.fonttype": 42,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "roadeval",
     "savefig.facecolor": "white",
 }
 """Matplotlib's settings for every figure; fonts go into a PDF as TrueType."""
 INK: Final = "#222222"
 FAINT: Final = "#666666"
+PALE: Final = "#E3E3E3"
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
     """How a variant is drawn: told apart by colour, by marker, and by dash.
 
-    ``dash`` is Matplotlib's: on and off lengths, or ``"-"``; ``order`` says what lies on top.
+    ``dash`` is Matplotlib's: on and off lengths, or ``"-"``; of two that overlap, the one with
+    the greater ``order`` is on top.
     """
 
     label: str
@@ -51,37 +58,63 @@ class Look:
     width: float = 1.8
     order: int = 3
 
+    @property
+    def line(self) -> dict[str, Any]:
+        """Matplotlib's arguments for its line."""
+        return {"color": self.colour, "linestyle": self.dash, "linewidth": self.width}
+
+    @property
+    def mark(self) -> dict[str, Any]:
+        """Matplotlib's arguments for its markers."""
+        face = "white" if self.hollow else self.colour
+        return {"marker": self.marker, "markerfacecolor": face}
+
 
 _KNOWN: Final = {
-    FILTERED: Look("filtered: with the shadow filter", "#0072B2", "o", "-"),
-    UNFILTERED: Look("unfiltered: without it", "#E69F00", "s", (0, (5, 2)), hollow=True),
+    FILTERED: Look(
+        "filtered: with the shadow filter", colours.hex_of(colours.FILTERED), "o", dash="-"
+    ),
+    UNFILTERED: Look(
+        "unfiltered: without it",
+        colours.hex_of(colours.UNFILTERED),
+        "s",
+        dash=(0, (5, 2)),
+        hollow=True,
+    ),
     BASELINE: Look(
-        "blind: never looks at the image", "#8A8A8A", "x", (0, (1, 1.4)), width=1.3, order=2
+        "blind: never looks at the image",
+        colours.hex_of(colours.BLIND),
+        "x",
+        dash=(0, (1, 1.4)),
+        width=1.3,
+        order=2,
     ),
 }
-_MORE: Final = (
-    Look("", "#009E73", "^", (0, (7, 2, 1.5, 2))),
-    Look("", "#CC79A7", "D", (0, (3, 2)), hollow=True),
-    Look("", "#D55E00", "v", (0, (9, 3))),
-    Look("", "#56B4E9", "P", (0, (5, 2, 1.5, 2, 1.5, 2)), hollow=True),
-    Look("", "#000000", "X", (0, (2, 1))),
+_SHAPES: Final = (
+    Look("", "", "^", (0, (7, 2, 1.5, 2))),
+    Look("", "", "D", (0, (3, 2)), hollow=True),
+    Look("", "", "v", (0, (9, 3))),
+    Look("", "", "P", (0, (5, 2, 1.5, 2, 1.5, 2)), hollow=True),
+    Look("", "", "X", (0, (2, 1))),
 )
 
 
 def looks(variants: Sequence[str]) -> dict[str, Look]:
-    """Give each variant its look; one that does not come by default gets the next free one."""
+    """Return each variant's look; those that do not come by default take turns at the others."""
     others = [name for name in variants if name not in _KNOWN]
     found = {
-        name: replace(_MORE[index % len(_MORE)], label=name) for index, name in enumerate(others)
+        name: replace(
+            _SHAPES[place % len(_SHAPES)],
+            label=name,
+            colour=colours.hex_of(colours.EXTRA[place % len(colours.EXTRA)]),
+        )
+        for place, name in enumerate(others)
     }
-    return {name: _KNOWN[name] if name in _KNOWN else found[name] for name in variants}
+    return {name: _KNOWN.get(name) or found[name] for name in variants}
 
 
-def heading(figure: Any, title: str, subtitle: str) -> None:
-    """Write a figure's title and, smaller, what it shows, at its top left.
-
-    ``figure`` is a Matplotlib Figure; the two lines take the topmost half inch.
-    """
+def heading(figure: Figure, title: str, subtitle: str) -> None:
+    """Write a figure's title and, smaller, what it shows, into its topmost half inch."""
     height = figure.get_figheight()
     figure.text(0.012, 1 - 0.10 / height, title, size=11, weight="bold", color=INK, va="top")
     figure.text(0.012, 1 - 0.32 / height, subtitle, size=8.5, color=FAINT, va="top")

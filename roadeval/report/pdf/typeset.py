@@ -1,4 +1,4 @@
-"""From blocks to a PDF, by Typst.
+"""Blocks typeset as a PDF by Typst.
 
 Chosen over ReportLab (its own layout is left to the caller), WeasyPrint (needs Pango and other
 system libraries) and LaTeX (no package of Python's index brings it): one wheel, Apache-2.0, that
@@ -17,23 +17,27 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
+from roadeval.data import colours
 from roadeval.errors import RoadevalError
 from roadeval.report.blocks import Document
-from roadeval.runtime import files as folders
+from roadeval.runtime.files import put
 
 _TEMPLATE: Final = "document.typ"
 _CONTROL: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 
 
 class Paper(StrEnum):
-    """Sizes of paper."""
+    """Paper sizes."""
 
     A4 = "a4"
     LETTER = "letter"
 
 
-_NAMES: Final = {Paper.A4: "a4", Paper.LETTER: "us-letter"}
-"""Typst's names for them."""
+_TYPST_NAMES: Final = {Paper.A4: "a4", Paper.LETTER: "us-letter"}
+_COLOURS: Final = {
+    "accent": colours.hex_of(colours.BLUE),
+    "alarm": colours.hex_of(colours.VERMILLION),
+}
 
 
 class ReportError(RoadevalError):
@@ -41,14 +45,15 @@ class ReportError(RoadevalError):
 
 
 def pdf(document: Document, paper: Paper = Paper.A4) -> bytes:
-    """Typeset a document. The same document gives the same bytes.
+    """Return a document as PDF; equal documents give equal bytes.
 
-    Fonts are Typst's own and, for the figures, Matplotlib's; never the machine's, so that it
-    looks the same everywhere.
+    Fonts are Typst's own and, for the figures, Matplotlib's; never the machine's, so that a
+    document looks the same everywhere.
     """
     import typst
 
-    data = _printable(document.plain() | {"paper": _NAMES[paper]})
+    page = {"paper": _TYPST_NAMES[paper], "colours": _COLOURS}
+    data = _printable(document.as_json() | page)
     sources = {
         _TEMPLATE: files("roadeval.report.pdf").joinpath(_TEMPLATE).read_bytes(),
         "document.json": json.dumps(data).encode(),
@@ -61,13 +66,13 @@ def pdf(document: Document, paper: Paper = Paper.A4) -> bytes:
             Path(folder, _TEMPLATE),
             root=Path(folder),
             format="pdf",
-            font_paths=typst.Fonts(include_system_fonts=False, font_paths=[_figures_fonts()]),
+            font_paths=typst.Fonts(include_system_fonts=False, font_paths=[_font_folder()]),
         )
     return compiled
 
 
-def put(path: Path, content: bytes) -> Path:
-    """Write a file, which bears its name only when it is complete.
+def write_file(path: Path, content: bytes) -> Path:
+    """Write a report; an incomplete file never has its name.
 
     Raises
     ------
@@ -75,23 +80,23 @@ def put(path: Path, content: bytes) -> Path:
         If it cannot be written.
     """
     try:
-        folders.put(path, content)
+        put(path, content)
     except OSError as error:
         raise ReportError(
-            f"{path}: cannot be written ({error.strerror}); choose another place with -o"
+            f"{path}: cannot be written ({error.strerror}); choose another place"
         ) from error
     return path
 
 
-def _figures_fonts() -> str:
-    """Find the folder of the fonts that Matplotlib brings."""
+def _font_folder() -> str:
+    """Return the folder of the fonts that Matplotlib brings."""
     from matplotlib import get_data_path
 
     return str(Path(get_data_path(), "fonts", "ttf"))
 
 
 def _printable(value: Any) -> Any:
-    """Leave out control characters and lone surrogates, which no font has."""
+    """Return a value without control characters and lone surrogates, which no font has."""
     match value:
         case str():
             return _CONTROL.sub("", value.encode("utf-8", "replace").decode())

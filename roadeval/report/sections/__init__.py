@@ -1,1 +1,1 @@
-"""The sections of a report, as blocks."""
+"""The sections of a drive's report, one file each: ``section(findings)`` yields its blocks."""

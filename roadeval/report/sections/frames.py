@@ -2,35 +2,35 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from roadeval.evaluation.analysis import FILTER
 from roadeval.report.blocks import (
     Block,
     Cell,
-    Columns,
     Command,
     Heading,
-    Strip,
+    ImageGrid,
+    KeepTogether,
     Table,
     Text,
-    Together,
+    TwoColumns,
 )
-from roadeval.report.findings import Case, Findings
-from roadeval.report.pictures import asset
-from roadeval.report.sections.front import variant_cell
-from roadeval.report.sections.reasons import FILTER
-from roadeval.report.words import moment, percent, points
+from roadeval.report.findings import Findings, NotableFrame
+from roadeval.report.images import jpeg
+from roadeval.report.sections.common import variant_cell
+from roadeval.report.words import percent, points, timestamp
 
 LARGE: Final = 420
 SMALL: Final = 200
+"""Pixels across the pictures of outcomes and of layers."""
 
 
-def gallery(found: Findings) -> Iterator[Block]:
-    """Show the worst frames with all their layers, then those that the filter moved most."""
-    first = next(iter(found.finals))
-    if not found.worst:
+def section(findings: Findings) -> Iterator[Block]:
+    """Yield the worst frames with all their layers, then those that the filter changed most."""
+    first = next(iter(findings.finals))
+    if not findings.worst:
         yield Heading("The worst frames")
         yield Text(f"ERR of {first} is undefined on every frame, so no frame is the worst.")
     rule = Text(
@@ -38,65 +38,64 @@ def gallery(found: Findings) -> Iterator[Block]:
         "Below the errors stand each variant's steps, from left to right.",
         "note",
     )
-    yield from _cards(found, [Heading("The worst frames"), rule], found.worst)
-    yield from _cards(found, [Heading("Frames that the filter helped most", 2)], found.helped)
-    yield from _cards(found, [Heading("Frames that the filter harmed most", 2)], found.harmed)
+    yield from _frames(findings, [Heading("The worst frames"), rule], findings.worst)
+    helped, harmed = (
+        Heading(f"Frames that the filter {what} most", 2) for what in ("helped", "harmed")
+    )
+    yield from _frames(findings, [helped], findings.helped)
+    yield from _frames(findings, [harmed], findings.harmed)
 
 
-def _cards(found: Findings, head: Sequence[Block], cases: Sequence[Case]) -> Iterator[Block]:
-    """Show frames below a heading that stays with the first of them."""
-    cards = [list(_card(found, case)) for case in cases]
-    for place, card in enumerate(cards):
-        yield Together([*head, *card] if place == 0 else card)
+def _frames(
+    findings: Findings, head: Sequence[Block], frames: Sequence[NotableFrame]
+) -> Iterator[Block]:
+    """Yield frames below a heading, which is on the page of the first of them."""
+    for place, frame in enumerate(frames):
+        yield KeepTogether([*(head if place == 0 else ()), *_frame(findings, frame)])
 
 
-def culprit(case: Case) -> str:
-    """Name the stage with the greatest part in a frame's error."""
-    name = max(case.parts, key=lambda part: case.parts[part])
-    return "the shadow filter" if name == FILTER else name
-
-
-def command(found: Findings, frame: int) -> str:
-    """Give the command that opens the viewer at a frame."""
-    return f"roadeval inspect {shlex.quote(found.source)} --frame {frame}"
-
-
-def _card(found: Findings, case: Case) -> Iterator[Block]:
+def _frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
     rates = Table(
-        ["<final mask, %", "ERR", "FPR", "FNR"],
+        ["final mask, %", "ERR", "FPR", "FNR"],
         [
             [
-                variant_cell(name, [*found.finals]),
-                Cell(percent(rates["ERR"]), bold=name == case.variant),
+                variant_cell(name, [*findings.finals]),
+                Cell(percent(rates["ERR"]), bold=name == frame.variant),
                 percent(rates["FPR"]),
                 percent(rates["FNR"]),
             ]
-            for name, rates in case.rates.items()
+            for name, rates in frame.rates.items()
         ],
         small=True,
     )
-    words = [Text(sentence, "note") for sentence in _said(case)]
-    yield Columns([Text(f"Frame {case.frame}", "title"), *words], [rates], 0.55)
-    if case.shots:
-        yield Strip([(shot.title, asset(shot, LARGE)) for shot in case.shots], 4)
-    columns = max((len(row) for row in case.rows), default=0)
-    for row in case.rows:
-        pictures = [(shot.title, asset(shot, SMALL)) for shot in row]
-        yield Strip(pictures, columns, skip=columns - len(row))
-    if found.pictured:
-        yield Command(command(found, case.frame))
+    sentences = [Text(sentence, "note") for sentence in _sentences(frame)]
+    yield TwoColumns([Text(f"Frame {frame.frame}", "title"), *sentences], [rates], 0.55)
+    if frame.images:
+        yield ImageGrid([(image.title, jpeg(image, LARGE)) for image in frame.images], 4)
+    columns = max((len(row) for row in frame.layers), default=0)
+    for row in frame.layers:
+        pictures = [(image.title, jpeg(image, SMALL)) for image in row]
+        yield ImageGrid(pictures, columns, skip=columns - len(row))
+    if findings.pictured and findings.commands:
+        yield Command(findings.commands.inspect(frame.frame))
 
 
-def _said(case: Case) -> Iterator[str]:
-    yield f"Stamp {moment(case.stamp_ns)}"
-    if case.change is not None:
-        yield f"The filter changes ERR by {points(case.change)} pp."
+def _sentences(frame: NotableFrame) -> Iterator[str]:
+    yield f"Stamp {timestamp(frame.stamp_ns)}"
+    if frame.change is not None:
+        yield f"The filter changes ERR by {points(frame.change)} pp."
         return
-    if len(case.parts) > 1:
-        first, *rest = case.parts
-        terms = [f"{first} {percent(case.parts[first])}"]
-        terms += [f"{name} {points(case.parts[name])}" for name in rest]
-        told = ", ".join(terms)
-        yield f"ERR of {case.variant}: {told} pp. Most of it comes from {culprit(case)}."
-    if case.notes:
-        yield " ".join(case.notes)
+    if len(frame.parts) > 1:
+        first, *rest = frame.parts
+        terms = [f"{first} {percent(frame.parts[first])}"]
+        terms += [f"{name} {points(frame.parts[name])}" for name in rest]
+        sum_ = ", ".join(terms)
+        yield f"ERR of {frame.variant}: {sum_} pp. Most of it comes from {culprit(frame)}."
+    if frame.notes:
+        yield " ".join(frame.notes)
+
+
+def culprit(frame: NotableFrame) -> str:
+    """Return the stage with the greatest part in a frame's error."""
+    name = max(frame.parts, key=lambda part: frame.parts[part])
+    return "the shadow filter" if name == FILTER else name

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from roadeval.data import Frame
-from roadeval.logs import FrameError, Instant, Kind, LogError, Span, open_log
+from roadeval.logs import FrameError, Instant, LogError, Span, TopicKind, open_log
 from roadeval.logs.messages.pictures import CompressedPicture, Picture
 from roadeval.logs.messages.video import Video, is_keyframe
 from tests.fixtures.flavours import ENCODERS, VIDEO_FRAMES, bar
@@ -26,7 +26,7 @@ def frames(path: Path, span: Span | None = None) -> list[Frame]:
 @pytest.mark.parametrize("log", VIDEOS, indirect=True)
 def test_its_size_is_known_before_the_first_frame(log: Path) -> None:
     with open_log(log) as opened:
-        assert opened.topics[0].kind is Kind.VIDEO
+        assert opened.topics[0].kind is TopicKind.VIDEO
         assert opened.topics[0].size in ((128, 96), (320, 240))
         assert opened.topics[0].size == frames(log)[0].image.shape[1::-1]
 
@@ -127,3 +127,11 @@ def test_every_codec_is_decoded_from_any_frame(log: Path) -> None:
     assert [frame.number for frame in found] == list(range(VIDEO_FRAMES))
     assert all(np.abs(f.image.astype(int) - bar(f.number)).mean() < 5 for f in found)
     assert all(np.array_equal(a.image, b.image) for a, b in zip(late, found[6:], strict=True))
+
+
+@pytest.mark.parametrize("log", both("flavours", H264), indirect=True)
+def test_parameters_in_a_packet_of_their_own_announce_a_keyframe(log: Path) -> None:
+    whole = bytes(Packets(log, set()).packets[0].data)
+    parameters = whole[: whole.index(b"\x00\x00\x01\x65")]
+    assert is_keyframe(CompressedPicture(0, "h264", parameters))
+    assert not is_keyframe(CompressedPicture(0, "h264", b"no video"))

@@ -8,7 +8,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from roadeval.logs import LabelValues, LogError, open_log, pack
+from roadeval.logs import LabelSettings, LogError, open_log, pack
 from tests.fixtures.shared import shared
 from tests.logs.making import grey, jpeg, png
 
@@ -78,7 +78,7 @@ def test_what_cannot_be_packed_is_refused(tmp_path: Path) -> None:
         ({"masks": lossy}, "a JPEG blurs its labels"),
         ({"masks": other}, "no mask has the name of an image"),
         ({"masks": empty}, "no image in it"),
-        ({"rate_hz": 0}, "--rate 0"),
+        ({"rate_hz": 0}, "0 images a second"),
     ):
         with pytest.raises(LogError, match=said):
             pack(images, out, **arguments)
@@ -111,9 +111,9 @@ def painted(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 
 def test_images_and_colour_masks_of_the_road(painted: Path, tmp_path: Path) -> None:
     packed = pack(painted / "imgs", tmp_path / "comma.mcap", masks=painted / "masks")
-    labels = LabelValues(road_colors=(ROAD, MARKING), ignore_colors=(OWN_CAR,))
+    labels = LabelSettings(road_colors=(ROAD, MARKING), ignore_colors=(OWN_CAR,))
     with open_log(packed.path) as log:
-        with pytest.raises(LogError, match=r"/truth/road.*--road-color R,G,B"):
+        with pytest.raises(LogError, match=r"/truth/road.*labels\.road_colors"):
             log.select()
         frames = [frame.decode() for frame in log.frames(log.select(labels=labels))]
     first = cv2.imread(str(min((painted / "masks").glob("*.png"))))[..., ::-1]

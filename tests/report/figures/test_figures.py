@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -12,11 +13,16 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from roadeval.report.figures.files import Example, FiguresError, write_figures
-from roadeval.report.figures.masks import road_masks
-from roadeval.report.figures.rates import CROWDED, error_rate, fp_fn_rate
+from roadeval.report import figures as folder
+from roadeval.report.figures.fig2_masks import road_masks
+from roadeval.report.figures.fig3a_error_rate import error_rate
+from roadeval.report.figures.fig3b_fp_fn_rate import fp_fn_rate
+from roadeval.report.figures.figure import ExampleFrame, FigureData, figures
+from roadeval.report.figures.files import FiguresError, svg_of, write_figures
+from roadeval.report.figures.rates_over_drive import CROWDED
 from roadeval.report.figures.style import looks
 
+NO_WINDOWS = pd.DataFrame()
 BY_DEFAULT = ("filtered", "unfiltered", "blind")
 FILES = {
     f"{stem}.{kind}"
@@ -49,11 +55,19 @@ def a_table(rows: int, variants: Sequence[str] = BY_DEFAULT, last: int = 10) -> 
     return pd.DataFrame(lines)
 
 
-def an_example(frame: int = 7, *, truth: bool = True) -> Example:
+def an_example(frame: int = 7, *, truth: bool = True) -> ExampleFrame:
     image = np.full((24, 40, 3), 90, np.uint8)
     mask = np.zeros((24, 40), np.uint8)
     mask[12:, 10:30] = 1
-    return Example(frame, image, mask if truth else None, {"filtered": mask, "unfiltered": mask})
+    return ExampleFrame(
+        frame, image, mask if truth else None, {"filtered": mask, "unfiltered": mask}
+    )
+
+
+def masks_of(examples: Sequence[ExampleFrame]) -> Figure:
+    figure = road_masks(FigureData("drive", NO_WINDOWS, examples))
+    assert figure is not None
+    return figure
 
 
 def drawn(figure: Figure) -> Figure:
@@ -74,7 +88,7 @@ def pictures(figure: Figure) -> list[list[np.ndarray]]:
 
 def test_figure_3a_shows_err_of_every_final_mask_in_percent() -> None:
     table = a_table(4)
-    (ax,) = error_rate("drive", table).axes
+    (ax,) = error_rate(FigureData("drive", table)).axes
     assert len(ax.lines) == 3
     for line, variant in zip(ax.lines, BY_DEFAULT, strict=True):
         own = table[(table["variant"] == variant) & (table["stage"] == "post")]
@@ -84,7 +98,7 @@ def test_figure_3a_shows_err_of_every_final_mask_in_percent() -> None:
 
 def test_figure_3b_shows_fpr_and_fnr_apart() -> None:
     table = a_table(4)
-    figure = fp_fn_rate("drive", table)
+    figure = fp_fn_rate(FigureData("drive", table))
     for ax, rate in zip(figure.axes, ("FPR", "FNR"), strict=True):
         assert rate in ax.get_ylabel()
         for line, variant in zip(ax.lines, BY_DEFAULT, strict=True):
@@ -94,39 +108,42 @@ def test_figure_3b_shows_fpr_and_fnr_apart() -> None:
 
 def test_a_variant_without_post_is_shown_by_its_last_stage() -> None:
     table = a_table(2, ("net",)).query("stage == 'svm'")
-    (ax,) = error_rate("drive", table).axes
+    (ax,) = error_rate(FigureData("drive", table)).axes
     assert len(ax.lines) == 1
-    assert "svm" in texts(error_rate("drive", table))
+    assert "svm" in texts(error_rate(FigureData("drive", table)))
 
 
 def test_the_title_names_the_drive() -> None:
-    for figure in (error_rate("my_drive", a_table(2)), road_masks("my_drive", [an_example()])):
+    for figure in (
+        error_rate(FigureData("my_drive", a_table(2))),
+        road_masks(FigureData("my_drive", NO_WINDOWS, [an_example()])),
+    ):
         assert "my_drive" in texts(figure)
 
 
 def test_rates_are_in_percent_from_zero() -> None:
-    (ax,) = drawn(error_rate("drive", a_table(4))).axes
+    (ax,) = drawn(error_rate(FigureData("drive", a_table(4)))).axes
     labels = [label.get_text() for label in ax.get_yticklabels()]
     assert labels[0] == "0 %"
     assert all(label.endswith(" %") for label in labels)
 
 
 def test_rows_are_named_by_their_frames() -> None:
-    (ax,) = error_rate("drive", a_table(3, last=1)).axes
+    (ax,) = error_rate(FigureData("drive", a_table(3, last=1))).axes
     assert [label.get_text() for label in ax.get_xticklabels()] == ["0–9", "10–19", "20"]  # noqa: RUF001
     assert ax.get_xlabel() == "Evaluated frames, 10 a row; the last row holds 1"
 
 
 @pytest.mark.parametrize("rows", [1, 2, 10, 12, 40, 400, 3600])
 def test_labels_never_touch_each_other(rows: int) -> None:
-    (ax,) = drawn(error_rate("drive", a_table(rows))).axes
+    (ax,) = drawn(error_rate(FigureData("drive", a_table(rows)))).axes
     boxes = [label.get_window_extent() for label in ax.get_xticklabels()]
     assert all(left.x1 < right.x0 for left, right in pairwise(boxes))
 
 
 @pytest.mark.parametrize("variants", [BY_DEFAULT, ("filtered", "unfiltered", "a", "b", "c", "d")])
 def test_the_legend_covers_nothing(variants: tuple[str, ...]) -> None:
-    figure = drawn(fp_fn_rate("drive", a_table(5, variants)))
+    figure = drawn(fp_fn_rate(FigureData("drive", a_table(5, variants))))
     legend = figure.legends[0].get_window_extent()
     for other in [*figure.axes, *figure.texts]:
         assert not legend.overlaps(other.get_window_extent())
@@ -149,19 +166,19 @@ def test_the_colours_are_those_of_the_design() -> None:
 def test_an_undefined_rate_leaves_a_gap() -> None:
     table = a_table(3)
     table.loc[table["window"] == 1, "FNR"] = np.nan
-    line = fp_fn_rate("drive", table).axes[1].lines[0]
+    line = fp_fn_rate(FigureData("drive", table)).axes[1].lines[0]
     assert np.isnan(line.get_ydata()).tolist() == [False, True, False]
 
 
 def test_a_rate_that_is_undefined_everywhere_says_so() -> None:
     table = a_table(3).assign(FNR=np.nan)
-    ax = drawn(fp_fn_rate("drive", table)).axes[1]
+    ax = drawn(fp_fn_rate(FigureData("drive", table))).axes[1]
     assert ax.texts[0].get_text() == "undefined on every frame"
 
 
 def test_a_long_drive_is_drawn_as_means_with_their_range() -> None:
     table = a_table(3600)
-    figure = error_rate("drive", table)
+    figure = error_rate(FigureData("drive", table))
     line, band = figure.axes[0].lines[0], figure.axes[0].collections[0]
     assert len(line.get_ydata()) == CROWDED
     first = 100 * table.query("variant == 'filtered' and stage == 'post'")["ERR"].to_numpy()[:24]
@@ -173,7 +190,7 @@ def test_a_long_drive_is_drawn_as_means_with_their_range() -> None:
 
 
 def test_figure_2_has_a_row_a_frame_and_a_column_a_mask() -> None:
-    figure = road_masks("drive", [an_example(7), an_example(33)])
+    figure = masks_of([an_example(7), an_example(33)])
     assert [len(row) for row in pictures(figure)] == [4, 4]
     titles = [ax.get_title() for ax in figure.axes[:4]]
     assert titles == ["camera image", "filtered", "unfiltered", "ground truth"]
@@ -184,13 +201,13 @@ def test_figure_2_has_a_row_a_frame_and_a_column_a_mask() -> None:
 
 
 def test_figure_2_without_truth_has_no_column_for_it() -> None:
-    figure = road_masks("drive", [an_example(truth=False)])
+    figure = masks_of([an_example(truth=False)])
     assert [ax.get_title() for ax in figure.axes] == ["camera image", "filtered", "unfiltered"]
 
 
 def test_masks_are_tinted_and_edged_and_leave_the_rest_as_it_is() -> None:
     example = an_example()
-    ((camera, masked, _, _),) = pictures(road_masks("drive", [example]))
+    ((camera, masked, _, _),) = pictures(masks_of([example]))
     road = example.masks["filtered"] == 1
     assert (camera == example.image).all()
     assert (masked[~road] == example.image[~road]).all()
@@ -203,16 +220,16 @@ def test_ignored_pixels_are_greyed() -> None:
     assert example.truth is not None
     truth = example.truth.copy()
     truth[:4] = 255
-    figure = road_masks("drive", [Example(1, example.image, truth, example.masks)])
+    figure = masks_of([ExampleFrame(1, example.image, truth, example.masks)])
     assert pictures(figure)[0][3][0, 0].tolist() == [120, 120, 120]
     assert "ignored" in texts(figure)
 
 
 def test_large_images_are_shrunk() -> None:
-    big = Example(
+    big = ExampleFrame(
         1, np.zeros((600, 1200, 3), np.uint8), None, {"net": np.zeros((600, 1200), np.uint8)}
     )
-    assert {picture.shape for picture in pictures(road_masks("drive", [big]))[0]} == {(200, 400, 3)}
+    assert {picture.shape for picture in pictures(masks_of([big]))[0]} == {(200, 400, 3)}
 
 
 @pytest.mark.parametrize("width", [40, 1000])
@@ -221,12 +238,12 @@ def test_a_small_example_is_drawn_like_the_large_one(width: int) -> None:
     shape = 31, width
     image = rng.integers(0, 256, (*shape, 3), np.uint8)
     truth = rng.choice(np.array([0, 1, 255], np.uint8), shape)
-    large = Example(3, image, truth, {"net": rng.integers(0, 2, shape, np.uint8)})
+    large = ExampleFrame(3, image, truth, {"net": rng.integers(0, 2, shape, np.uint8)})
     small = large.small()
     assert small.image.shape[1] <= 400
     assert small.truth is not None
     assert set(np.unique(small.truth)) == {0, 1, 255}
-    figures = [road_masks("drive", [each]) for each in (small, large)]
+    figures = [masks_of([each]) for each in (small, large)]
     assert figures[0].get_figheight() == figures[1].get_figheight()
     for mine, its in zip(*(pictures(figure)[0] for figure in figures), strict=True):
         np.testing.assert_array_equal(mine, its)
@@ -236,7 +253,9 @@ def test_a_small_example_is_drawn_like_the_large_one(width: int) -> None:
 def twice(tmp_path_factory: pytest.TempPathFactory) -> list[list[Path]]:
     """The files of one drive, written twice."""
     folders = [tmp_path_factory.mktemp("figures") / "new" for _ in range(2)]
-    return [write_figures(folder, "drive", a_table(3), [an_example()]) for folder in folders]
+    return [
+        write_figures(folder, FigureData("drive", a_table(3), [an_example()])) for folder in folders
+    ]
 
 
 def test_all_files_appear_and_no_other(twice: list[list[Path]]) -> None:
@@ -258,13 +277,41 @@ def test_pdfs_embed_their_fonts_and_tell_no_date(twice: list[list[Path]]) -> Non
 
 
 def test_without_rates_only_masks_are_drawn_and_older_figures_go(tmp_path: Path) -> None:
-    write_figures(tmp_path, "drive", a_table(3), [an_example()])
-    write_figures(tmp_path, "drive", a_table(3).iloc[:0], [an_example(truth=False)])
+    write_figures(tmp_path, FigureData("drive", a_table(3), [an_example()]))
+    write_figures(tmp_path, FigureData("drive", a_table(0), [an_example(truth=False)]))
     assert {path.name for path in tmp_path.iterdir()} == {"fig2_masks.png", "fig2_masks.pdf"}
 
 
 def test_a_folder_that_cannot_be_written_is_one_line_with_a_remedy(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(FiguresError, match=r"cannot write figures.*--reports") as caught:
-        write_figures(tmp_path / "file", "drive", a_table(1), [])
+    with pytest.raises(FiguresError, match=r"cannot write figures.*output.reports") as caught:
+        write_figures(tmp_path / "file", FigureData("drive", a_table(1)))
     assert "\n" not in str(caught.value)
+
+
+NEW_FIGURE = """
+from matplotlib.figure import Figure
+from roadeval.report.figures.figure import FigureSpec
+
+def draw(data):
+    figure = Figure()
+    figure.text(0, 0, f"{len(data.windows)} rows of {data.drive}")
+    return figure
+
+FIGURE = FigureSpec("fig1_rows", "Rows.", draw, in_report=True)
+"""
+
+
+def test_a_figure_is_one_file_in_the_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "fig1_rows.py").write_text(NEW_FIGURE)
+    monkeypatch.setattr(folder, "__path__", [*folder.__path__, str(tmp_path)])
+    data = FigureData("drive", a_table(3))
+    paths = write_figures(tmp_path / "reports", data)
+    assert [path.name for path in paths[:2]] == ["fig1_rows.png", "fig1_rows.pdf"]
+    first = next(figure for figure in figures() if figure.in_report)
+    picture = svg_of(first, data)
+    assert picture is not None
+    assert b"15 rows of drive" in picture.content
+    sys.modules.pop("roadeval.report.figures.fig1_rows")

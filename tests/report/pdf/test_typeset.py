@@ -7,22 +7,22 @@ import zlib
 import pytest
 
 from roadeval.report.blocks import (
-    Asset,
-    Break,
+    BulletList,
     Cell,
-    Columns,
     Command,
-    Contents,
     Figure,
     Heading,
-    Points,
-    Strip,
+    ImageFile,
+    ImageGrid,
+    KeepTogether,
+    PageBreak,
     Table,
+    TableOfContents,
     Text,
-    Together,
+    TwoColumns,
 )
-from roadeval.report.pdf.typeset import Paper, ReportError, pdf, put
-from tests.report.documents import a_document, reader, text
+from roadeval.report.pdf.typeset import Paper, ReportError, pdf, write_file
+from tests.report.making import a_document, reader, text
 
 HOSTILE = '#panic("x") $x^2$ *bold* _it_ <label> @ref `raw` [c] \\ // # = - "quoted" ${x}'
 
@@ -35,7 +35,7 @@ def a_png():
 
     header = struct.pack(">IIBBBBB", 2, 1, 8, 0, 0, 0, 0)
     parts = (b"IHDR", header), (b"IDAT", zlib.compress(b"\0\0\xff")), (b"IEND", b"")
-    return Asset(b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts))
+    return ImageFile(b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts))
 
 
 @pytest.mark.parametrize(
@@ -47,10 +47,10 @@ def a_png():
         Text(HOSTILE, "verdict"),
         Text(HOSTILE, "title"),
         Command(HOSTILE),
-        Points(HOSTILE, [HOSTILE], "warning"),
+        BulletList(HOSTILE, [HOSTILE], "warning"),
         Table([HOSTILE], [[HOSTILE]], caption=HOSTILE),
         Figure(a_png(), HOSTILE),
-        Strip([(HOSTILE, a_png())], 1),
+        ImageGrid([(HOSTILE, a_png())], 1),
     ],
     ids=lambda block: type(block).__name__,
 )
@@ -68,12 +68,12 @@ def test_control_characters_and_broken_unicode_are_left_out():
 
 
 def test_the_same_document_gives_the_same_bytes():
-    document = a_document(Heading("one"), Contents(), Figure(a_png(), "two"))
+    document = a_document(Heading("one"), TableOfContents(), Figure(a_png(), "two"))
     assert pdf(document) == pdf(document)
 
 
 def test_headings_are_the_outline_and_the_table_of_contents():
-    content = pdf(a_document(Contents(), Heading("First"), Break(), Heading("Second")))
+    content = pdf(a_document(TableOfContents(), Heading("First"), PageBreak(), Heading("Second")))
     assert [entry["/Title"] for entry in reader(content).outline] == ["1 First", "2 Second"]
     contents = reader(content).pages[0]
     assert len(contents["/Annots"]) == 2
@@ -96,7 +96,7 @@ def test_every_font_is_embedded():
 
 def test_blocks_side_by_side_and_held_together_are_all_there():
     words = text(
-        pdf(a_document(Columns([Text("left")], [Text("right")]), Together([Text("kept")])))
+        pdf(a_document(TwoColumns([Text("left")], [Text("right")]), KeepTogether([Text("kept")])))
     )
     assert "left" in words
     assert "right" in words
@@ -105,7 +105,7 @@ def test_blocks_side_by_side_and_held_together_are_all_there():
 
 def test_a_table_keeps_its_rows_and_repeats_its_head_on_the_next_page():
     rows = [[f"frame {number}", Cell(f"{number}.25", bold=True)] for number in range(100)]
-    table = Table(["<frame", "ERR"], rows, breaks=[50], groups=[("", 1), ("percent", 1)])
+    table = Table(["frame", "ERR"], rows, breaks=[50], groups=[("", 1), ("percent", 1)])
     words = text(pdf(a_document(table)))
     assert all(f"frame {number} {number}.25" in words for number in range(100))
     assert words.count("percent") > 1
@@ -119,12 +119,12 @@ def test_equal_pictures_are_kept_once():
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_place_that_cannot_be_written_to_is_told(tmp_path):
     tmp_path.chmod(0o500)
-    with pytest.raises(ReportError, match="choose another place with -o"):
-        put(tmp_path / "report.pdf", b"x")
+    with pytest.raises(ReportError, match="choose another place"):
+        write_file(tmp_path / "report.pdf", b"x")
 
 
 def test_a_folder_in_the_files_place_is_told_and_leaves_nothing_behind(tmp_path):
     (tmp_path / "report.pdf").mkdir()
     with pytest.raises(ReportError, match=r"report\.pdf: cannot be written"):
-        put(tmp_path / "report.pdf", b"x")
+        write_file(tmp_path / "report.pdf", b"x")
     assert [path.name for path in tmp_path.iterdir()] == ["report.pdf"]

@@ -1,0 +1,61 @@
+"""The palette: one colour a meaning, the same in the recording, the figures and the PDF.
+
+The hues are those of Okabe and Ito (https://jfly.uni-koeln.de/color/), which people with any kind
+of colour vision can tell apart. Colours are sRGB, ``(r, g, b)`` of 0..255 each.
+
+>>> hex_of(FP)
+'#D55E00'
+>>> with_opacity(FP, 220)
+(213, 94, 0, 220)
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+Colour = tuple[int, int, int]
+ColourWithOpacity = tuple[int, int, int, int]
+
+BLACK: Final = (0, 0, 0)
+ORANGE: Final = (230, 159, 0)
+SKY_BLUE: Final = (86, 180, 233)
+GREEN: Final = (0, 158, 115)
+YELLOW: Final = (240, 228, 66)
+BLUE: Final = (0, 114, 178)
+VERMILLION: Final = (213, 94, 0)
+PURPLE: Final = (204, 121, 167)
+GREY: Final = (153, 153, 153)
+"""Not of Okabe and Ito: for what is there to compare with."""
+DARK_GREY: Final = (90, 90, 90)
+
+FILTERED: Final = BLUE
+UNFILTERED: Final = ORANGE
+BLIND: Final = GREY
+EXTRA: Final = (GREEN, PURPLE, SKY_BLUE, VERMILLION, YELLOW)
+"""Of further variants, in the order in which they are given out; then from the first again."""
+
+TP: Final = GREEN
+FP: Final = VERMILLION
+FN: Final = PURPLE
+TN: Final = SKY_BLUE
+"""In graphs; an error map leaves true negatives clear."""
+
+ROAD: Final = GREEN
+IGNORE: Final = (128, 128, 128)
+BOUNDARY: Final = YELLOW
+SHADOW: Final = SKY_BLUE
+RING: Final = YELLOW
+"""Of lit road around a shadow, from which its compensation is estimated."""
+
+CLEAR: Final = (0, 0, 0, 0)
+"""Fully transparent: what is under it shows."""
+
+
+def with_opacity(colour: Colour, opacity: int) -> ColourWithOpacity:
+    """Return the colour with an opacity, from 0 (clear) to 255 (opaque)."""
+    return (*colour, opacity)
+
+
+def hex_of(colour: Colour) -> str:
+    """Return the colour as Matplotlib, Typst and HTML write it: ``#RRGGBB``."""
+    return "#{:02X}{:02X}{:02X}".format(*colour)

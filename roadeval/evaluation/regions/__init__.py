@@ -1,0 +1,52 @@
+"""The regions, one file each: sets of pixels that are counted apart, to tell where the errors are.
+
+To add one, add a file with a ``REGION``: it becomes rows of ``regions.csv`` and of the report.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Collection
+from typing import Final
+
+from roadeval.data.arrays import Bits
+from roadeval.evaluation.region import LabelledFrame, Region, RegionFamily
+from roadeval.runtime.discovery import found_in
+
+REGIONS: Final[tuple[Region | RegionFamily, ...]] = tuple(
+    sorted(found_in(sys.modules[__name__], "REGION"), key=lambda region: region.order)
+)
+
+
+def of_frame(labelled: LabelledFrame) -> dict[str, Bits]:
+    """Compute every region of a labelled frame, ``(H, words)`` each, by name."""
+    found: dict[str, Bits] = {}
+    for region in REGIONS:
+        found |= region.found(labelled)
+    return found
+
+
+def titles(names: Collection[str], height: int = 0) -> dict[str, str]:
+    """Return the titles of some regions for people, in order.
+
+    Parameters
+    ----------
+    names
+        Of regions; one that no file defines, as of a stage from elsewhere, is its own title.
+    height
+        Of the images in pixels, 0 if it is not known.
+    """
+    known: dict[str, str] = {}
+    for region in REGIONS:
+        known |= region.titles(names, height)
+    return known | {name: name.replace("_", " ") for name in names if name not in known}
+
+
+def partitions(names: Collection[str]) -> list[list[str]]:
+    """Return those of some regions that together are the whole frame, family by family."""
+    families = [
+        [*region.titles(names, 0)]
+        for region in REGIONS
+        if isinstance(region, RegionFamily) and region.whole
+    ]
+    return [family for family in families if family]

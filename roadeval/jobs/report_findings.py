@@ -1,0 +1,206 @@
+"""Findings for a report, collected from a result's tables and masks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, TruthBits
+from roadeval.data.packed import Packed
+from roadeval.evaluation import analysis, counts, maps
+from roadeval.evaluation.scoreboard import COMPARED
+from roadeval.jobs.report_frames import FramePicker, evenly, str_keys, variants_but_baseline
+from roadeval.jobs.result import Opened
+from roadeval.report.findings import Commands, ErrorHeatmap, Findings, PairedComparison
+from roadeval.results.lines import change_rows, heat_rows, window_rows
+from roadeval.results.reading import table_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SAMPLED: Final = 100
+"""Frames whose masks are read for the maps, at most; tables know every frame."""
+WINDOWS: Final = 30
+"""Rows of the table over the drive, at most."""
+EXAMPLES: Final = 4
+THUMBNAILS: Final = 8
+"""Frames in figure 2 and on the first page."""
+
+
+def collect(result: Opened, commands: Commands | None = None) -> Findings:
+    """Collect everything that the report of a result shows."""
+    frames, summary = result.frames, result.summary
+    pictured = _pictured(result)
+    changes, heat, sampled = _mask_sums(result, pictured)
+    windows, window_size = _windows(result)
+    paired = list(_paired(frames, summary, changes))
+    picker = FramePicker(result)
+    return Findings(
+        source=str(result.path),
+        complete=result.complete,
+        commands=commands,
+        pictured=len(pictured),
+        summary=summary,
+        properties=result.properties,
+        finals=analysis.final_stages(frames),
+        windows=windows,
+        window_size=window_size,
+        paired=paired,
+        regions=analysis.by_region(result.regions),
+        overlap={
+            variant: {stage: analysis.overlap(total) for stage, total in stages.items()}
+            for variant, stages in summary["totals"].items()
+        },
+        changes=_stage_changes(changes),
+        error_parts={
+            name: str_keys(analysis.causes(frames, name).mean().to_dict())
+            for name in variants_but_baseline(frames)
+        },
+        heatmaps=[
+            _heatmap(str(name), cells) for name, cells in heat.groupby("variant", sort=False)
+        ],
+        oracles=analysis.oracles(result.extra("oracles"), frames),
+        beyond=summary.get("beyond", {}),
+        sampled=sampled,
+        examples=picker.examples(evenly(pictured, EXAMPLES)),
+        thumbnails=picker.thumbnails(evenly(pictured, THUMBNAILS)),
+        worst=picker.worst(),
+        helped=picker.moved(paired, harmed=False),
+        harmed=picker.moved(paired, harmed=True),
+        coverage=_coverage(result, pictured),
+    )
+
+
+def _pictured(result: Opened) -> list[int]:
+    """Return the evaluated frames that have pictures, or without truth all that have."""
+    evaluated = set(result.frames["frame"]) or set(result.pictured)
+    return [number for number in result.pictured if number in evaluated]
+
+
+# --- Tables ---------------------------------------------------------------------------------------
+
+
+def _windows(result: Opened) -> tuple[pd.DataFrame, int]:
+    """Return the drive's windows and their size; longer ones where the drive is long."""
+    size = analysis.settings_of(result.summary).window
+    count = -(-result.frames["frame"].nunique() // size)
+    if (count <= WINDOWS and len(result.windows) == 0 < count) or count > WINDOWS:
+        size *= max(-(-count // WINDOWS), 1)
+        windows = analysis.windows(result.frames, size)
+        return table_of("windows", window_rows(windows)), size
+    return result.windows, size
+
+
+def _paired(
+    frames: pd.DataFrame, summary: dict[str, Any], changes: pd.DataFrame
+) -> Iterator[PairedComparison]:
+    """Compare with the filter against without, then every variant with the baseline."""
+    settings, finals = analysis.settings_of(summary), analysis.final_stages(frames)
+    pairs = [(FILTERED, UNFILTERED), *((v, BASELINE) for v in variants_but_baseline(frames))]
+    for treated, control in pairs:
+        if not {treated, control} <= finals.keys():
+            continue
+        paired = analysis.pairs(frames, treated, control)
+        known = summary["difference"].get(finals[treated]) if control == UNFILTERED else None
+        differences = known or {
+            rate: asdict(difference)
+            for rate, difference in analysis.differences(paired, settings, COMPARED).items()
+        }
+        pixels = _changed_pixels(changes, treated, control)
+        yield PairedComparison(treated, control, differences, paired, pixels)
+
+
+def _changed_pixels(
+    changes: pd.DataFrame, treated: str, control: str
+) -> tuple[int, int, int] | None:
+    """Return newly right, newly wrong and all labelled pixels from a final mask to another."""
+    between = (changes["from_variant"] == control) & (changes["to_variant"] == treated)
+    for row in changes[between & (changes["N"] > 0)].to_dict("records"):
+        return row["repaired"], row["spoiled"], row["N"]
+    return None
+
+
+def _stage_changes(changes: pd.DataFrame) -> pd.DataFrame:
+    """Return what stages changed, as shares of labelled pixels."""
+    import pandas as pd
+
+    own = changes[(changes["from_variant"] == changes["to_variant"]) & (changes["N"] > 0)]
+    return pd.DataFrame(
+        {
+            "variant": own["to_variant"],
+            "before": own["from_stage"],
+            "after": own["to_stage"],
+            "repaired": own["repaired"] / own["N"],
+            "spoiled": own["spoiled"] / own["N"],
+        }
+    )
+
+
+# --- Masks ----------------------------------------------------------------------------------------
+
+
+def _mask_sums(result: Opened, numbers: Sequence[int]) -> tuple[pd.DataFrame, pd.DataFrame, int]:
+    """Return the tables ``changes`` and ``heat``, and the number of frames that they sum up.
+
+    A run that was killed did not get to write them: they are made of the masks of evenly spread
+    frames then.
+    """
+    changes, heat = result.extra("changes"), result.extra("heat")
+    if len(changes) or len(heat):
+        return changes, heat, result.frames["frame"].nunique()
+    sample = _sample(result, numbers)
+    changes = table_of("changes", change_rows(sample.changes))
+    return changes, table_of("heat", heat_rows(sample.heat)), sample.frames
+
+
+def _sample(result: Opened, numbers: Sequence[int]) -> maps.Maps:
+    """Sum up the masks of evenly spread frames."""
+    sums, recording = maps.Maps(), result.recording
+    if recording is None or not len(result.frames):
+        return sums
+    for number in evenly(numbers, SAMPLED):
+        truth = recording.truth(number)
+        masks = {
+            (variant.name, stage): recording.layer(variant.name, stage, number)
+            for variant in recording.variants
+            for stage in variant.stages
+        }
+        finals = {variant: mask for (variant, _), mask in masks.items()}
+        errors = {name: counts.error_map(mask, truth) for name, mask in finals.items()}
+        packed = TruthBits.of(truth)
+        stacked = packed.bits_of(map(Packed.of, masks.values()))
+        sums.add(errors, maps.changes(list(masks), stacked, packed))
+    return sums
+
+
+def _heatmap(variant: str, cells: pd.DataFrame) -> ErrorHeatmap:
+    """Spread the cells of a variant's heat map; NaN where none was labelled."""
+    side = cells["side"].to_numpy()[0]
+    rows, columns = (cells[edge].to_numpy() // side for edge in ("top", "left"))
+    shares = np.full((2, rows.max() + 1, columns.max() + 1), np.nan)
+    for share, outcome in zip(shares, ("FP", "FN"), strict=True):
+        share[rows, columns] = cells[outcome] / cells["labelled"]
+    return ErrorHeatmap(variant, shares[0], shares[1])
+
+
+def _coverage(result: Opened, numbers: Sequence[int]) -> pd.DataFrame:
+    """Return without truth how much of the image each final mask covers."""
+    import pandas as pd
+
+    recording = result.recording
+    if recording is None or len(result.frames):
+        return pd.DataFrame()
+    chosen = evenly(numbers, SAMPLED)
+    return pd.DataFrame(
+        {
+            variant.name: [
+                float(np.mean(recording.layer(variant.name, variant.stages[-1], number) == 1))
+                for number in chosen
+            ]
+            for variant in recording.variants
+        },
+        index=pd.Index(chosen, name="frame"),
+    )

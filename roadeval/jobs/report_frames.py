@@ -1,0 +1,131 @@
+"""Frames for a report, picked from a result, with their pictures and facts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from roadeval.data import BASELINE, ERRORS, FILTERED, TRUTH, UNFILTERED, LayerKind
+from roadeval.evaluation import analysis
+from roadeval.jobs.result import Opened
+from roadeval.recording import Recording
+from roadeval.report.figures.figure import ExampleFrame
+from roadeval.report.findings import NotableFrame, PairedComparison
+from roadeval.report.images import LayerImage
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+WORST: Final = 6
+MOVED: Final = 3
+"""Frames that are shown: the worst, and those that the filter helped and harmed most."""
+OUTCOMES: Final = 6
+LAYERS: Final = 2
+"""Variants of which such a frame shows the errors, and all layers."""
+
+
+def variants_but_baseline(frames: pd.DataFrame) -> list[str]:
+    """Return the variants of a table that look at the image."""
+    return [name for name in frames["variant"].unique().tolist() if name != BASELINE]
+
+
+def evenly(numbers: Sequence[int], count: int) -> list[int]:
+    """Pick ``count`` of the numbers from the middles of equal parts.
+
+    >>> evenly(range(100), 4)
+    [12, 37, 62, 87]
+    """
+    count = min(count, len(numbers))
+    return [numbers[len(numbers) * (2 * i + 1) // (2 * count)] for i in range(count)]
+
+
+def str_keys(values: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return a mapping made by pandas with keys that are text to the type checker, too."""
+    return {str(name): value for name, value in values.items()}
+
+
+class FramePicker:
+    """Picks frames of a result and collects their pictures and facts."""
+
+    def __init__(self, result: Opened) -> None:
+        self._result = result
+        self._recording = result.recording
+        self._frames = result.frames
+        self._variants = variants_but_baseline(result.frames)
+        self._causes = {name: analysis.causes(self._frames, name) for name in self._variants}
+
+    def examples(self, numbers: Sequence[int]) -> list[ExampleFrame]:
+        """Return frames for figure 2."""
+        return [self._example(self._recording, n) for n in numbers] if self._recording else []
+
+    def thumbnails(self, numbers: Sequence[int]) -> list[LayerImage]:
+        """Return a picture of each frame: the first variant's errors, or without truth its mask."""
+        return [self._outcome(self._recording, n) for n in numbers] if self._recording else []
+
+    def worst(self) -> list[NotableFrame]:
+        """Return the worst frames of the first variant."""
+        if not self._variants:
+            return []
+        rows = analysis.worst(self._frames, self._variants[0], WORST).to_dict("records")
+        return [self._notable(row["frame"], row["stamp_ns"]) for row in rows]
+
+    def moved(self, paired: Sequence[PairedComparison], *, harmed: bool) -> list[NotableFrame]:
+        """Return the frames that the filter harmed most, or helped most."""
+        for pair in paired:
+            if (pair.treated, pair.control) == (FILTERED, UNFILTERED):
+                rows = analysis.most_changed(pair.frames, MOVED, harmed=harmed).to_dict("records")
+                return [self._notable(row["frame"], row["stamp_ns"], row["ERR"]) for row in rows]
+        return []
+
+    def _notable(self, frame: int, stamp_ns: int, change: float | None = None) -> NotableFrame:
+        own = analysis.finals(self._frames[self._frames["frame"] == frame]).set_index("variant")
+        rates = str_keys(own[["ERR", "FPR", "FNR"]].to_dict("index"))
+        first, recording = self._variants[0], self._recording
+        seen = recording is not None and frame in self._result.pictured
+        return NotableFrame(
+            frame=frame,
+            stamp_ns=stamp_ns,
+            variant=first,
+            rates={name: str_keys(each) for name, each in rates.items()},
+            parts=str_keys(self._causes[first].loc[frame].to_dict()),
+            change=change,
+            notes=self._result.notes(frame, first),
+            images=list(self._outcomes(recording, frame)) if recording and seen else [],
+            layers=list(self._layers(recording, frame))
+            if recording and seen and change is None
+            else [],
+        )
+
+    def _outcomes(self, recording: Recording, frame: int) -> Iterator[LayerImage]:
+        """Yield the camera, the truth and each variant's errors."""
+        image = recording.image(frame)
+        yield LayerImage("camera", image)
+        yield LayerImage("truth", image, TRUTH, recording.truth(frame))
+        for variant in recording.variants[:OUTCOMES]:
+            errors = recording.layer(variant.name, ERRORS.name, frame)
+            yield LayerImage(f"{variant.name}: errors", image, ERRORS, errors)
+
+    def _layers(self, recording: Recording, frame: int) -> Iterator[list[LayerImage]]:
+        """Yield each variant's layers: the stages' masks, and all that is not a mask."""
+        image = recording.image(frame)
+        for variant in recording.variants[:LAYERS]:
+            layers = [
+                (spec, self._result.layer(variant.name, spec.name, frame))
+                for spec in variant.layers
+                if spec.kind is not LayerKind.MASK or spec.name in variant.stages
+            ]
+            yield [LayerImage(s.name, image, s, array) for s, array in layers if array is not None]
+
+    def _outcome(self, recording: Recording, frame: int) -> LayerImage:
+        variant = recording.variants[0]
+        if len(self._frames):
+            spec = ERRORS
+        else:
+            spec = next(spec for spec in variant.layers if spec.name == variant.stages[-1])
+        layer = recording.layer(variant.name, spec.name, frame)
+        return LayerImage(f"frame {frame}", recording.image(frame), spec, layer)
+
+    def _example(self, recording: Recording, frame: int) -> ExampleFrame:
+        masks = {v.name: recording.layer(v.name, v.stages[-1], frame) for v in recording.variants}
+        truth = recording.truth(frame) if len(self._frames) else None
+        return ExampleFrame(frame, recording.image(frame), truth, masks)

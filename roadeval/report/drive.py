@@ -1,0 +1,52 @@
+"""The report of one drive: its sections and their order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from roadeval.report.blocks import Block, Document
+from roadeval.report.findings import Findings
+from roadeval.report.sections import (
+    filter_effect,
+    frames,
+    masks,
+    over_drive,
+    provenance,
+    regions,
+    stages,
+    summary,
+)
+
+
+def document(findings: Findings) -> Document:
+    """Return the report of one drive."""
+    return Document(
+        kicker="roadeval report",
+        title=findings.drive,
+        subtitle=", ".join(_facts(findings, findings.summary["drive"])),
+        footer=f"{findings.drive}, {findings.source}",
+        blocks=list(_sections(findings)),
+        keywords=["road recognition", "evaluation", findings.drive],
+    )
+
+
+def _sections(findings: Findings) -> Iterator[Block]:
+    scored = (over_drive, filter_effect, regions, stages, frames)
+    for part in (summary, *(scored if findings.totals else (masks,)), provenance):
+        yield from part.section(findings)
+
+
+def _facts(findings: Findings, drive: dict[str, Any]) -> Iterator[str]:
+    count = findings.summary["frames"].get("in_log") or findings.summary["frames"]["evaluated"]
+    yield f"{count} frames"
+    if drive.get("width"):
+        yield f"{drive['width']} \N{MULTIPLICATION SIGN} {drive['height']}"
+    if drive.get("rate_hz"):
+        yield f"{drive['rate_hz']:.4g} Hz"
+    preset = findings.summary["run"].get("preset") or findings.properties.get("preset")
+    if preset:
+        yield f"preset {preset}"
+    version = findings.summary["versions"].get("roadeval") or findings.properties.get("version")
+    if version:
+        yield f"roadeval {version}"

@@ -1,0 +1,89 @@
+"""What a figure is: a name, a caption, and a pure function that draws a run's results."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final
+
+from roadeval.data import Mask, Rgb, Truth
+from roadeval.report.images import shrink
+from roadeval.runtime.discovery import found_in
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+EXAMPLE_WIDTH: Final = 400
+"""Pixels across an example's picture, at most."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExampleFrame:
+    """A frame to show: its image, its truth if it has one, and each variant's final mask.
+
+    ``image`` is ``(H, W, 3)`` uint8 RGB, ``truth`` ``(H, W)`` uint8 (0, 1, 255) and each of
+    ``masks``, by variant, ``(H, W)`` uint8 (0, 1).
+    """
+
+    frame: int
+    image: Rgb
+    truth: Truth | None
+    masks: Mapping[str, Mask]
+
+    def small(self) -> ExampleFrame:
+        """Return the example in the size in which it is drawn, of which a run can hold a few."""
+        return ExampleFrame(
+            self.frame,
+            shrink(self.image, EXAMPLE_WIDTH),
+            None if self.truth is None else shrink(self.truth, EXAMPLE_WIDTH, labels=True),
+            {name: shrink(mask, EXAMPLE_WIDTH, labels=True) for name, mask in self.masks.items()},
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FigureData:
+    """The results that figures are drawn from.
+
+    Parameters
+    ----------
+    drive
+        Its name, for titles.
+    windows
+        As ``windows.csv``, any number of variants; no row without truth.
+    examples
+        A few frames, all with masks of the same variants.
+    """
+
+    drive: str
+    windows: pd.DataFrame
+    examples: Sequence[ExampleFrame] = field(default=())
+
+
+@dataclass(frozen=True, slots=True)
+class FigureSpec:
+    """A figure.
+
+    Parameters
+    ----------
+    name
+        Of its files, without the ending.
+    caption
+        A sentence to be printed below it.
+    draw
+        Draws it; returns None where the data has nothing to draw.
+    in_report
+        Whether the PDF of a drive shows it, too.
+    """
+
+    name: str
+    caption: str
+    draw: Callable[[FigureData], Figure | None]
+    in_report: bool = False
+
+
+def figures() -> tuple[FigureSpec, ...]:
+    """Return the figures of this folder, in the order of the files' names."""
+    from roadeval.report import figures as folder
+
+    return found_in(folder, "FIGURE")

@@ -1,0 +1,140 @@
+"""Rates of the final masks over the drive, a line a variant, as in the paper's figure 3."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from roadeval.evaluation.analysis import finals
+from roadeval.report.figures.style import Look, heading, looks
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+CROWDED: Final = 150
+"""More windows than this are drawn as means of several, with their range as a band."""
+MARKED: Final = 25
+"""Up to this many points each has its marker; beyond, about as many do."""
+PER_LINE: Final = 3
+"""Entries of the legend in a line."""
+
+
+def rates_over_drive(
+    title: str, windows: pd.DataFrame, rates: Mapping[str, str], height: float
+) -> Figure | None:
+    """Draw rates of each variant's final mask, one below the other.
+
+    Parameters
+    ----------
+    title
+        Of the figure.
+    windows
+        As ``windows.csv``; without a row there is no figure.
+    rates
+        Columns of ``windows``, each with the title of its axis.
+    height
+        Of the figure, in inches.
+    """
+    from matplotlib.figure import Figure
+
+    if not len(windows):
+        return None
+    final = finals(windows)
+    rows = final.drop_duplicates("window").sort_values("window")
+    group = -(-len(rows) // CROWDED)
+    figure = Figure(figsize=(8, height))
+    heading(figure, title, _subtitle(final, rows, group))
+    axes = figure.subplots(len(rates), 1, sharex=True, squeeze=False)[:, 0]
+    for ax, (rate, name) in zip(axes, rates.items(), strict=True):
+        _draw(ax, final, rate, group)
+        ax.set_ylabel(name)
+    _label_rows(axes[-1], rows)
+    lines = _legend(figure, axes[0])
+    top = 1 - (0.66 + 0.2 * lines) / height
+    figure.subplots_adjust(left=0.11, right=0.985, bottom=0.55 / height, top=top, hspace=0.13)
+    figure.align_ylabels(axes)
+    return figure
+
+
+def _subtitle(final: pd.DataFrame, rows: pd.DataFrame, group: int) -> str:
+    stages, size = ", ".join(dict.fromkeys(final["stage"])), rows["frames"].max()
+    each = f"each point is the mean of {size} frames" if size > 1 else "each point is one frame"
+    if group > 1:
+        each = f"each point averages {group} rows of {size} frames, the band spans them"
+    return f"Final mask ({stages}); {each}; lower is better"
+
+
+def _draw(ax: Axes, final: pd.DataFrame, rate: str, group: int) -> None:
+    from matplotlib.ticker import MaxNLocator, StrMethodFormatter
+
+    for name, look in looks(list(dict.fromkeys(final["variant"]))).items():
+        own = final[final["variant"] == name].sort_values("window")
+        _line(ax, own["window"], 100 * own[rate], look, group)
+    values = 100 * final[rate].to_numpy(float)
+    if np.isnan(values).all():
+        ax.text(0.5, 0.5, "undefined on every frame", transform=ax.transAxes, ha="center")
+    ax.set_ylim(0, max(1.08 * np.nanmax([*values, 0.1]), 0.5))
+    ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
+    ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g} %"))
+
+
+def _line(ax: Axes, x: pd.Series[float], y: pd.Series[float], look: Look, group: int) -> None:
+    """Draw a variant's series; with too many rows to tell apart, their mean and range."""
+    if group > 1:
+        rows = np.arange(len(x)) // group
+        low, high = y.groupby(rows).min(), y.groupby(rows).max()
+        x, y = x.groupby(rows).mean(), y.groupby(rows).mean()
+        ax.fill_between(x, low, high, color=look.colour, alpha=0.15, linewidth=0)
+    ax.plot(
+        x,
+        y,
+        **look.line,
+        **look.mark,
+        label=look.label,
+        markersize=5,
+        markevery=-(-len(x) // MARKED),
+        zorder=look.order,
+        clip_on=False,
+    )
+
+
+def _label_rows(ax: Axes, rows: pd.DataFrame) -> None:
+    """Write each row's frames below it; where there is no room, the first frame of some."""
+    first, last = rows["first_frame"].astype(str), rows["last_frame"].astype(str)
+    spans = first.where(first == last, first + "\N{EN DASH}" + last)
+    roomy = _step(spans) == 1
+    labels = spans if roomy else first
+    every = _step(labels)
+    numbers = rows["window"].to_numpy()
+    ax.set_xticks(numbers[::every], labels.tolist()[::every])
+    margin = 0.5 if len(rows) < CROWDED else 0.005 * len(rows)
+    ax.set_xlim(numbers[0] - margin, numbers[-1] + margin)
+    size, rest = rows["frames"].max(), rows["frames"].iloc[-1]
+    what = f"Evaluated frames, {size} a row" if roomy else f"First frame of each row of {size}"
+    short = f"; the last row holds {rest}" if rest != size else ""
+    ax.set_xlabel(what + short)
+
+
+def _step(labels: pd.Series[str]) -> int:
+    """Return n such that every nth label fits on 7 inches of axis at 8 points."""
+    room = max(int(7 / (0.075 * labels.str.len().max() + 0.12)), 1)
+    return -(-len(labels) // room)
+
+
+def _legend(figure: Figure, ax: Axes) -> int:
+    """Write the legend above the axes; return its number of lines."""
+    handles, labels = ax.get_legend_handles_labels()
+    figure.legend(
+        handles,
+        labels,
+        loc="upper left",
+        bbox_to_anchor=(0.0, 1 - 0.5 / figure.get_figheight()),
+        ncols=PER_LINE,
+        handlelength=3.4,
+        columnspacing=2.0,
+    )
+    return -(-len(labels) // PER_LINE)

@@ -1,0 +1,100 @@
+"""Camera images and layers as pictures: each layer is coloured by its description."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import LayerKind, LayerSpec, Rgb
+from roadeval.report.blocks import ImageFile
+
+WIDTH: Final = 420
+"""Pixels across a picture, at most: about 200 an inch at a quarter of the page."""
+QUALITY: Final = 85
+DARKEN: Final = 0.75
+"""Share of the camera's brightness that stays below an overlay."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LayerImage:
+    """One layer of one frame.
+
+    Parameters
+    ----------
+    title
+        A few words.
+    image
+        ``(H, W, 3)`` uint8 RGB: the camera's image.
+    spec, array
+        The layer, as in `roadeval.data.Layer`; None for the camera's image alone. A scalar map
+        is in its own unit.
+    """
+
+    title: str
+    image: Rgb
+    spec: LayerSpec | None = None
+    array: npt.NDArray[Any] | None = None
+
+
+def jpeg(layer: LayerImage, width: int = WIDTH) -> ImageFile:
+    """Return the layer as a JPEG file of at most ``width`` pixels across."""
+    import cv2
+
+    bgr = cv2.cvtColor(shrink(painted(layer), width), cv2.COLOR_RGB2BGR)
+    done, content = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    assert done
+    return ImageFile(content.tobytes())
+
+
+def painted(layer: LayerImage) -> Rgb:
+    """Return the layer as ``(H, W, 3)`` uint8 RGB."""
+    if layer.spec is None or layer.array is None:
+        return layer.image
+    match layer.spec.kind:
+        case LayerKind.RGB:
+            return layer.array.astype(np.uint8, copy=False)
+        case LayerKind.SCALAR:
+            return _coloured(layer.spec, layer.array)
+        case LayerKind.MASK | LayerKind.LABELS:
+            return _overlaid(layer.image, layer.spec, layer.array)
+
+
+def _coloured(spec: LayerSpec, values: npt.NDArray[Any]) -> Rgb:
+    """Colour a map of numbers over its range with Viridis, as the recording's viewer does."""
+    import cv2
+
+    low, high = spec.value_range
+    codes = np.clip((values - low) * (255 / (high - low)), 0, 255).astype(np.uint8)
+    bgr = cv2.applyColorMap(codes, cv2.COLORMAP_VIRIDIS)
+    rgb: Rgb = cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+    return rgb
+
+
+def _overlaid(image: Rgb, spec: LayerSpec, labels: npt.NDArray[Any]) -> Rgb:
+    """Draw the classes' colours over the darkened image."""
+    table = np.zeros((256, 4), np.float32)
+    for label in spec.classes:
+        table[label.value] = label.rgba
+    colours = table[labels]
+    opacity = colours[..., 3:] / 255
+    mixed = image * DARKEN * (1 - opacity) + colours[..., :3] * opacity
+    overlaid: Rgb = np.rint(mixed).astype(np.uint8)
+    return overlaid
+
+
+def shrink(
+    image: npt.NDArray[np.uint8], width: int, *, labels: bool = False
+) -> npt.NDArray[np.uint8]:
+    """Reduce an image to ``width`` pixels across, if it is wider; of labels none is mixed."""
+    import cv2
+
+    height, wide = image.shape[:2]
+    if wide <= width:
+        return image
+    size = width, max(round(height * width / wide), 1)
+    how = cv2.INTER_NEAREST if labels else cv2.INTER_AREA
+    small: npt.NDArray[np.uint8] = cv2.resize(image, size, interpolation=how)
+    return small

@@ -1,0 +1,53 @@
+"""Parts that several sections share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from roadeval.data import TRUTH, mask_spec
+from roadeval.evaluation.metrics import METRICS
+from roadeval.report.blocks import Cell, ImageFile
+from roadeval.report.figures.figure import ExampleFrame
+from roadeval.report.figures.style import looks
+from roadeval.report.findings import Findings
+from roadeval.report.images import LayerImage, jpeg
+
+PAPER_RATES: Final = ("ERR", "FPR", "FNR", "ACC")
+"""The rates of the paper that a report shows; TNR and TPR mirror FPR and FNR."""
+RATES: Final = (
+    *PAPER_RATES,
+    *(n for n, metric in METRICS.items() if metric.mirrors is None and n not in PAPER_RATES),
+)
+"""Those and every further metric of the tables."""
+SIDE_BY_SIDE: Final = 3
+"""More variants than this do not fit beside each other under several rates."""
+ROAD: Final = mask_spec("road", "road")
+
+
+def variant_cell(name: str, names: Sequence[str]) -> Cell:
+    """Return a variant's name with the dot of its colour among ``names``."""
+    return Cell(name, dot=looks(names)[name].colour)
+
+
+def sampled_frames(findings: Findings) -> str:
+    """Describe the frames whose masks were compared pixel by pixel."""
+    evaluated = findings.summary["frames"]["evaluated"]
+    if findings.sampled == evaluated:
+        return f"all {evaluated} evaluated frames"
+    if findings.pictured == evaluated:
+        return f"{findings.sampled} frames spread evenly over the {evaluated} evaluated"
+    return (
+        f"{findings.sampled} of the {findings.pictured} frames whose pictures were kept, out of "
+        f"{evaluated} evaluated (which may not be a fair sample)"
+    )
+
+
+def example_pictures(examples: Sequence[ExampleFrame]) -> Iterator[tuple[str, ImageFile]]:
+    """Yield for each example the image, each variant's mask over it, and the truth over it."""
+    for example in examples:
+        yield f"frame {example.frame}", jpeg(LayerImage("", example.image))
+        for name, mask in example.masks.items():
+            yield name, jpeg(LayerImage("", example.image, ROAD, mask))
+        if example.truth is not None:
+            yield "truth", jpeg(LayerImage("", example.image, TRUTH, example.truth))

@@ -1,0 +1,158 @@
+"""With the filter against without, frame by frame, and every variant against the baseline."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from roadeval.data import BASELINE
+from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
+from roadeval.report.figures.charts import difference
+from roadeval.report.figures.files import svg
+from roadeval.report.findings import Findings, PairedComparison
+from roadeval.report.sections.common import sampled_frames, variant_cell
+from roadeval.report.words import DASH, defined, interval, listing, number, percent, points
+
+
+def section(findings: Findings) -> Iterator[Block]:
+    """Yield what the filter changed, how much masks flicker, and who beats the baseline."""
+    filters = [each for each in findings.paired if each.control != BASELINE]
+    blind = [each for each in findings.paired if each.control == BASELINE]
+    yield Heading("With the filter against without")
+    for each in filters:
+        yield from _paired(findings, each)
+    if not filters:
+        yield Text("The two were not both run, so there is nothing to compare.")
+    yield from _flicker(findings)
+    if blind:
+        yield Heading("Against a guess that never looks at the image", 2)
+        yield _against_baseline(findings, blind)
+        yield Text(
+            f"{BASELINE}: the training frames' mean truth, thresholded at one half. A variant that "
+            "does not beat it has learnt nothing from the pixels. Differences are the variant "
+            "minus the guess; intervals as above.",
+            "note",
+        )
+
+
+def _paired(findings: Findings, pair: PairedComparison) -> Iterator[Block]:
+    yield _differences(findings, pair)
+    change = pair.differences["ERR"]
+    if not defined(change["mean"]):
+        yield Text("ERR is undefined on every frame, so nothing tells what the filter does to it.")
+        return
+    yield Text(_method(change), "note")
+    yield Text(frames_changed(pair))
+    if pair.pixels is not None:
+        yield Text(pixels_changed(findings, pair))
+    yield Figure(
+        svg(lambda: difference(pair.frames, pair.treated, pair.control, change)),
+        f"ERR of {pair.treated} minus {pair.control}, frame by frame. Dashed: the mean; grey band: "
+        "its interval, where one is given.",
+    )
+
+
+def _differences(findings: Findings, pair: PairedComparison) -> Table:
+    names = [pair.treated, pair.control]
+    return Table(
+        ["rate", *names, "difference, pp", "interval, pp", "frames", "effective"],
+        [
+            [
+                rate,
+                *(percent(findings.total(name)[rate]) for name in names),
+                Cell(points(change["mean"]), bold=True),
+                interval(change),
+                number(change["frames"]),
+                DASH if (worth := change["effective_frames"]) is None else f"{worth:.0f}",
+            ]
+            for rate, change in pair.differences.items()
+        ],
+        caption=(
+            f"Paired differences of the final masks, {pair.treated} minus {pair.control}: percent, "
+            "and percentage points with their interval."
+        ),
+    )
+
+
+def _method(change: Mapping[str, Any]) -> str:
+    if change["low"] is None:
+        return (
+            f"No interval for ERR: {change['reason']}. It would claim more than these frames know."
+        )
+    how = change.get("method") or change.get("reason")
+    return (
+        f"{100 * change['confidence']:.0f} % intervals ({how}). Neighbouring frames resemble each "
+        "other; effective says how many independent ones they are worth. All of this concerns "
+        "this drive only."
+    )
+
+
+def frames_changed(pair: PairedComparison) -> str:
+    """Return on how many frames the filter lowers ERR, raises it and leaves it."""
+    change = pair.frames["ERR"].dropna()
+    better, worse = int((change < 0).sum()), int((change > 0).sum())
+    same = len(change) - better - worse
+    count = max(len(change), 1)
+    parts = [
+        f"lowers ERR on {better} frames ({100 * better / count:.0f} %)",
+        f"raises it on {worse} ({100 * worse / count:.0f} %)",
+        *([f"leaves it on {same} ({100 * same / count:.0f} %)"] if same else []),
+    ]
+    return f"Of {len(change)} frames the filter {listing(parts)}."
+
+
+def pixels_changed(findings: Findings, pair: PairedComparison) -> str:
+    """Return which share of the pixels the filter made right and wrong, and what remains."""
+    assert pair.pixels is not None
+    right, wrong, labelled = pair.pixels
+    net = int(pair.frames["wrong"].sum())
+    change = f"{number(abs(net))} {'more' if net > 0 else 'fewer'} wrong pixels in all"
+    return (
+        f"Of the labelled pixels of {sampled_frames(findings)}, {percent(right / labelled)} % are "
+        f"newly right with the filter and {percent(wrong / labelled)} % newly wrong; over all "
+        f"frames that leaves {change}."
+    )
+
+
+def _flicker(findings: Findings) -> Iterator[Block]:
+    """Tabulate how much of each final mask changes from frame to frame, beside the truth's own."""
+    known = {name: each for name, each in findings.beyond.items() if defined(each["flicker"])}
+    if not known:
+        return
+    yield Heading("From one frame to the next", 2)
+    yield Table(
+        ["final mask", "flicker, %", "the truth's own, %", "beyond it, pp", "pairs of frames"],
+        [
+            [
+                variant_cell(name, [*findings.finals]),
+                Cell(percent(each["flicker"]), bold=True),
+                percent(each["truth_flicker"]),
+                points(each["flicker"] - each["truth_flicker"]),
+                number(each["pairs"]),
+            ]
+            for name, each in known.items()
+        ],
+    )
+    yield Text(
+        "Flicker: the share of pixels, labelled in both of two frames read one after the other, "
+        "whose mask differs. What moves must change, as the truth does; only what goes beyond it "
+        "is unrest. Motion is not taken out.",
+        "note",
+    )
+
+
+def _against_baseline(findings: Findings, blind: Sequence[PairedComparison]) -> Table:
+    return Table(
+        ["final mask", "ERR", "difference, pp", "interval, pp", "frames better", "frames worse"],
+        [
+            [
+                variant_cell(pair.treated, [*findings.finals]),
+                percent(findings.total(pair.treated)["ERR"]),
+                Cell(points(pair.differences["ERR"]["mean"]), bold=True),
+                interval(pair.differences["ERR"]),
+                number(int((pair.frames["ERR"] < 0).sum())),
+                number(int((pair.frames["ERR"] > 0).sum())),
+            ]
+            for pair in blind
+        ],
+    )

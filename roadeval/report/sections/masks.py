@@ -1,0 +1,28 @@
+"""Masks without truth: what they look like, and how much of the image they cover."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from roadeval.report.blocks import Block, Figure, Heading, ImageGrid, Text
+from roadeval.report.figures.charts import coverage
+from roadeval.report.figures.files import svg
+from roadeval.report.findings import Findings
+from roadeval.report.sections.common import example_pictures
+
+
+def section(findings: Findings) -> Iterator[Block]:
+    """Yield what there is to see without truth."""
+    yield Heading("Masks")
+    yield Text(
+        "Without truth nothing can be said about errors: not whether the road was found, not "
+        "whether the filter helps, not which stage is at fault. What follows is what was computed."
+    )
+    if findings.examples:
+        pictures = list(example_pictures(findings.examples))
+        yield ImageGrid(pictures, len(findings.examples[0].masks) + 1)
+    if len(findings.coverage):
+        yield Figure(
+            svg(lambda: coverage(findings.coverage)),
+            "The share of the image that the final masks call road. A jump is worth a look.",
+        )

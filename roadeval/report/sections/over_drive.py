@@ -1,0 +1,83 @@
+"""Rates over the drive: the paper's table, and its figures 2, 3a and 3b."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from roadeval.data import FILTERED, UNFILTERED
+from roadeval.report.blocks import Block, Cell, Figure, Heading, ImageGrid, Table, Text
+from roadeval.report.figures.figure import figures
+from roadeval.report.figures.files import svg_of
+from roadeval.report.findings import Findings
+from roadeval.report.sections.common import PAPER_RATES, SIDE_BY_SIDE, example_pictures
+from roadeval.report.words import DASH, percent
+
+PAPER_WINDOW: Final = 10
+"""Frames in a row of the paper's figures (section 5)."""
+
+
+def section(findings: Findings) -> Iterator[Block]:
+    """Yield the rates over the drive as the paper shows them."""
+    yield Heading("Over the drive: the paper's tables and figures")
+    if len(findings.windows):
+        yield from _tables(findings)
+    if findings.examples:
+        pictures = list(example_pictures(findings.examples))
+        yield ImageGrid(pictures, len(findings.examples[0].masks) + 2)
+        yield Text("The paper's figure 2: input and output images, and the truth.", "note")
+    for figure in figures():
+        if figure.in_report and (picture := svg_of(figure, findings.figure_data)):
+            yield Figure(picture, figure.caption)
+
+
+def _tables(findings: Findings) -> Iterator[Block]:
+    """Tabulate the windows; several tables where the variants do not fit side by side."""
+    together = len(findings.finals) <= SIDE_BY_SIDE
+    for rates in [PAPER_RATES] if together else [(rate,) for rate in PAPER_RATES]:
+        yield _table(findings, rates)
+    size = findings.window_size
+    long = "" if size == PAPER_WINDOW else f" The paper's rows are of {PAPER_WINDOW}."
+    yield Text(
+        f"Rows of {size} evaluated frames: the mean of the frames' rates in percent.{long} "
+        "The last line is the mean over all evaluated frames.",
+        "note",
+    )
+
+
+def _table(findings: Findings, rates: Sequence[str]) -> Table:
+    names = [*findings.finals]
+    found = {
+        (row["variant"], row["stage"], row["window"]): row
+        for row in findings.windows.to_dict("records")
+    }
+    rows: list[list[Cell | str]] = [
+        [
+            _span(window["first_frame"], window["last_frame"]),
+            *(
+                percent(found.get((name, findings.finals[name], window["window"]), {}).get(rate))
+                for rate in rates
+                for name in names
+            ),
+        ]
+        for window in findings.windows.drop_duplicates("window")
+        .sort_values("window")
+        .to_dict("records")
+    ]
+    whole = [percent(findings.total(name)[rate]) for rate in rates for name in names]
+    rows.append([Cell(text, bold=True) for text in ("all", *whole)])
+    return Table(
+        ["frames", *(_short(name) for _ in rates for name in names)],
+        rows,
+        breaks=[len(rows) - 1],
+        groups=[("", 1), *((f"{rate}, %", len(names)) for rate in rates)],
+        small=True,
+    )
+
+
+def _span(first: int, last: int) -> str:
+    return str(first) if first == last else f"{first}{DASH}{last}"
+
+
+def _short(name: str) -> str:
+    return {FILTERED: "with", UNFILTERED: "without"}.get(name, name)

@@ -1,0 +1,91 @@
+"""Settings and versions behind the results, and the command that makes them again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from roadeval.report.blocks import Block, Command, Heading, KeepTogether, Table, Text, TwoColumns
+from roadeval.report.findings import Findings
+
+
+def section(findings: Findings) -> Iterator[Block]:
+    """Yield what was run on what, and how to run it again."""
+    summary = findings.summary
+    yield Heading("Settings, versions, and how to reproduce this")
+    if log := summary.get("log"):
+        yield Text(f"Log: {log['path']}")
+        yield Text(f"SHA-256: {log['sha256']}")
+    if log and findings.commands:
+        yield Command(findings.commands.again(log["path"]))
+        yield Text(
+            "run.toml lies in the results folder and holds the whole configuration of the run; "
+            "the same log, configuration and versions give the same numbers.",
+            "note",
+        )
+    for topic in summary["drive"].get("topics", ()):
+        yield Text(str(topic), "note")
+    if findings.properties:
+        known = {name: value for name, value in findings.properties.items() if value != ""}
+        yield Text("; ".join(f"{name}: {value}" for name, value in known.items()), "note")
+    yield from _versions_and_seconds(summary)
+    if summary.get("settings"):
+        shared = {name: summary["run"].get(name, {}) for name in ("training", "evaluation")}
+        rows = settings_rows({name: each | shared for name, each in summary["settings"].items()})
+        half = -(-len(rows) // 2)
+        left, right = (_words(["setting", "value"], part) for part in (rows[:half], rows[half:]))
+        yield KeepTogether([Heading("Settings", 2), TwoColumns([left], [right])])
+
+
+def _versions_and_seconds(summary: Mapping[str, Any]) -> Iterator[Block]:
+    versions = [[name, str(value)] for name, value in summary.get("versions", {}).items()]
+    seconds = [
+        [variant, stage, f"{1e3 * value:.2f}"]
+        for variant, stages in summary.get("seconds", {}).items()
+        for stage, value in stages.items()
+    ]
+    if versions or seconds:
+        yield TwoColumns(
+            [_words(["package", "version"], versions)] if versions else [],
+            [_words(["variant", "stage", "ms a frame"], seconds)] if seconds else [],
+        )
+
+
+def _words(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """Return a small table whose first two columns are words."""
+    return Table(columns, rows, text_columns=(0, 1), small=True)
+
+
+def settings_rows(settings: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
+    """Return name and value of the settings: one value where the variants agree, else each one's.
+
+    Parameters
+    ----------
+    settings
+        By variant, nested as in a TOML file.
+    """
+    own = {variant: dict(flattened(each)) for variant, each in settings.items()}
+    rows = []
+    for name in dict.fromkeys(name for each in own.values() for name in each):
+        values = {variant: each[name] for variant, each in own.items() if name in each}
+        if len(set(values.values())) == 1:
+            only = "" if len(values) == len(own) else f" ({', '.join(values)} only)"
+            rows.append([name, next(iter(values.values())) + only])
+        else:
+            rows.append([name, "; ".join(f"{v}: {text}" for v, text in values.items())])
+    return rows
+
+
+def flattened(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Yield settings by their dotted names.
+
+    >>> list(flattened({"svm": {"kernel": "rbf"}, "frames": {"scale": 1.0}}))
+    [('svm.kernel', 'rbf'), ('frames.scale', '1.0')]
+    """
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            yield from flattened(value, f"{prefix}{name}.")
+        elif isinstance(value, list | tuple):
+            yield f"{prefix}{name}", ", ".join(map(str, value))
+        else:
+            yield f"{prefix}{name}", "none" if value is None else str(value)

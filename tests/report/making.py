@@ -1,0 +1,121 @@
+"""Findings made by hand, and reading back what was typeset."""
+
+import io
+import re
+
+import pandas as pd
+from pypdf import PdfReader
+
+from roadeval.report.blocks import Cell, Document
+from roadeval.report.findings import Findings, PairedComparison
+
+
+def a_document(*blocks, title="street"):
+    """A document of some blocks."""
+    return Document("kicker", title, "subtitle", "footer", blocks)
+
+
+def reader(content):
+    """Open a PDF."""
+    return PdfReader(io.BytesIO(content))
+
+
+def text(content):
+    """Every word of a PDF, with single spaces between them."""
+    pages = (page.extract_text() for page in reader(content).pages)
+    return re.sub(r"\s+", " ", " ".join(pages))
+
+
+VARIANTS = ("filtered", "unfiltered", "blind")
+
+
+def rates(err, fpr=0.25, fnr=0.5, **more):
+    """The rates of a mask, with those that mirror them."""
+    mirrored = {"ACC": 1 - err, "TNR": 1 - fpr, "TPR": 1 - fnr}
+    return {"ERR": err, "FPR": fpr, "FNR": fnr} | mirrored | more
+
+
+def a_total(err, fpr=0.25, fnr=0.5):
+    """Rates of a mask over a drive of 1,200 frames."""
+    return rates(err, fpr, fnr, pooled_ERR=err + 0.01, frames=1200, undefined={})
+
+
+def a_difference(mean, low=None, high=None):
+    """A paired difference, as ``summary.json`` has it."""
+    known = {"confidence": 0.95, "method": "a method", "reason": None}
+    unknown = {"confidence": 0.95, "method": None, "reason": "too few frames"}
+    return {"mean": mean, "low": low, "high": high, "frames": 1200, "effective_frames": 40.0} | (
+        unknown if low is None else known
+    )
+
+
+def a_pair(changes, wrong, pixels=(30, 10, 1000), control="unfiltered"):
+    """Filtered against another, by the frames' changes of ERR and of wrong pixels."""
+    frames = pd.DataFrame({"ERR": changes, "wrong": wrong, "stamp_ns": range(len(changes))})
+    differences = {rate: a_difference(-0.02, -0.03, -0.01) for rate in ("ERR", "FPR", "FNR")}
+    return PairedComparison("filtered", control, differences, frames, pixels)
+
+
+def some_findings(**changes):
+    """Findings of a drive whose numbers all differ: of two variants and the baseline."""
+    totals = {
+        "filtered": {"svm": a_total(0.20, 0.21, 0.22), "post": a_total(0.10, 0.11, 0.12)},
+        "unfiltered": {"svm": a_total(0.30, 0.31, 0.32), "post": a_total(0.15, 0.16, 0.17)},
+        "blind": {"post": a_total(0.12, 0.13, 0.14)},
+    }
+    frames = {"in_log": 1210, "evaluated": 1200, "skipped": {"trained on": 10}}
+    plain = {
+        "source": "drive.rrd",
+        "complete": True,
+        "again": "do it again",
+        "inspect": "open frame {}".format,
+        "pictured": 1200,
+        "summary": {
+            "drive": {"name": "street", "width": 40, "height": 20},
+            "verdict": "It helps.",
+            "frames": frames,
+            "totals": totals,
+            "settings": {},
+            "versions": {},
+        },
+        "properties": {},
+        "finals": dict.fromkeys(VARIANTS, "post"),
+        "windows": pd.DataFrame(),
+        "window_size": 10,
+        "paired": [],
+        "regions": pd.DataFrame(),
+        "overlap": {
+            name: {stage: {"IoU": 0.5 + place / 10, "F1": 0.6, "precision": 0.7} for stage in own}
+            for place, (name, own) in enumerate(totals.items())
+        },
+        "changes": pd.DataFrame(),
+        "error_parts": {},
+        "heatmaps": [],
+        "oracles": pd.DataFrame(),
+        "beyond": {},
+        "sampled": 1200,
+        "examples": [],
+        "thumbnails": [],
+        "worst": [],
+        "helped": [],
+        "harmed": [],
+        "coverage": pd.DataFrame(),
+    }
+    return Findings(**plain | changes)
+
+
+def the(kind, blocks):
+    """The only block of a kind."""
+    (block,) = (block for block in blocks if isinstance(block, kind))
+    return block
+
+
+def plain_rows(table):
+    """A table's cells as text."""
+    return [[cell.text if isinstance(cell, Cell) else cell for cell in row] for row in table.rows]
+
+
+def column(table, title):
+    """The cells below a title."""
+    place = list(table.columns).index(title)
+    return [row[place] for row in table.rows]

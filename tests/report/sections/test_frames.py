@@ -1,0 +1,69 @@
+"""The frames to look at: what is said about each, and how to open it."""
+
+from roadeval.report.blocks import Command, KeepTogether, Text, TwoColumns
+from roadeval.report.findings import NotableFrame
+from roadeval.report.sections.frames import section
+from roadeval.report.words import MINUS
+from tests.report.making import plain_rows, rates, some_findings, the
+
+
+def a_frame(number, **changes):
+    plain = {
+        "rates": {"filtered": rates(0.4, 0.3, 0.2), "unfiltered": rates(0.5, 0.6, 0.7)},
+        "parts": {"svm": 0.1, "filter": 0.2, "post": 0.1},
+        "notes": ["A note.", "Another."],
+    }
+    return NotableFrame(number, 12_345_000_000, "filtered", **plain | changes)
+
+
+def shown(findings):
+    return [block.blocks for block in section(findings) if isinstance(block, KeepTogether)]
+
+
+def said(blocks):
+    return [block.text for block in the(TwoColumns, blocks).left]
+
+
+def test_a_bad_frame_is_shown_with_its_rates_the_stage_at_fault_and_its_notes():
+    (blocks,) = shown(some_findings(worst=[a_frame(7)]))
+    assert said(blocks) == [
+        "Frame 7",
+        "Stamp 12.345 s",
+        "ERR of filtered: svm 10.00, filter +20.00, post +10.00 pp. "
+        "Most of it comes from the shadow filter.",
+        "A note. Another.",
+    ]
+    assert plain_rows(the(TwoColumns, blocks).right[0]) == [
+        ["filtered", "40.00", "30.00", "20.00"],
+        ["unfiltered", "50.00", "60.00", "70.00"],
+    ]
+    assert the(Command, blocks).text == "open frame 7"
+
+
+def test_the_stage_at_fault_is_the_one_with_the_greatest_part():
+    parts = {"svm": 0.1, "filter": -0.2, "post": 0.11}
+    (blocks,) = shown(some_findings(worst=[a_frame(7, parts=parts)]))
+    assert said(blocks)[2].endswith("Most of it comes from post.")
+
+
+def test_helped_and_harmed_frames_are_told_apart():
+    findings = some_findings(
+        worst=[a_frame(1)], helped=[a_frame(2, change=-0.1)], harmed=[a_frame(3, change=0.1)]
+    )
+    worst, helped, harmed = shown(findings)
+    assert worst[0].text == "The worst frames"
+    assert helped[0].text == "Frames that the filter helped most"
+    assert said(helped)[-1] == f"The filter changes ERR by {MINUS}10.00 pp."
+    assert harmed[0].text == "Frames that the filter harmed most"
+    assert said(harmed)[-1] == "The filter changes ERR by +10.00 pp."
+
+
+def test_without_pictures_there_is_nothing_to_open():
+    (blocks,) = shown(some_findings(worst=[a_frame(7)], pictured=0))
+    assert not [block for block in blocks if isinstance(block, Command)]
+
+
+def test_where_no_frame_is_the_worst_that_is_told():
+    assert the(Text, section(some_findings())).text == (
+        "ERR of filtered is undefined on every frame, so no frame is the worst."
+    )

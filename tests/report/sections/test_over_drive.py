@@ -1,0 +1,67 @@
+"""Rates over the drive: which number stands where, and which figures are shown."""
+
+import pandas as pd
+
+from roadeval.report.blocks import Figure, Table, Text
+from roadeval.report.sections.over_drive import section
+from tests.report.making import plain_rows, rates, some_findings
+
+
+def windows():
+    rows = []
+    for window, (first, last) in enumerate([(3, 12), (13, 13)]):
+        place = {"window": window, "first_frame": first, "last_frame": last, "frames": 10}
+        for variant, err in (("filtered", 0.01), ("unfiltered", 0.02), ("blind", 0.03)):
+            own = rates(err + window / 10, 0.4 + err, 0.5 + err)
+            rows.append(place | {"variant": variant, "stage": "post"} | own)
+            rows.append(place | {"variant": variant, "stage": "svm"} | rates(0.99, 0.98, 0.97))
+    return pd.DataFrame(rows)
+
+
+def test_each_window_has_the_final_masks_rates_and_the_last_line_is_the_whole():
+    table, *_ = (b for b in section(some_findings(windows=windows())) if isinstance(b, Table))
+    assert table.columns == ["frames", *(("with", "without", "blind") * 4)]
+    assert [title for title, _ in table.groups] == ["", "ERR, %", "FPR, %", "FNR, %", "ACC, %"]
+    assert plain_rows(table) == [
+        [
+            "3–12",  # noqa: RUF001
+            *("1.00", "2.00", "3.00", "41.00", "42.00", "43.00"),
+            *("51.00", "52.00", "53.00", "99.00", "98.00", "97.00"),
+        ],
+        [
+            "13",
+            *("11.00", "12.00", "13.00", "41.00", "42.00", "43.00"),
+            *("51.00", "52.00", "53.00", "89.00", "88.00", "87.00"),
+        ],
+        [
+            "all",
+            *("10.00", "15.00", "12.00", "11.00", "16.00", "13.00"),
+            *("12.00", "17.00", "14.00", "90.00", "85.00", "88.00"),
+        ],
+    ]
+
+
+def test_many_variants_have_a_table_a_rate():
+    totals = {name: {"post": rates(0.1)} for name in "abcd"}
+    findings = some_findings(windows=windows(), finals=dict.fromkeys(totals, "post"))
+    findings.summary["totals"] = totals
+    tables = [block for block in section(findings) if isinstance(block, Table)]
+    assert [len(table.columns) for table in tables] == [5, 5, 5, 5]
+
+
+def test_rows_of_another_length_than_the_papers_are_told():
+    findings = some_findings(windows=windows(), window_size=20)
+    (note,) = (block.text for block in section(findings) if isinstance(block, Text))
+    assert "Rows of 20 evaluated frames" in note
+    assert "The paper's rows are of 10." in note
+
+
+def test_the_figures_of_rates_follow_and_none_without_rates():
+    captions = [
+        b.caption for b in section(some_findings(windows=windows())) if isinstance(b, Figure)
+    ]
+    assert [caption.partition(":")[0] for caption in captions] == [
+        "The paper's figure 3a",
+        "The paper's figure 3b",
+    ]
+    assert not [block for block in section(some_findings()) if isinstance(block, Figure)]

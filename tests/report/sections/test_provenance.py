@@ -1,0 +1,41 @@
+"""Settings and versions: what all variants share is told once."""
+
+from roadeval.report.blocks import Command, Table, Text, TwoColumns
+from roadeval.report.sections.provenance import section, settings_rows
+from tests.report.making import plain_rows, some_findings, the
+
+
+def test_settings_are_told_once_where_variants_agree_and_apart_where_they_differ():
+    settings = {
+        "filtered": {"preset": "paper", "svm": {"c": 1.0}, "shadow": {"threshold": "otsu"}},
+        "unfiltered": {
+            "preset": "paper",
+            "svm": {"c": 2.0, "gamma": None},
+            "chain": ["svm", "post"],
+        },
+    }
+    assert settings_rows(settings) == [
+        ["preset", "paper"],
+        ["svm.c", "filtered: 1.0; unfiltered: 2.0"],
+        ["shadow.threshold", "otsu (filtered only)"],
+        ["svm.gamma", "none (unfiltered only)"],
+        ["chain", "svm, post (unfiltered only)"],
+    ]
+
+
+def test_the_log_and_the_command_that_makes_the_results_again_are_given():
+    findings = some_findings()
+    findings.summary["log"] = {"path": "street.mcap", "sha256": "abc"}
+    blocks = list(section(findings))
+    texts = [block.text for block in blocks if isinstance(block, Text)]
+    assert texts[:2] == ["Log: street.mcap", "SHA-256: abc"]
+    assert the(Command, blocks).text == "do it again"
+
+
+def test_seconds_are_told_in_milliseconds_beside_the_versions():
+    findings = some_findings()
+    findings.summary["versions"]["numpy"] = "2.0"
+    findings.summary["seconds"] = {"filtered": {"svm": 0.0123}}
+    both = the(TwoColumns, section(findings))
+    assert plain_rows(the(Table, both.left)) == [["numpy", "2.0"]]
+    assert plain_rows(the(Table, both.right)) == [["filtered", "svm", "12.30"]]

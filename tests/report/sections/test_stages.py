@@ -1,0 +1,56 @@
+"""Which stage broke it: the numbers of each stage, and the parts of the error."""
+
+import pandas as pd
+
+from roadeval.report.blocks import Table, Text
+from roadeval.report.sections.stages import section, stages_table
+from roadeval.report.words import DASH, MINUS
+from tests.report.making import column, plain_rows, some_findings
+
+PARTS = {
+    "filtered": {"svm": 0.3, "filter": -0.1, "post": -0.1},
+    "unfiltered": {"svm": 0.3, "post": -0.15},
+}
+
+
+def test_each_stage_has_its_rates_and_what_it_repaired_and_spoiled():
+    changes = pd.DataFrame(
+        [{"variant": "filtered", "after": "post", "repaired": 0.08, "spoiled": 0.02}]
+    )
+    table = stages_table(some_findings(changes=changes))
+    assert table.columns[2:] == ["ERR", "FPR", "FNR", "IoU", "repaired", "spoiled"]
+    assert plain_rows(table)[:3] == [
+        ["filtered", "svm", "20.00", "21.00", "22.00", "50.00", DASH, DASH],
+        ["", "post", "10.00", "11.00", "12.00", "50.00", "8.00", "2.00"],
+        ["unfiltered", "svm", "30.00", "31.00", "32.00", "60.00", DASH, DASH],
+    ]
+    assert [cell.bold for cell in column(table, "ERR")] == [False, True, False, True, True]
+    assert table.breaks == [2, 4]
+
+
+def test_the_parts_of_the_error_add_up_to_it():
+    _, parts = (b for b in section(some_findings(error_parts=PARTS)) if isinstance(b, Table))
+    assert parts.columns == ["final mask", "svm", "filter", "post", "ERR"]
+    assert plain_rows(parts) == [
+        ["filtered", "30.00", f"{MINUS}10.00", f"{MINUS}10.00", "10.00"],
+        ["unfiltered", "30.00", DASH, f"{MINUS}15.00", "15.00"],
+    ]
+
+
+def test_the_parts_are_explained():
+    (note,) = (b.text for b in section(some_findings(error_parts=PARTS)) if isinstance(b, Text))
+    assert note == (
+        "A sum, in percent of the pixels. svm: the error of the mask that the last stage is "
+        "given, without the filter; filter: what filtered has more or less than unfiltered in "
+        "that mask; post: what post made of it. Percentage points add up to ERR."
+    )
+
+
+def test_an_oracle_shows_what_would_change():
+    row = {"variant": "filtered", "oracle": "svm", "as_is": 0.1, "frames": 1200}
+    oracles = pd.DataFrame([row | {"ERR": 0.04, "FPR": 0.05, "FNR": 0.06}])
+    findings = some_findings(error_parts=PARTS, oracles=oracles)
+    *_, table = (block for block in section(findings) if isinstance(block, Table))
+    assert plain_rows(table) == [
+        ["filtered", "perfect svm", "10.00", "4.00", f"{MINUS}6.00", "5.00", "6.00", "1,200"]
+    ]

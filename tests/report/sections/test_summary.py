@@ -1,0 +1,109 @@
+"""The first page: which numbers stand out, and what a reader is warned of."""
+
+import math
+
+import pytest
+
+from roadeval.report.blocks import BulletList, Table, Text
+from roadeval.report.sections.summary import rates_table, section, warnings
+from tests.report.making import a_difference, column, plain_rows, some_findings
+
+
+def bold(table, title):
+    return [cell.text for cell in column(table, title) if cell.bold]
+
+
+@pytest.mark.parametrize(
+    ("title", "best"),
+    [
+        ("ERR", "10.00"),
+        ("FPR", "11.00"),
+        ("FNR", "12.00"),
+        ("ACC", "90.00"),
+        ("pooled ERR", "11.00"),
+        ("IoU", "70.00"),
+    ],
+)
+def test_the_best_of_each_column_is_bold_the_lowest_error_and_the_highest_accuracy(title, best):
+    assert bold(rates_table(some_findings()), title) == [best]
+
+
+def test_boundary_f_is_best_where_it_is_highest_and_may_be_unknown():
+    each = {"width": 5, "flicker": None}
+    known = {"filtered": each | {"boundary_F": 0.4}, "unfiltered": each | {"boundary_F": 0.8}}
+    table = rates_table(some_findings(beyond=known))
+    assert bold(table, "boundary F") == ["80.00"]
+    assert plain_rows(table)[2][-1] == "–"  # noqa: RUF001
+    assert "within 5 pixels" in table.caption
+
+
+def test_an_undefined_rate_is_never_the_best():
+    findings = some_findings()
+    findings.summary["totals"]["filtered"]["post"]["ERR"] = math.nan
+    assert bold(rates_table(findings), "ERR") == ["12.00"]
+
+
+def test_every_final_mask_has_its_row():
+    rows = plain_rows(rates_table(some_findings()))
+    assert rows[1] == [
+        *("unfiltered", "1,200", "15.00", "16.00", "17.00", "85.00", "16.00"),
+        *("60.00", "60.00", "70.00"),
+    ]
+
+
+def test_who_is_worse_than_the_baseline_is_named():
+    (warning,) = warnings(some_findings())
+    assert warning.startswith("unfiltered is worse than blind (ERR 12.00 %)")
+
+
+def test_undefined_rates_are_told_and_how_often():
+    findings = some_findings(finals={"filtered": "post"})
+    findings.summary["totals"]["filtered"]["post"]["undefined"] = {"FNR": 1200, "FPR": 3, "ERR": 0}
+    assert list(warnings(findings)) == [
+        "filtered: undefined on every frame: FNR.",
+        "filtered: undefined on some of 1200 frames, and left out: FPR on 3.",
+    ]
+
+
+def test_three_losses_are_named_and_the_others_counted():
+    findings = some_findings(finals={"filtered": "post"})
+    findings.summary["losses"] = ["a", "b", "c", "d", "e"]
+    assert list(warnings(findings)) == [
+        *("Lost: a", "Lost: b", "Lost: c"),
+        "2 more frames were lost; summary.json names them.",
+    ]
+
+
+def test_a_drive_that_trained_itself_says_so():
+    findings = some_findings(finals={"filtered": "post"})
+    findings.summary["training"] = {"source": "truth", "model": None}
+    assert [text.partition(" (")[0] for text in warnings(findings)] == [
+        "Trained on this drive's own first frames"
+    ]
+    findings.summary["training"]["model"] = "city.model"
+    assert not list(warnings(findings))
+
+
+def test_the_page_has_the_verdict_how_sure_it_is_and_every_count():
+    findings = some_findings()
+    findings.summary["difference"] = {"post": {"ERR": a_difference(-0.02, -0.03, -0.01)}}
+    blocks = list(section(findings))
+    texts = [block.text for block in blocks if isinstance(block, Text)]
+    assert texts[0] == "It helps."
+    assert texts[1].startswith(
+        "filtered minus unfiltered, 95 % interval over 1200 frames that are worth about 40 "
+    )
+    (counts,) = (block.left[0] for block in blocks if hasattr(block, "left"))
+    assert isinstance(counts, Table)
+    assert plain_rows(counts) == [
+        ["in log", "1,210"],
+        ["evaluated", "1,200"],
+        ["skipped: trained on", "10"],
+    ]
+
+
+def test_a_partial_recording_is_marked_before_the_verdict():
+    blocks = list(section(some_findings(complete=False)))
+    assert isinstance(blocks[1], BulletList)
+    assert blocks[1].tone == "warning"
+    assert "did not reach its end" in blocks[1].items[0]
