@@ -159,7 +159,7 @@ class _Growing:
         self._file.write(content)
 
 
-class Results:
+class ResultsFolder:
     """Reads a results folder.
 
     Parameters

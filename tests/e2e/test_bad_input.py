@@ -44,7 +44,7 @@ def refused(tmp_path, capsys):
         assert said.err.startswith("roadeval: error: ")
         assert said.err.count("\n") == 1
         assert not (tmp_path / "out.rrd").exists()
-        assert not (tmp_path / "reports").exists()
+        assert not list(tmp_path.glob("reports/*"))
         assert not list(tmp_path.rglob("*partial*"))
         return said.err
 
@@ -130,6 +130,6 @@ def test_a_table_cut_at_the_end_of_a_line_gives_one_line_and_no_numbers(words, s
     run = here(*words, cwd=tmp_path)
     assert (run.returncode, run.stdout) == (1, "")
     assert run.stderr == (
-        "roadeval: error: cut/frames.csv: does not agree with summary.json: it has 19 of 20 "
-        "frames of filtered similarity; make the results anew with roadeval replay\n"
+        "roadeval: error: cut/frames.csv: does not agree with its summary (133 of 140 rows); "
+        "make the results anew with roadeval replay\n"
     )

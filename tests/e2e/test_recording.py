@@ -98,7 +98,8 @@ def test_two_runs_give_the_same_summary_but_for_the_clock_and_what_was_asked(twi
 
 
 def test_two_runs_give_the_same_recording_but_for_the_clock(twice, tmp_path):
-    dropped = [word for path in (*CLOCKED, "/results/summary") for word in ("--drop-entity", path)]
+    paths = (*CLOCKED, "/results/summary", "/results/run")
+    dropped = [word for path in paths for word in ("--drop-entity", path)]
     for number, (recording, _) in enumerate(twice):
         code, said = rerun("filter", *dropped, recording, "-o", tmp_path / f"{number}.rrd")
         assert code == 0, said

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.fixtures.flavours import NoEncoderError
 from tests.fixtures.make import make
 from tests.fixtures.shared import SHARED
 
@@ -16,5 +17,5 @@ def log(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
         return SHARED / "mcap" / name
     try:
         return make(name, tmp_path)
-    except LookupError as missing:
+    except NoEncoderError as missing:
         pytest.skip(str(missing))

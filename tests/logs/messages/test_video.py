@@ -129,9 +129,9 @@ def test_every_codec_is_decoded_from_any_frame(log: Path) -> None:
     assert all(np.array_equal(a.image, b.image) for a, b in zip(late, found[6:], strict=True))
 
 
-def test_parameters_in_a_packet_of_their_own_announce_a_keyframe() -> None:
-    (first, *_) = Packets(make(f"flavours/{H264}"), set()).packets
-    whole = bytes(first.data)
+@pytest.mark.parametrize("log", both("flavours", H264), indirect=True)
+def test_parameters_in_a_packet_of_their_own_announce_a_keyframe(log: Path) -> None:
+    whole = bytes(Packets(log, set()).packets[0].data)
     parameters = whole[: whole.index(b"\x00\x00\x01\x65")]
     assert is_keyframe(CompressedPicture(0, "h264", parameters))
     assert not is_keyframe(CompressedPicture(0, "h264", b"no video"))
