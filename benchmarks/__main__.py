@@ -21,12 +21,14 @@ from benchmarks.plainly import PlainWay
 from benchmarks.replaying import Held, Whole, floor, hold, loop, whole
 from benchmarks.timing import Spread, ratios, table, timed
 from roadeval import logs
+from roadeval.config import configure
 from roadeval.data import Frame, Role
 from roadeval.jobs import frame as runner
-from roadeval.jobs.options import ReplayOptions
+from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import Run
 from roadeval.pipeline.stage import View
-from roadeval.recording import Rule, recorder_for
+from roadeval.recording import RecordRule, recorder_for
+from roadeval.results.lines import lines
 from roadeval.runtime.threads import one_thread_each
 
 Rows = list[dict[str, Any]]
@@ -57,7 +59,7 @@ def _at_size(
     frames: list[Frame], size: tuple[int, int], folder: Path, options: argparse.Namespace
 ) -> dict[str, Rows]:
     drive = drives.write(folder / "drive.mcap", frames, size)
-    run = ReplayOptions(jobs=1)
+    run = configure({"run": {"jobs": 1}})
     found: dict[str, Rows] = {}
     if "replay" in options.parts:
         held = hold(drive, run)
@@ -81,7 +83,7 @@ def _at_size(
 
 def _replay(drive: Path, held: Held, folder: Path, jobs: int, options: argparse.Namespace) -> Rows:
     """Measure loop and floor in turns, so that a busy machine slows both of them, then whole."""
-    run, count = ReplayOptions(jobs=jobs), len(held.files)
+    run, count = configure({"run": {"jobs": jobs}}), len(held.files)
     for work in (loop, whole):
         work(drive, run, folder)  # warms the caches
     pairs = [
@@ -117,12 +119,12 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
     def lap(name: str, seconds: float) -> None:
         times.setdefault(name, []).append(seconds)
 
-    options = ReplayOptions(jobs=1)
+    config = configure({"run": {"jobs": 1}})
     with logs.open_log(drive) as log, one_thread_each():
-        run = Run(log, options, lambda _progress: None)
-        recorder = recorder_for(folder / "stages.rrd", run.layout(), Rule.parse("all"))
+        run = Run(log, config, ignore)
+        recorder = recorder_for(folder / "stages.rrd", run.layout(), RecordRule.parse("all"))
         with recorder:
-            for position, logged in enumerate(log.frames(options.select(log))):
+            for position, logged in enumerate(log.frames(run.selection)):
                 frame, seconds = timed(logged.decode)
                 lap("decode", seconds)
                 seen = View.of(frame.image)
@@ -133,7 +135,7 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
                 score = partial(run.board.score, frame, Role.EVALUATED, variants)
                 result, seconds = timed(score)
                 lap("score", seconds)
-                encoded, seconds = timed(partial(recorder.encode, result, position))
+                encoded, seconds = timed(partial(recorder.encode, result, position, lines(result)))
                 lap("encode", seconds)
                 lap("write", timed(partial(recorder.write, encoded))[1])
             recorder.finish({})
@@ -143,14 +145,14 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
 def _plain(
     drive: Path, mine: dict[str, list[float]], folder: Path, options: argparse.Namespace
 ) -> Rows:
-    run_options = ReplayOptions(jobs=1)
+    config = configure({"run": {"jobs": 1}})
     with logs.open_log(drive) as log:
-        run = Run(log, run_options, lambda _progress: None)
-        frames = [each.decode() for each in log.frames(run_options.select(log))]
+        run = Run(log, config, ignore)
+        frames = [each.decode() for each in log.frames(run.selection)]
         step = max(1, len(frames) // options.plain_frames)
         chosen = range(len(frames))[step // 2 :: step][: options.plain_frames]
-        results = [r for i, (_, r) in enumerate(run.frames(Whole())) if i in chosen]
-    plain = PlainWay(frames, run_options)
+        results = [r for i, (_, _, r) in enumerate(run.frames(Whole())) if i in chosen]
+    plain = PlainWay(frames, config)
     for name, parameters in run.model.parameters.items():
         plain.require_same_machine(name, parameters["svm"])
     plain.save(folder / "plain.rrd")

@@ -16,8 +16,8 @@ import numpy as np
 from mcap_ros2.writer import Writer
 
 from roadeval import logs
+from roadeval.config import configure
 from roadeval.data import Frame
-from roadeval.jobs.options import ReplayOptions
 from roadeval.logs import LogWriter
 
 PERIOD_NS: Final = 100_000_000
@@ -46,9 +46,10 @@ class Source:
 
     def frames(self, count: int) -> list[Frame]:
         """Decode the first frames that have a truth."""
-        options = ReplayOptions(road_labels=self.road, ignore_labels=self.ignore)
+        config = configure({"labels": {"road": self.road, "ignore": self.ignore}})
         with logs.open_log(self.path) as log:
-            readable = (f for f in log.frames(options.select(log)) if f.labelled)
+            selection = log.select(config.topics, config.labels)
+            readable = (frame for frame in log.frames(selection) if frame.labelled)
             return [each.decode() for each in islice(readable, count)]
 
 

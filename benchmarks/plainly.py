@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
+from roadeval.config import RunConfig
 from roadeval.data import FILTERED, UNFILTERED, Frame, VariantResult
-from roadeval.jobs.options import ReplayOptions
-from roadeval.pipeline.chain import Chain
-from roadeval.pipeline.stage import TrainingSet
+from roadeval.pipeline.chain import Pipeline
+from roadeval.pipeline.training_set import TrainingSet
 from roadeval.training.sampling import sample
 from tests.pipeline import reference
 
@@ -26,16 +26,16 @@ Times = dict[str, list[float]]
 class PlainWay:
     """Both variants, trained on the frames and pixels that `roadeval.replay` trains on."""
 
-    def __init__(self, frames: list[Frame], options: ReplayOptions) -> None:
-        settings = options.training()
+    def __init__(self, frames: list[Frame], config: RunConfig) -> None:
+        settings = config.training
         first = frames[: settings.frames]
         pixels = sample([frame.truth for frame in first], settings)
         where = pixels.frame, pixels.row, pixels.column, pixels.road
         self.models = {}
-        for variant in options.all_variants():
-            plan = variant.config.plan()
-            filters = [name for name in plan.chain if name == "shadow"]
-            chain = Chain(filters, plan.settings, {})
+        for variant in config.variants():
+            pipeline = variant.pipeline
+            filters = tuple(name for name in pipeline.chain if name == "shadow")
+            chain = Pipeline(filters, pipeline.settings).bind({})
             images = tuple(chain.filtered(frame.image) for frame in first)
             colours = TrainingSet(images, *where).colours()
             self.models[variant.name] = reference.train(colours, pixels.road)

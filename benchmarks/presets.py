@@ -20,9 +20,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from arch.bootstrap import IIDBootstrap
 
-from roadeval.config import Config, preset
+from roadeval.config import RunConfig, configure
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.pipeline.chain import Chain
@@ -66,19 +65,20 @@ def counts(mask: np.ndarray, frame: Frame) -> np.ndarray:
     return np.array([part.sum() for part in sets])
 
 
-def variants() -> Iterator[tuple[str, Config]]:
-    """Give what is compared; ``unfiltered`` first."""
-    yield "unfiltered", preset("paper").without_filter()
+def variants() -> Iterator[tuple[str, RunConfig]]:
+    """Yield what is compared; ``unfiltered`` first."""
+    paper = configure()
+    yield "unfiltered", replace(paper, pipeline=paper.pipeline.without_filter())
     for name in ("paper", "gated", "robust"):
-        yield name, preset(name)
+        yield name, configure({"preset": name})
 
 
 def score(
-    name: str, config: Config, seed: int, train: list[Frame], test: dict[str, list[Frame]]
+    name: str, config: RunConfig, seed: int, train: list[Frame], test: dict[str, list[Frame]]
 ) -> np.ndarray:
     """Train a variant and count its outcomes on each drive, ``(drives, 6)``."""
-    model = fit(train, {name: config.plan()}, replace(config.training, seed=seed))
-    chain: Chain = config.bind(model.parameters[name])
+    model = fit(train, {name: config.pipeline}, replace(config.training, seed=seed))
+    chain: Chain = config.pipeline.bind(model.parameters[name])
     return np.array([sum(counts(last(chain, f), f) for f in frames) for frames in test.values()])
 
 
@@ -113,7 +113,8 @@ def difference(rate, new: np.ndarray, base: np.ndarray) -> str:
     def of(a: np.ndarray, b: np.ndarray) -> float:
         return rate(a.sum(axis=0)) - rate(b.sum(axis=0))
 
-    low, high = IIDBootstrap(new, base, seed=0).conf_int(of, 1000, method="percentile").ravel()
+    draws = np.random.default_rng(0).integers(len(new), size=(1000, len(new)))
+    low, high = np.percentile([of(new[drawn], base[drawn]) for drawn in draws], [2.5, 97.5])
     return f"{of(new, base):+6.1f} [{low:+5.1f}, {high:+5.1f}]"
 
 

@@ -14,15 +14,17 @@ import numpy as np
 import roadeval
 from benchmarks.timing import Cost, Meter
 from roadeval import logs
+from roadeval.config import RunConfig
 from roadeval.data import FrameResult
 from roadeval.data.packed import Packed
-from roadeval.jobs.options import ReplayOptions
+from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import Run
-from roadeval.recording import Rule, recorder_for
+from roadeval.recording import RecordRule, recorder_for
 from roadeval.results.folder import ResultsWriter
+from roadeval.results.lines import lines, sum_lines
 from roadeval.runtime.threads import ordered
 
-ALL: Final = Rule.parse("all")
+ALL: Final = RecordRule.parse("all")
 HELD_BYTES: Final = 400 << 20
 """Of layers computed beforehand and held for the floor, which goes round them."""
 
@@ -48,23 +50,24 @@ class Held:
 class Whole:
     """Stands where a recorder does, and hands out what it is given, layers and all."""
 
-    def encode(self, result: FrameResult, _position: int) -> FrameResult:
-        """Give the result."""
+    def encode(self, result: FrameResult, _position: int, _lines: Any) -> FrameResult:
+        """Return the result."""
         return result
 
 
-def hold(drive: Path, options: ReplayOptions) -> Held:
+def hold(drive: Path, config: RunConfig) -> Held:
     """Run the pipeline once, before any clock runs, and keep what the floor needs."""
     with logs.open_log(drive) as log:
-        run = Run(log, options, lambda _progress: None)
+        run = Run(log, config, ignore)
         results, sizes = [], []
         recorder = recorder_for(drive.with_suffix(".held.rrd"), run.layout(), ALL)
-        for position, (_, result) in enumerate(run.frames(Whole())):
+        for position, (_, _, result) in enumerate(run.frames(Whole())):
             if position % max(1, -(-run.total * _bytes(result) // HELD_BYTES)) == 0:
                 results.append(result)
-                encoded = recorder.encode(result, position).encoded
+                encoded = recorder.encode(result, position, lines(result))
                 sizes.append(_layer_bytes(encoded.payloads))
-        files = [_files(logged) for logged in log.frames(options.select(log), options.span())]
+        frames = log.frames(run.selection, logs.Span.of(config.frames))
+        files = [_files(logged) for logged in frames]
         return Held(files, results, run.layout(), float(np.mean(sizes)))
 
 
@@ -92,7 +95,7 @@ def floor(held: Held, folder: Path, jobs: int) -> Cost:
         number, files, result = item
         for flags, data in zip((cv2.IMREAD_COLOR_RGB, *[-1] * 9), files, strict=False):
             cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-        return recorder.encode(result, number)
+        return recorder.encode(result, number, lines(result))
 
     recorder = recorder_for(folder / "floor.rrd", held.layout, ALL)
     meter = Meter()
@@ -103,24 +106,25 @@ def floor(held: Held, folder: Path, jobs: int) -> Cost:
     return meter.read()
 
 
-def loop(drive: Path, options: ReplayOptions, folder: Path) -> Cost:
+def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
     """Do what `replay` does, without its training, its summary and its figures."""
     with logs.open_log(drive) as log:
-        run = Run(log, options, lambda _progress: None)
+        run = Run(log, config, ignore)
         recorder = recorder_for(folder / "loop.rrd", run.layout(), ALL)
         meter = Meter()
         with recorder, ResultsWriter(folder / "reports") as results:
-            for result, encoded in run.frames(recorder):
+            for _, own, encoded in run.frames(recorder):
                 recorder.write(encoded)
-                results.append(result)
+                results.append(own)
             recorder.finish({})
             cost = meter.read()
-            results.finish(run.summary(), run.board.tables())
+            results.append(sum_lines(run.board.sums()))
+            results.finish(run.summary())
         return cost
 
 
-def whole(drive: Path, options: ReplayOptions, folder: Path) -> Cost:
+def whole(drive: Path, config: RunConfig, folder: Path) -> Cost:
     """Call `replay` as a user does: training, tables and figures too."""
     meter = Meter()
-    roadeval.replay(drive, save=folder / "out.rrd", reports=folder / "reports", options=options)
+    roadeval.replay(drive, config, save=folder / "out.rrd", reports=folder / "reports")
     return meter.read()

@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Any, Final
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
-    from roadeval.config import Config, load_config, preset
+    from roadeval.config import RunConfig, configure, load_config
     from roadeval.errors import RoadevalError
     from roadeval.jobs.frame import run_frame
-    from roadeval.jobs.options import Outcome, Progress, ReplayOptions
-    from roadeval.jobs.replay import replay
+    from roadeval.jobs.progress import Progress
+    from roadeval.jobs.replay import Outcome, replay
     from roadeval.jobs.train import train
     from roadeval.recording import Recording
     from roadeval.training import Model, load_model, save_model
@@ -30,16 +30,15 @@ if TYPE_CHECKING:
 __version__ = VERSION
 
 __all__ = [
-    "Config",
     "Model",
     "Outcome",
     "Progress",
     "Recording",
-    "ReplayOptions",
     "RoadevalError",
+    "RunConfig",
+    "configure",
     "load_config",
     "load_model",
-    "preset",
     "replay",
     "run_frame",
     "save_model",
@@ -47,10 +46,10 @@ __all__ = [
 ]
 
 _HOMES: Final = {
-    **dict.fromkeys(("Config", "load_config", "preset"), "config"),
-    **dict.fromkeys(("Outcome", "Progress", "ReplayOptions"), "jobs.options"),
+    **dict.fromkeys(("RunConfig", "configure", "load_config"), "config"),
+    **dict.fromkeys(("Outcome", "replay"), "jobs.replay"),
+    "Progress": "jobs.progress",
     **dict.fromkeys(("Model", "load_model", "save_model"), "training"),
-    "replay": "jobs.replay",
     "train": "jobs.train",
     "Recording": "recording",
     "RoadevalError": "errors",

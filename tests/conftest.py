@@ -4,12 +4,9 @@ import os
 from pathlib import Path
 
 import pytest
-
-# Dozens of replays of a few frames need not each start a process that imports it.
-import sklearn.svm  # noqa: F401
 from hypothesis import settings
 
-from roadeval.kernels.first_time import prepare
+from roadeval.kernels import prepare
 
 # A compiled kernel takes seconds where it is compiled: no deadline for a single example.
 settings.register_profile("roadeval", deadline=None)

@@ -5,25 +5,19 @@ from __future__ import annotations
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated
 
 import typer
 
-from roadeval.cli import (
-    compare,
-    demo,
-    info,
-    inspect,
-    messages,
-    pack,
-    replay,
-    report,
-    signals,
-    train,
-)
+from roadeval.cli import commands, messages, signals
 from roadeval.cli.exit_codes import ExitCode
+from roadeval.cli.options import with_flags
 from roadeval.errors import RoadevalError
+from roadeval.runtime.discovery import found_in
+
+FIRST = ("replay", "report", "inspect", "compare", "info", "train", "config", "pack", "demo")
+"""The order of the commands in the help; others follow by their names."""
 
 app = typer.Typer(
     add_completion=False,
@@ -31,16 +25,15 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _command in (
-    replay.replay,
-    report.report,
-    inspect.inspect,
-    compare.compare,
-    info.info,
-    train.train,
-    pack.pack,
-    demo.demo,
-):
+
+
+def _place(command: Callable[..., int]) -> int:
+    """Where a command stands in the help."""
+    name = command.__name__
+    return FIRST.index(name) if name in FIRST else len(FIRST)
+
+
+for _command in sorted(found_in(commands, "COMMAND"), key=_place):
     app.command()(_command)
 
 
@@ -103,7 +96,7 @@ def explain(error: Exception | SystemExit) -> int:
             messages.error(_usage(error))
             return error.exit_code
         case RoadevalError():
-            messages.error(_with_notes(str(error), error))
+            messages.error(with_flags(_with_notes(str(error), error)))
             return ExitCode.FAILED
         case BrokenPipeError() | SystemExit(__context__=BrokenPipeError()):
             _drop_stdout()

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from roadeval.cli import console
+from roadeval.cli.options import with_flags
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -26,11 +27,13 @@ def show(found: Mapping[str, Any], out: Console) -> None:
             out.print(f"{topic['name']}: {_gap(gap, found['start_ns'])}", soft_wrap=True)
     out.print()
     if found["problem"]:
-        out.print(f"replay would stop: {found['problem']}", soft_wrap=True)
+        out.print(f"replay would stop: {with_flags(found['problem'])}", soft_wrap=True)
     else:
         out.print("replay would pick")
         for pick in found["picks"]:
-            out.print(console.wrapped(pick, out.width, indent=2, hang=2), soft_wrap=True)
+            out.print(
+                console.wrapped(with_flags(pick), out.width, indent=2, hang=2), soft_wrap=True
+            )
 
 
 def _extent(found: Mapping[str, Any]) -> str:

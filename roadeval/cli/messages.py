@@ -2,31 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 from roadeval.cli import console
+from roadeval.cli.exit_codes import ExitCode
+from roadeval.cli.options import with_flags
 
 PROGRAM: Final = "roadeval"
 
 
 def error(sentence: object) -> None:
-    """Say what went wrong: ``roadeval: error: ...``."""
-    _say("error", "bold red", sentence)
+    """Write what went wrong: ``roadeval: error: ...``."""
+    _write("error", "bold red", sentence)
 
 
 def warning(sentence: object) -> None:
-    """Say what the user should know although the work goes on: ``roadeval: warning: ...``."""
-    _say("warning", "bold yellow", sentence)
+    """Write what the user should know although the work goes on: ``roadeval: warning: ...``."""
+    _write("warning", "bold yellow", with_flags(str(sentence)))
 
 
-def lost(sentence: object) -> None:
-    """Say which part of a log could not be read: ``roadeval: lost: ...``."""
-    _say("lost", "bold yellow", sentence)
+def losses(sentences: Sequence[str]) -> ExitCode:
+    """Write which parts of a log could not be read: ``roadeval: lost: ...``.
+
+    Returns the exit code that follows from them.
+    """
+    for sentence in sentences:
+        _write("lost", "bold yellow", with_flags(sentence))
+    return ExitCode.LOSS if sentences else ExitCode.DONE
 
 
 def interrupted(sentence: object) -> None:
-    """Say what is left after a signal: ``roadeval: interrupted: ...``."""
-    _say("interrupted", "bold yellow", sentence)
+    """Write what is left after a signal: ``roadeval: interrupted: ...``."""
+    _write("interrupted", "bold yellow", sentence)
 
 
 def one_line(sentence: object) -> str:
@@ -34,7 +42,7 @@ def one_line(sentence: object) -> str:
     return " ".join(line.strip() for line in str(sentence).splitlines())
 
 
-def _say(kind: str, style: str, sentence: object) -> None:
+def _write(kind: str, style: str, sentence: object) -> None:
     from rich.text import Text
 
     line = Text.assemble(f"{PROGRAM}: ", (f"{kind}:", style), " ", one_line(sentence))

@@ -1,289 +1,263 @@
-"""The options that several commands share, each said once.
+"""The options that repeat settings of a run's configuration, each declared once.
 
-What can be seen to be wrong without opening a file is wrong usage, by the rooms' own rules.
+A setting is named as in the configuration, ``table.key``. Its documentation, type and range stand
+there; here stand its flag, a line of help, and how its words are read. No other module knows a
+flag: errors name settings, and `with_flags` replaces these names.
 """
 
 from __future__ import annotations
 
+import inspect
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from enum import StrEnum
-from functools import partial
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
 
-from roadeval.errors import RoadevalError
 
-option = partial(typer.Option, show_default=False)
-
-_SELECTION: Final = re.compile(r"all|masks|none|(worst|every):[1-9]\d*")
-
-
-class PresetName(StrEnum):
-    """What a run starts from."""
-
-    PAPER = "paper"
-    PRINTED = "printed"
-    GATED = "gated"
-    ROBUST = "robust"
-
-
-def split_variant(text: str) -> tuple[str, Path]:
-    """Read ``NAME=FILE.toml``."""
-    name, _, file = text.partition("=")
-    if not name or not file:
-        raise typer.BadParameter(f"{text!r} is not NAME=FILE.toml")
-    return name, Path(file)
-
-
-@contextmanager
-def usage() -> Iterator[None]:
-    """Turn a known problem inside the block into wrong usage."""
-    try:
-        yield
-    except RoadevalError as error:
-        raise typer.BadParameter(str(error)) from error
-
-
-def _checked(check: Callable[[Any], object]) -> Callable[[Any], Any]:
-    """Make an option's callback from a check that is made where the option is given."""
-
-    def callback(value: Any) -> Any:
-        if value is not None:
-            with usage():
-                check(value)
-        return value
-
-    return callback
-
-
-def split_mask(text: str) -> tuple[str, str]:
-    """Read ``NAME=TOPIC``."""
-    name, _, topic = text.partition("=")
-    if not name or not topic:
-        raise typer.BadParameter(f"{text!r} is not NAME=TOPIC")
-    return name, topic
-
-
-def color(text: str) -> tuple[int, int, int]:
+def color(text: str) -> tuple[int, ...]:
     """Read ``R,G,B``, 0..255 each."""
     parts = text.split(",")
     if len(parts) != 3 or not all(part.strip().isdecimal() for part in parts):
         raise typer.BadParameter(f"{text!r} is not R,G,B (as 128,64,128)")
-    red, green, blue = (int(part) for part in parts)
-    return red, green, blue
+    return tuple(int(part) for part in parts)
 
 
-def _colors(texts: Sequence[str]) -> None:
-    for text in texts:
-        color(text)
+def named(text: str) -> tuple[str, str]:
+    """Read ``NAME=VALUE``."""
+    name, _, value = text.partition("=")
+    if not name or not value:
+        raise typer.BadParameter(f"{text!r} is not NAME=...")
+    return name, value
 
 
-def _mask_names(texts: Sequence[str]) -> None:
-    _names(split_mask(text)[0] for text in texts)
+@dataclass(frozen=True, slots=True)
+class Option:
+    """An option of the command line that gives a setting its value.
+
+    Parameters
+    ----------
+    setting
+        ``table.key`` in a run's configuration; ``preset``, ``config`` and ``variants`` are read
+        by `roadeval.cli.arguments`.
+    flags
+        As they are typed; the last one is named in messages.
+    metavar
+        Stands for the value in the help; none for a switch.
+    help
+        One line or two.
+    kind
+        The type of what is typed; a list for an option that can be repeated.
+    read
+        Turns a word of such a list into a value.
+    """
+
+    setting: str
+    flags: tuple[str, ...]
+    metavar: str | None
+    help: str
+    kind: Any = str
+    read: Callable[[str], Any] | None = None
+
+    @property
+    def argument(self) -> str:
+        """The name of the Python argument that receives the value."""
+        return self.setting.replace(".", "_")
+
+    def parameter(self) -> inspect.Parameter:
+        """Return the parameter that Typer makes the option of."""
+        option = typer.Option(*self.flags, metavar=self.metavar, show_default=False, help=self.help)
+        return inspect.Parameter(
+            self.argument,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=None,
+            annotation=Annotated[self.kind | None, option],
+        )
 
 
-def _variant_names(texts: Sequence[str]) -> None:
-    _names(split_variant(text)[0] for text in texts)
+def _switch(setting: str, flag: str, text: str) -> Option:
+    return Option(setting, (flag,), None, text, bool)
 
 
-def _names(names: Iterable[str]) -> None:
-    from roadeval.config import check_variant_name
-    from roadeval.data import FILTERED, UNFILTERED
-
-    taken = {FILTERED, UNFILTERED}
-    for name in names:
-        check_variant_name(name, taken)
-        taken.add(name)
-
-
-def _time(text: str) -> None:
-    from roadeval.logs import parse_time
-
-    parse_time(text)
-
-
-def _scale(value: float) -> None:
-    if not 0 < value <= 1:
-        raise typer.BadParameter(f"{value:g} is not above 0 and at most 1")
-
-
-def _selection(text: str) -> None:
-    if not _SELECTION.fullmatch(text):
-        raise typer.BadParameter(f"{text!r} is none of all, masks, worst:K, every:N, none")
-
-
-Drive = Annotated[
-    Path, typer.Argument(metavar="DRIVE", show_default=False, help="A camera log (MCAP).")
-]
-
-Result = Annotated[
-    Path,
-    typer.Argument(
-        metavar="RESULT", show_default=False, help="A recording (.rrd), or a results folder."
+OPTIONS: Final = (
+    Option("output.save", ("--save",), "OUT.rrd", "Recording. Default: recordings/<drive>.rrd"),
+    Option(
+        "output.reports", ("--reports",), "DIR", "Tables and figures. Default: reports/<drive>/"
     ),
-]
-
-Preset = Annotated[
-    PresetName | None,
-    option(
-        "--preset",
-        metavar="paper|printed|gated|robust",
-        help="The equations as meant, or with the misprints taken literally; with a filter that "
+    Option(
+        "output.mcap", ("--mcap",), "OUT.mcap", "Masks and rates as a log, to open beside DRIVE."
+    ),
+    Option(
+        "preset",
+        ("--preset",),
+        "paper|printed|gated|robust",
+        "The equations as meant, or with the misprints taken literally; with a filter that "
         "does no harm; or for use on a road. Default: paper.",
     ),
-]
-ConfigFile = Annotated[
-    Path | None, option("--config", metavar="FILE.toml", help="Settings on top of the preset.")
-]
-Variants = Annotated[
-    list[str] | None,
-    option(
-        "--variant",
-        metavar="NAME=FILE.toml",
-        callback=_checked(_variant_names),
-        help="One more variant beside filtered and unfiltered. Repeatable.",
+    Option(
+        "config",
+        ("--config",),
+        "FILE.toml",
+        "Settings on top of the preset: all that 'roadeval config' prints, and the run.toml of an "
+        "earlier run.",
+        Path,
     ),
-]
+    Option(
+        "variants",
+        ("--variant",),
+        "NAME=FILE.toml",
+        "One more variant beside filtered and unfiltered. Repeatable.",
+        list[str],
+        named,
+    ),
+    Option(
+        "training.model",
+        ("--model",),
+        "FILE",
+        "Made by 'roadeval train'. Default: the drive's first frames train one.",
+    ),
+    Option(
+        "training.frames",
+        ("--train-frames",),
+        "N",
+        "Labelled frames to train on, which are never evaluated. Default: 10.",
+        int,
+    ),
+    Option(
+        "training.gap",
+        ("--train-gap",),
+        "N",
+        "Frames to leave out after those trained on. Default: 0.",
+        int,
+    ),
+    Option("topics.image", ("--image-topic",), "T", "The camera, where the log has several."),
+    Option("topics.truth", ("--truth-topic",), "T", "The label images that say where road is."),
+    Option("topics.shadow", ("--shadow-topic",), "T", "The masks that say where shadow truly is."),
+    Option(
+        "labels.road", ("--road-label",), "V", "A truth value that is road. Repeatable.", list[int]
+    ),
+    Option(
+        "labels.ignore",
+        ("--ignore-label",),
+        "V",
+        "A truth value to count nowhere. Repeatable.",
+        list[int],
+    ),
+    Option(
+        "labels.road_colors",
+        ("--road-color",),
+        "R,G,B",
+        "A truth colour that is road. Repeatable.",
+        list[str],
+        color,
+    ),
+    Option(
+        "labels.ignore_colors",
+        ("--ignore-color",),
+        "R,G,B",
+        "A truth colour to count nowhere. Repeatable.",
+        list[str],
+        color,
+    ),
+    Option(
+        "topics.masks",
+        ("--mask-topic",),
+        "NAME=TOPIC",
+        "Score masks that the log carries, as one more variant. Repeatable.",
+        list[str],
+        named,
+    ),
+    Option(
+        "topics.sync_tolerance_ms",
+        ("--sync-tolerance",),
+        "MS",
+        "How far truth and image may be apart. Default: half a frame period.",
+        float,
+    ),
+    _switch("topics.resize_truth", "--resize-truth", "Bring truth of another size to the image's."),
+    Option(
+        "frames.scale",
+        ("--scale",),
+        "F",
+        "Reduce frames and truth to this share of their size first: quicker, and coarser.",
+        float,
+    ),
+    _switch("frames.keep_corrupt", "--keep-corrupt", "Use data whose checksum is wrong."),
+    Option(
+        "frames.start",
+        ("-S", "--start"),
+        "TIME",
+        "Seconds from the log's start, nanoseconds, or RFC 3339.",
+    ),
+    Option(
+        "frames.end", ("-E", "--end"), "TIME", "Likewise; a frame at that very time is not read."
+    ),
+    Option("frames.every", ("--every",), "N", "Read every N-th frame.", int),
+    Option("frames.max_frames", ("--max-frames",), "N", "Stop after N frames read.", int),
+    Option(
+        "output.record",
+        ("--record",),
+        "WHAT",
+        "all (the default), masks, worst:K, every:N or none.",
+    ),
+    Option("run.jobs", ("--jobs",), "N", "Worker threads. Default: one per CPU core.", int),
+)
+"""In the order of the help."""
 
-ModelFile = Annotated[
-    Path | None,
-    option(
-        "--model",
-        metavar="FILE",
-        help="Made by 'roadeval train'. Default: the drive's first frames train one.",
-    ),
-]
-TrainFrames = Annotated[
-    int | None,
-    option(
-        "--train-frames",
-        metavar="N",
-        min=1,
-        help="Labelled frames to train on, which are never evaluated. Default: 10.",
-    ),
-]
-TrainGap = Annotated[
-    int | None,
-    option(
-        "--train-gap",
-        metavar="N",
-        min=0,
-        help="Frames to leave out after those trained on. Default: 0.",
-    ),
-]
+FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS}
+_SETTINGS: Final = re.compile(
+    rf"(?<![\w./])({'|'.join(re.escape(name) for name in FLAGS if '.' in name)})(?![\w/]|\.\w)"
+)
 
-ImageTopic = Annotated[
-    str | None,
-    option("--image-topic", metavar="T", help="The camera, where the log has several."),
-]
-TruthTopic = Annotated[
-    str | None,
-    option("--truth-topic", metavar="T", help="The label images that say where road is."),
-]
-ShadowTopic = Annotated[
-    str | None,
-    option("--shadow-topic", metavar="T", help="The masks that say where shadow truly is."),
-]
-RoadLabels = Annotated[
-    list[int] | None,
-    option("--road-label", metavar="V", min=0, help="A truth value that is road. Repeatable."),
-]
-IgnoreLabels = Annotated[
-    list[int] | None,
-    option(
-        "--ignore-label", metavar="V", min=0, help="A truth value to count nowhere. Repeatable."
-    ),
-]
-RoadColors = Annotated[
-    list[str] | None,
-    option(
-        "--road-color",
-        metavar="R,G,B",
-        callback=_checked(_colors),
-        help="A truth colour that is road. Repeatable.",
-    ),
-]
-IgnoreColors = Annotated[
-    list[str] | None,
-    option(
-        "--ignore-color",
-        metavar="R,G,B",
-        callback=_checked(_colors),
-        help="A truth colour to count nowhere. Repeatable.",
-    ),
-]
-MaskTopics = Annotated[
-    list[str] | None,
-    option(
-        "--mask-topic",
-        metavar="NAME=TOPIC",
-        callback=_checked(_mask_names),
-        help="Score masks that the log carries, as one more variant. Repeatable.",
-    ),
-]
-SyncTolerance = Annotated[
-    float | None,
-    option(
-        "--sync-tolerance",
-        metavar="MS",
-        min=0,
-        help="How far truth and image may be apart. Default: half a frame period.",
-    ),
-]
-ResizeTruth = Annotated[
-    bool, option("--resize-truth", help="Bring truth of another size to the image's.")
-]
-Scale = Annotated[
-    float,
-    option(
-        "--scale",
-        metavar="F",
-        callback=_checked(_scale),
-        help="Reduce frames and truth to this share of their size first: quicker, and coarser.",
-    ),
-]
-KeepCorrupt = Annotated[bool, option("--keep-corrupt", help="Use data whose checksum is wrong.")]
+Given = Mapping[str, Any]
+"""Values of options by the names of their settings; one that was not typed is not there."""
 
-Start = Annotated[
-    str | None,
-    option(
-        "-S",
-        "--start",
-        metavar="TIME",
-        callback=_checked(_time),
-        help="Seconds from the log's start, nanoseconds, or RFC 3339.",
-    ),
-]
-End = Annotated[
-    str | None,
-    option(
-        "-E",
-        "--end",
-        metavar="TIME",
-        callback=_checked(_time),
-        help="Likewise; a frame at that very time is not read.",
-    ),
-]
-Every = Annotated[int, option("--every", metavar="N", min=1, help="Read every N-th frame.")]
-MaxFrames = Annotated[
-    int | None, option("--max-frames", metavar="N", min=1, help="Stop after N frames read.")
-]
 
-Jobs = Annotated[
-    int | None, option("--jobs", metavar="N", min=1, help="Workers. Default: one a processor.")
-]
-Record = Annotated[
-    str,
-    option(
-        "--record",
-        metavar="WHAT",
-        callback=_checked(_selection),
-        help="all (the default), masks, worst:K, every:N or none.",
-    ),
-]
-Json = Annotated[bool, option("--json", help="Print the result on stdout as JSON.")]
-Quiet = Annotated[bool, option("-q", "--quiet", help="No progress and no table; warnings stay.")]
+def with_flags(text: str) -> str:
+    """Replace the names of settings in a message by the flags that give them values.
+
+    Examples
+    --------
+    >>> with_flags("nothing is left to evaluate; lower training.frames")
+    'nothing is left to evaluate; lower --train-frames'
+    """
+    return _SETTINGS.sub(lambda found: FLAGS[found[1]], text)
+
+
+def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
+    """Make a command take the options of some settings, which it receives as ``given``.
+
+    Parameters
+    ----------
+    settings
+        Names of settings in `OPTIONS`, or of whole tables.
+    """
+    chosen = [o for o in OPTIONS if {o.setting, o.setting.partition(".")[0]} & {*settings}]
+
+    def decorate(command: Callable[..., int]) -> Callable[..., int]:
+        signature = inspect.signature(command, eval_str=True)
+        own = [each for each in signature.parameters.values() if each.name != "given"]
+        place = next((i for i, each in enumerate(own) if each.kind is each.KEYWORD_ONLY), len(own))
+
+        @wraps(command)
+        def run(*args: Any, **values: Any) -> int:
+            given = {o.setting: _value(o, values.pop(o.argument, None)) for o in chosen}
+            typed = {name: value for name, value in given.items() if value is not None}
+            return command(*args, given=typed, **values)
+
+        parameters = [*own[:place], *(o.parameter() for o in chosen), *own[place:]]
+        run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {each.name: each.annotation for each in parameters}
+        return run
+
+    return decorate
+
+
+def _value(option: Option, typed: Any) -> Any:
+    """Read what was typed; None where nothing was."""
+    if option.read is None:
+        return None if typed == [] else typed
+    return [option.read(word) for word in typed] if typed else None

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from roadeval.jobs.options import Outcome
+    from roadeval.jobs.replay import Outcome
 
 RATES: Final = ("ERR", "pooled_ERR", "ACC", "FPR", "FNR")
 COMPARED: Final = ("ERR", "FPR", "FNR")

@@ -5,126 +5,84 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.cli import console
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from roadeval.jobs.progress import OnProgress, Progress
 
 LINE_PERIOD_S: Final = 10.0
 """At most one plain line in this time, so that a log file of a long run stays short."""
 
 
-class Step(Protocol):
-    """How far a job has come: ``done`` of ``total`` frames of ``stage``."""
-
-    @property
-    def done(self) -> int:
-        """Frames done."""
-
-    @property
-    def total(self) -> int | None:
-        """Frames to do, or None where that is not known."""
-
-    @property
-    def stage(self) -> str:
-        """What is being done, as ``replaying``."""
-
-
-Watch = Callable[[Step], None]
-
-
 @contextmanager
-def watched(quiet: bool = False) -> Iterator[Watch]:
-    """Yield the function that a job calls with each `Step`; the display ends with the block."""
-    stderr = console.diagnostics()
+def watched(quiet: bool = False) -> Iterator[OnProgress]:
+    """Yield the function that a job calls with its progress; the display ends with the block."""
     if quiet:
-        yield lambda _step: None
-    elif stderr.is_terminal:
-        with _bar(stderr) as watch:
-            yield watch
-    else:
-        yield Lines(lambda line: stderr.print(line, soft_wrap=True))
+        yield lambda _progress: None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+    from rich.progress import Progress as Display
 
-
-@contextmanager
-def _bar(stderr: Console) -> Iterator[Watch]:
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
+    stderr = console.diagnostics()
     columns = (
         TextColumn("{task.description:<9}"),
         BarColumn(bar_width=None),
         MofNCompleteColumn(),
         TextColumn("{task.fields[pace]}"),
     )
-    with Progress(*columns, console=stderr, transient=True, expand=True) as bars:
-        task = bars.add_task("opening", total=None, pace="")
-        clock = StageClock()
-
-        def watch(step: Step) -> None:
-            clock.enters(step)
-            bars.update(
-                task,
-                description=step.stage,
-                completed=step.done,
-                # Before the first frame nothing is known; the bar shows that something moves.
-                total=step.total if step.done else None,
-                pace="  ".join(clock.pace(step)),
-            )
-
-        yield watch
+    lines = not stderr.is_terminal
+    with Display(*columns, console=stderr, transient=True, expand=True, disable=lines) as display:
+        write = (lambda line: stderr.print(line, soft_wrap=True)) if lines else None
+        yield Watch(display, write)
 
 
-@dataclass
-class StageClock:
-    """When the stage in hand began, to tell its rate."""
+class Watch:
+    """Shows each progress on a Rich display, or writes it as plain lines.
 
-    now: Callable[[], float] = time.monotonic
-    stage: str = ""
-    began: float = 0.0
-    first: int = 0
+    Parameters
+    ----------
+    display
+        A `rich.progress.Progress`; it measures the pace even where it shows nothing.
+    write
+        Writes a line: one as a stage begins, then one in `LINE_PERIOD_S`. None: no lines.
+    """
 
-    def enters(self, step: Step) -> bool:
-        """Note the beginning of a stage; return whether this step is one."""
-        if step.stage == self.stage:
-            return False
-        self.stage, self.began, self.first = step.stage, self.now(), step.done
-        return True
+    def __init__(self, display: Any, write: Callable[[str], None] | None) -> None:
+        self._display = display
+        self._task = display.add_task("opening", total=None, pace="")
+        self._write = write
+        self._stage = ""
+        self._written = 0.0
 
-    def frames_per_second(self, step: Step) -> float:
-        """Return the mean rate since the stage began; 0 while nothing is known."""
-        elapsed = self.now() - self.began
-        return (step.done - self.first) / elapsed if elapsed > 0 else 0.0
+    def __call__(self, progress: Progress) -> None:
+        """Show how far a job is."""
+        begins = progress.stage != self._stage
+        if begins:
+            self._stage = progress.stage
+            self._display.reset(self._task, description=progress.stage, completed=progress.done)
+        # Before the first frame nothing is known; the bar shows that something moves.
+        total = progress.total if progress.done else None
+        self._display.update(self._task, completed=progress.done, total=total)
+        pace = self._pace()
+        self._display.update(self._task, pace="  ".join(pace))
+        if self._write and (begins or time.monotonic() - self._written >= LINE_PERIOD_S):
+            self._written = time.monotonic()
+            self._write(line(progress, pace))
 
-    def pace(self, step: Step) -> tuple[str, ...]:
+    def _pace(self) -> tuple[str, ...]:
         """Return rate and time left for a person, as ``("23.4 frames/s", "12 s left")``."""
-        rate = self.frames_per_second(step)
-        if not rate:
+        (task,) = self._display.tasks
+        if not task.speed:
             return ()
-        if step.total is None:
-            return (f"{rate:.1f} frames/s",)
-        return f"{rate:.1f} frames/s", f"{(step.total - step.done) / rate:.0f} s left"
+        left = task.time_remaining
+        return f"{task.speed:.1f} frames/s", *([] if left is None else [f"{left:.0f} s left"])
 
 
-@dataclass
-class Lines:
-    """Progress as plain lines: one as a stage begins, then one now and then."""
-
-    write: Callable[[str], None]
-    clock: StageClock = field(default_factory=StageClock)
-    written: float = 0.0
-
-    def __call__(self, step: Step) -> None:
-        """Take note of a step and write a line if it is time for one."""
-        begins = self.clock.enters(step)
-        if not begins and self.clock.now() - self.written < LINE_PERIOD_S:
-            return
-        self.written = self.clock.now()
-        if not step.done:
-            self.write(step.stage)
-            return
-        of = f" of {step.total}" if step.total is not None else ""
-        figures = f"{step.done}{of} frames", *self.clock.pace(step)
-        self.write(f"{step.stage}: {', '.join(figures)}")
+def line(progress: Progress, pace: tuple[str, ...] = ()) -> str:
+    """Write a job's progress as a line."""
+    if not progress.done:
+        return progress.stage
+    of = f" of {progress.total}" if progress.total is not None else ""
+    return f"{progress.stage}: {', '.join((f'{progress.done}{of} frames', *pace))}"

@@ -17,12 +17,12 @@ from roadeval.data.layer import (
     LayerSpec,
     mask_spec,
 )
-from roadeval.data.names import BASELINE, CAMERA, FILTERED, FINAL_STAGE, NAMES, RESERVED, UNFILTERED
+from roadeval.data.names import BASELINE, CAMERA, FILTERED, FINAL_STAGE, RESERVED, UNFILTERED
 from roadeval.data.packed import Packed, TruthBits, everywhere, ones, pack, unpack
 from roadeval.data.result import (
     FrameResult,
     Health,
-    Pictures,
+    Output,
     StageResult,
     VariantLayout,
     VariantResult,
@@ -35,7 +35,6 @@ __all__ = [
     "FILTERED",
     "FINAL_STAGE",
     "IGNORE",
-    "NAMES",
     "NON_ROAD",
     "RESERVED",
     "ROAD",
@@ -52,8 +51,8 @@ __all__ = [
     "LayerKind",
     "LayerSpec",
     "Mask",
+    "Output",
     "Packed",
-    "Pictures",
     "Rgb",
     "Role",
     "StageResult",

@@ -1,4 +1,7 @@
-"""The kinds of arrays that the kernels take and give, and the outcomes that some hold."""
+"""The kinds of arrays that the kernels take and return, and the outcomes that some hold.
+
+The kernels are compiled for these names, see `roadeval.kernels.compiler`.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,9 @@ Plane = npt.NDArray[np.uint8]
 Planes = tuple[Plane, Plane, Plane]
 """Red, green and blue."""
 Table = npt.NDArray[np.uint8]
-"""What becomes of each level, code or colour."""
+"""``(n, m)``: a code for each pair of numbers."""
+Levels = npt.NDArray[np.uint8]
+"""``(n,)``: what becomes of each grey level."""
 Labels = npt.NDArray[np.int32]
 """``(H, W)``: a component's number at each of its pixels, 0 outside."""
 Runs = npt.NDArray[np.int32]
@@ -29,7 +34,10 @@ Parents = npt.NDArray[np.uintp]
 Sums = npt.NDArray[np.int64]
 """``(n, ...)``: whole numbers by label or kind."""
 Values = npt.NDArray[np.float32]
-Floats = npt.NDArray[np.float64]
+Vector = npt.NDArray[np.float64]
+"""``(n,)``."""
+Matrix = npt.NDArray[np.float64]
+"""``(n, m)``."""
 Bits = npt.NDArray[np.uint64]
 """``(H, words)`` of an ``(H, W)`` mask, C-contiguous, 64 pixels a word, the leftmost in the lowest
 bit; those beyond the width are 0. ``(K, H, words)`` of K masks."""

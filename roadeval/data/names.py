@@ -1,4 +1,4 @@
-"""Names that variants, stages and table columns bear, and those that are taken."""
+"""Names of variants and stages, and those that are taken."""
 
 from __future__ import annotations
 
@@ -20,9 +20,3 @@ RESERVED: Final = frozenset(
     }
 )
 """Names that no variant may bear: the tables or the recording use them for something else."""
-
-NAMES: Final = (
-    *("variant", "stage", "region", "oracle"),
-    *("from_variant", "from_stage", "to_variant", "to_stage"),
-)
-"""Columns of the tables that hold names, which are text even where a variant is called ``007``."""

@@ -7,30 +7,48 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from roadeval.data.counts import Change, Step, Tally
-from roadeval.data.frame import Frame, Mask, Role
+from roadeval.data.frame import Frame, Mask, Rgb, Role
 from roadeval.data.layer import Layer, LayerSpec
 from roadeval.data.packed import Packed, TruthBits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StageResult:
-    """What one stage of one variant made of one frame.
+class Output:
+    """What a stage makes of a frame.
 
-    ``mask`` is the stage's road mask, packed, or None for a stage that only changes the image.
-    ``regions`` are pixel sets worth counting apart, by name. ``facts`` are numbers about the
-    frame (``components``, ``max_gain``); ``seconds`` is wall time.
+    Parameters
+    ----------
+    layers
+        Named arrays to record.
+    image
+        ``(H, W, 3)`` uint8 RGB that replaces the image for the stages after it, if any.
+    mask
+        Its road mask, if it makes one; also among its layers, under the stage's name.
+    regions
+        Sets of pixels to count separately, by name.
+    facts
+        Numbers about the frame, by name, as ``components`` and ``max_gain``.
     """
 
+    layers: tuple[Layer, ...] = ()
+    image: Rgb | None = None
+    mask: Packed | None = None
+    regions: Mapping[str, Packed] = field(default_factory=dict)
+    facts: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StageResult:
+    """The output of one stage of one variant on one frame, and the wall time it took."""
+
     stage: str
-    layers: tuple[Layer, ...]
-    mask: Packed | None
-    regions: Mapping[str, Packed]
-    facts: Mapping[str, float]
+    output: Output
     seconds: float
 
     def without_layers(self) -> StageResult:
-        """Give what is left to sum up once the pictures are encoded."""
-        return StageResult(self.stage, (), self.mask, {}, self.facts, self.seconds)
+        """Return what is still needed once the layers are encoded: the mask and the facts."""
+        kept = Output(mask=self.output.mask, facts=self.output.facts)
+        return StageResult(self.stage, kept, self.seconds)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,13 +66,13 @@ class VariantResult:
     def masks(self) -> Iterator[tuple[str, Packed]]:
         """Yield each stage that has a road mask, with the mask; `Packed.pixels` gives its array."""
         for result in self.stages:
-            if result.mask is not None:
-                yield result.stage, result.mask
+            if result.output.mask is not None:
+                yield result.stage, result.output.mask
 
     def layers(self) -> Iterator[Layer]:
         """Yield every layer of every stage, in order."""
         for result in self.stages:
-            yield from result.layers
+            yield from result.output.layers
 
     def final(self) -> Mask:
         """Give the pixels of the last stage's mask, ``(H, W)`` uint8."""
@@ -80,25 +98,14 @@ class Health(StrEnum):
     FAILED = "failed"
 
 
-class Pictures(StrEnum):
-    """Which of a frame's pictures are recorded; its numbers always are."""
-
-    ALL = "all"
-    MASKS = "masks"
-    NONE = "none"
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameResult:
     """Everything known about one replayed frame: what is recorded and what is tabled.
 
-    ``tallies`` is empty unless the frame is evaluated. ``tables`` holds this frame's finished
-    lines of the tables that grow frame by frame (keys ``frames``, ``regions``, ``oracles``; no
-    header). ``truth_bits`` is what the masks were held against. ``changes`` are from
-    stage to stage and from final mask to final mask, ``contours`` the boundary F of each final
-    mask by variant, and ``oracles`` the counts of what the stages made once one was replaced by
-    the truth, by that one. ``notes`` are sentences for a person, ``pictures`` says what is
-    recorded beside the numbers.
+    ``tallies`` is empty unless the frame is evaluated. ``truth_bits`` is what the masks were held
+    against. ``changes`` are from stage to stage and from final mask to final mask, ``contours``
+    the boundary F of each final mask by variant, and ``oracles`` the counts of what the stages
+    made once one was replaced by the truth, by that one. ``notes`` are sentences for a person.
     """
 
     frame: Frame
@@ -108,12 +115,10 @@ class FrameResult:
     tallies: tuple[Tally, ...] = ()
     health: Mapping[str, Health] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    tables: Mapping[str, str] = field(default_factory=dict)
     truth_bits: TruthBits | None = None
     changes: Mapping[Step, Change] = field(default_factory=dict)
     contours: Mapping[str, float] = field(default_factory=dict)
     oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)
-    pictures: Pictures = Pictures.ALL
 
     def without_layers(self) -> FrameResult:
         """Give what is left to sum up once the pictures, which take most memory, are encoded."""

@@ -6,19 +6,19 @@ that was killed is understood as well as a complete one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED, Counts
-from roadeval.evaluation import metrics, windows
-from roadeval.evaluation.history import History
+from roadeval.evaluation import metrics
+from roadeval.evaluation.frame_counts import FrameCounts, sum_up
 from roadeval.evaluation.regions import partitions
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference, mean_difference
-from roadeval.evaluation.windows import Window
+from roadeval.evaluation.windows import Window, cut
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,17 +28,18 @@ FILTER: Final = "filter"
 """Stands among the stages for what the shadow filter changed in the mask of a stage after it."""
 
 
-def settings_of(summary: dict[str, Any]) -> EvaluationSettings:
-    """Give the settings that a summary was made with; the defaults where it says nothing."""
+def settings_of(summary: Mapping[str, Any]) -> EvaluationSettings:
+    """Return the settings that a summary was made with; the defaults where it states none.
+
+    A setting that this version does not know is left out.
+    """
+    given = summary.get("run", {}).get("evaluation", {})
     known = {field.name for field in fields(EvaluationSettings)}
-    for settings in summary.get("settings", {}).values():
-        given = settings.get("evaluation", {})
-        return EvaluationSettings(**{name: given[name] for name in known & given.keys()})
-    return EvaluationSettings()
+    return EvaluationSettings(**{name: given[name] for name in known & given.keys()})
 
 
 def final_stages(frames: pd.DataFrame) -> dict[str, str]:
-    """Name each variant's final stage: ``post``, or the last that it has."""
+    """Return each variant's final stage: ``post``, or the last that it has."""
     stages = frames.groupby("variant", sort=False)["stage"].unique()
     return {
         str(variant): FINAL_STAGE if FINAL_STAGE in own else str(own[-1])
@@ -47,28 +48,21 @@ def final_stages(frames: pd.DataFrame) -> dict[str, str]:
 
 
 def finals(frames: pd.DataFrame) -> pd.DataFrame:
-    """Keep the rows of each variant's final mask, of a table with ``variant`` and ``stage``."""
+    """Return the rows of each variant's final mask, of a table with ``variant`` and ``stage``."""
     return frames[frames["stage"] == frames["variant"].map(final_stages(frames))]
-
-
-def histories(frames: pd.DataFrame) -> Iterator[History]:
-    """Yield what a `Scoreboard` has kept of each variant and stage, in the table's order."""
-    places = {number: place for place, number in enumerate(frames["frame"].unique())}
-    for (variant, stage), rows in frames.groupby(["variant", "stage"], sort=False):
-        yield History.of_table(
-            str(variant),
-            str(stage),
-            rows["frame"].map(places).to_numpy(np.int64),
-            rows[[*OUTCOMES]].to_numpy(np.int64),
-        )
 
 
 def totals(frames: pd.DataFrame) -> dict[str, dict[str, dict[str, Any]]]:
     """Sum up by variant and stage, as in ``summary.json``."""
     sums: dict[str, dict[str, dict[str, Any]]] = {}
-    for history in histories(frames):
-        sums.setdefault(history.variant, {})[history.stage] = history.totals()
+    for (variant, stage), rows in frames.groupby(["variant", "stage"], sort=False):
+        sums.setdefault(str(variant), {})[str(stage)] = sum_up_rows(rows)
     return sums
+
+
+def sum_up_rows(rows: pd.DataFrame) -> dict[str, Any]:
+    """Sum up the rows of one mask, see `roadeval.evaluation.frame_counts.sum_up`."""
+    return sum_up(rows[[*OUTCOMES]].to_numpy(np.int64))
 
 
 def overlap(total: dict[str, Any]) -> dict[str, float]:
@@ -76,26 +70,14 @@ def overlap(total: dict[str, Any]) -> dict[str, float]:
     return metrics.overlap(Counts(*(total[name] for name in OUTCOMES)))
 
 
-def rows(frames: pd.DataFrame, size: int) -> pd.DataFrame:
-    """Cut the drive into rows of ``size`` evaluated frames, with the columns of ``windows.csv``."""
-    import pandas as pd
-
+def windows(frames: pd.DataFrame, size: int) -> Iterator[Window]:
+    """Cut the drive into windows of ``size`` evaluated frames, one mask after the other."""
     numbers = frames["frame"].unique().tolist()
-    cut = [row for history in histories(frames) for row in windows.rows(history, numbers, size)]
-    return pd.DataFrame([_row(window) for window in cut])
-
-
-def _row(window: Window) -> dict[str, Any]:
-    return {
-        "window": window.number,
-        "first_frame": window.first_frame,
-        "last_frame": window.last_frame,
-        "frames": window.frames,
-        "variant": window.variant,
-        "stage": window.stage,
-        **window.rates,
-        **{f"pooled_{name}": value for name, value in window.pooled.items()},
-    }
+    places = {number: place for place, number in enumerate(numbers)}
+    for (variant, stage), rows in frames.groupby(["variant", "stage"], sort=False):
+        positions = rows["frame"].map(places).to_numpy(np.int64)
+        counts = rows[[*OUTCOMES]].to_numpy(np.int64)
+        yield from cut(FrameCounts(str(variant), str(stage), positions, counts), numbers, size)
 
 
 # --- One variant against another ------------------------------------------------------------------
@@ -183,7 +165,7 @@ def oracles(table: pd.DataFrame, frames: pd.DataFrame) -> pd.DataFrame:
 
 
 def causes(frames: pd.DataFrame, variant: str) -> pd.DataFrame:
-    """Say for each frame how its error rate came about, stage by stage.
+    """Take each frame's error rate apart, stage by stage.
 
     The final mask's ERR is a sum: the ERR of the mask that the final stage was given, as it is
     without the filter; what the filter changed in that mask (`FILTER`, where both default
@@ -196,23 +178,21 @@ def causes(frames: pd.DataFrame, variant: str) -> pd.DataFrame:
     """
     import pandas as pd
 
-    names = frames["variant"].unique()
-    own = {name: _errors(frames[frames["variant"] == name]) for name in names}
-    mine = own[variant]
-    last, given = mine.columns[-1], list(mine.columns[-2:-1])
-    if not given:
+    mine = _errors(frames, variant)
+    if len(mine.columns) == 1:
         return mine
-    (before,) = given
+    *_, before, last = mine.columns
     parts = {before: mine[before]}
-    if variant == FILTERED and before in own.get(UNFILTERED, mine[[last]]):
-        without = own[UNFILTERED][before].reindex(mine.index)
+    unfiltered = _errors(frames, UNFILTERED)
+    if variant == FILTERED and before in unfiltered:
+        without = unfiltered[before].reindex(mine.index)
         parts = {before: without, FILTER: mine[before] - without}
-    parts[last] = mine[last] - mine[before]
-    return pd.DataFrame(parts)
+    return pd.DataFrame({**parts, last: mine[last] - mine[before]})
 
 
-def _errors(rows: pd.DataFrame) -> pd.DataFrame:
+def _errors(frames: pd.DataFrame, variant: str) -> pd.DataFrame:
     """Spread a variant's ERR: a row a frame, a column a stage, in the order the stages ran."""
+    rows = frames[frames["variant"] == variant]
     stages = rows["stage"].unique()
     # Where ERR is undefined on every frame there are rows and columns all the same.
     spread = rows.pivot_table(index="frame", columns="stage", values="ERR", dropna=False)
@@ -240,7 +220,7 @@ def worst(
 def most_changed(
     paired: pd.DataFrame, count: int, *, harmed: bool, apart_ns: int | None = None
 ) -> pd.DataFrame:
-    """Pick the frames whose ERR rose most (``harmed``) or fell most, of what `pairs` gave.
+    """Pick the frames whose ERR rose most (``harmed``) or fell most, of what `pairs` returned.
 
     Only frames that did rise, or fall, and of neighbours only one, as in `worst`.
     """
@@ -251,7 +231,7 @@ def most_changed(
 
 
 def _neighbourhood(frames: pd.DataFrame) -> int:
-    """Say how far apart two frames' stamps lie, in nanoseconds, if they are no neighbours."""
+    """Return how far apart the stamps of two frames that are no neighbours lie, in nanoseconds."""
     if not len(frames):
         return 0
     return int(min((frames["stamp_ns"].max() - frames["stamp_ns"].min()) // 30, 1_000_000_000))

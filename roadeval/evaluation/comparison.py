@@ -8,24 +8,28 @@ a difference between them would mix the scene with the method.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.data import BASELINE
+from roadeval.data import BASELINE, UNFILTERED
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import analysis
+from roadeval.evaluation.compared import (
+    ComparedResult,
+    Comparison,
+    MaskComparison,
+    MovedFrame,
+)
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import mean_difference
-from roadeval.jobs.asked import TELLING
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FORMAT: Final = {"name": "roadeval-comparison", "version": 1}
 COMPARED: Final = tuple(name for name, metric in METRICS.items() if metric.mirrors is None)
-"""The metrics whose differences are given."""
+"""The metrics that are subtracted: those that mirror no other."""
 MOVED: Final = 5
 """Frames named of those that changed most, in each direction."""
 
@@ -46,21 +50,22 @@ class Side:
         The log's name and SHA-256, None where the result does not know it.
     frames
         The rows of ``frames.csv``.
-    selection
-        What was asked of the log, by the options' names; empty where the result does not know it.
+    asked
+        What was asked of the log, by the settings' names as ``frames.scale``; empty where the
+        result does not know it.
     """
 
     label: str
     drive: str
     digest: str | None
     frames: pd.DataFrame
-    selection: Mapping[str, Any] = field(default_factory=dict)
+    asked: Mapping[str, Any] = field(default_factory=dict)
 
 
 def variants_as_sides(
     frames: pd.DataFrame, drive: str, digest: str | None, chosen: Sequence[str] | None = None
 ) -> list[Side]:
-    """Take the variants of one result for results of their own; the first is the base.
+    """Return the variants of one result as results of their own, the base first.
 
     Parameters
     ----------
@@ -77,7 +82,8 @@ def variants_as_sides(
         If a variant is not there, or fewer than two are.
     """
     there = frames["variant"].unique().tolist() if len(frames) else []
-    names = list(chosen or sorted((n for n in there if n != BASELINE), key=_unfiltered_first))
+    pipelines = sorted((n for n in there if n != BASELINE), key=lambda name: name != UNFILTERED)
+    names = list(chosen or pipelines)
     for name in names:
         if name not in there:
             raise ComparisonError(f"{drive}: no variant {name}; there are {', '.join(there)}")
@@ -88,13 +94,9 @@ def variants_as_sides(
     return [Side(name, drive, digest, frames[frames["variant"] == name]) for name in names]
 
 
-def _unfiltered_first(name: str) -> bool:
-    return name != "unfiltered"
-
-
 def compare(
     sides: Sequence[Side], settings: EvaluationSettings, *, across_variants: bool = False
-) -> dict[str, Any]:
+) -> Comparison:
     """Compare results with the first of them.
 
     Parameters
@@ -106,15 +108,6 @@ def compare(
     across_variants
         Whether each side is one variant of the same result, to be matched with another one.
 
-    Returns
-    -------
-    dict
-        The content of the comparison's JSON file: ``format``, ``same_drive``, ``results``,
-        ``changes`` (a row per new result, variant and stage, of the frames that both evaluated),
-        ``levels`` (the same of all of its own frames, whatever the base lacks), ``moved`` (the
-        frames that changed most) and ``warnings``. For different drives ``changes`` and ``levels``
-        have rows of every result.
-
     Raises
     ------
     ComparisonError
@@ -123,179 +116,163 @@ def compare(
     for side in sides:
         if not len(side.frames):
             raise ComparisonError(f"{side.label}: nothing was scored, so nothing can be compared")
-    same = len({side.digest for side in sides}) == 1 and sides[0].digest is not None
-    found: dict[str, Any] = {
-        "format": FORMAT,
-        "same_drive": same,
-        "results": [
-            {
-                "label": side.label,
-                "drive": side.drive,
-                "sha256": side.digest,
-                "frames": side.frames["frame"].nunique(),
-                "scale": side.selection.get("scale"),
-            }
-            for side in sides
-        ],
-    }
-    levels = [row for side in (sides[1:] if same else sides) for row in _levels(side)]
-    if not same:
-        return found | {
-            "changes": levels,
-            "levels": levels,
-            "moved": [],
-            "warnings": [_apart(sides)],
-        }
-    pairs = [_Pair(sides[0], new, settings, across_variants=across_variants) for new in sides[1:]]
-    return found | {
-        "changes": [row for pair in pairs for row in pair.changes()],
-        "levels": levels,
-        "moved": [row for pair in pairs for row in pair.moved()],
-        "warnings": [sentence for pair in pairs for sentence in pair.warnings()],
-    }
+    results = tuple(_result(side) for side in sides)
+    base, *others = sides
+    if base.digest is None or len({side.digest for side in sides}) > 1:
+        levels = tuple(row for side in sides for row in _levels(side))
+        return Comparison(False, results, levels, levels, (), (_why_apart(sides),))
+    pairs = [_Pair(base, new, settings, across_variants=across_variants) for new in others]
+    return Comparison(
+        same_drive=True,
+        results=results,
+        changes=tuple(row for pair in pairs for row in pair.changes()),
+        levels=tuple(row for side in others for row in _levels(side)),
+        moved=tuple(frame for pair in pairs for frame in pair.moved()),
+        warnings=tuple(sentence for pair in pairs for sentence in pair.warnings()),
+    )
 
 
 class _Pair:
-    """A base and a new result of the same drive, on the frames that both evaluated."""
+    """A base and a new result of the same drive, on the frames that both evaluated.
+
+    The rows of both, in the base's order, are indexed alike: by stamp, variant and stage.
+    """
 
     def __init__(
         self, base: Side, new: Side, settings: EvaluationSettings, *, across_variants: bool
     ) -> None:
         self._base, self._new, self._settings = base, new, settings
-        before = base.frames
-        if across_variants:
-            before = before.assign(variant=new.label)
-        keys = ["stamp", "variant", "stage"]
-        matched = _stamped(before).merge(_stamped(new.frames), on=keys, suffixes=("_base", ""))
-        if not len(matched):
+        frames = base.frames.assign(variant=new.label) if across_variants else base.frames
+        before, after = _stamped(frames), _stamped(new.frames)
+        both = before.index.intersection(after.index, sort=False)
+        if not len(both):
             raise ComparisonError(
                 f"{base.label} and {new.label} have no evaluated frame and stage in common"
             )
-        self._matched = matched
-        self._last = analysis.final_stages(matched)
+        self._before, self._after = before.loc[both], after.loc[both]
 
-    def changes(self) -> Iterator[dict[str, Any]]:
+    def changes(self) -> Iterator[MaskComparison]:
         """Yield a row for each variant and stage that both have."""
-        for variant, stage, rows in _by_mask(self._matched):
-            before = rows[["frame", *(f"{c}_base" for c in (*analysis.OUTCOMES, *METRICS))]]
-            before = before.rename(columns=lambda name: name.removesuffix("_base"))
-            rates = COMPARED if stage == self._last[variant] else COMPARED[:1]
-            yield {
-                "result": self._new.label,
-                "variant": variant,
-                "stage": stage,
-                "final": stage == self._last[variant],
-                "frames": len(rows),
-                "base": _rates(before.assign(variant=variant, stage=stage)),
-                "new": _rates(rows),
-                "difference": {
-                    rate: asdict(
-                        mean_difference(
-                            (rows[rate] - rows[f"{rate}_base"]).to_numpy(float), self._settings
-                        )
+        for variant, stage, final, after in _by_mask(self._after):
+            before = self._before.loc[after.index]
+            yield MaskComparison(
+                result=self._new.label,
+                variant=variant,
+                stage=stage,
+                final=final,
+                frames=len(after),
+                base=_rates(before),
+                new=_rates(after),
+                difference={
+                    name: mean_difference(
+                        (after[name] - before[name]).to_numpy(float), self._settings
                     )
-                    for rate in rates
+                    for name in (COMPARED if final else COMPARED[:1])
                 },
-            }
+            )
 
-    def moved(self) -> Iterator[dict[str, Any]]:
+    def moved(self) -> Iterator[MovedFrame]:
         """Yield the frames whose final ERR changed most, the first variant's."""
-        variant = next(iter(self._last))
-        rows = analysis.finals(self._matched)
-        rows = rows[rows["variant"] == variant].assign(change=lambda r: r["ERR"] - r["ERR_base"])
-        paired = rows.drop(columns="ERR").rename(columns={"change": "ERR"}).set_index("frame")
+        variant, stage = next(iter(analysis.final_stages(self._after).items()))
+        after = self._after[(self._after["variant"] == variant) & (self._after["stage"] == stage)]
+        before = self._before.loc[after.index, "ERR"]
+        paired = after[["frame", "stamp_ns"]].assign(base=before, ERR=after["ERR"] - before)
         for harmed in (True, False):
-            found = analysis.most_changed(paired, MOVED, harmed=harmed)
-            for row in found.to_dict("records"):
-                yield {
-                    "result": self._new.label,
-                    "variant": variant,
-                    "frame": row["frame"],
-                    "stamp_ns": row["stamp_ns"],
-                    "base": row["ERR_base"],
-                    "new": row["ERR_base"] + row["ERR"],
-                    "change": row["ERR"],
-                }
+            most = analysis.most_changed(paired.set_index("frame"), MOVED, harmed=harmed)
+            for row in most.to_dict("records"):
+                yield MovedFrame(
+                    result=self._new.label,
+                    variant=variant,
+                    frame=row["frame"],
+                    stamp_ns=row["stamp_ns"],
+                    base=row["base"],
+                    new=row["base"] + row["ERR"],
+                    change=row["ERR"],
+                )
 
     def warnings(self) -> Iterator[str]:
-        """Say what was left out, and what makes the two less comparable than they look."""
+        """Yield what was left out, and what makes the two less comparable than they look."""
         base, new = self._base, self._new
-        both = self._matched["stamp"].nunique()
-        for side in (base, new):
+        both = self._after["stamp"].nunique()
+        for side, other in ((base, new), (new, base)):
             rest = side.frames["frame"].nunique() - both
             if rest:
                 yield (
                     f"{rest} frames that {side.label} evaluated are left out against "
-                    f"{(new if side is base else base).label}, which lacks them or trained on them"
+                    f"{other.label}, which lacks them or trained on them"
                 )
-        if options := _differing(base.selection, new.selection):
+        settings = _differing(base.asked, new.asked)
+        if settings:
             yield (
-                f"{base.label} and {new.label} were replayed with different options "
-                f"({', '.join(options)}): part of the change may be theirs"
+                f"{base.label} and {new.label} were replayed with different settings "
+                f"({', '.join(settings)}): part of the change may be theirs"
             )
-        truths = self._matched[["TP", "FN", "N"]].sum(axis=1) != self._matched[
-            ["TP_base", "FN_base", "N_base"]
-        ].sum(axis=1)
-        if truths.any():
-            guess = "" if options else " (other labels or topics?)"
+        differs = _truths(self._after).ne(_truths(self._before)).any(axis=1)
+        if differs.any():
+            guess = "" if settings else " (other labels or topics?)"
             yield (
-                f"the truth differs on {self._matched[truths]['stamp'].nunique()} frames between "
+                f"the truth differs on {self._after['stamp'][differs].nunique()} frames between "
                 f"{base.label} and {new.label}{guess}: part of the change may be the truth's"
             )
 
 
 def _differing(base: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """Name the options of `TELLING` that two results know and differ in, with both values."""
+    """Return the settings that two results know and differ in, with both values."""
     return [
-        f"{option} {_said(base[name])} and {_said(new[name])}"
-        for name, option in TELLING.items()
-        if name in base and name in new and base[name] != new[name]
+        f"{name} {_text(base[name])} and {_text(new[name])}"
+        for name in base
+        if name in new and base[name] != new[name]
     ]
 
 
-def _said(value: Any) -> str:
-    """Write an option's value for a person."""
+def _text(value: Any) -> str:
+    """Write a setting's value for a person."""
     if value is None or value in ({}, [], ()):
         return "not given"
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _by_mask(frames: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
-    """Yield each variant and stage with its rows, in the table's order."""
-    for (variant, stage), rows in frames.groupby(["variant", "stage"], sort=False):
-        yield str(variant), str(stage), rows
+def _truths(frames: pd.DataFrame) -> pd.DataFrame:
+    """Return each row's road and labelled pixels of the truth, whatever the mask made of them."""
+    return frames[["N"]].assign(road=frames["TP"] + frames["FN"])
 
 
 def _stamped(frames: pd.DataFrame) -> pd.DataFrame:
-    """Add a key to match frames by: the stamp, and among equal ones the place."""
+    """Index rows by stamp, variant and stage; equal stamps are told apart by their order."""
+    import pandas as pd
+
     place = frames.groupby(["variant", "stage", "stamp_ns"], sort=False).cumcount()
-    return frames.assign(stamp=frames["stamp_ns"].astype(str) + "/" + place.astype(str))
+    stamp = frames["stamp_ns"].astype(str) + "/" + place.astype(str)
+    keys = [stamp, frames["variant"], frames["stage"]]
+    return frames.assign(stamp=stamp).set_index(pd.MultiIndex.from_arrays(keys, names=[None] * 3))
 
 
-def _rates(rows: pd.DataFrame) -> dict[str, Any]:
-    """Sum up rows of one variant and stage: mean and pooled rates, IoU, F1 and precision."""
-    (history,) = analysis.histories(rows)
-    total = history.totals()
-    named = {name: total[name] for name in (*METRICS, *(f"pooled_{rate}" for rate in METRICS))}
-    return named | analysis.overlap(total)
+def _by_mask(frames: pd.DataFrame) -> Iterator[tuple[str, str, bool, pd.DataFrame]]:
+    """Yield each variant and stage, whether that is its final one, and its rows, in order."""
+    last = analysis.final_stages(frames)
+    for (variant, stage), rows in frames.groupby(["variant", "stage"], sort=False):
+        yield str(variant), str(stage), stage == last[str(variant)], rows
 
 
-def _levels(side: Side) -> Iterator[dict[str, Any]]:
-    last = analysis.final_stages(side.frames)
-    for variant, stage, rows in _by_mask(side.frames):
-        yield {
-            "result": side.label,
-            "variant": variant,
-            "stage": stage,
-            "final": stage == last[variant],
-            "frames": len(rows),
-            "base": {},
-            "new": _rates(rows),
-            "difference": {},
-        }
+def _rates(rows: pd.DataFrame) -> dict[str, float]:
+    """Sum up rows of one mask: mean and pooled metrics, and those of the overlap."""
+    total = analysis.sum_up_rows(rows)
+    names = (*METRICS, *(f"pooled_{name}" for name in METRICS))
+    return {name: total[name] for name in names} | analysis.overlap(total)
 
 
-def _apart(sides: Sequence[Side]) -> str:
+def _levels(side: Side) -> Iterator[MaskComparison]:
+    for variant, stage, final, rows in _by_mask(side.frames):
+        new = _rates(rows)
+        yield MaskComparison(side.label, variant, stage, final, len(rows), {}, new, {})
+
+
+def _result(side: Side) -> ComparedResult:
+    frames, scale = side.frames["frame"].nunique(), side.asked.get("frames.scale")
+    return ComparedResult(side.label, side.drive, side.digest, frames, scale)
+
+
+def _why_apart(sides: Sequence[Side]) -> str:
     for side in sides:
         if side.digest is None:
             return f"{side.label} does not say which log it is of: nothing is subtracted"

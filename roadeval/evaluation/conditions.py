@@ -1,4 +1,4 @@
-"""Limits that a comparison must keep: the small language of ``--fail-if``.
+"""Conditions: limits that a comparison must keep, and the small language they are written in.
 
 A condition is a quantity, an operator and a limit::
 
@@ -27,9 +27,10 @@ import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from roadeval.errors import RoadevalError
+from roadeval.evaluation.compared import ComparedResult, Comparison, Judgement, MaskComparison
 from roadeval.evaluation.metrics import METRICS, OVERLAP
 from roadeval.evaluation.settings import EvaluationSettings
 
@@ -48,7 +49,7 @@ _GRAMMAR: Final = re.compile(
 
 
 class ConditionError(RoadevalError):
-    """A condition that cannot be read, or not be judged."""
+    """A condition that cannot be read or judged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,46 +96,40 @@ class Condition:
             match["unit"] == "pp",
         )
 
-    def judge(self, change: Mapping[str, Any]) -> tuple[bool, str]:
-        """Say whether it holds, and why in a sentence.
-
-        Parameters
-        ----------
-        change
-            A row of a comparison's ``changes``: ``result``, ``base`` and ``new`` rates.
+    def judge(self, mask: MaskComparison) -> Judgement:
+        """Judge the condition on what was found of the mask that it names.
 
         Raises
         ------
         ConditionError
             If the rate is undefined there.
         """
-        before, after = change["base"].get(self.rate), change["new"][self.rate]
-        wanted = (before, after) if self.is_change else (after,)
-        if any(value is None or math.isnan(value) for value in wanted):
-            raise ConditionError(f"{self.text}: undefined in {change['result']}, so not judged")
-        what = f"{self.stage}.{self.variant}.{self.rate} of {change['result']}"
+        before, after = mask.base.get(self.rate, math.nan), mask.new[self.rate]
         value = 100 * (after - before if self.is_change else after)
+        if math.isnan(value):
+            raise ConditionError(f"{self.text}: undefined in {mask.result}, so not judged")
         holds = OPERATORS[self.operator](value, self.limit)
-        if self.is_change:
-            told = f"changed by {value:+.2f} pp ({100 * before:.2f} % to {100 * after:.2f} %)"
-        else:
-            told = f"is {value:.2f} %"
-        return holds, f"{what} {told}: {self.text} {'holds' if holds else 'does not hold'}"
+        found = (
+            f"changed by {value:+.2f} pp ({100 * before:.2f} % to {100 * after:.2f} %)"
+            if self.is_change
+            else f"is {value:.2f} %"
+        )
+        what = f"{self.stage}.{self.variant}.{self.rate} of {mask.result}"
+        verdict = "holds" if holds else "does not hold"
+        return Judgement(self.text, holds, f"{what} {found}: {self.text} {verdict}")
 
 
 def judge(
-    comparison: Mapping[str, Any],
-    conditions: Sequence[Condition],
-    settings: EvaluationSettings,
-) -> list[dict[str, Any]]:
-    """Judge conditions on every new result; a row for each: ``text``, ``holds``, ``sentence``.
+    comparison: Comparison, conditions: Sequence[Condition], settings: EvaluationSettings
+) -> tuple[Judgement, ...]:
+    """Judge each condition on every result that it names a mask of.
 
     Parameters
     ----------
     comparison
         See `roadeval.evaluation.comparison.compare`.
     conditions
-        Each is judged on every result that it names a mask of.
+        In the order in which they are judged.
     settings
         How many frames it takes.
 
@@ -144,71 +139,57 @@ def judge(
         If a condition asks for what is not there, or for a change between different drives or
         scales, or if too few frames tell.
     """
-    rows = []
+    judgements = []
     for condition in conditions:
-        if condition.is_change and not comparison["same_drive"]:
-            raise ConditionError(
-                f"{condition.text}: not judged, because the results are of different drives, whose "
-                "difference mixes the scene with the method; limits in % can be judged"
-            )
-        for row in _matching(condition, comparison["changes" if condition.is_change else "levels"]):
-            _must_tell(condition, row, comparison["results"], settings.effective_frames)
-            holds, sentence = condition.judge(row)
-            rows.append({"text": condition.text, "holds": holds, "sentence": sentence})
-    return rows
+        for mask in _named(condition, comparison):
+            why = _obstacle(condition, mask, comparison.results, settings.effective_frames)
+            if why:
+                raise ConditionError(f"{condition.text}: not judged, because {why}")
+            judgements.append(condition.judge(mask))
+    return tuple(judgements)
 
 
-def _matching(
-    condition: Condition, compared: Sequence[Mapping[str, Any]]
-) -> list[Mapping[str, Any]]:
-    """Give the rows of the mask that a condition names."""
-    named = (condition.stage, condition.variant)
-    matching = [row for row in compared if (row["stage"], row["variant"]) == named]
-    if not matching:
-        there = {f"{row['stage']}.{row['variant']}" for row in compared}
+def _named(condition: Condition, comparison: Comparison) -> list[MaskComparison]:
+    """Return what was found of the mask that a condition names, a row a result."""
+    if condition.is_change and not comparison.same_drive:
         raise ConditionError(
-            f"{condition.text}: nothing compared is called {'.'.join(named)}; there are "
-            f"{', '.join(sorted(there))}"
+            f"{condition.text}: not judged, because the results are of different drives, whose "
+            "difference mixes the scene with the method; limits in % can be judged"
         )
-    return matching
+    masks = comparison.changes if condition.is_change else comparison.levels
+    named = [m for m in masks if (m.stage, m.variant) == (condition.stage, condition.variant)]
+    if not named:
+        there = ", ".join(sorted({f"{mask.stage}.{mask.variant}" for mask in masks}))
+        raise ConditionError(
+            f"{condition.text}: nothing compared is called {condition.stage}.{condition.variant}; "
+            f"there are {there}"
+        )
+    return named
 
 
-def _must_tell(
-    condition: Condition,
-    row: Mapping[str, Any],
-    results: Sequence[Mapping[str, Any]],
-    least: int,
-) -> None:
-    """Refuse to judge by a handful of frames, or a change of what hardly has anything in common."""
-    label, count = row["result"], row["frames"]
-    why = ""
-    if condition.is_change:
-        new = next(each for each in results if each["label"] == label)
-        why = _no_change_tells(results[0], new, count, least)
-    elif count < least:
-        why = f"{label} has {count} evaluated frames, and {least} are needed; replay more of it"
-    if why:
-        raise ConditionError(f"{condition.text}: not judged, because {why}")
-
-
-def _no_change_tells(
-    base: Mapping[str, Any], new: Mapping[str, Any], common: int, least: int
+def _obstacle(
+    condition: Condition, mask: MaskComparison, results: Sequence[ComparedResult], least: int
 ) -> str:
-    """Say why a change between two results of a drive tells nothing; empty if it does."""
-    names = f"{base['label']} and {new['label']}"
-    scales = base["scale"], new["scale"]
-    if None not in scales and scales[0] != scales[1]:
+    """Return why a condition cannot be judged on a mask, or nothing."""
+    if not condition.is_change:
+        few = f"{mask.result} has {mask.frames} evaluated frames, and {least} are needed"
+        return "" if mask.frames >= least else f"{few}; replay more of it"
+    base, new = results[0], next(each for each in results if each.label == mask.result)
+    names = f"{base.label} and {new.label}"
+    if base.scale is not None and new.scale is not None and base.scale != new.scale:
         return (
-            f"{names} were replayed at --scale {scales[0]:g} and {scales[1]:g}; replay both at one "
-            "scale, or limit in %"
+            f"{names} were replayed with frames.scale {base.scale:g} and {new.scale:g}; replay "
+            "both at one scale, or limit in %"
         )
-    shorter = min(base["frames"], new["frames"])
-    if common < least:
-        why = f"and {least} are needed"
-    elif 2 * common < shorter:
-        why = f"fewer than half of the {shorter} of the shorter one"
-    else:
+    shorter = min(base.frames, new.frames)
+    if mask.frames >= least and 2 * mask.frames >= shorter:
         return ""
+    few = (
+        f"and {least} are needed"
+        if mask.frames < least
+        else f"fewer than half of the {shorter} of the shorter one"
+    )
     return (
-        f"{names} have {common} evaluated frames in common, {why}; replay both over the same range"
+        f"{names} have {mask.frames} evaluated frames in common, {few}; replay both over the same "
+        "range"
     )

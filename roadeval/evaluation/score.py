@@ -1,4 +1,4 @@
-"""One frame against its truth: counts, rates, error maps, health, notes and table lines."""
+"""One frame against its truth: counts, rates, error maps, health and notes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,6 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.maps import Name
 from roadeval.evaluation.region import LabelledFrame
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results import tables
 
 
 class CountsNotConservedError(RuntimeError):
@@ -65,7 +64,6 @@ def score_frame(
     final_bits = {variant: mask for (variant, _), mask in zip(masks, bits, strict=True)}
     finals = {result.variant: result.rates for result in tallies}
     blind = finals.pop(BASELINE, None)
-    oracles = _oracles(variants, truth)
     return FrameResult(
         frame,
         role,
@@ -74,15 +72,10 @@ def score_frame(
         tallies=tallies,
         health={name: health.judge(own, blind, settings) for name, own in finals.items()},
         notes=health.notes(finals, blind, settings),
-        tables={
-            "frames": tables.frame_lines(frame, tallies),
-            "regions": tables.region_lines(frame, tallies),
-            **({"oracles": tables.oracle_lines(frame, oracles)} if oracles else {}),
-        },
         truth_bits=truth,
         changes=maps.changes(list(masks), bits, truth),
         contours=contours.boundary_f(final_bits, truth, settings.boundary_width),
-        oracles=oracles,
+        oracles=_oracles(variants, truth),
     )
 
 

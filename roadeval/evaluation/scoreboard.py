@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from operator import attrgetter
 from typing import Any, Final
 
@@ -17,27 +17,37 @@ from roadeval.data import (
     FILTERED,
     FINAL_STAGE,
     UNFILTERED,
+    Change,
     Frame,
     FrameResult,
     Role,
+    Step,
     VariantResult,
 )
 from roadeval.evaluation import windows
 from roadeval.evaluation.baselines import BlindPrior
-from roadeval.evaluation.beyond import Beyond
-from roadeval.evaluation.history import History
-from roadeval.evaluation.maps import Maps
+from roadeval.evaluation.edges_and_flicker import EdgesAndFlicker
+from roadeval.evaluation.frame_counts import FrameCounts, GrowingCounts, sum_up
+from roadeval.evaluation.maps import HeatMap, Maps, Name
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import score_frame
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference, mean_difference
 from roadeval.evaluation.verdict import NO_PAIR, NOTHING_SCORED, verdict
-from roadeval.results import tables
 
 COMPARED: Final = tuple(
     name for name, metric in METRICS.items() if name == "ACC" or metric.mirrors is None
 )
 """The metrics whose paired differences are given: all but mirrors, and ACC."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sums:
+    """What the drive's tables of sums hold: its windows, changes of masks, and heat maps."""
+
+    windows: Sequence[windows.Window]
+    changes: Mapping[Step, Change]
+    heat: Mapping[str, HeatMap]
 
 
 class Scoreboard:
@@ -64,12 +74,14 @@ class Scoreboard:
         self._frames: Final[list[int]] = []
         self._roles: Final[Counter[str]] = Counter()
         self._health: Final[defaultdict[str, Counter[str]]] = defaultdict(Counter)
-        self._histories: Final[dict[tuple[str, str], History]] = {}
-        self._oracles: Final[dict[tuple[str, str, str], History]] = {}
+        self._counts: Final[defaultdict[Name, GrowingCounts]] = defaultdict(GrowingCounts)
+        self._oracles: Final[defaultdict[tuple[str, str, str], GrowingCounts]] = defaultdict(
+            GrowingCounts
+        )
         self._maps: Final = Maps()
-        self._beyond: Final = Beyond(settings.boundary_width)
-        self._seconds: Final[defaultdict[tuple[str, str], float]] = defaultdict(float)
-        self._runs: Final[Counter[tuple[str, str]]] = Counter()
+        self._beyond: Final = EdgesAndFlicker(settings.boundary_width)
+        self._seconds: Final[defaultdict[Name, float]] = defaultdict(float)
+        self._runs: Final[Counter[Name]] = Counter()
 
     def score(self, frame: Frame, role: Role, variants: tuple[VariantResult, ...]) -> FrameResult:
         """Score one frame; changes nothing, so any thread may call it at any time."""
@@ -87,16 +99,12 @@ class Scoreboard:
             return
         for name, health in result.health.items():
             self._health[name][health] += 1
+        position = len(self._frames)
         for tally in result.tallies:
-            history = self._histories.setdefault(
-                (tally.variant, tally.stage), History(tally.variant, tally.stage)
-            )
-            history.append(len(self._frames), tally)
+            self._counts[tally.variant, tally.stage].append(position, tally.counts)
         for oracle, tallies in result.oracles.items():
             for tally in tallies:
-                key = tally.variant, oracle, tally.stage
-                history = self._oracles.setdefault(key, History(tally.variant, tally.stage))
-                history.append(len(self._frames), tally)
+                self._oracles[tally.variant, oracle, tally.stage].append(position, tally.counts)
         self._maps.add(result.errors, result.changes)
         self._frames.append(result.frame.number)
 
@@ -104,39 +112,32 @@ class Scoreboard:
         """Say that a frame was read here and could not be decoded."""
         self._beyond.interrupt()
 
-    def tables(self) -> dict[str, str]:
-        """Give the lines of the tables that sum up the drive, by name; none without a score."""
-        texts = {
-            "windows": tables.window_lines(self.windows()),
-            "changes": tables.change_lines(self._maps),
-            "heat": tables.heat_lines(self._maps),
-        }
-        return {name: text for name, text in texts.items() if text}
+    def sums(self) -> Sums:
+        """Sum up the drive for its tables; nothing without a score."""
+        return Sums(tuple(self.windows()), self._maps.changes, self._maps.heat)
 
     def roles(self) -> dict[str, int]:
         """Count the frames added so far by role."""
         return {str(role): count for role, count in self._roles.items()}
 
     def totals(self) -> dict[str, dict[str, dict[str, Any]]]:
-        """Sum up by variant and stage: see `roadeval.evaluation.history.History.totals`."""
+        """Sum up by variant and stage: see `roadeval.evaluation.frame_counts.sum_up`."""
         sums: dict[str, dict[str, dict[str, Any]]] = {}
-        for history in self._ordered():
-            sums.setdefault(history.variant, {})[history.stage] = history.totals()
+        for mask in self._masks():
+            sums.setdefault(mask.variant, {})[mask.stage] = sum_up(mask.counts)
         return sums
 
     def oracles(self) -> dict[str, dict[str, dict[str, dict[str, Any]]]]:
         """Sum up by variant, stage replaced by the truth, and stage after it, as in `totals`."""
         sums: dict[str, dict[str, dict[str, dict[str, Any]]]] = {}
-        for (variant, oracle, stage), history in self._oracles.items():
-            sums.setdefault(variant, {}).setdefault(oracle, {})[stage] = history.totals()
+        for (variant, oracle, stage), growing in self._oracles.items():
+            counts = growing.so_far(variant, stage).counts
+            sums.setdefault(variant, {}).setdefault(oracle, {})[stage] = sum_up(counts)
         return sums
 
     def windows(self) -> Iterator[windows.Window]:
         """Cut the drive into windows: by window, then variant and stage."""
-        rows = (
-            windows.rows(history, self._frames, self._settings.window)
-            for history in self._ordered()
-        )
+        rows = (windows.cut(mask, self._frames, self._settings.window) for mask in self._masks())
         return heapq.merge(*rows, key=attrgetter("number"))
 
     def differences(self) -> dict[str, dict[str, Difference]]:
@@ -171,14 +172,16 @@ class Scoreboard:
             "seconds": self._mean_seconds(),
         }
 
-    def _ordered(self) -> Iterator[History]:
-        """Yield the histories by variant in the tables' order, then by stage as they ran."""
-        return iter(sorted(self._histories.values(), key=lambda h: self._order.index(h.variant)))
+    def _masks(self) -> list[FrameCounts]:
+        """Return the counts by variant in the tables' order, then by stage as they ran."""
+        names = sorted(self._counts, key=lambda name: self._order.index(name[0]))
+        return [self._counts[name].so_far(*name) for name in names]
 
     def _paired(self) -> Iterator[tuple[str, npt.NDArray[np.float64]]]:
         """Yield each stage of both default variants with ``(n, m)`` differences of its rates."""
-        for (variant, stage), treated in self._histories.items():
-            control = self._histories.get((UNFILTERED, stage))
+        masks = {(mask.variant, mask.stage): mask for mask in self._masks()}
+        for (variant, stage), treated in masks.items():
+            control = masks.get((UNFILTERED, stage))
             if variant == FILTERED and control is not None:
                 _, mine, theirs = np.intersect1d(
                     treated.positions, control.positions, return_indices=True

@@ -37,11 +37,6 @@ class EvaluationSettings:
     effective_frames
         No interval is given below this many effectively independent frames: there it would be
         too short more often than its confidence admits (`roadeval.evaluation.uncertainty`).
-    resamples
-        Bootstrap repetitions; they shape the interval, while its width comes from the standard
-        error (`roadeval.evaluation.uncertainty`), so a thousand are plenty.
-    seed
-        Of the bootstrap, so that the same drive gives the same interval.
     """
 
     window: Annotated[int, Field(ge=1)] = 10
@@ -54,5 +49,3 @@ class EvaluationSettings:
     noteworthy: Annotated[float, Field(ge=0, le=1)] = 0.05
     confidence: Annotated[float, Field(gt=0.5, lt=1)] = 0.95
     effective_frames: Annotated[int, Field(ge=2)] = 10
-    resamples: Annotated[int, Field(ge=200, le=100_000)] = 1000
-    seed: Annotated[int, Field(ge=0)] = 0

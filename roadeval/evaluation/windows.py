@@ -9,7 +9,7 @@ import numpy as np
 
 from roadeval.data import Counts
 from roadeval.evaluation import metrics
-from roadeval.evaluation.history import History, means
+from roadeval.evaluation.frame_counts import FrameCounts, means
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,20 +42,19 @@ class Window:
     pooled: dict[str, float]
 
 
-def rows(history: History, frame_numbers: Sequence[int], size: int) -> Iterator[Window]:
-    """Cut a history into windows of ``size`` consecutive evaluated frames.
+def cut(mask: FrameCounts, frame_numbers: Sequence[int], size: int) -> Iterator[Window]:
+    """Cut a drive into windows of ``size`` consecutive evaluated frames.
 
     Parameters
     ----------
-    history
-        Of one stage of one variant.
+    mask
+        The counts of one stage of one variant.
     frame_numbers
         The numbers of all evaluated frames, in order.
     size
         Frames in a window.
     """
-    window_of = history.positions // size
-    counts, table = history.counts, history.rates
+    window_of, rates = mask.positions // size, mask.rates
     for number in np.unique(window_of).tolist():
         here = slice(*np.searchsorted(window_of, [number, number + 1]))
         last = min((number + 1) * size, len(frame_numbers)) - 1
@@ -64,8 +63,8 @@ def rows(history: History, frame_numbers: Sequence[int], size: int) -> Iterator[
             first_frame=frame_numbers[number * size],
             last_frame=frame_numbers[last],
             frames=here.stop - here.start,
-            variant=history.variant,
-            stage=history.stage,
-            rates=means(table[here]),
-            pooled=metrics.of(Counts(*counts[here].sum(axis=0).tolist())),
+            variant=mask.variant,
+            stage=mask.stage,
+            rates=means(rates[here]),
+            pooled=metrics.of(Counts(*mask.counts[here].sum(axis=0).tolist())),
         )

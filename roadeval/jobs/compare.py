@@ -12,15 +12,25 @@ from typing import TYPE_CHECKING, Any, Final
 from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import analysis, comparison
+from roadeval.evaluation.compared import Comparison, Judgement, as_dict
 from roadeval.evaluation.comparison import Side
 from roadeval.evaluation.conditions import Condition, judge
 from roadeval.jobs.result import Opened
 from roadeval.report.comparison import document, markdown
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
+from roadeval.results.lines import window_rows
+from roadeval.results.reading import table_of
+from roadeval.results.summary import plain
 
 if TYPE_CHECKING:
     import pandas as pd
 
+ASKED: Final = {
+    "topics": ("image", "truth", "shadow", "masks", "sync_tolerance_ms", "resize_truth"),
+    "labels": ("road", "ignore", "road_colors", "ignore_colors"),
+    "frames": ("every", "scale"),
+}
+"""Settings that change a frame's numbers, or which frames are seen."""
 ROWS: Final = 60
 """Points of the figure over the drive, at most."""
 
@@ -31,21 +41,28 @@ class Compared:
 
     Parameters
     ----------
-    content
-        See `roadeval.evaluation.comparison.compare`; and ``conditions``, as
-        `roadeval.evaluation.conditions.judge` gives them.
+    comparison
+        See `roadeval.evaluation.comparison.compare`.
+    judgements
+        Of the conditions, see `roadeval.evaluation.conditions.judge`.
     windows
         ERR and the rest over the drive, with each result as a variant; empty for different
         drives.
     """
 
-    content: Mapping[str, Any]
+    comparison: Comparison
+    judgements: tuple[Judgement, ...]
     windows: pd.DataFrame
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """The content of the JSON file."""
+        return as_dict(self.comparison, self.judgements)
 
     @property
     def held(self) -> list[str]:
         """The sentences of the conditions that hold."""
-        return [row["sentence"] for row in self.content["conditions"] if row["holds"]]
+        return [judgement.sentence for judgement in self.judgements if judgement.holds]
 
 
 def compare(
@@ -86,15 +103,15 @@ def compare(
                 each.name,
                 _digest(each),
                 _chosen(each, variants),
-                each.summary.get("selection") or {},
+                _asked(each.summary),
             )
             for name, each in zip(names, opened, strict=True)
         ]
     settings = analysis.settings_of(opened[0].summary)
-    content = comparison.compare(sides, settings, across_variants=across)
-    content["conditions"] = judge(content, conditions, settings)
-    windows = _windows(sides, settings.window) if content["same_drive"] else sides[0].frames[:0]
-    return Compared(content, windows)
+    found = comparison.compare(sides, settings, across_variants=across)
+    judgements = judge(found, conditions, settings)
+    windows = _windows(sides, settings.window) if found.same_drive else sides[0].frames[:0]
+    return Compared(found, judgements, windows)
 
 
 def write(compared: Compared, path: Path, *, paper: Paper = Paper.A4) -> Path:
@@ -128,15 +145,18 @@ def writer(path: Path) -> Callable[[Compared, Paper], bytes]:
 
 def as_json(compared: Compared) -> str:
     """Write a comparison as JSON; undefined numbers become null."""
-    return json.dumps(_plain(compared.content), indent=2, ensure_ascii=False) + "\n"
+    return json.dumps(plain(compared.content), indent=2, ensure_ascii=False) + "\n"
 
 
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and value != value else value  # noqa: PLR0124
+def _asked(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a result's log was asked for that changes a frame's numbers, by the settings."""
+    run = summary.get("run", {})
+    return {
+        f"{table}.{key}": run[table][key]
+        for table, keys in ASKED.items()
+        for key in keys
+        if key in run.get(table, {})
+    }
 
 
 def _digest(opened: Opened) -> str | None:
@@ -180,4 +200,4 @@ def _windows(sides: Sequence[Side], size: int) -> pd.DataFrame:
     frames = pd.concat([*tables, blind])
     frames = frames[frames["frame"].isin(common)]
     size *= max(-(-len(common) // (size * ROWS)), 1)
-    return analysis.rows(frames, size)
+    return table_of("windows", window_rows(analysis.windows(frames, size)))

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from time import perf_counter
 from typing import Any, Final
 
-from roadeval.config import Config, Variant
+from roadeval.config import RunConfig, Variant
 from roadeval.data import (
     FILTERED,
     FINAL_STAGE,
-    UNFILTERED,
     Layer,
     Mask,
+    Output,
     Rgb,
     StageResult,
     Truth,
@@ -21,6 +21,7 @@ from roadeval.data import (
     mask_spec,
 )
 from roadeval.data.packed import Packed
+from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import View
 from roadeval.training import Model
@@ -39,9 +40,6 @@ def run_variant(
 ) -> VariantResult:
     """Run a chain on a frame and time each of its stages.
 
-    To take the image's channels apart is counted to the stage that first asks for them, of all
-    variants that share the view.
-
     Given the truth, run it also with each stage that has an oracle replaced by that, untimed;
     ``known`` is what the frame's variants share of it, see `Chain.oracles`.
     """
@@ -49,9 +47,7 @@ def run_variant(
     start = perf_counter()
     for stage, output in chain.run(view):
         seconds = perf_counter() - start
-        results.append(
-            StageResult(stage, output.layers, output.mask, output.regions, output.facts, seconds)
-        )
+        results.append(StageResult(stage, output, seconds))
         outputs.append(output)
         start = perf_counter()
     oracles = {}
@@ -69,17 +65,17 @@ def external_layout(name: str, topic: str) -> VariantLayout:
 def external_variant(name: str, mask: Mask) -> VariantResult:
     """Present a mask that the log carries as a variant with the final stage alone."""
     road = Packed.of(mask)
-    stage = StageResult(FINAL_STAGE, (Layer(EXTERNAL, road),), road, {}, {}, 0.0)
+    stage = StageResult(FINAL_STAGE, Output((Layer(EXTERNAL, road),), mask=road), 0.0)
     return VariantResult(name, (stage,))
 
 
 def bind(variants: tuple[Variant, ...], model: Model) -> Mapping[str, Chain]:
     """Make the variants' chains ready to run with what the model learnt for each."""
-    return {v.name: v.config.bind(model.parameters[v.name]) for v in variants}
+    return {v.name: v.pipeline.bind(model.parameters[v.name]) for v in variants}
 
 
 def run_frame(
-    image: Rgb, model: Model, config: Config | None = None, *, variant: str = FILTERED
+    image: Rgb, model: Model, config: RunConfig | None = None, *, variant: str = FILTERED
 ) -> VariantResult:
     """Run one variant on one image, with all layers: the notebook's way in.
 
@@ -91,9 +87,8 @@ def run_frame(
         What `roadeval.train` or `roadeval.load_model` gave.
     config
         The configuration that the model was trained with; the preset ``paper`` by default.
-        ``unfiltered`` runs it without its filters.
     variant
-        Whose parameters to use.
+        Which of its variants to run.
 
     Returns
     -------
@@ -105,7 +100,7 @@ def run_frame(
     >>> result = roadeval.run_frame(image, roadeval.load_model("city.model"))  # doctest: +SKIP
     >>> {layer.spec.name: layer.array.shape for layer in result.layers()}  # doctest: +SKIP
     """
-    config = config or Config()
-    if variant == UNFILTERED:
-        config = config.without_filter()
-    return run_variant(variant, config.bind(model.parameters[variant]), View.of(image))
+    chains = bind((config or RunConfig()).variants(), model)
+    if variant not in chains:
+        raise RoadevalError(f"there is no variant {variant}; there are {', '.join(chains)}")
+    return run_variant(variant, chains[variant], View.of(image))

@@ -2,34 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from roadeval import logs
-from roadeval.evaluation import metrics
-from roadeval.jobs.options import Outcome, Progress, ReplayOptions, keep_apart
+from roadeval.config import OutputSettings, RunConfig
+from roadeval.config.toml import run_toml
+from roadeval.jobs import summary
+from roadeval.jobs.outputs import AnyPath, Outputs, keep_apart
+from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import Run
-from roadeval.recording import NullRecorder, Rule, recorder_for
+from roadeval.recording import NullRecorder, RecordRule, recorder_for
 from roadeval.report.figures.figure import ExampleFrame, FigureData
 from roadeval.report.figures.files import write_figures
-from roadeval.results.folder import Results, ResultsWriter, summary_text
-from roadeval.results.tables import header
-from roadeval.runtime.memory import give_back
+from roadeval.results.folder import Results, ResultsWriter
+from roadeval.results.lines import sum_lines
+from roadeval.results.schema import TABLES
+from roadeval.results.summary import summary_text
+from roadeval.runtime.memory import trim
+from roadeval.version import VERSION
 
-__all__ = ["Outcome", "Progress", "ReplayOptions", "replay"]
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The result of a replay: where it lies, and the content of ``summary.json``."""
+
+    recording: Path | None
+    reports: Path | None
+    summary: dict[str, Any]
+    warnings: tuple[str, ...]
+    losses: tuple[str, ...]
+    files: tuple[Path, ...]
 
 
 def replay(
-    drive: str | Path,
+    drive: AnyPath,
+    config: RunConfig | None = None,
     *,
-    save: str | Path | None = None,
-    reports: str | Path | None = None,
-    mcap: str | Path | None = None,
-    options: ReplayOptions | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
+    save: AnyPath | None = None,
+    reports: AnyPath | None = None,
+    mcap: AnyPath | None = None,
+    on_progress: OnProgress = ignore,
 ) -> Outcome:
     """Replay a log through every variant; record, score and table every frame.
 
@@ -37,88 +53,77 @@ def replay(
     ----------
     drive
         An MCAP file, or a rosbag2 folder of split files.
-    save
-        The recording; ``recordings/<drive>.rrd`` by default.
-    reports
-        The folder of tables and figures; ``reports/<drive>/`` by default.
-    mcap
-        A log for masks, error maps and rates, with the images' own times; none by default.
-    options
-        Everything else.
+    config
+        Every option; the defaults of ``roadeval replay`` otherwise. See `roadeval.configure` and
+        `roadeval.load_config`.
+    save, reports, mcap
+        Where the recording, the folder of tables and figures, and the log of masks land; in place
+        of what the configuration says.
     on_progress
         Called in the caller's thread after every frame, and where something else begins that takes
         its time.
 
-    Returns
-    -------
-    Outcome
-        What was written, and the summary.
-
     Raises
     ------
     RoadevalError
-        For whatever a user can mend: one line that says what, where, and what to do.
+        For whatever a user can mend: one line with what is wrong, where, and what to do.
     """
-    options, tell = options or ReplayOptions(), on_progress or _silent
-    rule = Rule.parse(options.record)
-    options.check_sidecar(mcap)
-    with logs.open_log(drive, keep_corrupt=options.keep_corrupt) as log:
-        path = Path(save or Path("recordings", f"{log.name}.rrd"))
-        folder = Path(reports or Path("reports", log.name))
-        keep_apart((drive, options.model), (path, mcap))
-        outcome, examples = _run(log, _Outputs(path, rule, folder, mcap), options, tell)
-        # What the run has learnt and held is gone: figures take its room.
-        give_back()
-        figures = write_figures(folder, FigureData(log.name, Results(folder).windows, examples))
+    given = {"save": save, "reports": reports, "mcap": mcap}
+    wanted = {name: str(path) for name, path in given.items() if path is not None}
+    config = (config or RunConfig()).override({"output": wanted})
+    with logs.open_log(drive, keep_corrupt=config.frames.keep_corrupt) as log:
+        to = Outputs.of(config.output, log.name)
+        keep_apart((drive, config.training.model), (to.recording, to.mcap))
+        outcome, examples = _run(log, config, to, on_progress)
+        # The run's frames and models are released here: figures take their room.
+        trim()
+        windows = Results(to.reports).windows
+        figures = write_figures(to.reports, FigureData(log.name, windows, examples))
         return replace(outcome, files=(*outcome.files, *figures))
 
 
-class _Outputs(NamedTuple):
-    """Where a run writes, and whose pictures it records."""
-
-    recording: Path
-    rule: Rule
-    reports: Path
-    mcap: str | Path | None
-
-
 def _run(
-    log: logs.Log, to: _Outputs, options: ReplayOptions, tell: Callable[[Progress], None]
+    log: logs.Log, config: RunConfig, to: Outputs, on_progress: OnProgress
 ) -> tuple[Outcome, list[ExampleFrame]]:
-    """Run over the log into a recording and tables; give the frames for the figure of masks."""
+    """Run over the log into a recording and tables; return the frames for the figure of masks."""
     with (
         ResultsWriter(to.reports) as results,
         _sidecar(to.mcap) as sidecar,
         ExitStack() as opened,
     ):
-        run = Run(log, options, tell)
-        recorder = recorder_for(to.recording, run.layout(), to.rule)
+        run = Run(log, config, on_progress)
+        recorder = recorder_for(to.recording, run.layout(), RecordRule.parse(config.output.record))
         opened.enter_context(recorder)
-        for result, encoded in run.frames(recorder):
+        for result, lines, encoded in run.frames(recorder):
             recorder.write(encoded)
-            results.append(result)
+            results.append(lines)
             sidecar.write(result)
-        tell(Progress(run.done, run.total, "writing"))
-        recorder.settle()
-        give_back()
-        sums, summary = run.board.tables(), run.summary()
-        recorder.finish(_texts(summary, sums))
-        files = results.finish(summary, sums)
+        on_progress(Progress(run.done, run.total, "writing"))
+        recorder.flush()
+        trim()
+        sums = sum_lines(run.board.sums())
+        results.append(sums)
+        facts = summary.of(run) | {"tables": results.tables}
+        recorder.finish(_texts(run, facts, sums))
+        files = results.finish(facts, run_toml(config, log.name, VERSION))
     saved = None if isinstance(recorder, NullRecorder) else recorder.path
     files += [sidecar.path] if sidecar.path else []
-    outcome = Outcome(saved, to.reports, summary, run.warnings(), run.losses(), tuple(files))
-    return outcome, run.examples.kept
+    warnings, losses = summary.warnings(run), summary.losses(run)
+    return Outcome(saved, to.reports, facts, warnings, losses, tuple(files)), run.examples.kept
 
 
-def _sidecar(path: str | Path | None) -> logs.SidecarWriter | logs.NoSidecar:
-    return logs.NoSidecar() if path is None else logs.SidecarWriter(path, metrics.of)
+def _sidecar(path: Path | None) -> logs.SidecarWriter | logs.NoSidecar:
+    return logs.NoSidecar() if path is None else logs.SidecarWriter(path)
 
 
-def _texts(summary: dict[str, Any], sums: dict[str, str]) -> dict[str, str]:
-    """Give the results as the recording keeps them: the files' own text."""
-    tables = {name: header(name) + text for name, text in sums.items()}
-    return {"summary": summary_text(summary), **tables}
+def _texts(run: Run, facts: Mapping[str, Any], sums: Mapping[str, str]) -> dict[str, str]:
+    """Return the results as the recording keeps them: the files' own text.
 
-
-def _silent(_progress: Progress) -> None:
-    """Tell nobody."""
+    Where they were written is left out, so that the same input gives the same recording.
+    """
+    config = replace(run.config, output=OutputSettings(record=run.config.output.record))
+    return {
+        "summary": summary_text({**facts, "run": config.as_dict()}),
+        "run": run_toml(config, run.log.name, VERSION),
+        **{name: TABLES[name].header + text for name, text in sums.items()},
+    }

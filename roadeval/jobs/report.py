@@ -7,13 +7,18 @@ from pathlib import Path
 from roadeval.jobs.report_findings import collect
 from roadeval.jobs.result import Opened
 from roadeval.report.drive import document
+from roadeval.report.findings import Commands
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 
 __all__ = ["collect", "report"]
 
 
 def report(
-    result: str | Path | Opened, output: str | Path | None = None, *, paper: Paper = Paper.A4
+    result: str | Path | Opened,
+    output: str | Path | None = None,
+    *,
+    paper: Paper = Paper.A4,
+    commands: Commands | None = None,
 ) -> Path:
     """Write the report of one drive as a PDF.
 
@@ -26,6 +31,8 @@ def report(
         By default ``report.pdf`` in the results folder, or ``reports/<recording>.pdf``.
     paper
         A4 or Letter.
+    commands
+        What the reader may type for more; none by default.
 
     Returns
     -------
@@ -40,4 +47,4 @@ def report(
     opened = result if isinstance(result, Opened) else Opened(result)
     beside = opened.path / "report.pdf"
     usual = beside if opened.recording is None else Path("reports", f"{opened.path.stem}.pdf")
-    return write_file(Path(output or usual), pdf(document(collect(opened)), paper))
+    return write_file(Path(output or usual), pdf(document(collect(opened, commands)), paper))

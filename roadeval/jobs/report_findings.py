@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
-from io import StringIO
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, FILTERED, NAMES, UNFILTERED, TruthBits
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, TruthBits
 from roadeval.data.packed import Packed
 from roadeval.evaluation import analysis, counts, maps
 from roadeval.evaluation.scoreboard import COMPARED
 from roadeval.jobs.report_frames import FramePicker, evenly, str_keys, variants_but_baseline
 from roadeval.jobs.result import Opened
-from roadeval.report.findings import ErrorHeatmap, Findings, PairedComparison
-from roadeval.results import tables
+from roadeval.report.findings import Commands, ErrorHeatmap, Findings, PairedComparison
+from roadeval.results.lines import change_rows, heat_rows, window_rows
+from roadeval.results.reading import table_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,7 +30,7 @@ THUMBNAILS: Final = 8
 """Frames in figure 2 and on the first page."""
 
 
-def collect(result: Opened) -> Findings:
+def collect(result: Opened, commands: Commands | None = None) -> Findings:
     """Collect everything that the report of a result shows."""
     frames, summary = result.frames, result.summary
     pictured = _pictured(result)
@@ -42,8 +41,7 @@ def collect(result: Opened) -> Findings:
     return Findings(
         source=str(result.path),
         complete=result.complete,
-        again=_again(summary),
-        inspect=lambda frame: f"roadeval inspect {shlex.quote(str(result.path))} --frame {frame}",
+        commands=commands,
         pictured=len(pictured),
         summary=summary,
         properties=result.properties,
@@ -82,11 +80,6 @@ def _pictured(result: Opened) -> list[int]:
     return [number for number in result.pictured if number in evaluated]
 
 
-def _again(summary: dict[str, Any]) -> str:
-    log = summary.get("log")
-    return shlex.join(["roadeval", "replay", log["path"], "--config", "run.toml"]) if log else ""
-
-
 # --- Tables ---------------------------------------------------------------------------------------
 
 
@@ -96,7 +89,8 @@ def _windows(result: Opened) -> tuple[pd.DataFrame, int]:
     count = -(-result.frames["frame"].nunique() // size)
     if (count <= WINDOWS and len(result.windows) == 0 < count) or count > WINDOWS:
         size *= max(-(-count // WINDOWS), 1)
-        return analysis.rows(result.frames, size), size
+        windows = analysis.windows(result.frames, size)
+        return table_of("windows", window_rows(windows)), size
     return result.windows, size
 
 
@@ -154,18 +148,12 @@ def _mask_sums(result: Opened, numbers: Sequence[int]) -> tuple[pd.DataFrame, pd
     A run that was killed did not get to write them: they are made of the masks of evenly spread
     frames then.
     """
-    import pandas as pd
-
     changes, heat = result.extra("changes"), result.extra("heat")
     if len(changes) or len(heat):
         return changes, heat, result.frames["frame"].nunique()
     sample = _sample(result, numbers)
-    lines = {"changes": tables.change_lines(sample), "heat": tables.heat_lines(sample)}
-    made = {
-        name: pd.read_csv(StringIO(tables.header(name) + text), dtype=dict.fromkeys(NAMES, str))
-        for name, text in lines.items()
-    }
-    return made["changes"], made["heat"], sample.frames
+    changes = table_of("changes", change_rows(sample.changes))
+    return changes, table_of("heat", heat_rows(sample.heat)), sample.frames
 
 
 def _sample(result: Opened, numbers: Sequence[int]) -> maps.Maps:

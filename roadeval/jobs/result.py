@@ -135,6 +135,7 @@ class Opened:
             "difference": {},
             "warnings": [],
             "losses": [],
+            "run": {},
             "settings": {},
             "versions": {},
             "seconds": {},

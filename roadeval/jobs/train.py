@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
 from roadeval import logs
+from roadeval.config import RunConfig
 from roadeval.data import Frame
-from roadeval.jobs import learning
-from roadeval.jobs.options import Progress, ReplayOptions, keep_apart
-from roadeval.kernels.first_time import prepare
-from roadeval.training import Model, save_model
+from roadeval.jobs.outputs import AnyPath, keep_apart
+from roadeval.jobs.progress import OnProgress, Progress, ignore
+from roadeval.kernels import prepare
+from roadeval.training import Model, TrainingError, learning, save_model
+from roadeval.training.held import HeldFrames
 
 
 def train(
-    drives: Sequence[str | Path],
-    output: str | Path,
+    drives: Sequence[AnyPath],
+    output: AnyPath,
+    config: RunConfig | None = None,
     *,
-    options: ReplayOptions | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: OnProgress = ignore,
 ) -> Model:
     """Train every variant on some drives, and write the model file.
 
@@ -32,24 +34,25 @@ def train(
     RoadevalError
         If some drives have truth and others none, or there is nothing to learn.
     """
-    options, tell = options or ReplayOptions(), on_progress or _silent
+    config = config or RunConfig()
     keep_apart(drives, (output,))
-    settings = options.training()
+    settings = config.training
     total, by_truth = settings.frames * len(drives), settings.source != "patch"
-    memory = learning.Memory()
+    held = HeldFrames()
     frames: dict[Path, list[Frame]] = {}
     for drive in drives:
-        with logs.open_log(drive, keep_corrupt=options.keep_corrupt) as log:
-            there = partial(log.frames, options.select(log), options.span())
-            prepare(lambda: tell(Progress(0, total, "compiling")))
+        with logs.open_log(drive, keep_corrupt=config.frames.keep_corrupt) as log:
+            selection = log.select(config.topics, config.labels, scale=config.frames.scale)
+            there = partial(log.frames, selection, logs.Span.of(config.frames))
+            prepare(lambda: on_progress(Progress(0, total, "compiling")))
             frames[log.path] = []
             for frame in learning.spread(there, settings.frames, labelled=by_truth):
-                frames[log.path].append(memory.hold(frame))
-                tell(Progress(memory.frames, total, "training"))
-    model = learning.from_drives(frames, options.all_variants(), settings)
+                if not held.add(frame):
+                    raise TrainingError(
+                        f"{held.full()}; lower training.frames, or reduce them with frames.scale"
+                    )
+                frames[log.path].append(frame)
+                on_progress(Progress(len(held.frames), total, "training"))
+    model = learning.from_drives(frames, config.pipelines(), settings)
     save_model(model, Path(output))
     return model
-
-
-def _silent(_progress: Progress) -> None:
-    """Tell nobody."""

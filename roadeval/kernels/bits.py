@@ -3,31 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from roadeval.data.arrays import Bits, Reach, Sums, Words
+from roadeval.kernels.compiler import compiled, part
 from roadeval.kernels.words import ones
 
-_compiled = njit(cache=True, nogil=True)
 
-
-@_compiled  # type: ignore[untyped-decorator]
-def area(words: Words) -> int:
-    """See `plain.area`."""
-    total = np.uint64(0)
-    for word in words:
-        total += ones(word)
-    return int(total)
-
-
-@_compiled  # type: ignore[untyped-decorator]
+@compiled
 def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
     """See `plain.count_bits`."""
     counts = np.zeros((len(masks), len(classes), len(regions)), np.int64)
     both = np.empty(masks.shape[1], np.uint64)
     for region in range(len(regions)):
-        # Many a region is a part of the rows, and nothing lies beyond. Unsigned, or these loops
-        # would not run in vector instructions.
+        # Many regions are a part of the rows: the words before and after it hold no pixel.
+        # Indices are unsigned, or these loops would not run in vector instructions.
         first, last = _span(regions, region)
         for kind in range(len(classes)):
             for word in range(first, last):
@@ -40,9 +29,9 @@ def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
     return counts
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@part
 def _span(bits: Bits, row: int) -> tuple[np.uintp, np.uintp]:
-    """Find the first word of a row that is not 0, and the end of the last one."""
+    """Return the first word of a row that is not 0, and the one after the last."""
     first, last = 0, bits.shape[1]
     while last > 0 and not bits[row, last - 1]:
         last -= 1
@@ -51,51 +40,81 @@ def _span(bits: Bits, row: int) -> tuple[np.uintp, np.uintp]:
     return np.uintp(first), np.uintp(last)
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@compiled
 def grow(bits: Bits, reach: Reach, width: int, outside: bool) -> Bits:
-    """See `plain.grow`."""
+    """See `plain.grow`.
+
+    The mask's rows lie in one array, with a word between them for what is outside the image::
+
+        wide:   | . | row 0 | . | row 1 | . | row 2 | . |      across = words in a row + 1
+
+    so that the row that lies ``away`` rows below is the one ``away * across`` words later, and each
+    step below is one long loop, which runs in vector instructions.
+
+    The element is a stack of stretches that narrow with the distance from its middle row::
+
+        away 2       # #          reach[2] = 1
+        away 1     # # # #        reach[1] = 2
+        away 0   # # # # # #      reach[0] = 3
+
+    They are taken from the outermost inwards. Before each, ``wide`` is the mask widened by ``done``
+    pixels to either side; widened further until ``done`` is ``reach[away]`` it is united with
+    ``grown``, moved up and down by ``away`` rows. So no widening is done twice.
+    """
     height, words = bits.shape
-    # All rows one behind the other, with a word before and after each, so that every step is one
-    # long loop, which runs in vector instructions.
     across = words + 1
-    # The copy and what surrounds it set every word.
-    wide = np.empty(1 + height * across, np.uint64)
-    spare, grown = np.empty_like(wide), np.zeros_like(wide)
-    wide[1:].reshape(height, across)[:, :words] = bits
+    size = 1 + height * across
+    wide, spare, grown = (
+        np.empty(size, np.uint64),
+        np.empty(size, np.uint64),
+        np.zeros(size, np.uint64),
+    )
+    for y in range(height):
+        for word in range(words):
+            wide[1 + y * across + word] = bits[y, word]
     _surround(wide, across, width, outside)
     done = 0
-    # The rows furthest away first: what reached there grows on for those that are nearer.
     for away in range(len(reach) - 1, -1, -1):
         while done < reach[away]:
-            # Of what is set at the side half is cut off, and the other half must do.
+            # A set pixel is by now a stretch of 2 done + 1, or of done + 1 where the image's side
+            # cuts it off: moved by no more than done + 1 it leaves no gap. A word moves by 63 bits
+            # at most.
             step = min(reach[away] - done, done + 1, 63)
             _widen(wide[:-2], wide[1:-1], wide[2:], spare[1:-1], np.uint64(step))
             wide, spare = spare, wide
             _surround(wide, across, width, outside)
             done += step
         if away < height:
-            rest = len(wide) - away * across
+            rest = size - away * across
             _unite(grown[away * across :], wide[:rest])
             if away:
                 _unite(grown[:rest], wide[away * across :])
-    result = grown[1:].reshape(height, across)[:, :words].copy()
-    if outside:
-        near = min(len(reach) - 1, height)
-        result[:near] = ~np.uint64(0)
-        result[height - near :] = ~np.uint64(0)
-        result[:, words - 1] &= _inside(width)
+    return _image(grown, (height, words), width, min(len(reach) - 1, height) if outside else 0)
+
+
+@part
+def _image(grown: Words, shape: tuple[int, int], width: int, edge: int) -> Bits:
+    """Return the rows that lie in ``grown``; all of the ``edge`` first and last are set."""
+    height, words = shape
+    inside = _inside(width)
+    result = np.empty(shape, np.uint64)
+    for y in range(height):
+        reached = y < edge or y >= height - edge
+        for word in range(words):
+            result[y, word] = ~np.uint64(0) if reached else grown[1 + y * (words + 1) + word]
+        result[y, words - 1] &= inside
     return result
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@part
 def _inside(width: int) -> np.uint64:
-    """Give the bits of a row's last word that lie within the width."""
+    """Return the bits of a row's last word that lie within the width."""
     rest = np.uint64(width % 64)
     return ~np.uint64(0) if rest == 0 else (np.uint64(1) << rest) - np.uint64(1)
 
 
-@_compiled  # type: ignore[untyped-decorator]
-def _surround(wide: Bits, across: int, width: int, outside: bool) -> None:
+@part
+def _surround(wide: Words, across: int, width: int, outside: bool) -> None:
     """Set, or clear, what lies between rows and beyond their width."""
     inside = _inside(width)
     beyond = ~np.uint64(0) if outside else np.uint64(0)
@@ -105,16 +124,16 @@ def _surround(wide: Bits, across: int, width: int, outside: bool) -> None:
         wide[y - 1] = wide[y - 1] & inside | beyond & ~inside
 
 
-@_compiled  # type: ignore[untyped-decorator]
-def _widen(before: Bits, here: Bits, after: Bits, wide: Bits, step: np.uint64) -> None:
-    """Set every bit of ``wide`` that is so many pixels from one that is set, or nearer."""
+@part
+def _widen(before: Words, here: Words, after: Words, wide: Words, step: np.uint64) -> None:
+    """Set each pixel of ``wide`` that is set in ``here``, or ``step`` pixels left or right."""
     back = np.uint64(64) - step
     for word in range(len(here)):
         left, right = here[word] << step | before[word] >> back, here[word] >> step
         wide[word] = here[word] | left | right | after[word] << back
 
 
-@_compiled  # type: ignore[untyped-decorator]
-def _unite(grown: Bits, more: Bits) -> None:
+@part
+def _unite(grown: Words, more: Words) -> None:
     for word in range(len(more)):
         grown[word] |= more[word]

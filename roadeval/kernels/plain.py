@@ -1,4 +1,4 @@
-"""The twins of the compiled kernels: the definitions, and the way out where none compile."""
+"""The kernels as NumPy and OpenCV expressions: their definition, and used where none compile."""
 
 from __future__ import annotations
 
@@ -7,13 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data.arrays import (
-    FN,
-    FP,
-    IGNORED,
     Bits,
-    Floats,
     Image,
     Labels,
+    Matrix,
     Plane,
     Planes,
     Reach,
@@ -21,6 +18,7 @@ from roadeval.data.arrays import (
     Sums,
     Table,
     Values,
+    Vector,
     Words,
 )
 from roadeval.data.packed import pack, unpack
@@ -118,13 +116,7 @@ def _sums(labels: npt.NDArray[np.integer], colours: npt.NDArray[np.uint8], count
     return np.stack(columns, axis=1).astype(np.int64)
 
 
-def transfer(
-    image: Image,
-    runs: Runs,
-    source: Floats,
-    target: Floats,
-    gain: Floats,
-) -> Image:
+def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> Image:
     """Map each component's colours to ``target + (I - source) * gain``, rounded and clipped.
 
     ``runs`` are ``(n, 4)``, see `components`; ``source``, ``target`` and ``gain`` ``(count, 3)``
@@ -138,10 +130,7 @@ def transfer(
 
 
 def mahalanobis(
-    planes: Planes,
-    mean: Floats,
-    whitening: Floats,
-    greatest: float,
+    planes: Planes, mean: Vector, whitening: Matrix, greatest: float
 ) -> tuple[Values, Plane]:
     """Distance of Eq. 2, ``|W (x - m)|``, of every pixel.
 
@@ -170,7 +159,7 @@ def mahalanobis(
 def _squared(
     planes: Planes, mean: npt.NDArray[np.floating], whitening: npt.NDArray[np.floating]
 ) -> npt.NDArray[np.floating]:
-    """Give ``|W (x - m)|^2`` in the precision of m and W."""
+    """Compute ``|W (x - m)|^2`` in the precision of m and W."""
     r, g, b = (plane.astype(mean.dtype) - level for plane, level in zip(planes, mean, strict=True))
     first, second, third = whitening
     u = first[0] * r
@@ -206,18 +195,6 @@ def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
     return found
 
 
-def look_up_levels(plane: Plane, table: Table) -> Plane:
-    """Look each level of an ``(H, W)`` uint8 plane up in a ``(256,)`` uint8 table."""
-    found: Plane = cv2.LUT(plane, table)
-    return found
-
-
-def look_up_channels(image: Image, table: Table) -> Image:
-    """Look each channel of ``(H, W, 3)`` uint8 up in its column of a ``(256, 3)`` uint8 table."""
-    found: Image = cv2.LUT(image, table[None])
-    return found
-
-
 def rectified_sum(
     features: tuple[Values, ...], planes: Values, bias: Values, weights: Values
 ) -> Values:
@@ -244,20 +221,11 @@ def rectified_sum(
     return result
 
 
-def climb(greatest: Values, least: Values) -> None:
-    """Let each pixel of two ``(H, W)`` float32 planes know of those below it in its column.
-
-    In place: the greatest of the one, and the least of the other, of the pixel and all below it.
-    """
-    for plane, extremum in ((greatest, np.maximum), (least, np.minimum)):
-        plane[::-1] = extremum.accumulate(plane[::-1], axis=0)
-
-
 # --- Masks ----------------------------------------------------------------------------------------
 
 
 def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
-    """Find what is connected in a mask (Eq. 9).
+    """Label the connected components of a mask (Eq. 9).
 
     Parameters
     ----------
@@ -283,7 +251,7 @@ def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
 
 
 def paint(runs: Runs, height: int, width: int) -> Labels:
-    """Make the ``(height, width)`` int32 image of `components`' labels, 0 outside."""
+    """Return the ``(height, width)`` int32 image of `components`' labels, 0 outside."""
     labels = np.zeros((height, width), np.int32)
     y, x, label = _pixels(runs)
     labels[y, x] = label
@@ -291,7 +259,7 @@ def paint(runs: Runs, height: int, width: int) -> Labels:
 
 
 def label_runs(labels: Labels) -> Runs:
-    """Find the rows' stretches of equal labels of an ``(H, W)`` int32 image, see `components`."""
+    """Return the rows' stretches of equal labels of an ``(H, W)`` int32 image, see `components`."""
     begins = np.ones((labels.shape[0], labels.shape[1] + 1), np.bool_)
     begins[:, 1:-1] = labels[:, 1:] != labels[:, :-1]
     y, x = np.nonzero(begins)
@@ -328,30 +296,6 @@ def fill_holes(bits: Bits, width: int) -> Bits:
     outside = np.pad(unpack(bits, width), 1)
     cv2.floodFill(outside, None, (0, 0), 2, flags=4)
     return pack(outside[1:-1, 1:-1] != 2)
-
-
-def outcomes(mask: Plane, truth: Plane) -> Plane:
-    """Say how each pixel came out: TN, TP, FP or FN, or `IGNORED`.
-
-    ``mask`` is ``(H, W)`` uint8, 0 or 1; ``truth`` likewise, and greater where it is ignored.
-    """
-    value = truth + 2 * (truth ^ mask)
-    found: Plane = np.where(truth <= 1, value, IGNORED).astype(np.uint8)
-    return found
-
-
-def add_outcomes(errors: Plane, sums: Plane) -> None:
-    """Count, pixel by pixel, how often it was labelled, FP and FN: ``sums``, ``(3, H, W)`` uint8.
-
-    ``errors`` is ``(H, W)`` uint8, as `outcomes` gives it.
-    """
-    for total, found in zip(sums, (errors != IGNORED, errors == FP, errors == FN), strict=True):
-        np.add(total, found.view(np.uint8), out=total)
-
-
-def area(words: Words) -> int:
-    """Count the set bits of ``(n,)`` words."""
-    return int(np.bitwise_count(words).sum())
 
 
 def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:

@@ -8,19 +8,17 @@ is asked of some thousand runs instead of all pixels.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from roadeval.data.arrays import Bits, Columns, Labels, Parents, Places, Plane, Runs
+from roadeval.kernels.compiler import compiled, inlined, part
 from roadeval.kernels.words import lowest
 
-_compiled = njit(cache=True, nogil=True)
-_inlined = njit(cache=True, nogil=True, inline="always")
-
 _ONE = np.uintp(1)
-"""Indices are unsigned where loops are short: nobody asks then whether they count from the end."""
+"""Indices are unsigned where loops are short: Numba checks signed ones for counting from the end.
+"""
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@compiled
 def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
     """See `plain.components`."""
     rows, starts, ends = _runs(bits, width, True)
@@ -44,7 +42,7 @@ def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
     return runs, count
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@compiled
 def label_runs(labels: Labels) -> Runs:
     """See `plain.label_runs`."""
     height, width = labels.shape
@@ -63,7 +61,7 @@ def label_runs(labels: Labels) -> Runs:
     return runs[:count].copy()
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@compiled
 def keep_region(bits: Bits, width: int, patch: Plane) -> Bits:
     """See `plain.keep_region`."""
     rows, starts, ends = _runs(bits, width, True)
@@ -88,7 +86,7 @@ def keep_region(bits: Bits, width: int, patch: Plane) -> Bits:
     return kept
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@compiled
 def fill_holes(bits: Bits, width: int) -> Bits:
     """See `plain.fill_holes`."""
     height = len(bits)
@@ -107,7 +105,7 @@ def fill_holes(bits: Bits, width: int) -> Bits:
     return filled
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@part
 def _set(bits: Bits, y: int, start: int, end: int) -> None:
     """Set the bits of a row from ``start`` up to but not including ``end``."""
     word, stop = start // 64, end // 64
@@ -119,7 +117,7 @@ def _set(bits: Bits, y: int, start: int, end: int) -> None:
         bits[y, word] |= part & ((np.uint64(1) << np.uint64(end % 64)) - np.uint64(1))
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@part
 def _runs(bits: Bits, width: int, inside: bool) -> tuple[Places, Columns, Columns]:
     """Find the runs of ones (or of zeros, if not ``inside``), row after row.
 
@@ -155,7 +153,7 @@ def _runs(bits: Bits, width: int, inside: bool) -> tuple[Places, Columns, Column
     return rows, starts[:count], ends[:count]
 
 
-@_compiled  # type: ignore[untyped-decorator]
+@part
 def _joined(rows: Places, starts: Columns, ends: Columns, corner: int) -> Parents:
     """Join runs of neighbouring rows that touch: of each run the first one of its component.
 
@@ -178,7 +176,7 @@ def _joined(rows: Places, starts: Columns, ends: Columns, corner: int) -> Parent
     return parents
 
 
-@_inlined  # type: ignore[untyped-decorator]
+@inlined
 def _first(parents: Parents, run: np.uintp) -> np.uintp:
     parent = parents[run]
     while parent != run:

@@ -1,6 +1,7 @@
-"""What a processor can do with a word of bits, for the compiled loops over masks.
+"""The instructions popcount and ctz on a word of 64 bits, for the compiled loops over masks.
 
-Numba's cache looks at no file but a loop's own. These are instructions, and do not change.
+Numba compiles a kernel anew when the kernel's own file changes. After a change here, delete the
+cache (``__pycache__``).
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numba.extending import intrinsic
 
 @intrinsic  # type: ignore[untyped-decorator]
 def ones(_context: Any, _word: Any) -> Any:
-    """Count the set bits of a word."""
+    """Return the number of set bits of a word."""
 
     def build(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         return builder.ctpop(arguments[0])
@@ -24,7 +25,7 @@ def ones(_context: Any, _word: Any) -> Any:
 
 @intrinsic  # type: ignore[untyped-decorator]
 def lowest(_context: Any, _word: Any) -> Any:
-    """Find the lowest set bit of a word that has one."""
+    """Return the place of the lowest set bit of a word that has one."""
 
     def build(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         return builder.cttz(arguments[0], cgutils.true_bit)

@@ -1,17 +1,23 @@
-"""Camera logs (MCAP) in and out. No other room knows MCAP."""
+"""Camera logs (MCAP) in and out. No other room knows MCAP.
+
+A log goes from bytes to frames through its sub-rooms: ``container`` (records, chunks, damage),
+``messages`` (pictures, whatever their encoding) and ``topics`` (which topics, and which label
+belongs to which image); `Log.frames` puts them together. ``writing`` writes logs.
+"""
 
 from roadeval.logs.container.damage import Damage
 from roadeval.logs.description import LogDescription, describe
 from roadeval.logs.errors import FrameError, LogError
 from roadeval.logs.frames import Accounting, FrameStream
 from roadeval.logs.log import Log, open_log
-from roadeval.logs.logged import LoggedFrame
-from roadeval.logs.messages.pictures import Kind
+from roadeval.logs.logged_frame import LoggedFrame
+from roadeval.logs.messages.schemas import TopicKind
+from roadeval.logs.settings import FrameSettings, LabelSettings, TopicSettings
+from roadeval.logs.span import Span
+from roadeval.logs.times import Instant, parse_time
 from roadeval.logs.topics.description import TopicInfo
-from roadeval.logs.topics.labels import LabelValues
 from roadeval.logs.topics.selection import LabelTopic, Selection
-from roadeval.logs.topics.span import Instant, Span, parse_time
-from roadeval.logs.writing.pack import Packed, pack
+from roadeval.logs.writing.pack import PackResult, pack
 from roadeval.logs.writing.sidecar import NoSidecar, SidecarWriter
 from roadeval.logs.writing.writer import LogWriter
 
@@ -19,22 +25,24 @@ __all__ = [
     "Accounting",
     "Damage",
     "FrameError",
+    "FrameSettings",
     "FrameStream",
     "Instant",
-    "Kind",
+    "LabelSettings",
     "LabelTopic",
-    "LabelValues",
     "Log",
     "LogDescription",
     "LogError",
     "LogWriter",
     "LoggedFrame",
     "NoSidecar",
-    "Packed",
+    "PackResult",
     "Selection",
     "SidecarWriter",
     "Span",
     "TopicInfo",
+    "TopicKind",
+    "TopicSettings",
     "describe",
     "open_log",
     "pack",

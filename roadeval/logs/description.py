@@ -1,16 +1,15 @@
-"""All that there is to say about a log, as plain data."""
+"""The description of a log, as plain data."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from roadeval.logs.errors import LogError
-from roadeval.logs.log import Log, open_log
+from roadeval.logs.log import open_log
+from roadeval.logs.settings import LabelSettings, TopicSettings
 from roadeval.logs.topics.description import TopicInfo
-from roadeval.logs.topics.selection import Selection
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +19,7 @@ class LogDescription:
     Parameters
     ----------
     path, bytes
-        Where it lies, and the size of its files.
+        The log, and the size of its files.
     start_ns, end_ns
         Log times of its first and last message.
     topics
@@ -44,13 +43,14 @@ class LogDescription:
     losses: tuple[str, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """Give it as JSON has it: text, numbers, lists, objects."""
+        """Return it as JSON has it: text, numbers, lists, objects."""
         return asdict(self)
 
 
 def describe(
     path: str | Path,
-    select: Callable[[Log], Selection] = Log.select,
+    topics: TopicSettings | None = None,
+    labels: LabelSettings | None = None,
     *,
     keep_corrupt: bool = False,
 ) -> LogDescription:
@@ -60,8 +60,8 @@ def describe(
     ----------
     path
         File or folder.
-    select
-        Settles what a replay would pick.
+    topics, labels
+        What a replay would be asked for.
     keep_corrupt
         Whether data with a wrong checksum count as readable.
 
@@ -75,17 +75,17 @@ def describe(
         picks: tuple[str, ...] = ()
         problem = ""
         try:
-            picks = select(log).reasons
+            picks = log.select(topics, labels).reasons
         except LogError as error:
             problem = str(error)
         return LogDescription(
-            str(path),
-            log.size,
-            log.start_ns,
-            log.end_ns,
-            log.topics,
-            picks,
-            problem,
-            tuple(map(str, log.damage)),
-            log.losses,
+            path=str(path),
+            bytes=log.size,
+            start_ns=log.start_ns,
+            end_ns=log.end_ns,
+            topics=log.topics,
+            picks=picks,
+            problem=problem,
+            damage=tuple(map(str, log.damage)),
+            losses=log.losses,
         )

@@ -1,4 +1,4 @@
-"""What can go wrong with a log, in one line each."""
+"""Errors of reading and writing logs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class LogError(RoadevalError):
 
 
 class FrameError(RoadevalError):
-    """One frame that cannot be decoded. It costs that frame, never the run."""
+    """One frame that cannot be decoded; a run continues without it."""
 
 
 class BadRecord(Exception):  # noqa: N818  (never leaves this room)

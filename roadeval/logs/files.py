@@ -1,4 +1,4 @@
-"""Finding the files of a log, and calling by its name what is no log."""
+"""The files of a log, and what a file is that is no log."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from roadeval.logs.container.records import MAGIC
 from roadeval.logs.errors import LogError
 
 _HEAD: Final = 64
-"""Bytes that tell what a file is."""
+"""Bytes by which a file is recognised."""
 _DAMAGED: Final = 2
 """Bytes of the first eight that may be wrong in what still counts as an MCAP file."""
 
@@ -38,12 +38,12 @@ _OTHERS: Final = (
 def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     """List the MCAP files of a log: the file itself, or a rosbag2 folder's in natural order.
 
-    A file of a folder that is no MCAP file costs its part only, and is told.
+    A file in a folder that is no MCAP file is left out, and returned as damage.
 
     Raises
     ------
     LogError
-        If there is none; it says what there is instead and how to convert it.
+        If there is none; the message names what there is instead, and how to convert it.
     """
     if not path.is_dir():
         _check(path)
@@ -62,7 +62,7 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
 
 
 def natural(path: Path) -> list[tuple[int, str]]:
-    """Order by which ``drive_2`` comes before ``drive_10``."""
+    """Sort key by which ``drive_2`` comes before ``drive_10``."""
     parts = re.findall(r"(\d+)|(\D+)", path.name)
     return [(int(number or 0), text) for number, text in parts]
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 import numpy.typing as npt
@@ -17,13 +16,14 @@ from roadeval.logs.container.file import Container
 from roadeval.logs.errors import BadRecord, LogError
 from roadeval.logs.files import files_of
 from roadeval.logs.frames import FrameStream
-from roadeval.logs.messages.decoders import message_is_whole
-from roadeval.logs.messages.pictures import Kind, kind_of
-from roadeval.logs.topics.description import TopicInfo, describe_topic, sources_by_topic
-from roadeval.logs.topics.labels import LabelValues
-from roadeval.logs.topics.selection import Asked, Selection, settle
-from roadeval.logs.topics.span import NS, Span
-from roadeval.logs.topics.track import Track
+from roadeval.logs.messages.decoders import kind_of, message_is_whole
+from roadeval.logs.messages.schemas import TopicKind
+from roadeval.logs.settings import LabelSettings, TopicSettings
+from roadeval.logs.span import Span
+from roadeval.logs.times import NS
+from roadeval.logs.topics.description import TopicInfo, describe_topic
+from roadeval.logs.topics.reader import topic_readers
+from roadeval.logs.topics.selection import Selection, settle
 
 
 def open_log(path: str | Path, *, keep_corrupt: bool = False) -> Log:
@@ -78,10 +78,9 @@ class Log:
         self._containers = [
             Container(f, _is_image, message_is_whole, keep_corrupt=keep_corrupt) for f in files
         ]
-        sources = sources_by_topic(self._containers)
-        self._tracks = {name: Track(name, found) for name, found in sources.items()}
+        self._readers = topic_readers(self._containers)
         self.topics: tuple[TopicInfo, ...] = tuple(
-            describe_topic(name, sources[name], self._tracks[name]) for name in sorted(sources)
+            describe_topic(reader) for _, reader in sorted(self._readers.items())
         )
         starts = [topic.first_ns for topic in self.topics if topic.first_ns is not None]
         ends = [topic.last_ns for topic in self.topics if topic.last_ns is not None]
@@ -98,7 +97,7 @@ class Log:
 
     @property
     def losses(self) -> tuple[str, ...]:
-        """What is lost of the log, a sentence each; empty if nothing is.
+        """What is lost of the log, a sentence for each loss; empty if nothing is.
 
         Damage inside chunks is found when they are read, or by `verify`.
         """
@@ -114,11 +113,11 @@ class Log:
         return sum(container.source.size for container in self._containers)
 
     def _kept(self, topic: TopicInfo) -> str:
-        track = self._tracks[topic.name]
-        total = max(track.expected(), len(track))
-        known = f" of {total}" if total > track.readable() else ""
+        reader = self._readers[topic.name]
+        total = max(reader.expected(), len(reader))
+        known = f" of {total}" if total > reader.readable() else ""
         until = (topic.last_ns or self.start_ns) - self.start_ns
-        return f"{topic.name}: {track.readable()}{known} images kept, up to {until / NS:.3f} s"
+        return f"{topic.name}: {reader.readable()}{known} images kept, up to {until / NS:.3f} s"
 
     def verify(self) -> None:
         """Read the whole log once, so that `damage` knows all of it."""
@@ -147,34 +146,22 @@ class Log:
 
     def select(
         self,
+        topics: TopicSettings | None = None,
+        labels: LabelSettings | None = None,
         *,
-        image: str | None = None,
-        truth: str | None = None,
-        shadow: str | None = None,
-        masks: Mapping[str, str] | None = None,
-        labels: LabelValues | None = None,
-        sync_tolerance_ns: int | None = None,
-        resize_truth: bool = False,
         scale: float = 1.0,
     ) -> Selection:
         """Settle what to replay.
 
         Parameters
         ----------
-        image, truth, shadow
-            Topics of the camera, the road truth and the true shadow. None picks what is plain;
-            an empty truth or shadow takes none.
-        masks
-            Topics of other systems' road masks, by a name for each.
+        topics
+            What the user chose; the rest is chosen here, where the log leaves no doubt.
         labels
             What the values of the truth mean.
-        sync_tolerance_ns
-            Largest difference of header stamps of an image and its label; half the frame
-            period by default.
-        resize_truth
-            Whether to scale label images of another size than the camera's.
         scale
-            Hand out frames reduced to this share of their width and height, with their labels.
+            Of the frames that `frames` returns, with their labels, to the logged ones' width and
+            height.
 
         Raises
         ------
@@ -182,12 +169,9 @@ class Log:
             If a topic is missing or the choice is not plain, a label value does not occur or
             cannot be understood, or a label image has another size.
         """
-        asked = Asked(
-            image, truth, shadow, masks or {}, labels or LabelValues(), sync_tolerance_ns,
-            resize_truth, scale,
-        )  # fmt: skip
+        topics, labels = topics or TopicSettings(), labels or LabelSettings()
         try:
-            return settle(self.topics, self._tracks, asked)
+            return settle(self.topics, self._readers, topics, labels, scale)
         except LogError as error:
             raise LogError(f"{self.path.name}: {error}") from error
 
@@ -200,14 +184,14 @@ class Log:
             If the span holds no frame.
         """
         span = span or Span()
-        times = self._tracks[selection.image.name].log_times
+        times = self._readers[selection.image.name].log_times
         start = span.start.resolve(self.start_ns) if span.start else None
         end = span.end.resolve(self.start_ns) if span.end else None
         first = 0 if start is None else int(np.searchsorted(times, start))
         last = len(times) if end is None else int(np.searchsorted(times, end))
         if first >= last:
             raise LogError(self._empty(times))
-        return FrameStream(self._tracks, selection, span, range(first, last))
+        return FrameStream(self._readers, selection, span, range(first, last))
 
     def _empty(self, times: npt.NDArray[np.int64]) -> str:
         if not len(times):
@@ -226,14 +210,9 @@ class Log:
     def __enter__(self) -> Log:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
 
 def _is_image(channel: Channel, schema: Schema | None) -> bool:
-    return kind_of(channel, schema) is not Kind.OTHER
+    return kind_of(channel, schema) is not TopicKind.OTHER

@@ -1,14 +1,29 @@
-"""What a run asks of a log: topics, labels, and which frames are read."""
+"""Settings of a log: its topics, the meaning of its labels, and which frames are read."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass as validated
 
+from roadeval.logs.errors import LogError
+from roadeval.logs.times import parse_time
+
+
+def _check_time(text: str) -> str:
+    try:
+        parse_time(text)
+    except LogError as error:
+        raise ValueError(str(error)) from error
+    return text
+
+
+Time = Annotated[str, AfterValidator(_check_time)]
+"""A moment as `roadeval.logs.parse_time` reads it."""
+Label = Annotated[int, Field(ge=0, le=65535)]
 Level = Annotated[int, Field(ge=0, le=255)]
 Color = tuple[Level, Level, Level]
 """Red, green and blue, 0..255 each."""
@@ -23,9 +38,9 @@ class TopicSettings:
     image
         The camera's topic.
     truth
-        The topic of label images that say where road is.
+        The topic of label images that show where road is; an empty name takes none.
     shadow
-        The topic of masks that say where shadow truly is.
+        The topic of masks that show where shadow truly is; an empty name takes none.
     masks
         Topics of road masks that the log already carries, by the name of their variant: a
         network's output, for example, which is then scored beside the pipeline.
@@ -46,12 +61,15 @@ class TopicSettings:
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class LabelSettings:
-    """What the values, or the colours, of the truth mean; understood by itself where it is plain.
+    """Which values, or colours, of a label image mean road, and which are ignored.
+
+    All others are non-road. With none given, a mask is understood by itself if its values are among
+    0 and 255 (road), with 128 for ignore; or among 0 and 1 (road), with 255 for ignore.
 
     Parameters
     ----------
     road
-        Values that are road.
+        Values that are road; of an image with a palette, its indices.
     ignore
         Values that are counted nowhere.
     road_colors
@@ -60,10 +78,24 @@ class LabelSettings:
         Colours that are counted nowhere.
     """
 
-    road: tuple[Annotated[int, Field(ge=0)], ...] = ()
-    ignore: tuple[Annotated[int, Field(ge=0)], ...] = ()
+    road: tuple[Label, ...] = ()
+    ignore: tuple[Label, ...] = ()
     road_colors: tuple[Color, ...] = ()
     ignore_colors: tuple[Color, ...] = ()
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.road or self.ignore) and (self.road_colors or self.ignore_colors):
+            raise ValueError("the truth's labels are given as values or as colours, not as both")
+        if self.ignore and not self.road:
+            raise ValueError("labels.ignore needs labels.road: name the values that mean road")
+        if self.ignore_colors and not self.road_colors:
+            raise ValueError(
+                "labels.ignore_colors needs labels.road_colors: name the colours that mean road"
+            )
+        for both in {*self.road} & {*self.ignore} or {*self.road_colors} & {*self.ignore_colors}:
+            raise ValueError(f"label {both} cannot mean road and ignore at once")
+        return self
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
@@ -87,8 +119,8 @@ class FrameSettings:
         Use messages whose checksum is wrong.
     """
 
-    start: str | None = None
-    end: str | None = None
+    start: Time | None = None
+    end: Time | None = None
     every: Annotated[int, Field(ge=1)] = 1
     max_frames: Annotated[int, Field(ge=1)] | None = None
     scale: Annotated[float, Field(gt=0, le=1)] = 1.0

@@ -1,1 +1,1 @@
-"""The paper's pipeline: pure functions on arrays, one file a phase."""
+"""Stages and chains: pure functions on arrays. `paper` is what the paper has, `beyond` the rest."""

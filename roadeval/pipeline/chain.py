@@ -1,32 +1,93 @@
-"""The chain: stages by name, bound to settings and parameters, run one after the other."""
+"""A pipeline: stages by name with their settings; and the chain that it becomes to run."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from roadeval.data import LayerSpec, Rgb, Truth
-from roadeval.data.packed import Packed
-from roadeval.pipeline.beyond import context, exposure, gated
-from roadeval.pipeline.paper import post as morphology
-from roadeval.pipeline.paper import shadow, similarity
-from roadeval.pipeline.paper import svm as classify
-from roadeval.pipeline.stage import Output, Stage, View, perfect_mask
+from roadeval.data import LayerSpec, Output, Packed, Rgb, Truth
+from roadeval.pipeline import beyond, paper
+from roadeval.pipeline.stage import Stage, View, perfect_mask
+from roadeval.runtime.discovery import found_in
 
 STAGES: Final[Mapping[str, Stage[Any, Any]]] = {
-    stage.name: stage
-    for stage in (
-        exposure.STAGE,
-        shadow.STAGE,
-        gated.STAGE,
-        similarity.STAGE,
-        classify.STAGE,
-        context.STAGE,
-        morphology.STAGE,
-    )
+    stage.name: stage for stage in (*found_in(beyond, "STAGE"), *found_in(paper, "STAGE"))
 }
-"""Every stage that a configuration's ``chain`` may name."""
+"""Every stage that a configuration's ``chain`` may name, found by its folder."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pipeline:
+    """Stages in the order they run, by their names in `STAGES`, and the settings of each."""
+
+    chain: tuple[str, ...]
+    settings: Mapping[str, Any]
+
+    @classmethod
+    def default(cls, chain: Sequence[str]) -> Pipeline:
+        """Return a pipeline of these stages with their default settings."""
+        return cls(tuple(chain), {name: STAGES[name].settings() for name in chain})
+
+    def stages(self) -> tuple[Stage[Any, Any], ...]:
+        """Return the stages, in order."""
+        return tuple(STAGES[name] for name in self.chain)
+
+    def layers(self) -> tuple[LayerSpec, ...]:
+        """Return the layers that the stages will hand out, in order."""
+        return tuple(
+            spec for stage in self.stages() for spec in stage.layers(self.settings[stage.name])
+        )
+
+    def masks(self) -> tuple[str, ...]:
+        """Return the road masks, in order, by the names that their stages are reported under."""
+        return tuple(stage.reported for stage in self.stages() if stage.yields_mask)
+
+    @property
+    def has_filter(self) -> bool:
+        """Whether some stage is a filter."""
+        return any(stage.is_filter for stage in self.stages())
+
+    def without_filter(self) -> Pipeline:
+        """Return the pipeline without its filters."""
+        chain = tuple(stage.name for stage in self.stages() if not stage.is_filter)
+        return Pipeline(chain, {name: self.settings[name] for name in chain})
+
+    def learning(self) -> tuple[str, ...]:
+        """Return the names of the stages that learn."""
+        return tuple(stage.name for stage in self.stages() if stage.fit is not None)
+
+    def relevant(self) -> dict[str, dict[str, Any]]:
+        """Return the settings that what is learnt depends on, by stage.
+
+        Those of stages that learn or change the image, except where they are `inference_only`.
+        """
+        found = {}
+        for stage in self.stages():
+            if stage.fit is not None or not stage.yields_mask:
+                settings = dataclasses.asdict(self.settings[stage.name])
+                found[stage.name] = {
+                    key: value for key, value in settings.items() if key not in stage.inference_only
+                }
+        return found
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the chain and its settings as plain data, in the shape of a TOML file."""
+        settings = {name: dataclasses.asdict(self.settings[name]) for name in self.chain}
+        return {"chain": list(self.chain), **settings}
+
+    def bind(self, parameters: Mapping[str, Any]) -> Chain:
+        """Return the chain that runs with what the stages have learnt, by stage.
+
+        A `MisfitError` if that does not fit the settings.
+        """
+        return Chain(
+            tuple(
+                _bound(stage, self.settings[stage.name], parameters.get(stage.name))
+                for stage in self.stages()
+            )
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,23 +100,16 @@ class Step:
     oracle: Callable[[View, Truth], Output] | None = None
 
 
+def _bound(stage: Stage[Any, Any], settings: Any, parameters: Any) -> Step:
+    oracle = None if stage.oracle is None else stage.oracle(settings, parameters)
+    return Step(stage, settings, stage.bind(settings, parameters), oracle)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Chain:
-    """Stages in the order they run.
+    """The steps of a pipeline, ready to run one after the other on an image."""
 
-    Parameters
-    ----------
-    names
-        Stages, by their names in `STAGES`.
-    settings
-        The settings of each, by name.
-    parameters
-        What the stages that learn have learnt, by name.
-    """
-
-    def __init__(
-        self, names: Sequence[str], settings: Mapping[str, Any], parameters: Mapping[str, Any]
-    ) -> None:
-        self.steps = tuple(_bind(STAGES[name], settings[name], parameters) for name in names)
+    steps: tuple[Step, ...]
 
     def run(self, view: View) -> Iterator[tuple[str, Output]]:
         """Yield each stage's name and output on what is seen before the first.
@@ -80,11 +134,11 @@ class Chain:
         Parameters
         ----------
         view, outputs
-            What `run` was given, and gave.
+            The argument and the outputs of `run`.
         road, shadow
-            The truths, ``(H, W)`` uint8 (0, 1, 255). Without that of shadow filters have none.
+            The truths, ``(H, W)`` uint8 (0, 1, 255). Without that of shadow no filter is replaced.
         known
-            What the frame's other variants gave that is the same for all, filled as it is found.
+            What is the same for all variants of the frame, filled as it is computed.
 
         Yields
         ------
@@ -105,21 +159,18 @@ class Chain:
 
     def filtered(self, image: Rgb) -> Rgb:
         """Return the image as the chain's filters leave it; itself where there are none."""
+        view = View.of(image)
         for step in self.steps:
             if not step.stage.yields_mask:
-                output = step.run(View.of(image))
-                image = image if output.image is None else output.image
-        return image
-
-
-def _bind(stage: Stage[Any, Any], settings: Any, parameters: Mapping[str, Any]) -> Step:
-    learnt = parameters.get(stage.name)
-    oracle = None if stage.oracle is None else stage.oracle(settings, learnt)
-    return Step(stage, settings, stage.bind(settings, learnt), oracle)
+                view = view.after(step.run(view))
+        return view.image
 
 
 def _shared(step: Step, rest: Sequence[Step]) -> tuple[tuple[str, Any], ...]:
-    """Give what the masks after a perfect stage depend on beside the truth; empty for the image."""
+    """Return what the masks after a perfect stage depend on apart from the truth.
+
+    Empty where they depend on the image too.
+    """
     if step.stage.oracle is not perfect_mask or not all(s.stage.sees_mask_alone for s in rest):
         return ()
     return tuple((each.stage.name, each.settings) for each in rest)
@@ -131,14 +182,3 @@ def _masks(steps: Sequence[Step], view: View) -> Iterator[tuple[str, Packed]]:
         view = view.after(output)
         if output.mask is not None:
             yield step.stage.reported, output.mask
-
-
-def layers_of(names: Sequence[str], settings: Mapping[str, Any]) -> tuple[LayerSpec, ...]:
-    """List the layers that a chain will hand out, in order, without running it."""
-    return tuple(spec for name in names for spec in STAGES[name].layers(settings[name]))
-
-
-def masks_of(names: Sequence[str]) -> tuple[str, ...]:
-    """List a chain's road masks, in order, by the names that their stages are reported under."""
-    stages = (STAGES[name] for name in names)
-    return tuple(stage.reported for stage in stages if stage.yields_mask)

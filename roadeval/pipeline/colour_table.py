@@ -1,4 +1,4 @@
-"""A decision for every colour there is: 2^24 bits, so that a pixel's is looked up."""
+"""A decision for every colour there is: 2^24 bits, in which a pixel's is looked up."""
 
 from __future__ import annotations
 
@@ -9,33 +9,32 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Mask
-from roadeval.data.arrays import Words
+from roadeval.data.arrays import Planes, Words
 from roadeval.data.packed import ones
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.cube import Slabs
-from roadeval.pipeline.paper.hsi import Planes
+from roadeval.pipeline.colour_cube import Slabs
 
 Colours = npt.NDArray[np.uint8]
 Decide = Callable[[Colours], npt.NDArray[np.bool_]]
 
 UNDECIDED: Final = 2
-"""What the kernel gives for a colour that is still open."""
+"""The kernel's value for a colour that is not decided yet."""
 FEW: Final = 1 << 16
-"""Open colours that are decided at once, so that nobody need look for them again."""
+"""Up to so many undecided colours are decided at once, when the table is made."""
 _NONE: Final = np.zeros(0, np.uint64)
 
 
 class ColourTable:
-    """Which colours have a positive margin, each decided as exactly as `decide` says it.
+    """Which colours have a positive margin, each decided as exactly as by `decide`.
 
     Parameters
     ----------
     margins
-        The margin of every colour. Where its error bound keeps it off 0 it decides.
+        The margin of every colour. It decides where it is further from 0 than its error bound.
     decide
-        From ``(n, 3)`` uint8 colours to ``(n,)`` bool, for the colours that are left. Mostly these
-        are some twenty; but where a machine has learnt nothing and its margin is 0 everywhere,
-        they are all colours, and only those are decided that are looked up.
+        From ``(n, 3)`` uint8 colours to ``(n,)`` bool, for the colours that are left. There are
+        some twenty of them as a rule. Where a machine has learnt nothing and its margin is 0
+        everywhere they are all colours, and only those that are looked up are decided.
     """
 
     def __init__(self, margins: Slabs, decide: Decide) -> None:
@@ -49,15 +48,15 @@ class ColourTable:
             self._words = road, _NONE
 
     def look_up(self, planes: Planes) -> Mask:
-        """Give ``(H, W)`` uint8, 1 where a pixel's margin is positive; from any thread."""
+        """Return ``(H, W)`` uint8, 1 where a pixel's margin is positive; from any thread."""
         words = self._words
-        mask: Mask = KERNELS.look_up_colours(planes, *words)
+        mask = KERNELS.look_up_colours(planes, *words)
         if len(words[1]):
             seen = mask == UNDECIDED
             if seen.any():
                 places = np.unique(_places(*(plane[seen] for plane in planes)))
-                # In new words, for others look up in the ones there are. Of two threads that come
-                # here together the later one's are kept, and the other's colours asked for again.
+                # In new words, because other threads look up in the old ones. If two threads come
+                # here together the later one's are kept, and the other's colours decided again.
                 self._words = words = self._decided(words, places)
                 mask = KERNELS.look_up_colours(planes, *words)
         return mask
@@ -65,7 +64,7 @@ class ColourTable:
     def _decided(
         self, words: tuple[Words, Words], places: npt.NDArray[np.int64]
     ) -> tuple[Words, Words]:
-        """Give words in which the colours of ``(n,)`` places are decided too."""
+        """Return words in which the colours of ``(n,)`` places are decided too."""
         road, left = (each.copy() for each in words)
         word, bit = places >> 6, np.uint64(1) << (places & 63).astype(np.uint64)
         np.bitwise_or.at(road, word, np.where(self._decide(_colours(places)), bit, np.uint64(0)))
@@ -74,23 +73,35 @@ class ColourTable:
 
 
 def _table(margins: Slabs) -> tuple[Words, Words]:
-    """Make the words of the colours that are road for certain, and of those that are open."""
+    """Return the words of the colours that are road for certain, and of those undecided.
+
+    A word holds a cube of 4x4x4 colours, so a block of four red levels fills 64 x 64 words::
+
+        place of a colour    R7..R2 G7..G2 B7..B2 | R1 R0 G1 G0 B1 B0
+                             word                 | bit
+
+        a slab, one red level     (G, B) = (256, 256)
+        reshaped                  (G7..G2, G1 G0, B7..B2, B1 B0) = (64, 4, 64, 4)
+        transposed                (G7..G2, B7..B2, G1 G0, B1 B0) = (64, 64, 4, 4)
+        four of them, the block   (G7..G2, B7..B2, R1 R0, G1 G0, B1 B0): word, then bit
+    """
     words = np.empty((2, 64, 64 * 64), np.uint64)
     block = np.empty((2, 64, 64, 4, 4, 4), np.bool_)
+    road, left = block
     for red, margin in enumerate(margins):
-        for here, slab in zip(
-            block, (margin > margins.error, np.abs(margin) <= margins.error), strict=True
+        for kind, slab in (
+            (road, margin > margins.error),
+            (left, np.abs(margin) <= margins.error),
         ):
-            here[:, :, red & 3] = slab.reshape(64, 4, 64, 4).transpose(0, 2, 1, 3)
+            kind[:, :, red & 3] = slab.reshape(64, 4, 64, 4).transpose(0, 2, 1, 3)
         if red & 3 == 3:
             bits = np.packbits(block.reshape(2, -1), axis=1, bitorder="little")
             words[:, red >> 2] = bits.view(np.uint64)
-    road, left = words.reshape(2, -1)
-    return road, left
+    return words[0].reshape(-1), words[1].reshape(-1)
 
 
 def _places(*colours: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
-    """Place of ``(n,)`` red, green and blue: the word times 64, and the bit in it.
+    """Return the places of ``(n,)`` red, green and blue: the word times 64, and the bit in it.
 
     See `roadeval.kernels.plain.look_up_colours`.
     """
@@ -100,7 +111,7 @@ def _places(*colours: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
 
 
 def _colours(places: npt.NDArray[np.int64]) -> Colours:
-    """Give the ``(n, 3)`` colours of ``(n,)`` places."""
+    """Return the ``(n, 3)`` colours of ``(n,)`` places."""
     coarse = places >> 18, places >> 12 & 63, places >> 6 & 63
     fine = places >> 4 & 3, places >> 2 & 3, places & 3
     channels = [c << 2 | f for c, f in zip(coarse, fine, strict=True)]

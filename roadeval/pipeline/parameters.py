@@ -1,4 +1,4 @@
-"""What learnt parameters must be, wherever they come from: finite numbers of known shapes."""
+"""Checks of learnt parameters: finite numbers of known shapes, wherever they come from."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ float32 too."""
 def check_arrays(
     parameters: Any, dtype: type[np.floating[Any]], **shapes: tuple[int | str, ...]
 ) -> None:
-    """Make sure that a stage's parameters are what its functions take for granted.
+    """Check what the functions of a stage assume about its parameters.
 
     Parameters
     ----------

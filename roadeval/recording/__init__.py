@@ -1,20 +1,46 @@
-"""Rerun out and back in: nobody else knows Rerun."""
+"""Rerun recordings: written during a replay, read back without the log. Nobody else knows Rerun.
 
-from roadeval.recording.layout import RESERVED, Layout, RecordingError
-from roadeval.recording.read.recording import Recording
-from roadeval.recording.write.encoding import Encoded
-from roadeval.recording.write.keeping import Keeper, Rule, recorder_for
-from roadeval.recording.write.recorder import NullRecorder, Recorder
+Names are imported when they are first used: Rerun takes a second, and a `RecordRule` needs none.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from roadeval.recording.layout import Layout, RecordingError
+    from roadeval.recording.read.recording import Recording
+    from roadeval.recording.rule import RecordRule
+    from roadeval.recording.write.encoding import EncodedFrame
+    from roadeval.recording.write.recorder import NullRecorder, Recorder
+    from roadeval.recording.write.selective import SelectiveRecorder, recorder_for
 
 __all__ = [
-    "RESERVED",
-    "Encoded",
-    "Keeper",
+    "EncodedFrame",
     "Layout",
     "NullRecorder",
+    "RecordRule",
     "Recorder",
     "Recording",
     "RecordingError",
-    "Rule",
+    "SelectiveRecorder",
     "recorder_for",
 ]
+
+_MODULES: Final = {
+    "EncodedFrame": "write.encoding",
+    "Layout": "layout",
+    "NullRecorder": "write.recorder",
+    "RecordRule": "rule",
+    "Recorder": "write.recorder",
+    "Recording": "read.recording",
+    "RecordingError": "layout",
+    "SelectiveRecorder": "write.selective",
+    "recorder_for": "write.selective",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used."""
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)

@@ -1,4 +1,4 @@
-"""How a layer becomes bytes of a recording, and an array again: one codec a kind of layer.
+"""Codecs between a layer's array and its bytes in the recording: one a kind of layer.
 
 =========  ==========================  ============================================================
 kind       in the file                 what comes back
@@ -27,9 +27,10 @@ import numpy as np
 import numpy.typing as npt
 import rerun as rr
 
-from roadeval.data import LayerKind, LayerSpec
+from roadeval.data import ERRORS, TRUTH, LayerKind, LayerSpec
 from roadeval.data.packed import Packed
 from roadeval.recording import indexed_png
+from roadeval.recording.layout import CAMERA, FORMAT, SHADOW_TRUTH, Layout
 
 Array = npt.NDArray[Any]
 
@@ -46,26 +47,45 @@ _NOISY: Final = (
 
 
 class Codec(Protocol):
-    """What every kind of layer needs: its style, and the way there and back."""
+    """Encodes and decodes one kind of layer, and describes to the viewer how it looks."""
 
     component: str
     """Identifier of the component that carries the payload."""
 
     def style(self) -> Sequence[Any]:
-        """Archetypes to log once for the entity."""
+        """Return the archetypes to log once for the entity."""
 
     def encode(self, array: Any) -> bytes:
-        """Turn a frame's array into its payload; a mask may be packed."""
+        """Return the payload of a frame's array; a mask may be packed."""
 
     def columns(self, payloads: list[bytes]) -> Any:
-        """Make the viewer's columns of the payloads of many frames."""
+        """Return the viewer's columns of the payloads of many frames."""
 
     def decode(self, payload: bytes) -> Array:
-        """Turn a payload into an array again."""
+        """Return the array of a payload."""
+
+
+def codecs_of(layout: Layout, version: int = FORMAT) -> dict[str, Codec]:
+    """Return the codec of every image, by its entity path.
+
+    Parameters
+    ----------
+    layout
+        Of the recording.
+    version
+        Of its format.
+    """
+    codecs: dict[str, Codec] = {CAMERA: CameraCodec()}
+    for path, spec in layout.images():
+        if version < 3 and spec in (TRUTH, SHADOW_TRUTH, ERRORS):
+            codecs[path] = LabelCodec(spec, layout.width, layout.height)
+        else:
+            codecs[path] = codec(spec, layout.width, layout.height)
+    return codecs
 
 
 def codec(spec: LayerSpec, width: int, height: int) -> Codec:
-    """Choose the codec of a layer of ``width`` x ``height`` pixels."""
+    """Return the codec of a layer of ``width`` x ``height`` pixels."""
     match spec.kind:
         case LayerKind.MASK:
             return MaskCodec(spec)
@@ -99,24 +119,24 @@ class MaskCodec:
         return places
 
     def style(self) -> Sequence[Any]:
-        """Draw it above the camera's image."""
+        """Return a style that is drawn above the camera's image."""
         return [rr.EncodedImage.from_fields(media_type="image/png", draw_order=10)]
 
     def encode(self, array: npt.NDArray[np.uint8] | Packed) -> bytes:
-        """Turn ``(H, W)`` uint8, or the bits of two classes, into a PNG file.
+        """Return ``(H, W)`` uint8, or the bits of two classes, as a PNG file.
 
-        No value may be there but the classes': there is no colour for another.
+        It may hold the classes' values only: there is no colour for another.
         """
         if self._places is not None and not isinstance(array, Packed):
             array = np.asarray(cv2.LUT(array, self._places), np.uint8)
         return indexed_png.encode(array, [c.rgba for c in self.spec.classes])
 
     def columns(self, payloads: list[bytes]) -> Any:
-        """Make encoded images."""
+        """Return columns of encoded images."""
         return rr.EncodedImage.columns(blob=payloads)
 
     def decode(self, payload: bytes) -> Array:
-        """Give back the same array."""
+        """Return the same array."""
         labels = indexed_png.decode(payload)
         return labels if self._places is None else np.asarray(self._values[labels])
 
@@ -131,7 +151,7 @@ class LabelCodec:
     component = "SegmentationImage:buffer"
 
     def style(self) -> Sequence[Any]:
-        """Name and colour the classes, and describe every frame's format."""
+        """Return the classes' names and colours, and every frame's format."""
         classes = [rr.AnnotationInfo(c.value, c.name, c.rgba) for c in self.spec.classes]
         form = rr.components.ImageFormat(
             self.width,
@@ -145,15 +165,15 @@ class LabelCodec:
         ]
 
     def encode(self, array: Array) -> bytes:
-        """Turn ``(H, W)`` uint8 into its bytes."""
+        """Return the bytes of ``(H, W)`` uint8."""
         return array.tobytes()
 
     def columns(self, payloads: list[bytes]) -> Any:
-        """Make segmentation images."""
+        """Return columns of segmentation images."""
         return rr.SegmentationImage.columns(buffer=payloads)
 
     def decode(self, payload: bytes) -> Array:
-        """Give back the same array."""
+        """Return the same array."""
         return np.frombuffer(payload, np.uint8).reshape(self.height, self.width)
 
 
@@ -167,7 +187,7 @@ class ScalarCodec:
     component = "EncodedDepthImage:blob"
 
     def style(self) -> Sequence[Any]:
-        """Choose the colour map; the viewer takes grey levels for fractions, whatever the unit."""
+        """Return the colour map; the viewer takes grey levels for fractions, whatever the unit."""
         return [
             rr.EncodedDepthImage.from_fields(
                 media_type="image/png",
@@ -178,7 +198,7 @@ class ScalarCodec:
         ]
 
     def encode(self, array: Array) -> bytes:
-        """Turn ``(H, W)`` float32, or uint8 codes that span the range, into a PNG file."""
+        """Return ``(H, W)`` float32, or uint8 codes that span the range, as a PNG file."""
         if not self.spec.exact:
             array = _halve(array)
         if array.dtype != np.uint8:
@@ -190,11 +210,11 @@ class ScalarCodec:
         return cv2.imencode(".png", array, _NOISY)[1].tobytes()
 
     def columns(self, payloads: list[bytes]) -> Any:
-        """Make encoded depth images."""
+        """Return columns of encoded depth images."""
         return rr.EncodedDepthImage.columns(blob=payloads)
 
     def decode(self, payload: bytes) -> Array:
-        """Give ``(H, W)`` float32 in the layer's own unit, at full resolution."""
+        """Return ``(H, W)`` float32 in the layer's own unit, at full resolution."""
         codes = _read(payload, cv2.IMREAD_UNCHANGED)
         low, high = self.spec.value_range
         values: Array = codes * np.float32((high - low) / 255) + np.float32(low)
@@ -212,19 +232,19 @@ class CameraCodec:
     component = "EncodedImage:blob"
 
     def style(self) -> Sequence[Any]:
-        """Draw it below every mask."""
+        """Return a style that is drawn below every mask."""
         return [rr.EncodedImage.from_fields(draw_order=-10)]
 
     def encode(self, array: Array) -> bytes:
-        """Turn ``(H, W, 3)`` uint8 RGB into a JPEG file."""
+        """Return ``(H, W, 3)`` uint8 RGB as a JPEG file."""
         return _jpeg(array)
 
     def columns(self, payloads: list[bytes]) -> Any:
-        """Make encoded images; the viewer tells JPEG from PNG by itself."""
+        """Return columns of encoded images; the viewer tells JPEG from PNG by itself."""
         return rr.EncodedImage.columns(blob=payloads)
 
     def decode(self, payload: bytes) -> Array:
-        """Give ``(H, W, 3)`` uint8 RGB."""
+        """Return ``(H, W, 3)`` uint8 RGB."""
         return _read(payload, cv2.IMREAD_COLOR_RGB)
 
 
@@ -237,14 +257,14 @@ class ImageCodec(CameraCodec):
     exact: bool
 
     def encode(self, array: Array) -> bytes:
-        """Turn ``(H, W, 3)`` uint8 RGB into a PNG file, or a small JPEG file."""
+        """Return ``(H, W, 3)`` uint8 RGB as a PNG file, or a small JPEG file."""
         if self.exact:
             bgr = cv2.cvtColor(array, cv2.COLOR_RGB2BGR)
             return cv2.imencode(".png", bgr, _NOISY)[1].tobytes()
         return _jpeg(_halve(array))
 
     def decode(self, payload: bytes) -> Array:
-        """Give ``(H, W, 3)`` uint8 RGB at full resolution."""
+        """Return ``(H, W, 3)`` uint8 RGB at full resolution."""
         return _restore(super().decode(payload), self.width, self.height)
 
 

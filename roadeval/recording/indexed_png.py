@@ -1,8 +1,8 @@
-"""Small label images as PNG files of 1, 2, 4 or 8 bits a pixel with a palette.
+"""Label images as PNG files of 1, 2, 4 or 8 bits a pixel with a palette.
 
-A binary mask of a real frame takes a quarter of what its raw bytes take after LZ4, and a
-quarter of the time of an image library's encoder, which has no such format or does not let
-go of the interpreter's lock. The value of a pixel is its index; the palette only colours it.
+The value of a pixel is its index; the palette only colours it. A binary mask of a real frame takes
+a quarter of what its raw bytes take after LZ4. Pillow, which decodes these files, takes several
+times as long to encode them, and holds the interpreter's lock for much of it.
 
 References
 ----------
@@ -14,28 +14,28 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Sequence
+from io import BytesIO
 from typing import Final
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
+from roadeval.data.colours import ColourWithOpacity
 from roadeval.data.packed import Packed
 
 _SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
 _PALETTE: Final = 3
-_NONE, _UP = 0, 2
-"""A row's filters, as its first byte names them: the bytes themselves, or less those above."""
+_UP: Final = 2
+"""The filter of every row, as its first byte names it: its bytes less those above."""
 
 _REVERSED: Final = np.packbits(
     np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little"), axis=1
 ).ravel()
 """Each byte with its bits the other way round."""
 
-Rgba = tuple[int, int, int, int]
 
-
-def encode(labels: npt.NDArray[np.uint8] | Packed, palette: Sequence[Rgba]) -> bytes:
+def encode(labels: npt.NDArray[np.uint8] | Packed, palette: Sequence[ColourWithOpacity]) -> bytes:
     """Encode ``(H, W)`` uint8 labels, each below ``len(palette)``, as a PNG file.
 
     Labels of two classes may be packed.
@@ -65,33 +65,25 @@ def encode(labels: npt.NDArray[np.uint8] | Packed, palette: Sequence[Rgba]) -> b
 
 
 def decode(png: bytes) -> npt.NDArray[np.uint8]:
-    """Give back the ``(H, W)`` uint8 labels of a file that `encode` made.
+    """Return the ``(H, W)`` uint8 labels of a PNG file with a palette.
 
     Raises
     ------
     ValueError
-        For any other file.
+        If it has none.
+    OSError
+        If it is no image.
     """
-    chunks = dict(_chunks(png))
-    width, height, bits, colour, *rest = struct.unpack(">IIBBBBB", chunks[b"IHDR"])
-    if colour != _PALETTE or any(rest):
-        raise ValueError("not a PNG file with a palette")
-    lines = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), np.uint8).reshape(height, -1)
-    return _unpack(_rows(lines), bits)[:, :width]
+    from PIL import Image
 
-
-def _rows(lines: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    """Undo the rows' filter; earlier recordings have none."""
-    filters, rows = lines[:, 0], lines[:, 1:]
-    if (filters == _NONE).all():
-        return rows
-    if (filters == _UP).all():
-        return np.cumsum(rows, axis=0, dtype=np.uint8)
-    raise ValueError("not a PNG file that was written here: its rows have other filters")
+    with Image.open(BytesIO(png)) as image:
+        if image.mode != "P":
+            raise ValueError("not a PNG file with a palette")
+        return np.array(image)
 
 
 def _reversed(mask: Packed) -> npt.NDArray[np.uint8]:
-    """Give the mask's bytes with the leftmost pixel in the highest bit."""
+    """Return the mask's bytes with the leftmost pixel in the highest bit."""
     used = mask.bits.view(np.uint8)[:, : -(-mask.width // 8)]
     return np.asarray(cv2.LUT(used, _REVERSED), np.uint8)
 
@@ -111,24 +103,5 @@ def _pack(labels: npt.NDArray[np.uint8], bits: int) -> npt.NDArray[np.uint8]:
     return packed
 
 
-def _unpack(rows: npt.NDArray[np.uint8], bits: int) -> npt.NDArray[np.uint8]:
-    if bits == 1:
-        return np.unpackbits(rows, axis=1)
-    shifts = np.arange(8 - bits, -1, -bits, dtype=np.uint8)
-    values = (rows[:, :, None] >> shifts) & np.uint8((1 << bits) - 1)
-    return values.reshape(len(rows), -1)
-
-
 def _chunk(name: bytes, body: bytes) -> bytes:
     return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
-
-
-def _chunks(png: bytes) -> Sequence[tuple[bytes, bytes]]:
-    if not png.startswith(_SIGNATURE):
-        raise ValueError("not a PNG file")
-    found, at = [], len(_SIGNATURE)
-    while at + 12 <= len(png):
-        (size,) = struct.unpack_from(">I", png, at)
-        found.append((png[at + 4 : at + 8], png[at + 8 : at + 8 + size]))
-        at += size + 12
-    return found

@@ -1,4 +1,4 @@
-"""What a recording will hold, known before its first frame, and where each thing lies in it."""
+"""The layout of a recording: what it will hold, and under which entity path each thing lies."""
 
 from __future__ import annotations
 
@@ -11,16 +11,19 @@ from roadeval.data import (
     BASELINE,
     ERRORS,
     FINAL_STAGE,
+    RESERVED,
     TRUTH,
     LabelClass,
     LayerKind,
     LayerSpec,
     VariantLayout,
 )
+from roadeval.data.colours import CLEAR, SHADOW, with_opacity
+from roadeval.data.layer import IGNORED_CLASS
 from roadeval.errors import RoadevalError
 
 APPLICATION: Final = "roadeval"
-"""Name under which the files are known to the viewer, and by which our own are told."""
+"""Name under which the viewer knows the files, and by which ours are recognised."""
 FORMAT: Final = 3
 """Version of the arrangement inside the file; raised when an older reader would go wrong.
 
@@ -46,14 +49,6 @@ SECONDS: Final = "/timing/summary"
 PROPERTIES: Final = "/__properties/roadeval"
 """Where the viewer and `rerun.RecordingStream.send_property` keep a recording's properties."""
 ROLE: Final = "/state/frame"
-RESERVED: Final = frozenset(
-    {
-        *("camera", "truth", "true_shadow", "metrics", "counts", "timing", "facts"),
-        *("state", "frame", "notes", "results"),
-    }
-)
-"""Names that no variant may bear, because the recording has another use for the path."""
-
 COUNTS: Final = ("TP", "TN", "FP", "FN", "N")
 """The order of the five numbers under ``/counts``."""
 
@@ -94,7 +89,7 @@ class Layout:
     width: int
     height: int
     variants: tuple[VariantLayout, ...]
-    rates: tuple[str, ...] = ("ACC", "ERR", "TPR", "FNR", "TNR", "FPR")
+    rates: tuple[str, ...]
     baseline: bool = True
     has_truth: bool = True
     has_shadow_truth: bool = False
@@ -132,12 +127,12 @@ class Layout:
             yield BASELINE, FINAL_STAGE
 
     def to_json(self) -> str:
-        """Write the layout as JSON, from which `from_json` makes an equal one."""
+        """Return the layout as JSON, from which `from_json` makes an equal one."""
         return json.dumps(asdict(self), sort_keys=True)
 
     @classmethod
     def from_json(cls, text: str) -> Layout:
-        """Read a layout that `to_json` wrote."""
+        """Return the layout that `to_json` wrote."""
         raw = json.loads(text)
         raw["variants"] = tuple(_variant(v) for v in raw["variants"])
         raw["rates"] = tuple(raw["rates"])
@@ -149,35 +144,38 @@ SHADOW_TRUTH: Final = LayerSpec(
     LayerKind.MASK,
     "True shadow",
     (
-        LabelClass(0, "lit", (0, 0, 0, 0)),
-        LabelClass(1, "shadow", (86, 180, 233, 160)),
-        LabelClass(255, "ignored", (128, 128, 128, 160)),
+        LabelClass(0, "lit", CLEAR),
+        LabelClass(1, "shadow", with_opacity(SHADOW, 160)),
+        IGNORED_CLASS,
     ),
 )
 
 
 def layer_path(variant: str, layer: str) -> str:
-    """Entity path of a variant's layer."""
+    """Return the entity path of a variant's layer."""
     return f"/{variant}/{layer}"
 
 
 def guide_path(variant: str) -> str:
-    """Entity path of the words that introduce a variant."""
+    """Return the entity path of the text that introduces a variant."""
     return f"{GUIDE}/{variant}"
 
 
 def scalar_path(kind: str, variant: str, stage: str, name: str = "") -> str:
-    """Entity path of numbers about a stage: ``kind`` is metrics, counts, timing or facts."""
+    """Return the entity path of numbers about a stage.
+
+    ``kind`` is metrics, counts, timing or facts.
+    """
     return "/".join(("", kind, variant, stage, *([name] if name else [])))
 
 
 def state_path(variant: str) -> str:
-    """Entity path of a variant's lane of health."""
+    """Return the entity path of a variant's lane of health."""
     return f"/state/{variant}"
 
 
 def result_path(name: str) -> str:
-    """Entity path of a table or a document."""
+    """Return the entity path of a table or a document."""
     return f"/results/{name}"
 
 

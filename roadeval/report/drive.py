@@ -44,9 +44,9 @@ def _facts(findings: Findings, drive: dict[str, Any]) -> Iterator[str]:
         yield f"{drive['width']} \N{MULTIPLICATION SIGN} {drive['height']}"
     if drive.get("rate_hz"):
         yield f"{drive['rate_hz']:.4g} Hz"
-    presets = {str(each["preset"]) for each in findings.summary["settings"].values()}
-    presets = presets or {str(findings.properties.get("preset", ""))} - {""}
-    yield from (f"preset {name}" for name in sorted(presets))
+    preset = findings.summary["run"].get("preset") or findings.properties.get("preset")
+    if preset:
+        yield f"preset {preset}"
     version = findings.summary["versions"].get("roadeval") or findings.properties.get("version")
     if version:
         yield f"roadeval {version}"

@@ -86,6 +86,18 @@ class NotableFrame:
     layers: Sequence[Sequence[LayerImage]] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Commands:
+    """Commands for a terminal, as they are typed.
+
+    ``again`` makes the results again from the log, whose path it is given; ``inspect`` opens the
+    viewer at a frame, whose number it is given.
+    """
+
+    again: Callable[[str], str]
+    inspect: Callable[[int], str]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Findings:
     """Everything that a report of one drive shows.
@@ -96,10 +108,8 @@ class Findings:
         The recording or folder, as it was named.
     complete
         Whether the run reached its end.
-    again
-        The command that makes the results again; empty if the log is not known.
-    inspect
-        Returns the command that opens the viewer at a frame.
+    commands
+        What to type for more; None where the report is not made at a terminal.
     pictured
         Number of frames with pictures, of those evaluated, or without truth of all.
     summary
@@ -143,8 +153,7 @@ class Findings:
 
     source: str
     complete: bool
-    again: str
-    inspect: Callable[[int], str]
+    commands: Commands | None
     pictured: int
     summary: Mapping[str, Any]
     properties: Mapping[str, Any]

@@ -6,55 +6,24 @@ Tables grow frame by frame under temporary names and take their own only when th
 
 from __future__ import annotations
 
-import json
-import math
+import hashlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Final, Self
 
-from roadeval.data import FrameResult
-from roadeval.errors import RoadevalError
-from roadeval.results import tables
-from roadeval.results.agreement import disagreement
-from roadeval.results.reading import read_table
-from roadeval.runtime import files as folders
+from roadeval.results.reading import ResultsError, read_table
+from roadeval.results.schema import TABLES, Table
+from roadeval.results.summary import SUMMARY, read_summary, summary_text
+from roadeval.runtime import files
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FORMAT: Final = {"name": "roadeval-summary", "version": 1}
-SUMMARY: Final = "summary.json"
-STREAMED: Final = ("frames", "regions", "oracles")
-"""The tables that grow frame by frame."""
-SUMS: Final = ("windows", "changes", "heat")
-"""The tables that are written at the end."""
-PARTS: Final = (
-    *("format", "verdict", "drive", "frames", "totals", "beyond", "difference", "oracles"),
-    *("windows", "health", "training", "seconds", "warnings", "losses"),
-    *("selection", "settings", "versions", "log"),
-)
-"""The parts of the summary, in the file's order."""
 
-
-class ResultsError(RoadevalError):
-    """The results cannot be written or read."""
-
-
-def summary_text(parts: Mapping[str, Any]) -> str:
-    """Write a summary as JSON; undefined numbers become null.
-
-    Raises
-    ------
-    ValueError
-        If a part is unknown or missing (see `PARTS`; ``format`` is added here).
-    """
-    document = {"format": FORMAT} | dict(parts)
-    if document.keys() ^ set(PARTS):
-        raise ValueError(f"summary: unknown or missing {sorted(document.keys() ^ set(PARTS))}")
-    ordered = {name: _plain(document[name]) for name in PARTS}
-    return json.dumps(ordered, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+RUN: Final = "run.toml"
+"""The file that makes the run again."""
 
 
 class ResultsWriter:
@@ -76,13 +45,11 @@ class ResultsWriter:
 
     def __init__(self, folder: Path) -> None:
         self._folder: Final = folder
-        self._filled: Final = {SUMMARY}
-        self._open: Final[dict[str, IO[str]]] = {}
-        self._made: Final[list[Path]] = []
+        self._open: Final[dict[str, _Growing]] = {}
         with self._explained():
-            self._made.extend(folders.make(folder))
-            for table in STREAMED:
-                self._begin(f"{table}.csv", tables.header(table))
+            folder.mkdir(parents=True, exist_ok=True)
+            for name, table in TABLES.items():
+                self._open[name] = _Growing(folder, table)
 
     def __enter__(self) -> Self:
         return self
@@ -95,64 +62,49 @@ class ResultsWriter:
     ) -> None:
         self._discard()
 
-    def append(self, result: FrameResult) -> None:
-        """Add a frame's finished lines; a frame that was not evaluated has none."""
+    def append(self, lines: Mapping[str, str]) -> None:
+        """Add lines to tables, by their names."""
         with self._explained():
-            for table, lines in result.tables.items():
-                self._open[f"{table}.csv"].write(lines)
-                self._filled.add(f"{table}.csv")
+            for name, text in lines.items():
+                self._open[name].append(text)
 
-    def finish(self, summary: Mapping[str, Any], sums: Mapping[str, str]) -> list[Path]:
-        """Complete the tables and give all files their names.
+    @property
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """What the summary states of each table with rows so far: ``rows`` and ``sha256``."""
+        return {name: table.stated for name, table in self._open.items() if table.rows}
 
-        Where no frame was scored there are no tables, and those of an earlier run are removed:
-        they would not belong to this summary.
+    def finish(self, summary: Mapping[str, Any], run_toml: str) -> list[Path]:
+        """Give all files their names, the summary last.
+
+        A table without rows is not there, nor is that of an earlier run: it would not belong to
+        this summary.
 
         Parameters
         ----------
         summary
-            All of `PARTS` but ``format``.
-        sums
-            The lines of the tables in `SUMS`, by name; one that is missing has none.
+            See `roadeval.results.summary.summary_text`.
+        run_toml
+            The configuration of the run, as the text of a TOML file.
 
         Returns
         -------
         list of Path
             The files written.
         """
+        path, text = self._folder / SUMMARY, summary_text({"tables": self.tables} | dict(summary))
         with self._explained():
-            for table in SUMS:
-                self._begin(f"{table}.csv", tables.header(table) + sums.get(table, ""))
-                self._filled.update([f"{table}.csv"] if sums.get(table) else [])
-            self._begin(SUMMARY, summary_text(summary))
             # From here to the end an earlier run's summary would stand beside this one's tables.
-            (self._folder / SUMMARY).unlink(missing_ok=True)
-            return [self._folder / name for name in list(self._open) if self._complete(name)]
-
-    def _begin(self, name: str, text: str) -> None:
-        self._open[name] = self._temporary(name).open("w", encoding="utf-8", newline="\n")
-        self._open[name].write(text)
-
-    def _complete(self, name: str) -> bool:
-        """Give a file its name, or remove it if it is a table with nothing in it."""
-        self._open.pop(name).close()
-        if name in self._filled:
-            self._temporary(name).replace(self._folder / name)
-            return True
-        self._temporary(name).unlink()
-        (self._folder / name).unlink(missing_ok=True)
-        return False
+            path.unlink(missing_ok=True)
+            written = [table.path for table in self._open.values() if table.complete()]
+            self._open.clear()
+            files.put(self._folder / RUN, run_toml.encode())
+            files.put(path, text.encode())
+        return [*written, self._folder / RUN, path]
 
     def _discard(self) -> None:
-        for name, file in self._open.items():
-            with suppress(OSError):
-                file.close()
-            self._temporary(name).unlink(missing_ok=True)
+        for table in self._open.values():
+            table.discard()
         self._open.clear()
-        folders.remove(self._made)
-
-    def _temporary(self, name: str) -> Path:
-        return self._folder / f".{name}.partial"
 
     @contextmanager
     def _explained(self) -> Iterator[None]:
@@ -162,8 +114,49 @@ class ResultsWriter:
             self._discard()
             raise ResultsError(
                 f"{error.filename or self._folder}: cannot write results ({error.strerror}); "
-                "choose another folder with --reports"
+                "choose another folder with output.reports"
             ) from error
+
+
+class _Growing:
+    """A table that grows under a temporary name."""
+
+    def __init__(self, folder: Path, table: Table) -> None:
+        self.path: Final = folder / f"{table.name}.csv"
+        self.rows = 0
+        self._temporary: Final = folder / f".{table.name}.csv.partial"
+        self._digest: Final = hashlib.sha256()
+        self._file: Final[IO[bytes]] = self._temporary.open("wb")
+        self._write(table.header)
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """As `roadeval.results.reading.fingerprint` of the whole file."""
+        return {"rows": self.rows, "sha256": self._digest.hexdigest()}
+
+    def append(self, lines: str) -> None:
+        self.rows += lines.count("\n")
+        self._write(lines)
+
+    def complete(self) -> bool:
+        """Give the file its name, and return True; without rows, leave none of that name."""
+        self._file.close()
+        if self.rows:
+            self._temporary.replace(self.path)
+        else:
+            self._temporary.unlink()
+            self.path.unlink(missing_ok=True)
+        return self.rows > 0
+
+    def discard(self) -> None:
+        with suppress(OSError):
+            self._file.close()
+        self._temporary.unlink(missing_ok=True)
+
+    def _write(self, text: str) -> None:
+        content = text.encode()
+        self._digest.update(content)
+        self._file.write(content)
 
 
 class Results:
@@ -182,7 +175,7 @@ class Results:
 
     def __init__(self, folder: Path) -> None:
         self._folder: Final = folder
-        self.summary: Final[dict[str, Any]] = _read_summary(folder / SUMMARY)
+        self.summary: Final[dict[str, Any]] = read_summary(folder / SUMMARY)
 
     @property
     def frames(self) -> pd.DataFrame:
@@ -200,49 +193,13 @@ class Results:
         return self.table("regions")
 
     def table(self, name: str) -> pd.DataFrame:
-        """Read a table by its name in `roadeval.results.tables.COLUMNS`.
+        """Read a table by its name in `roadeval.results.schema.TABLES`.
 
         One that was not written, there being nothing to count, is empty.
 
         Raises
         ------
-        RoadevalError
-            If it is damaged, or lacks rows of which the summary tells.
+        ResultsError
+            If it is damaged, or not the one of which the summary tells.
         """
-        path = self._folder / f"{name}.csv"
-        table = read_table(path if path.exists() else "", tables.COLUMNS[name])
-        if difference := disagreement(name, table, self.summary):
-            raise ResultsError(
-                f"{path}: does not agree with {SUMMARY}: it has {difference}; "
-                "make the results anew with roadeval replay"
-            )
-        return table
-
-
-def _read_summary(path: Path) -> dict[str, Any]:
-    try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ResultsError(
-            f"{path.parent}: no results here ({SUMMARY}: {error.strerror}); "
-            "make some with roadeval replay"
-        ) from error
-    except ValueError as error:
-        raise ResultsError(f"{path}: not a summary ({error}); make it anew") from error
-    if not isinstance(summary, dict) or summary.get("format") != FORMAT:
-        raise ResultsError(
-            f"{path}: not a summary of format {FORMAT['name']} {FORMAT['version']}; "
-            "make it anew with this version of roadeval replay"
-        )
-    return summary
-
-
-def _plain(value: Any) -> Any:
-    """Turn mappings, sequences, paths and undefined numbers into what JSON has."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return str(value) if isinstance(value, Path) else value
+        return read_table(name, self._folder / f"{name}.csv", self.summary)

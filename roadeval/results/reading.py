@@ -2,75 +2,133 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import hashlib
+from collections.abc import Iterable, Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.data import NAMES
 from roadeval.errors import RoadevalError
+from roadeval.results.lines import Row
+from roadeval.results.schema import TABLES, Kind, Table
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
-RATES: Final = ("ACC", "ERR", "TPR", "FNR", "TNR", "FPR")
-"""Columns that hold fractions, each also as ``pooled_...``; all but these and names are counts."""
+TYPES: Final = {
+    Kind.NAME: "string",
+    Kind.COUNT: "int64",
+    Kind.TIME: "int64",
+    Kind.RATE: "float64",
+}
+"""Each kind's type in Arrow."""
 
 
-class TableError(RoadevalError):
-    """A table that is damaged."""
+class ResultsError(RoadevalError):
+    """Results that cannot be written or read."""
 
 
-def read_table(source: Path | str, columns: Sequence[str]) -> pd.DataFrame:
-    """Read a table bit by bit; an undefined rate is NaN.
+def read_table(
+    name: str, source: Path | str, summary: Mapping[str, Any] | None = None
+) -> pd.DataFrame:
+    """Read a table bit-exactly, and check that it is whole.
 
     Parameters
     ----------
+    name
+        Of the table, in `roadeval.results.schema.TABLES`.
     source
-        A CSV file, or its text with the header line. Without any text there are no rows.
-    columns
-        The columns that must be there; their names settle their types, rows or none.
+        A CSV file, or its text with the header line. A file that is not there has no rows, like an
+        empty text.
+    summary
+        The summary that belongs to it. Where it states the table's rows and SHA-256 (its part
+        ``tables``, which earlier versions do not write) they must be those of the text.
 
     Returns
     -------
     DataFrame
-        Names are text, whatever they look like; rates are float64, all else int64.
+        Names are text, whatever they look like; rates are float64, all else int64. A rate that the
+        table lacks, as it was written before that metric was known, is NaN.
 
     Raises
     ------
-    TableError
-        If the table is empty, cut off, lacks a column or holds a value of another type.
+    ResultsError
+        If the table is empty, cut off, lacks a column, holds a value of another type, or is not
+        the one of which the summary tells.
     """
+    table = TABLES[name]
+    where = source if isinstance(source, Path) else f"the recording's table {name}"
+    try:
+        content = source.encode() if isinstance(source, str) else source.read_bytes()
+    except FileNotFoundError:
+        content = b""
+    if summary and "tables" in summary:
+        _check(where, content, summary["tables"].get(name))
+    if not content:
+        return _pandas(_types(table).empty_table())
+    try:
+        return _pandas(_parsed(content, table))
+    except ValueError as error:  # Arrow's too
+        reason = str(error).partition("\n")[0]
+        raise ResultsError(
+            f"{where}: damaged ({reason}); make the results anew with roadeval replay"
+        ) from error
+
+
+def table_of(name: str, rows: Iterable[Row]) -> pd.DataFrame:
+    """Return rows as `read_table` would have read them back."""
+    import pyarrow as pa
+
+    schema = _types(TABLES[name])
+    columns = [*zip(*rows, strict=True)] or [()] * len(schema)
+    arrays = [pa.array(cells, kind) for cells, kind in zip(columns, schema.types, strict=True)]
+    return _pandas(pa.Table.from_arrays(arrays, schema=schema))
+
+
+def fingerprint(content: bytes) -> dict[str, Any]:
+    """Return what a summary states of a table: ``rows`` and ``sha256`` of its text."""
+    rows = max(content.count(b"\n") - 1, 0)
+    return {"rows": rows, "sha256": hashlib.sha256(content).hexdigest()}
+
+
+def _check(where: Path | str, content: bytes, stated: Mapping[str, Any] | None) -> None:
+    found = fingerprint(content)
+    if found == stated or (stated is None and not found["rows"]):
+        return
+    wanted = stated["rows"] if stated else 0
+    difference = (
+        "its content is another" if found["rows"] == wanted else f"{found['rows']} of {wanted} rows"
+    )
+    raise ResultsError(
+        f"{where}: does not agree with its summary ({difference}); "
+        "make the results anew with roadeval replay"
+    )
+
+
+def _types(table: Table) -> pa.Schema:
+    import pyarrow as pa
+
+    return pa.schema([(column.name, TYPES[column.kind]) for column in table.columns])
+
+
+def _parsed(content: bytes, table: Table) -> pa.Table:
+    """Parse CSV; a ValueError says what is wrong with it."""
     import pyarrow as pa
     from pyarrow import csv
 
-    schema = pa.schema([(column, _kind(column)) for column in columns])
-    if not source:
-        table = schema.empty_table()
-    else:
-        text = source.encode() if isinstance(source, str) else source.read_bytes()
-        options = csv.ConvertOptions(column_types=schema)
-        try:
-            table = csv.read_csv(BytesIO(text), convert_options=options)
-        except pa.ArrowInvalid as error:
-            raise _damaged(source, str(error).partition("\n")[0]) from error
-        if not text.endswith(b"\n"):
-            raise _damaged(source, "its last line is cut off")
-        if missing := set(columns) - set(table.column_names):
-            raise _damaged(source, f"no column {', '.join(sorted(missing))}")
+    options = csv.ConvertOptions(column_types=_types(table))
+    parsed = csv.read_csv(BytesIO(content), convert_options=options)
+    if not content.endswith(b"\n"):
+        raise ValueError("its last line is cut off")
+    lacking = [column for column in table.columns if column.name not in parsed.column_names]
+    if missing := [column.name for column in lacking if column.kind is not Kind.RATE]:
+        raise ValueError(f"no column {', '.join(missing)}")
+    for column in lacking:
+        parsed = parsed.append_column(column.name, pa.nulls(len(parsed), pa.float64()))
+    return parsed
+
+
+def _pandas(table: pa.Table) -> pd.DataFrame:
     frame: pd.DataFrame = table.to_pandas()
     return frame
-
-
-def _damaged(source: Path | str, why: str) -> TableError:
-    where = source if isinstance(source, Path) else "a table of the recording"
-    return TableError(f"{where}: damaged ({why}); make the results anew with roadeval replay")
-
-
-def _kind(column: str) -> Any:
-    """Give a column's type in Arrow."""
-    import pyarrow as pa
-
-    if column in NAMES:
-        return pa.string()
-    return pa.float64() if column.removeprefix("pooled_") in RATES else pa.int64()

@@ -1,71 +1,42 @@
-"""Outputs and their folders: made where missing, and gone again if nothing came to stand there."""
+"""Files that appear under their name only when they are complete."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
-def make(folder: Path) -> list[Path]:
-    """Make a folder and those above it.
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Write a file atomically: under a temporary name, and then under its own.
 
-    Returns
-    -------
-    list of Path
-        Those that it made, the innermost first.
+    Yields the temporary path, in the folder of ``path``, which is made if it does not exist. When
+    the block ends the file takes its name and replaces what bore it; if the block fails it is
+    removed, and what bore the name stays.
 
     Raises
     ------
     OSError
-        If it cannot be made; what was made on the way is gone again.
+        If the folder cannot be made or the file cannot take its name.
     """
-    missing = [each for each in (folder, *folder.parents) if not each.exists()]
-    new: list[Path] = []
+    temporary = path.with_name(f".{path.name}.partial")
+    path.parent.mkdir(parents=True, exist_ok=True)
     try:
-        for each in reversed(missing):
-            # Another process may make one meanwhile, which is its own then.
-            with suppress(FileExistsError):
-                each.mkdir()
-                new.insert(0, each)
-        folder.mkdir(exist_ok=True)
-    except OSError:
-        remove(new)
-        raise
-    return new
-
-
-def remove(new: Iterable[Path]) -> None:
-    """Remove folders that `make` made, but those in which something stands by now."""
-    for folder in new:
+        yield temporary
+        temporary.replace(path)
+    finally:
         with suppress(OSError):
-            folder.rmdir()
-
-
-@contextmanager
-def made(folder: Path) -> Iterator[list[Path]]:
-    """Make a folder and those above it; if the block fails they are gone again.
-
-    Yields those that it made, as `make` gives them. An OSError if it cannot be made.
-    """
-    new = make(folder)
-    try:
-        yield new
-    except BaseException:
-        remove(new)
-        raise
+            temporary.unlink(missing_ok=True)
 
 
 def put(path: Path, content: bytes) -> None:
-    """Write a file, which bears its name only when it is complete, and its folder.
+    """Write a file atomically, and make its folder.
 
-    An OSError if it cannot be written; then nothing is left behind.
+    Raises
+    ------
+    OSError
+        If it cannot be written; then nothing is left behind.
     """
-    temporary = path.with_name(f".{path.name}.partial")
-    with made(path.parent):
-        try:
-            temporary.write_bytes(content)
-            temporary.replace(path)
-        finally:
-            with suppress(OSError):
-                temporary.unlink(missing_ok=True)
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)

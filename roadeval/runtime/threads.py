@@ -1,4 +1,4 @@
-"""Frames flow through worker threads, in order and bounded: never more than a few at once."""
+"""An ordered, bounded map over worker threads."""
 
 from __future__ import annotations
 
@@ -20,25 +20,28 @@ def ordered(work: Callable[[T], R], items: Iterable[T], jobs: int) -> Iterator[R
 
     The items are drawn as results are taken, at most ``jobs + 2`` ahead (back-pressure: memory
     does not grow with their number). The first exception, of ``work`` or of ``items``, is
-    raised in its place; what is in flight then is waited for, and nothing new is begun. So is
-    it when the caller stops early.
+    raised in its place; what is in flight then is waited for, and nothing new is begun. The same
+    happens when the caller stops early.
     """
-    with one_thread_each(), _pool(jobs) as pool:
+    with one_thread_each(), ThreadPoolExecutor(jobs, thread_name_prefix="roadeval") as pool:
         waiting: deque[Future[R]] = deque()
-        for item in items:
-            waiting.append(pool.submit(work, item))
-            if len(waiting) >= jobs + AHEAD:
+        try:
+            for item in items:
+                waiting.append(pool.submit(work, item))
+                if len(waiting) >= jobs + AHEAD:
+                    yield waiting.popleft().result()
+            while waiting:
                 yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
 
 
 @contextmanager
 def one_thread_each() -> Iterator[None]:
-    """Keep BLAS and OpenCV from starting threads of their own while frames run side by side.
+    """Keep BLAS and OpenCV from starting threads of their own while `ordered` runs.
 
     Theirs would only compete with ours: on a busy machine BLAS threads that spin, waiting for
-    each other, made a frame ten times slower.
+    each other, made an item ten times slower.
     """
     import cv2
     from threadpoolctl import threadpool_limits
@@ -50,12 +53,3 @@ def one_thread_each() -> Iterator[None]:
             yield
     finally:
         cv2.setNumThreads(before)
-
-
-@contextmanager
-def _pool(jobs: int) -> Iterator[ThreadPoolExecutor]:
-    pool = ThreadPoolExecutor(jobs, thread_name_prefix="roadeval")
-    try:
-        yield pool
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)

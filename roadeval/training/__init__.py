@@ -1,13 +1,11 @@
-"""How the pipeline learns: which frames, which pixels, what is fitted, and the model file."""
+"""How a pipeline learns: which frames, which pixels, what is fitted, and the model file."""
 
 from roadeval.training.fitting import TrainingError, fit
 from roadeval.training.model import Model, load_model, save_model
-from roadeval.training.plan import Plan
 from roadeval.training.settings import TrainingSettings
 
 __all__ = [
     "Model",
-    "Plan",
     "TrainingError",
     "TrainingSettings",
     "fit",

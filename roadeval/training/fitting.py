@@ -11,10 +11,9 @@ import numpy.typing as npt
 
 from roadeval.data import Frame, Rgb, Truth
 from roadeval.errors import RoadevalError
-from roadeval.pipeline.chain import STAGES, Chain
+from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import TrainingSet, View
 from roadeval.training.model import Model
-from roadeval.training.plan import Plan
 from roadeval.training.sampling import sample
 from roadeval.training.selfsupervision import patch_truth
 from roadeval.training.settings import TrainingSettings
@@ -30,7 +29,7 @@ class TrainingError(RoadevalError):
 
 def fit(
     frames: Sequence[Frame],
-    plans: Mapping[str, Plan],
+    pipelines: Mapping[str, Pipeline],
     settings: TrainingSettings,
     prior: npt.NDArray[np.float32] | None = None,
 ) -> Model:
@@ -40,7 +39,7 @@ def fit(
     ----------
     frames
         The training frames; with truth, unless ``settings.source`` allows the patch.
-    plans
+    pipelines
         The variants to train, by name.
     settings
         Sampling, and where the labels come from.
@@ -58,19 +57,19 @@ def fit(
         numbers = f"{frames[0].number} to {frames[-1].number}"
         raise TrainingError(
             f"frames {numbers} do not show both road and non-road, so nothing can be learnt from "
-            "them; choose other frames with --start or --train-frames, or give --model"
+            "them; choose other frames with frames.start or training.frames, or give training.model"
         )
     images = tuple(frame.image for frame in frames)
     training_set = TrainingSet(
         images, pixels.frame, pixels.row, pixels.column, pixels.road, settings.seed
     )
     parameters, warnings = {}, []
-    for name, plan in plans.items():
-        parameters[name] = _fit_variant(training_set, plan)
-        warnings += _collapsed(name, images, plan, parameters[name])
+    for name, pipeline in pipelines.items():
+        parameters[name] = _fit_variant(training_set, pipeline)
+        warnings += _collapsed(name, images, pipeline, parameters[name])
     return Model(
         parameters,
-        {name: plan.relevant() for name, plan in plans.items()},
+        {name: pipeline.relevant() for name, pipeline in pipelines.items()},
         source,
         frozenset(frame.digest() for frame in frames),
         len(pixels.road),
@@ -87,31 +86,30 @@ def _truths(frames: Sequence[Frame], settings: TrainingSettings) -> tuple[str, l
         return "truth", labelled
     if settings.source == "truth":
         raise TrainingError(
-            "there is no truth to train on: name its topic with --truth-topic, give --model, "
+            "there is no truth to train on: name its topic with topics.truth, give training.model, "
             'or allow training.source = "patch"'
         )
     return "patch", [patch_truth(frame.image, settings) for frame in frames]
 
 
-def _fit_variant(training_set: TrainingSet, plan: Plan) -> dict[str, Any]:
-    """Fit the stages in order; what follows a filter learns from the images it leaves."""
+def _fit_variant(training_set: TrainingSet, pipeline: Pipeline) -> dict[str, Any]:
+    """Fit the stages in order; what follows a filter learns from the filtered images."""
     parameters: dict[str, Any] = {}
-    for name in plan.chain:
-        stage = STAGES[name]
+    for stage in pipeline.stages():
         if stage.fit is not None:
-            parameters[name] = stage.fit(training_set, plan.settings[name])
+            parameters[stage.name] = stage.fit(training_set, pipeline.settings[stage.name])
         if not stage.yields_mask:
-            filter_alone = Chain((name,), plan.settings, parameters)
-            left = tuple(filter_alone.filtered(image) for image in training_set.images)
-            training_set = dataclasses.replace(training_set, images=left)
+            only = Pipeline((stage.name,), pipeline.settings).bind(parameters)
+            filtered = tuple(only.filtered(image) for image in training_set.images)
+            training_set = dataclasses.replace(training_set, images=filtered)
     return parameters
 
 
 def _collapsed(
-    variant: str, images: Sequence[Rgb], plan: Plan, parameters: Mapping[str, Any]
+    variant: str, images: Sequence[Rgb], pipeline: Pipeline, parameters: Mapping[str, Any]
 ) -> list[str]:
-    """Say which stages call everything, or nothing, road on the frames they learnt from."""
-    chain = Chain(plan.chain, plan.settings, parameters)
+    """Return a warning for each stage that calls all or none of its training frames road."""
+    chain = pipeline.bind(parameters)
     shares: dict[str, list[float]] = {}
     for image in images:
         for name, output in chain.run(View.of(image)):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -16,9 +16,9 @@ from pydantic import Field, ValidationError
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.errors import RoadevalError
-from roadeval.pipeline.chain import STAGES
+from roadeval.pipeline.chain import STAGES, Pipeline
 from roadeval.pipeline.parameters import check_arrays, check_range
-from roadeval.training.plan import Plan
+from roadeval.runtime.files import put
 
 FORMAT: Final = "roadeval-model"
 VERSION: Final = 2
@@ -32,7 +32,7 @@ class ModelError(RoadevalError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
-    """What training gave.
+    """The result of training.
 
     Parameters
     ----------
@@ -67,20 +67,20 @@ class Model:
             check_arrays(self, np.float32, prior=("H", "W"))
             check_range("prior", self.prior, 0, 1)
 
-    def require(self, variant: str, plan: Plan, path: Path) -> None:
-        """Refuse, as a `ModelError`, a variant that this model was not made for.
+    def require(self, variant: str, pipeline: Pipeline, path: Path) -> None:
+        """Raise a `ModelError` for a variant that this model was not made for.
 
-        Settings that a stage's decision alone follows may differ.
+        Settings that what is learnt does not depend on may differ.
         """
         if variant not in self.settings:
             known = ", ".join(sorted(self.settings))
             raise ModelError(
                 f"{path}: the model has no variant {variant} (it has {known}); "
-                "train one with the same --config and --variant options"
+                "train one with the same preset and variants"
             )
         made_for = self.settings[variant]
         # Through JSON, as the file has been: tuples and lists are the same there.
-        wanted = json.loads(json.dumps(plan.relevant()))
+        wanted = json.loads(json.dumps(pipeline.relevant()))
         for name in sorted({*made_for, *wanted}):
             if made_for.get(name) != wanted.get(name):
                 raise ModelError(
@@ -88,7 +88,7 @@ class Model:
                     f"{variant} ({_difference(made_for.get(name), wanted.get(name))}); "
                     "train one with the settings of this run"
                 )
-        for name in plan.learning():
+        for name in pipeline.learning():
             if name not in self.parameters.get(variant, {}):
                 raise ModelError(
                     f"{path}: the model file is incomplete: {name} of variant {variant} has "
@@ -127,16 +127,12 @@ def save_model(model: Model, path: Path) -> None:
         "warnings": model.warnings,
     }
     arrays["header"] = np.frombuffer(json.dumps(header, sort_keys=True).encode(), np.uint8)
-    partial = path.with_name(path.name + ".partial")
+    content = BytesIO()
+    np.savez_compressed(content, allow_pickle=False, **arrays)
     try:
-        with partial.open("wb") as file:
-            np.savez_compressed(file, allow_pickle=False, **arrays)
-        partial.replace(path)
+        put(path, content.getvalue())
     except OSError as error:
         raise ModelError(f"{path}: cannot write the model: {error.strerror}") from error
-    finally:
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
 
 
 def load_model(path: Path) -> Model:
@@ -191,7 +187,7 @@ class _Header:
 
 
 def _model(content: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) -> Model:
-    """Put a model together; a ValueError if a part is missing, or is not what it must be."""
+    """Return the model of a file; a ValueError if a part is missing, or is not what it must be."""
     names = [entry.name for entry in dataclasses.fields(_Header)]
     given: dict[str, Any] = {name: content.get(name) for name in names}
     header = _Header(**given)
@@ -225,7 +221,7 @@ def _parameters(variant: str, stage: str, arrays: Mapping[str, npt.NDArray[Any]]
 
 
 def _line(error: ValueError) -> str:
-    """Say in one line what is wrong."""
+    """Return in one line what is wrong."""
     if not isinstance(error, ValidationError):
         return str(error)
     problem = error.errors(include_url=False)[0]

@@ -6,9 +6,9 @@ import numpy as np
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Rgb, Truth
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.paper.hsi import planes
+from roadeval.pipeline.channels import split
 from roadeval.pipeline.paper.similarity import limit, whitening
-from roadeval.pipeline.patch import patch_mask
+from roadeval.pipeline.reference_patch import patch_mask
 from roadeval.training.settings import TrainingSettings
 
 
@@ -24,7 +24,7 @@ def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     colours = image[patch].astype(np.float64)
     factors = whitening(np.cov(colours, rowvar=False, ddof=0) + np.eye(3))
     mean, far = colours.mean(axis=0), limit(settings.far)
-    _, near = KERNELS.mahalanobis(planes(image), mean, factors, far)
+    _, near = KERNELS.mahalanobis(split(image), mean, factors, far)
     truth = np.full((height, width), IGNORE, np.uint8)
     truth[near == 0] = NON_ROAD
     truth[: round(settings.horizon * height)] = NON_ROAD

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.pipeline.patch import ReferencePatch
+from roadeval.pipeline.reference_patch import ReferencePatch
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
@@ -16,6 +16,9 @@ class TrainingSettings:
 
     Parameters
     ----------
+    model
+        A model file, made from other drives: then nothing is trained here. None: the log itself
+        trains one.
     source
         ``auto``: the log's truth where it has one, else the reference patch; ``truth`` or
         ``patch`` insists.
@@ -42,6 +45,7 @@ class TrainingSettings:
         The rest stays undecided.
     """
 
+    model: str | None = None
     source: Literal["auto", "truth", "patch"] = "auto"
     frames: Annotated[int, Field(ge=1, le=1000)] = 10
     gap: Annotated[int, Field(ge=0)] = 0

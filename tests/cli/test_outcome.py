@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from roadeval.cli import outcome
-from roadeval.jobs.options import Outcome
+from roadeval.jobs.replay import Outcome
 
 RATES = ("ACC", "ERR", "TPR", "FNR", "TNR", "FPR")
 

@@ -5,10 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from roadeval import RunConfig, configure
 from roadeval.cli.app import main
-from roadeval.config import Config
-from roadeval.jobs import replay as job
-from roadeval.jobs.options import Outcome, Progress, ReplayOptions
+from roadeval.cli.options import OPTIONS, with_flags
+from roadeval.config import PRESETS
+from roadeval.jobs.progress import Progress
+from roadeval.jobs.replay import Outcome
 
 SUMMARY = {
     "verdict": "",
@@ -24,7 +26,7 @@ SUMMARY = {
     "seconds": {},
     "warnings": [],
     "losses": [],
-    "selection": {},
+    "run": {},
     "settings": {},
     "versions": {},
     "log": {},
@@ -36,8 +38,8 @@ def asked(monkeypatch):
     """What the main job was asked for; it does nothing and is done at once."""
     asked = {"warnings": (), "losses": ()}
 
-    def replay(drive, *, save, reports, mcap, options, on_progress):
-        asked.update(drive=drive, save=save, reports=reports, mcap=mcap, options=options)
+    def replay(drive, config, *, on_progress):
+        asked.update(drive=drive, config=config)
         on_progress(Progress(3, 3, "replaying"))
         return Outcome(None, None, SUMMARY, asked["warnings"], asked["losses"], ())
 
@@ -48,8 +50,7 @@ def asked(monkeypatch):
 def test_the_defaults_are_those_of_the_library(asked):
     assert main(["replay", "drive.mcap"]) == 0
     assert asked["drive"] == Path("drive.mcap")
-    assert asked["save"] is asked["reports"] is asked["mcap"] is None
-    assert asked["options"] == ReplayOptions()
+    assert asked["config"] == RunConfig()
 
 
 def test_every_option_arrives(asked, tmp_path):
@@ -57,41 +58,83 @@ def test_every_option_arrives(asked, tmp_path):
     settings.write_text("[shadow]\nring_width = 3\n")
     words = (
         "replay drive.mcap --save out.rrd --reports out --mcap o.mcap --preset printed "
-        f"--config {settings} --variant narrow={settings} --model city.model --train-frames 5 "
+        f"--config {settings} --variant narrow={settings} --train-frames 5 "
         "--train-gap 2 --image-topic /image --truth-topic /truth --shadow-topic /shadow "
         "--road-label 3 --road-label 4 --ignore-label 11 --mask-topic net=/net "
         "--sync-tolerance 2.5 --resize-truth --keep-corrupt -S 1.5 -E 2013-05-01T12:00:00Z "
         "--every 2 --max-frames 7 --record none --jobs 1"
     )
     assert main(words.split()) == 0
-    outputs = (asked["save"], asked["reports"], asked["mcap"])
-    assert outputs == (Path("out.rrd"), Path("out"), Path("o.mcap"))
-    options = asked["options"]
-    assert options.config.preset == "printed"
-    assert options.config.stages["shadow"].ring_width == 3
-    assert options.variants["narrow"].stages["shadow"].ring_width == 3
-    assert options == ReplayOptions(
-        config=options.config,
-        variants=options.variants,
-        model=Path("city.model"),
-        image_topic="/image",
-        truth_topic="/truth",
-        shadow_topic="/shadow",
-        mask_topics={"net": "/net"},
-        road_labels=(3, 4),
-        ignore_labels=(11,),
-        start="1.5",
-        end="2013-05-01T12:00:00Z",
-        every=2,
-        max_frames=7,
-        sync_tolerance_ms=2.5,
-        train_frames=5,
-        train_gap=2,
-        jobs=1,
-        record="none",
-        keep_corrupt=True,
-        resize_truth=True,
+    assert asked["config"] == configure(
+        {
+            "preset": "printed",
+            "shadow": {"ring_width": 3},
+            "variants": {"narrow": {"shadow": {"ring_width": 3}}},
+            "training": {"frames": 5, "gap": 2},
+            "topics": {
+                "image": "/image",
+                "truth": "/truth",
+                "shadow": "/shadow",
+                "masks": {"net": "/net"},
+                "sync_tolerance_ms": 2.5,
+                "resize_truth": True,
+            },
+            "labels": {"road": [3, 4], "ignore": [11]},
+            "frames": {
+                "start": "1.5",
+                "end": "2013-05-01T12:00:00Z",
+                "every": 2,
+                "max_frames": 7,
+                "keep_corrupt": True,
+            },
+            "output": {"save": "out.rrd", "reports": "out", "mcap": "o.mcap", "record": "none"},
+            "run": {"jobs": 1},
+        }
     )
+
+
+def test_an_option_overrides_the_file(asked, tmp_path):
+    (tmp_path / "c.toml").write_text("[frames]\nevery = 2\nmax_frames = 9\n")
+    assert main(["replay", "d.mcap", "--config", str(tmp_path / "c.toml"), "--every", "3"]) == 0
+    assert (asked["config"].frames.every, asked["config"].frames.max_frames) == (3, 9)
+
+
+def test_a_preset_that_is_not_the_file_s_is_refused(asked, tmp_path, capsys):
+    (tmp_path / "c.toml").write_text('preset = "gated"\n')
+    words = ["replay", "d.mcap", "--config", str(tmp_path / "c.toml"), "--preset"]
+    assert main([*words, "gated"]) == 0
+    assert main([*words, "robust"]) == 1
+    assert "starts from preset gated, not from robust" in capsys.readouterr().err
+
+
+def test_a_model_and_training_frames_do_not_go_together(capsys):
+    assert main(["replay", "d.mcap", "--model", "m", "--train-gap", "3"]) == 2
+    assert "--train-frames and --train-gap do not go with --model" in capsys.readouterr().err
+
+
+def test_every_option_s_words_are_a_setting_s_value(asked):
+    """The help's flags and the settings' names belong together, each once."""
+    assert main(["replay", "d.mcap", "--model", "city.model"]) == 0
+    assert asked["config"].training.model == "city.model"
+    flags = [flag for option in OPTIONS for flag in option.flags]
+    assert len({*flags}) == len(flags)
+    for option in OPTIONS:
+        table, _, key = option.setting.partition(".")
+        assert not key or hasattr(getattr(RunConfig(), table), key)
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("lower training.frames or frames.scale", "lower --train-frames or --scale"),
+        ("name it with topics.truth.", "name it with --truth-topic."),
+        ("a.toml: [frames] every: bad", "a.toml: [frames] every: bad"),
+        ("/data/frames.start/x and frames.starting", "/data/frames.start/x and frames.starting"),
+        ("my.frames.every stays", "my.frames.every stays"),
+    ],
+)
+def test_names_of_settings_become_flags(text, shown):
+    assert with_flags(text) == shown
 
 
 def test_the_result_goes_to_stdout_and_progress_to_stderr(asked, capsys):
@@ -104,7 +147,7 @@ def test_the_result_goes_to_stdout_and_progress_to_stderr(asked, capsys):
 def test_json_is_the_summary_and_nothing_else(asked, capsys):
     main(["replay", "drive.mcap", "--json"])
     printed = json.loads(capsys.readouterr().out)
-    assert printed.pop("format") == {"name": "roadeval-summary", "version": 1}
+    assert printed.pop("format") == {"name": "roadeval-summary", "version": 2}
     assert printed == SUMMARY
 
 
@@ -125,18 +168,14 @@ def test_a_loss_is_told_and_has_its_exit_code(asked, capsys):
 def test_a_configuration_that_cannot_be_used_is_a_known_problem(asked, capsys):
     assert main(["replay", "drive.mcap", "--config", "no-such.toml"]) == 1
     assert "no-such.toml" in capsys.readouterr().err
-    assert "options" not in asked
-
-
-def test_a_preset_alone_is_the_library_s():
-    assert job.ReplayOptions().config == Config()
+    assert "config" not in asked
 
 
 def test_the_truth_s_colours_arrive(asked):
     words = "replay d.mcap --road-color 64,32,32 --road-color 255,0,0 --ignore-color 1,2,3"
     assert main(words.split()) == 0
-    assert asked["options"].road_colors == ((64, 32, 32), (255, 0, 0))
-    assert asked["options"].ignore_colors == ((1, 2, 3),)
+    assert asked["config"].labels.road_colors == ((64, 32, 32), (255, 0, 0))
+    assert asked["config"].labels.ignore_colors == ((1, 2, 3),)
 
 
 @pytest.mark.parametrize(
@@ -148,8 +187,6 @@ def test_colours_and_masks_are_checked_before_anything_is_opened(words, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_every_preset_can_be_asked_for():
-    from roadeval.cli.options import PresetName
-    from roadeval.config import PRESETS
-
-    assert {name.value for name in PresetName} == set(PRESETS)
+def test_every_preset_is_named_in_the_help():
+    (preset,) = (option for option in OPTIONS if option.setting == "preset")
+    assert (preset.metavar or "").split("|") == [*PRESETS]

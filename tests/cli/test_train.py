@@ -3,7 +3,7 @@
 import pytest
 
 from roadeval.cli.app import main
-from tests.jobs.test_replay import write_log
+from tests.jobs.making import write_log
 
 PATCH = '[training]\nsource = "patch"\nframes = 3'
 

@@ -52,7 +52,7 @@ def test_a_mistyped_command_is_guessed(capsys):
         ),
         (
             ["replay", "a.mcap", "--ignore-label", "3"],
-            "--ignore-label without --road-label: say which label is road",
+            "--ignore-label needs --road-label: name the values that mean road",
         ),
     ],
 )

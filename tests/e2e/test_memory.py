@@ -17,11 +17,11 @@ MEASURE = f"""
 import json, sys
 from roadeval import replay
 from roadeval.recording.write import recorder
-from roadeval.recording.write.tracks import Patience
+from roadeval.recording.write.batching import WaitLimits
 
 # Rows wait in memory for more frames the longer the recording, up to a limit at 1,024 frames and
 # more. Here that limit is reached before the first measurement.
-recorder.IMAGES_AND_WORDS = recorder.NUMBERS = Patience(8, 8)
+recorder.IMAGES_AND_TEXT = recorder.NUMBERS = WaitLimits(8, 8)
 
 peaks = {{}}
 

@@ -139,13 +139,13 @@ def test_a_results_folder_gives_the_same_numbers_without_pictures(demo, words, t
 
 KILLED = """
 import os, signal, sys
-from roadeval import ReplayOptions, replay
+from roadeval import configure, replay
 
 def kill(progress):
     if progress.stage == "replaying" and progress.done == int(sys.argv[2]):
         os.kill(os.getpid(), signal.SIGKILL)
 
-replay(sys.argv[1], save="out.rrd", options=ReplayOptions(jobs=1), on_progress=kill)
+replay(sys.argv[1], configure({"run": {"jobs": 1}}), save="out.rrd", on_progress=kill)
 """
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from roadeval.data import Counts, Frame, Mask, StageResult, Tally, Truth, VariantResult
+from roadeval.data import Counts, Frame, Mask, Output, StageResult, Tally, Truth, VariantResult
 from roadeval.data.arrays import Bits
 from roadeval.data.packed import Packed
 from roadeval.evaluation import metrics
@@ -38,7 +38,7 @@ def a_variant(
     """A variant with a mask a stage; its first stage found the regions."""
     found = {region: Packed.of(mask) for region, mask in (regions or {}).items()}
     stages = [
-        StageResult(stage, (), Packed.of(mask), found if place == 0 else {}, {}, 0.002)
+        StageResult(stage, Output(mask=Packed.of(mask), regions={} if place else found), 0.002)
         for place, (stage, mask) in enumerate(masks.items())
     ]
     return VariantResult(name, tuple(stages))

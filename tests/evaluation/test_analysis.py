@@ -2,6 +2,7 @@
 
 import io
 import math
+from dataclasses import asdict
 
 import pandas as pd
 import pytest
@@ -11,7 +12,8 @@ from roadeval.evaluation import analysis
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results import tables
+from roadeval.results.lines import lines as lines_of
+from roadeval.results.schema import TABLES
 from tests.evaluation.making import a_frame, a_table, a_variant, pixels
 
 POST, SVM = ("filtered", "post"), ("filtered", "svm")
@@ -23,7 +25,7 @@ def scored() -> tuple[Scoreboard, pd.DataFrame]:
     settings = EvaluationSettings(window=5, boundary_width=1, bands=2)
     truth = pixels("##..", "##.?")
     board = Scoreboard(settings, ["filtered"], BlindPrior.of_truths([truth]))
-    lines = tables.header("frames")
+    lines = TABLES["frames"].header
     for number in range(12):
         mask = pixels("#..." if number % 3 else "###.", "....")
         masks = {"svm": truth % 2, "post": mask}
@@ -31,7 +33,7 @@ def scored() -> tuple[Scoreboard, pd.DataFrame]:
             a_frame(truth, number), Role.EVALUATED, (a_variant("filtered", masks),)
         )
         board.add(result)
-        lines += result.tables["frames"]
+        lines += lines_of(result)["frames"]
     return board, pd.read_csv(io.StringIO(lines))
 
 
@@ -40,12 +42,11 @@ def test_totals_of_the_table_are_those_of_the_run():
     assert analysis.totals(frames) == board.totals()
 
 
-def test_rows_of_the_table_are_those_of_the_run():
+def test_windows_of_the_table_are_those_of_the_run():
     board, frames = scored()
-    found = analysis.rows(frames, 5)
-    told = [(row.number, row.variant, row.stage, row.rates["ERR"]) for row in board.windows()]
-    names = ["window", "variant", "stage", "ERR"]
-    assert sorted(found[names].itertuples(index=False, name=None)) == sorted(told)
+    found = [asdict(window) for window in analysis.windows(frames, 5)]
+    told = [asdict(window) for window in board.windows()]
+    assert sorted(map(str, found)) == sorted(map(str, told))
 
 
 def test_the_final_stage_is_post_or_else_the_last():
@@ -111,7 +112,7 @@ def test_a_region_tells_its_share_of_the_pixels_and_of_the_errors():
             (0, "filtered", "post", "interior", 40, 45, 5, 0, 90),
             (0, "filtered", "post", "shadow", 0, 0, 0, 0, 0),
         ],
-        columns=list(tables.COLUMNS["regions"]),
+        columns=list(TABLES["regions"].names),
     )
     found = analysis.by_region(regions).set_index("region")
     assert found.loc["boundary", "ERR"] == 0.5
@@ -121,6 +122,8 @@ def test_a_region_tells_its_share_of_the_pixels_and_of_the_errors():
 
 
 def test_settings_of_another_version_are_read_as_far_as_they_are_known():
-    summary = {"settings": {"filtered": {"evaluation": {"window": 7, "from_the_future": 1}}}}
-    assert analysis.settings_of(summary) == EvaluationSettings(window=7)
+    evaluation = {"evaluation": {"window": 7, "from_the_future": 1}}
+    assert analysis.settings_of({"run": evaluation}) == EvaluationSettings(window=7)
+    earlier = {"settings": {"filtered": evaluation}}
+    assert analysis.settings_of(earlier) == EvaluationSettings(window=7)
     assert analysis.settings_of({}) == EvaluationSettings()

@@ -9,33 +9,33 @@ from roadeval.evaluation.conditions import Condition, ConditionError, judge
 from roadeval.evaluation.settings import EvaluationSettings
 from tests.evaluation.making import a_table
 
-SETTINGS = EvaluationSettings(resamples=200)
+SETTINGS = EvaluationSettings()
 POST = ("filtered", "post")
 
 
-def a_side(label, errors, *, digest="d1", selection=None, **table):
-    return Side(label, "street", digest, a_table({POST: errors}, **table), selection or {})
+def a_side(label, errors, *, digest="d1", asked=None, **table):
+    return Side(label, "street", digest, a_table({POST: errors}, **table), asked or {})
 
 
 def test_a_result_against_itself_differs_by_nothing_for_sure():
     errors = [(7 * number) % 23 for number in range(40)]
     found = compare([a_side("a", errors), a_side("b", errors)], SETTINGS)
-    (change,) = found["changes"]
-    assert change["base"] == change["new"]
-    for told in change["difference"].values():
-        assert (told["mean"], told["low"], told["high"]) == (0, 0, 0)
-    assert found["moved"] == []
-    assert found["warnings"] == []
+    (change,) = found.changes
+    assert change.base == change.new
+    for told in change.difference.values():
+        assert (told.mean, told.low, told.high) == (0, 0, 0)
+    assert found.moved == ()
+    assert found.warnings == ()
 
 
 def test_differences_are_new_minus_base_on_the_frames_that_both_have():
     base, new = a_side("base", [10, 10, 10, 10]), a_side("new", [12, 14])
     found = compare([base, new], SETTINGS)
-    (change,) = found["changes"]
-    assert change["frames"] == 2
-    assert change["base"]["ERR"] == pytest.approx(0.10)
-    assert change["difference"]["ERR"]["mean"] == pytest.approx(0.03)
-    assert found["warnings"] == [
+    (change,) = found.changes
+    assert change.frames == 2
+    assert change.base["ERR"] == pytest.approx(0.10)
+    assert change.difference["ERR"].mean == pytest.approx(0.03)
+    assert list(found.warnings) == [
         "2 frames that base evaluated are left out against new, which lacks them or trained on them"
     ]
 
@@ -44,66 +44,68 @@ def test_frames_are_matched_by_their_stamps_not_by_their_numbers():
     base, new = a_side("base", [10, 20, 30]), a_side("new", [10, 20, 30])
     shifted = new.frames.assign(frame=new.frames["frame"] + 5)
     found = compare([base, Side("new", "street", "d1", shifted)], SETTINGS)
-    assert found["changes"][0]["difference"]["ERR"]["mean"] == 0
+    assert found.changes[0].difference["ERR"].mean == 0
 
 
 def test_frames_with_the_same_stamp_are_matched_in_their_order():
     base, new = (a_side(name, [10, 20, 30]) for name in ("base", "new"))
     frozen = [each.frames.assign(stamp_ns=0) for each in (base, new)]
     sides = [Side(name, "street", "d1", table) for name, table in zip("ab", frozen, strict=True)]
-    (change,) = compare(sides, SETTINGS)["changes"]
-    assert change["frames"] == 3
-    assert change["difference"]["ERR"]["mean"] == 0
+    (change,) = compare(sides, SETTINGS).changes
+    assert change.frames == 3
+    assert change.difference["ERR"].mean == 0
 
 
 def test_different_drives_stand_side_by_side_without_differences():
     sides = [a_side("a", [10] * 20), a_side("b", [30] * 20, digest="d2")]
     found = compare(sides, SETTINGS)
-    assert not found["same_drive"]
-    assert [change["new"]["ERR"] for change in found["changes"]] == pytest.approx([0.1, 0.3])
-    assert all(change["difference"] == {} for change in found["changes"])
-    assert "different drives" in found["warnings"][0]
+    assert not found.same_drive
+    assert [change.new["ERR"] for change in found.changes] == pytest.approx([0.1, 0.3])
+    assert all(change.difference == {} for change in found.changes)
+    assert "different drives" in found.warnings[0]
 
 
 def test_a_result_that_does_not_know_its_log_is_not_subtracted():
     sides = [a_side("a", [10] * 20), a_side("b", [10] * 20, digest=None)]
     found = compare(sides, SETTINGS)
-    assert found["warnings"] == ["b does not say which log it is of: nothing is subtracted"]
+    assert list(found.warnings) == ["b does not say which log it is of: nothing is subtracted"]
 
 
 def test_another_truth_is_told():
     base, new = a_side("base", [10, 20]), a_side("new", [10, 20])
     relabelled = new.frames.assign(N=new.frames["N"] - 1)
     found = compare([base, Side("new", "street", "d1", relabelled)], SETTINGS)
-    assert "the truth differs on 2 frames" in found["warnings"][0]
+    assert "the truth differs on 2 frames" in found.warnings[0]
 
 
-def test_options_that_differ_and_change_numbers_are_named():
-    asked = {"scale": 1.0, "every": 1, "road_labels": [], "start": None, "truth_topic": "/a"}
-    other = asked | {"scale": 0.5, "road_labels": [3], "start": "5"}
-    base, new = a_side("base", [10, 20], selection=asked), a_side("new", [10, 20], selection=other)
+def test_settings_that_differ_are_named_with_both_values():
+    asked = {"frames.scale": 1.0, "frames.every": 1, "labels.road": [], "topics.truth": "/a"}
+    other = asked | {"frames.scale": 0.5, "labels.road": [3]}
+    base, new = a_side("base", [10, 20], asked=asked), a_side("new", [10, 20], asked=other)
     relabelled = replace(new, frames=new.frames.assign(N=new.frames["N"] - 1))
-    assert compare([base, relabelled], SETTINGS)["warnings"] == [
-        "base and new were replayed with different options (--road-label not given and [3], "
-        "--scale 1 and 0.5): part of the change may be theirs",
+    assert list(compare([base, relabelled], SETTINGS).warnings) == [
+        "base and new were replayed with different settings (frames.scale 1 and 0.5, "
+        "labels.road not given and [3]): part of the change may be theirs",
         "the truth differs on 2 frames between base and new: part of the change may be the truth's",
     ]
 
 
-@pytest.mark.parametrize("selection", [None, {"scale": 1.0}])
-def test_a_result_that_does_not_know_its_options_is_compared_without_a_word(selection):
-    sides = [a_side("base", [10] * 12, selection=selection), a_side("new", [12] * 12)]
+@pytest.mark.parametrize("asked", [None, {"frames.scale": 1.0}])
+def test_a_result_that_does_not_know_its_settings_is_compared_without_a_word(asked):
+    sides = [a_side("base", [10] * 12, asked=asked), a_side("new", [12] * 12)]
     found = compare(sides, SETTINGS)
-    assert found["warnings"] == []
-    assert judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)[0]["holds"]
+    assert found.warnings == ()
+    assert judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)[0].holds
 
 
 def test_a_change_between_scales_is_not_judged_but_a_level_is():
-    base = a_side("base", [10] * 12, selection={"scale": 1.0})
-    found = compare([base, a_side("new", [12] * 12, selection={"scale": 0.5})], SETTINGS)
-    with pytest.raises(ConditionError, match=r"not judged, because .* at --scale 1 and 0\.5"):
+    base = a_side("base", [10] * 12, asked={"frames.scale": 1.0})
+    found = compare([base, a_side("new", [12] * 12, asked={"frames.scale": 0.5})], SETTINGS)
+    with pytest.raises(
+        ConditionError, match=r"not judged, because .* with frames\.scale 1 and 0\.5"
+    ):
         judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
-    assert judge(found, [Condition.parse("post.filtered.ERR > 11%")], SETTINGS)[0]["holds"]
+    assert judge(found, [Condition.parse("post.filtered.ERR > 11%")], SETTINGS)[0].holds
 
 
 def test_nothing_in_common_is_an_error():
@@ -115,8 +117,8 @@ def test_nothing_in_common_is_an_error():
 
 def test_frames_that_changed_most_are_named_in_both_directions():
     base, new = a_side("base", [10] * 4, hertz=1), a_side("new", [10, 30, 10, 5], hertz=1)
-    moved = compare([base, new], SETTINGS)["moved"]
-    assert [(row["frame"], round(row["change"], 2)) for row in moved] == [(1, 0.2), (3, -0.05)]
+    moved = compare([base, new], SETTINGS).moved
+    assert [(row.frame, round(row.change, 2)) for row in moved] == [(1, 0.2), (3, -0.05)]
 
 
 def test_variants_of_one_result_are_compared_with_unfiltered():
@@ -125,7 +127,7 @@ def test_variants_of_one_result_are_compared_with_unfiltered():
     sides = variants_as_sides(frames, "street", "d1")
     assert [side.label for side in sides] == ["unfiltered", "filtered", "other"]
     found = compare(sides, SETTINGS, across_variants=True)
-    told = {row["variant"]: row["difference"]["ERR"]["mean"] for row in found["changes"]}
+    told = {row.variant: row.difference["ERR"].mean for row in found.changes}
     assert told == pytest.approx({"filtered": -0.01, "other": 0.01})
 
 
@@ -142,7 +144,7 @@ def test_chosen_variants_keep_their_order_and_must_be_there():
 def test_a_condition_is_judged_on_every_new_result():
     sides = [a_side("base", [10] * 12), a_side("good", [10] * 12), a_side("bad", [12] * 12)]
     judged = judge(compare(sides, SETTINGS), [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
-    assert [row["holds"] for row in judged] == [False, True]
+    assert [row.holds for row in judged] == [False, True]
 
 
 @pytest.mark.parametrize(
@@ -169,14 +171,14 @@ def test_a_level_is_that_of_all_frames_of_the_new_result_whatever_the_base_has()
     (row,) = judge(
         compare([base, new], SETTINGS), [Condition.parse("post.filtered.ERR > 33%")], SETTINGS
     )
-    assert row["sentence"].startswith("post.filtered.ERR of new is 34.00 %")
+    assert row.sentence.startswith("post.filtered.ERR of new is 34.00 %")
 
 
 def test_a_condition_is_not_judged_where_two_ranges_hardly_overlap():
     base, new = a_side("base", [10] * 50), a_side("new", [90] * 40)
     late = new.frames.assign(stamp_ns=new.frames["stamp_ns"] + 31 * 10**8)
     found = compare([base, Side("new", "street", "d1", late)], SETTINGS)
-    assert found["changes"][0]["frames"] == 19
+    assert found.changes[0].frames == 19
     with pytest.raises(ConditionError, match="fewer than half of the 40 of the shorter one"):
         judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
 
@@ -184,7 +186,7 @@ def test_a_condition_is_not_judged_where_two_ranges_hardly_overlap():
 def test_a_condition_is_judged_where_one_result_covers_a_part_of_the_other():
     found = compare([a_side("base", [10] * 50), a_side("new", [90] * 12)], SETTINGS)
     (row,) = judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
-    assert row["holds"]
+    assert row.holds
 
 
 def test_a_condition_on_what_is_not_there_is_an_error_not_a_pass():
@@ -198,4 +200,4 @@ def test_a_change_between_different_drives_is_not_judged_but_a_level_is():
     with pytest.raises(ConditionError, match="different drives"):
         judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
     judged = judge(found, [Condition.parse("post.filtered.ERR > 5%")], SETTINGS)
-    assert [row["holds"] for row in judged] == [False, True]
+    assert [row.holds for row in judged] == [False, True]

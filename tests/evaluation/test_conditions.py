@@ -1,16 +1,22 @@
-"""The language of ``--fail-if``: what it accepts, and what it says."""
+"""Conditions: which are accepted, and what they say."""
 
 import math
 
 import pytest
 
+from roadeval.evaluation.compared import MaskComparison
 from roadeval.evaluation.conditions import Condition, ConditionError
 
-CHANGE = {
-    "result": "new",
-    "base": {"ERR": 0.100, "IoU": 0.8},
-    "new": {"ERR": 0.106, "IoU": 0.7, "FNR": math.nan},
-}
+MASK = MaskComparison(
+    result="new",
+    variant="filtered",
+    stage="post",
+    final=True,
+    frames=12,
+    base={"ERR": 0.100, "IoU": 0.8},
+    new={"ERR": 0.106, "IoU": 0.7, "FNR": math.nan},
+    difference={},
+)
 
 
 def test_a_change_is_in_percentage_points():
@@ -62,12 +68,12 @@ def test_an_unknown_rate_is_told_with_those_that_there_are():
     ],
 )
 def test_a_condition_holds_or_not(text, holds):
-    assert Condition.parse(text).judge(CHANGE)[0] is holds
+    assert Condition.parse(text).judge(MASK).holds is holds
 
 
 def test_the_sentence_says_why():
-    _, sentence = Condition.parse("post.filtered.ERR > +0.5pp").judge(CHANGE)
-    assert sentence == (
+    judgement = Condition.parse("post.filtered.ERR > +0.5pp").judge(MASK)
+    assert judgement.sentence == (
         "post.filtered.ERR of new changed by +0.60 pp (10.00 % to 10.60 %): "
         "post.filtered.ERR > +0.5pp holds"
     )
@@ -75,4 +81,4 @@ def test_the_sentence_says_why():
 
 def test_what_is_undefined_is_not_judged_as_passed():
     with pytest.raises(ConditionError, match="undefined in new"):
-        Condition.parse("post.filtered.FNR > 5%").judge(CHANGE)
+        Condition.parse("post.filtered.FNR > 5%").judge(MASK)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from roadeval.data import Counts, Health, Role
+from roadeval.data import Change, Counts, Health, Role
 from roadeval.data.packed import Packed
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.score import CountsNotConservedError, prove
@@ -77,7 +77,6 @@ def test_only_evaluated_frames_are_counted(role: Role) -> None:
     result = board.score(a_frame(truth), role, (FILTERED,))
     board.add(result)
     assert result.tallies == ()
-    assert result.tables == {}
     assert board.roles() == {role: 1}
     assert board.totals() == {}
     assert board.summary()["verdict"] == "Nothing to score: no frame with truth was evaluated."
@@ -185,15 +184,13 @@ class TestOracles:
     def test_are_counted_apart_and_named_after_the_stage_that_was_replaced(self) -> None:
         result = a_board().score(a_frame(TRUTH, 4), Role.EVALUATED, (self.variant,))
         assert result.oracles["svm"][0].counts == Counts(tp=4, tn=3)
-        assert result.tables["oracles"].startswith("4,filtered,svm,post,4,3,0,0,7,1.0,0.0,")
 
     def test_are_never_among_the_results(self) -> None:
         frame, own = a_frame(TRUTH), (self.variant, UNFILTERED)
         with_oracles = a_board().score(frame, Role.EVALUATED, own)
         without = a_board().score(frame, Role.EVALUATED, (FILTERED, UNFILTERED))
         assert with_oracles.tallies == without.tallies
-        assert with_oracles.tables["frames"] == without.tables["frames"]
-        assert "oracles" not in without.tables
+        assert without.oracles == {}
 
     def test_are_summed_up_by_variant_oracle_and_stage(self) -> None:
         board = a_board()
@@ -206,17 +203,16 @@ class TestOracles:
 
 
 def test_changes_and_heat_maps_are_summed_up_over_the_drive() -> None:
-    texts = a_drive(3, a_board(BlindPrior.of_truths([TRUTH]))).tables()
-    changes = texts["changes"].splitlines()
-    assert "filtered,svm,filtered,post,3,0,21" in changes
-    assert "unfiltered,post,filtered,post,0,3,21" in changes
-    assert "filtered,post,unfiltered,post,3,0,21" in changes
-    assert "blind,post,filtered,post,0,3,21" in changes
-    heat = texts["heat"].splitlines()
-    assert "filtered,1,1,1,3,0,3" in heat
-    assert "unfiltered,1,1,1,3,0,0" in heat
-    assert not [line for line in heat if line.startswith("filtered,1,3,")]
+    sums = a_drive(3, a_board(BlindPrior.of_truths([TRUTH]))).sums()
+    assert sums.changes["filtered", "svm", "filtered", "post"] == Change(3, 0, 21)
+    assert sums.changes["unfiltered", "post", "filtered", "post"] == Change(0, 3, 21)
+    assert sums.changes["filtered", "post", "unfiltered", "post"] == Change(3, 0, 21)
+    assert sums.changes["blind", "post", "filtered", "post"] == Change(0, 3, 21)
+    side, cells = sums.heat["filtered"].cells()
+    assert (side, cells[:, 1, 1].tolist(), cells[:, 1, 3].tolist()) == (1, [3, 0, 3], [0, 0, 0])
+    assert sums.heat["unfiltered"].cells()[1][:, 1, 1].tolist() == [3, 0, 0]
 
 
 def test_a_drive_without_scores_has_no_sums() -> None:
-    assert a_board().tables() == {}
+    sums = a_board().sums()
+    assert (sums.windows, sums.changes, sums.heat) == ((), {}, {})

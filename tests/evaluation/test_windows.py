@@ -8,59 +8,58 @@ import pytest
 
 from roadeval.data import Counts
 from roadeval.evaluation import metrics, windows
-from roadeval.evaluation.history import History
-from tests.evaluation.making import a_tally
+from roadeval.evaluation.frame_counts import FrameCounts, GrowingCounts, sum_up
 
 
-def history_of(*counts: tuple[int, int, int, int]) -> History:
-    history = History("filtered", "post")
+def counts_of(*counts: tuple[int, int, int, int]) -> FrameCounts:
+    growing = GrowingCounts()
     for position, row in enumerate(counts):
-        history.append(position, a_tally(*row))
-    return history
+        growing.append(position, Counts(*row))
+    return growing.so_far("filtered", "post")
 
 
 def test_a_window_averages_rates_and_pools_counts() -> None:
-    (row,) = windows.rows(history_of((0, 1, 1, 0), (0, 6, 2, 0)), [7, 9], size=10)
+    (row,) = windows.cut(counts_of((0, 1, 1, 0), (0, 6, 2, 0)), [7, 9], size=10)
     assert (row.number, row.first_frame, row.last_frame, row.frames) == (0, 7, 9, 2)
     assert row.rates["FPR"] == (1 / 2 + 2 / 8) / 2
     assert row.pooled["FPR"] == 3 / 10
 
 
 def test_an_undefined_rate_is_left_out_of_the_mean() -> None:
-    (row,) = windows.rows(history_of((3, 1, 0, 1), (0, 4, 0, 0)), [0, 1], size=10)
+    (row,) = windows.cut(counts_of((3, 1, 0, 1), (0, 4, 0, 0)), [0, 1], size=10)
     assert row.rates["TPR"] == row.pooled["TPR"] == 0.75
 
 
 def test_a_rate_undefined_in_the_whole_window_stays_undefined() -> None:
-    (row,) = windows.rows(history_of((0, 1, 1, 0)), [0], size=10)
+    (row,) = windows.cut(counts_of((0, 1, 1, 0)), [0], size=10)
     assert math.isnan(row.rates["TPR"])
     assert math.isnan(row.pooled["TPR"])
 
 
 def test_the_last_window_may_be_short() -> None:
-    rows = list(windows.rows(history_of(*[(1, 1, 1, 1)] * 7), list(range(10, 17)), size=3))
+    rows = list(windows.cut(counts_of(*[(1, 1, 1, 1)] * 7), list(range(10, 17)), size=3))
     spans = [(row.number, row.first_frame, row.last_frame, row.frames) for row in rows]
     assert spans == [(0, 10, 12, 3), (1, 13, 15, 3), (2, 16, 16, 1)]
 
 
 def test_a_mask_that_is_missing_on_some_frames_says_how_many_it_has() -> None:
-    history = History("net", "post")
+    growing = GrowingCounts()
     for position in (0, 4, 5):
-        history.append(position, a_tally(1, 1, 1, 1, "net"))
-    rows = list(windows.rows(history, [0, 1, 2, 3, 4, 5, 6], size=2))
+        growing.append(position, Counts(1, 1, 1, 1))
+    rows = list(windows.cut(growing.so_far("net", "post"), [0, 1, 2, 3, 4, 5, 6], size=2))
     assert [(row.number, row.frames) for row in rows] == [(0, 1), (2, 2)]
 
 
 def test_windows_equal_a_groupby_of_pandas() -> None:
     rng = np.random.default_rng(0)
     table = rng.integers(0, 3, (37, 4))
-    history = history_of(*map(tuple, table.tolist()))
+    mask = counts_of(*map(tuple, table.tolist()))
     frames = pd.DataFrame([metrics.of(Counts(*row)) for row in table.tolist()])
     counts = pd.DataFrame(table)
     groups = np.arange(37) // 10
     means = frames.groupby(groups).mean()
     sums = counts.groupby(groups).sum()
-    for row in windows.rows(history, list(range(37)), size=10):
+    for row in windows.cut(mask, list(range(37)), size=10):
         assert row.rates == pytest.approx(means.loc[row.number].to_dict(), nan_ok=True)
         assert row.pooled == pytest.approx(
             metrics.of(Counts(*sums.loc[row.number].tolist())), nan_ok=True
@@ -68,7 +67,7 @@ def test_windows_equal_a_groupby_of_pandas() -> None:
 
 
 def test_totals_sum_counts_average_rates_and_count_the_undefined() -> None:
-    totals = history_of((3, 1, 0, 1), (0, 4, 4, 0)).totals()
+    totals = sum_up(counts_of((3, 1, 0, 1), (0, 4, 4, 0)).counts)
     assert totals["frames"] == 2
     assert [totals[name] for name in ("TP", "TN", "FP", "FN", "N")] == [3, 5, 4, 1, 13]
     assert totals["ERR"] == (1 / 5 + 4 / 8) / 2

@@ -1,44 +1,22 @@
 """The main job, on a small log of our own."""
 
 import json
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
-import cv2
 import pandas as pd
 import pytest
 
 import roadeval
-from roadeval import ReplayOptions, RoadevalError
-from roadeval.config import Config, load_config
+from roadeval import RoadevalError
+from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import Run
-from roadeval.logs import LogWriter, open_log
-from roadeval.pipeline.paper import svm as classify
-from roadeval.results.folder import Results, summary_text
-from roadeval.results.tables import COLUMNS
-from tests.training.making import frame
-
-FRAMES = 26
-NS = 100_000_000
-
-
-def write_log(path: Path, *, truth: bool = True, net: bool = False, broken: int = -1) -> Path:
-    """Write a log of small frames; some have no truth, one may be broken."""
-    with LogWriter(path) as writer:
-        for number in range(FRAMES):
-            made, stamp = frame(number), (number + 1) * NS
-            # The verge creeps over the road, so that no fixed mask is right everywhere.
-            made.image[12 : 12 + number // 8] = made.image[0]
-            made.truth[12 : 12 + number // 8] = 0
-            _, png = cv2.imencode(".png", made.image[..., ::-1])
-            data = b"no image" if number == broken else png.tobytes()
-            writer.image("/camera/image", stamp, data, "png")
-            if truth and number != 20:
-                writer.mask("/truth/road", stamp, made.truth * 255)
-            if net:
-                writer.mask("/net/road_mask_prediction", stamp, made.truth * 255)
-    return path
+from roadeval.logs import TopicSettings, open_log
+from roadeval.pipeline.paper import svm
+from roadeval.results.folder import Results
+from roadeval.results.schema import TABLES
+from roadeval.results.summary import summary_text
+from tests.jobs.making import FRAMES, NS, settings, write_log
 
 
 @pytest.fixture(scope="module")
@@ -57,10 +35,7 @@ def _no_figures(request, monkeypatch):
 
 def run(drive: Path, folder: Path, **options):
     return roadeval.replay(
-        drive,
-        save=folder / "out.rrd",
-        reports=folder / "reports",
-        options=ReplayOptions(**options),
+        drive, settings(**options), save=folder / "out.rrd", reports=folder / "reports"
     )
 
 
@@ -130,7 +105,7 @@ def test_the_recording_holds_the_masks_that_were_scored(once):
 def test_the_summary_file_is_the_outcome_s_summary(once):
     folder, outcome = once
     written = json.loads((folder / "reports" / "summary.json").read_text())
-    assert written["format"] == {"name": "roadeval-summary", "version": 1}
+    assert written["format"] == {"name": "roadeval-summary", "version": 2}
     assert written == json.loads(summary_text(outcome.summary))
 
 
@@ -148,26 +123,26 @@ def test_figures_are_written(once):
 
 def test_the_number_of_workers_changes_no_number(drive, once, tmp_path):
     run(drive, tmp_path, jobs=1)
-    for table in COLUMNS:
+    for table in TABLES:
         other = (tmp_path / "reports" / f"{table}.csv").read_bytes()
         assert other == (once[0] / "reports" / f"{table}.csv").read_bytes()
 
 
 def test_frames_after_training_can_be_left_out(drive, tmp_path):
-    outcome = run(drive, tmp_path, train_frames=4, train_gap=5)
+    outcome = run(drive, tmp_path, train_frames=4, gap=5)
     assert outcome.summary["frames"]["skipped"]["gap after training"] == 5
     assert frames_of(tmp_path).frame.min() == 9
 
 
 def test_a_model_file_leaves_its_own_frames_out_and_evaluates_the_rest(drive, tmp_path):
-    model = roadeval.train([drive], tmp_path / "m.model", options=ReplayOptions(train_frames=5))
+    model = roadeval.train([drive], tmp_path / "m.model", settings(train_frames=5))
     outcome = run(drive, tmp_path, model=tmp_path / "m.model")
     assert outcome.summary["frames"]["trained_on"] == len(model.digests) == 5
     assert outcome.summary["frames"]["evaluated"] == 20
 
 
 def test_training_frames_of_the_drive_itself_are_warned_of(drive, tmp_path):
-    roadeval.train([drive], tmp_path / "m.model", options=ReplayOptions(train_frames=5))
+    roadeval.train([drive], tmp_path / "m.model", settings(train_frames=5))
     warnings = run(drive, tmp_path, model=tmp_path / "m.model").summary["warnings"]
     assert any("5 of the model's 5 training frames lie in this drive; their" in w for w in warnings)
 
@@ -180,15 +155,15 @@ def test_the_variants_of_a_model_file_are_bound_once(drive, tmp_path, monkeypatc
         bound.append(machine)
         return made(machine, settings)
 
-    made = classify.colour_table
-    monkeypatch.setattr(classify, "colour_table", table)
+    made = svm.colour_table
+    monkeypatch.setattr(svm, "colour_table", table)
     run(drive, tmp_path, model=tmp_path / "m.model", max_frames=3)
     assert len(bound) == len({id(machine) for machine in bound}) == 2
 
 
 def test_a_model_of_another_drive_is_not_warned_of(drive, tmp_path):
-    half = ReplayOptions(train_frames=5, end="1.25")
-    roadeval.train([drive], tmp_path / "m.model", options=half)
+    half = settings(train_frames=5, end="1.25")
+    roadeval.train([drive], tmp_path / "m.model", half)
     outcome = run(drive, tmp_path, model=tmp_path / "m.model", start="1.25")
     assert outcome.summary["frames"]["evaluated"] > 0
     assert not [text for text in outcome.warnings if "training frames lie" in text]
@@ -204,16 +179,15 @@ def test_a_range_without_truth_is_replayed_by_the_patch(drive, tmp_path):
 
 def test_a_log_without_truth_trains_a_model_for_others(drive, tmp_path):
     bare = write_log(tmp_path / "bare.mcap", truth=False)
-    (tmp_path / "c.toml").write_text('[training]\nsource = "patch"')
-    options = ReplayOptions(config=load_config(tmp_path / "c.toml"))
-    assert roadeval.train([bare], tmp_path / "m.model", options=options).source == "patch"
-    assert roadeval.train([bare, drive], tmp_path / "m.model", options=options).source == "patch"
+    patch = settings(source="patch")
+    assert roadeval.train([bare], tmp_path / "m.model", patch).source == "patch"
+    assert roadeval.train([bare, drive], tmp_path / "m.model", patch).source == "patch"
     assert run(bare, tmp_path, model=tmp_path / "m.model").summary["training"]["frames"] == 10
 
 
 def test_the_memory_of_training_is_bounded_over_all_drives(drive, tmp_path, monkeypatch):
     other = write_log(tmp_path / "other.mcap")
-    monkeypatch.setattr("roadeval.jobs.learning.GREATEST_MEMORY", 15 * 10_000)
+    monkeypatch.setattr("roadeval.training.held.GREATEST_MEMORY", 15 * 10_000)
     with pytest.raises(RoadevalError, match=r"more than 1\d of them would take"):
         roadeval.train([drive, other], tmp_path / "m.model")
 
@@ -227,24 +201,20 @@ def test_a_drive_without_truth_is_no_help_to_others(drive, tmp_path):
 
 def test_a_model_made_for_other_settings_is_refused(drive, tmp_path):
     roadeval.train([drive], tmp_path / "m.model")
-    (tmp_path / "c.toml").write_text("[svm]\ngamma = 3.0")
     with pytest.raises(RoadevalError, match=r"gamma 0.5 there, 3.0 here"):
-        run(drive, tmp_path, model=tmp_path / "m.model", config=load_config(tmp_path / "c.toml"))
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["c.toml", "m.model"]
+        run(drive, tmp_path, model=tmp_path / "m.model", svm={"gamma": 3.0})
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["m.model"]
 
 
 def test_a_further_variant_is_run_like_the_two(drive, tmp_path):
-    config = Config()
-    wide = replace(
-        config, stages={**config.stages, "shadow": type(config.stages["shadow"])(ring_width=3)}
-    )
+    wide = {"shadow": {"ring_width": 3}}
     outcome = run(drive, tmp_path, variants={"wide": wide}, max_frames=16)
     assert set(outcome.summary["totals"]["wide"]) == {"similarity", "svm", "post"}
     assert roadeval.Recording(outcome.recording).layer("wide", "rings", 12).max() == 2
 
 
 def test_a_mask_in_the_log_is_scored_as_a_variant(drive, tmp_path):
-    outcome = run(drive, tmp_path, mask_topics={"net": "/net/road_mask_prediction"})
+    outcome = run(drive, tmp_path, masks={"net": "/net/road_mask_prediction"})
     total = outcome.summary["totals"]["net"]["post"]
     assert (total["ERR"], total["frames"]) == (0, 15)
     assert roadeval.Recording(outcome.recording).layer("net", "post", 12).max() == 1
@@ -253,10 +223,10 @@ def test_a_mask_in_the_log_is_scored_as_a_variant(drive, tmp_path):
 def test_the_folder_of_the_log_is_made_and_gone_again_if_the_run_is_refused(drive, tmp_path):
     names = {"save": "o.rrd", "reports": "reports", "mcap": "new/m.mcap"}
     outputs = {option: tmp_path / name for option, name in names.items()}
-    with pytest.raises(RoadevalError, match="--train-frames"):
-        roadeval.replay(drive, **outputs, options=ReplayOptions(max_frames=3))
+    with pytest.raises(RoadevalError, match="training"):
+        roadeval.replay(drive, settings(max_frames=3), **outputs)
     assert list(tmp_path.iterdir()) == []
-    roadeval.replay(drive, **outputs, options=ReplayOptions(max_frames=14))
+    roadeval.replay(drive, settings(max_frames=14), **outputs)
     assert (tmp_path / "new" / "m.mcap").exists()
 
 
@@ -265,7 +235,7 @@ def test_results_become_a_log_with_the_images_own_times(drive, tmp_path):
     scored = pd.read_csv(tmp_path / "frames.csv").query("variant == 'filtered' and stage == 'post'")
     with open_log(tmp_path / "side.mcap") as side:
         counts = {topic.name: topic.count for topic in side.topics}
-        masks = side.select(image="/roadeval/filtered/post", truth="")
+        masks = side.select(TopicSettings(image="/roadeval/filtered/post", truth=""))
         stamps = [logged.stamp_ns for logged in side.frames(masks)]
     assert counts["/roadeval/unfiltered/svm"] == FRAMES
     assert counts["/roadeval/metrics/filtered/post"] == len(scored)
@@ -371,21 +341,15 @@ def test_an_output_never_replaces_the_drive(tmp_path, output):
     assert log.read_bytes() == before
 
 
-def test_a_variant_s_own_training_is_not_followed_and_this_is_said(drive, tmp_path):
-    (tmp_path / "v.toml").write_text("[training]\nframes = 3")
-    config = load_config(tmp_path / "v.toml")
-    outcome = run(drive, tmp_path, variants={"v": config}, max_frames=14)
-    assert outcome.summary["totals"]["v"]["post"]["frames"] == 4
-    assert any("v: its own [training] is not followed" in text for text in outcome.warnings)
+def test_a_variant_whose_preset_trains_otherwise_is_trained_like_the_rest_and_warned_of():
+    config = settings(variants={"v": {"preset": "robust"}})
+    (pixels, most) = config.ignored()
+    assert "v: preset robust asks for training.pixels_per_class = 800" in pixels
+    assert "training.max_pixels = 20000" in most
+    assert settings(preset="robust", variants={"v": {"preset": "robust"}}).ignored() == ()
 
 
-@pytest.mark.parametrize("jobs", [0, -2])
-def test_no_workers_are_refused(drive, tmp_path, jobs):
-    with pytest.raises(RoadevalError, match="at least one worker"):
-        run(drive, tmp_path, jobs=jobs)
-
-
-@pytest.mark.parametrize("table", COLUMNS)
+@pytest.mark.parametrize("table", TABLES)
 def test_a_table_is_the_same_in_the_folder_and_in_the_recording_bit_by_bit(once, table):
     folder, outcome = once
     recording, results = roadeval.Recording(outcome.recording), Results(folder / "reports")
@@ -394,22 +358,25 @@ def test_a_table_is_the_same_in_the_folder_and_in_the_recording_bit_by_bit(once,
     pd.testing.assert_frame_equal(recording.table(table), written, check_exact=True)
 
 
-def test_the_summary_tells_what_was_asked_of_the_log(drive, tmp_path):
-    asked = {
-        "truth_topic": "/truth/road",
-        "road_labels": (255,),
-        "start": "0.2",
-        "every": 2,
-        "max_frames": 12,
-        "sync_tolerance_ms": 3.0,
-        "record": "none",
-        "resize_truth": True,
-    }
-    run(drive, tmp_path, train_frames=4, jobs=1, **asked)
-    told = json.loads((tmp_path / "reports" / "summary.json").read_text())["selection"]
-    assert {name: told[name] for name in asked} == asked | {"road_labels": [255]}
-    assert (told["end"], told["mask_topics"], told["keep_corrupt"]) == (None, {}, False)
-    assert not {"jobs", "config", "train_frames"} & set(told)
+def test_the_summary_holds_the_run_s_configuration(drive, tmp_path):
+    config = settings(
+        truth="/truth/road",
+        road=[255],
+        start="0.2",
+        every=2,
+        max_frames=12,
+        record="none",
+        resize_truth=True,
+        train_frames=4,
+        variants={"wide": {"shadow": {"ring_width": 3}}},
+    )
+    roadeval.replay(drive, config, save=tmp_path / "o.rrd", reports=tmp_path)
+    written = json.loads((tmp_path / "summary.json").read_text())
+    outputs = {"save": str(tmp_path / "o.rrd"), "reports": str(tmp_path)}
+    whole = config.override({"output": outputs})
+    assert written["run"] == json.loads(json.dumps(whole.as_dict()))
+    assert written["settings"]["unfiltered"]["chain"] == ["similarity", "svm", "post"]
+    assert written["settings"]["wide"]["shadow"]["ring_width"] == 3
 
 
 def test_changes_are_what_the_recorded_masks_show(once):
@@ -450,7 +417,7 @@ def test_a_perfect_svm_is_counted_on_evaluated_frames_alone_and_in_no_other_tabl
 
 
 def test_a_mask_in_the_log_has_no_oracles(drive, tmp_path):
-    outcome = run(drive, tmp_path, mask_topics={"net": "/net/road_mask_prediction"})
+    outcome = run(drive, tmp_path, masks={"net": "/net/road_mask_prediction"})
     assert set(outcome.summary["oracles"]) == {"filtered", "unfiltered"}
     assert outcome.summary["beyond"]["net"]["boundary_F"] == 1
 
@@ -469,10 +436,10 @@ def test_a_broken_frame_is_no_neighbour(tmp_path):
 
 
 def test_a_scale_reduces_images_truth_and_recording_alike(drive, tmp_path, once):
-    outcome = run(drive, tmp_path, scale=0.5, mask_topics={"net": "/net/road_mask_prediction"})
+    outcome = run(drive, tmp_path, scale=0.5, masks={"net": "/net/road_mask_prediction"})
     full, small = once[1].summary["drive"], outcome.summary["drive"]
     assert (small["width"], small["height"]) == (full["width"] // 2, full["height"] // 2)
-    assert outcome.summary["selection"]["scale"] == 0.5
+    assert outcome.summary["run"]["frames"]["scale"] == 0.5
     frames = frames_of(tmp_path)
     assert set(frames["N"]) == {small["width"] * small["height"]}
     # The log's own masks are reduced like the truth that they are copies of.
@@ -485,12 +452,12 @@ def test_a_scale_reduces_images_truth_and_recording_alike(drive, tmp_path, once)
 
 @pytest.mark.parametrize("scale", [0, -1, 1.01, float("nan")])
 def test_a_scale_that_is_no_share_is_refused(scale):
-    with pytest.raises(RoadevalError, match="--scale"):
-        ReplayOptions(scale=scale)
+    with pytest.raises(RoadevalError, match=r"frames\.scale: input should be"):
+        settings(scale=scale)
 
 
 def test_reduced_frames_and_a_model_of_another_size_are_told(drive, tmp_path):
-    roadeval.train([drive], tmp_path / "m.model", options=ReplayOptions(scale=0.5))
+    roadeval.train([drive], tmp_path / "m.model", settings(scale=0.5))
     warnings = " ".join(run(drive, tmp_path, model=tmp_path / "m.model").warnings)
     assert "the model learnt from frames of" in warnings
     assert "are reduced to" not in warnings
@@ -501,18 +468,18 @@ def test_reduced_frames_and_a_model_of_another_size_are_told(drive, tmp_path):
 
 
 def test_reduced_masks_do_not_go_beside_the_log(drive, tmp_path):
-    with pytest.raises(RoadevalError, match="--mcap and --scale do not go"):
-        roadeval.replay(drive, mcap=tmp_path / "o.mcap", options=ReplayOptions(scale=0.5))
+    with pytest.raises(RoadevalError, match=r"output\.mcap and frames\.scale do not go"):
+        roadeval.replay(drive, settings(scale=0.5), mcap=tmp_path / "o.mcap")
 
 
 def test_results_that_wait_have_lost_their_layers_but_not_their_masks(drive):
     class Seen:
-        def encode(self, result, position):
+        def encode(self, result, position, lines):
             return result
 
-    options = ReplayOptions(max_frames=14)
+    options = settings(max_frames=14)
     with open_log(drive) as log:
-        *_, (lean, whole) = Run(log, options, lambda progress: None).frames(Seen())
+        *_, (lean, _, whole) = Run(log, options, ignore).frames(Seen())
     assert any(list(variant.layers()) for variant in whole.variants)
     assert not any(list(variant.layers()) for variant in lean.variants)
     assert lean.tallies == whole.tallies

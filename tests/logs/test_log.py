@@ -6,8 +6,18 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType
 
-from roadeval.logs import FrameError, Instant, LabelValues, LogError, Span, open_log, parse_time
-from roadeval.logs.container import chunks
+from roadeval.logs import (
+    FrameError,
+    FrameSettings,
+    Instant,
+    LabelSettings,
+    LogError,
+    Span,
+    TopicSettings,
+    open_log,
+    parse_time,
+)
+from roadeval.logs.container import chunks, compression
 from roadeval.logs.container.records import Message
 from roadeval.logs.topics.pairing import UNREADABLE
 from tests.logs.making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
@@ -71,6 +81,13 @@ def test_a_range_is_half_open_and_keeps_the_numbers(tmp_path: Path) -> None:
     assert numbers(path, Span(parse_time("0.1"), every=3, max_frames=2)) == [1, 4]
 
 
+def test_a_range_is_made_of_settings() -> None:
+    settings = FrameSettings(start="1.5", end="1700000000000000000", every=2, max_frames=3)
+    span = Span(Instant(1_500_000_000, relative=True), Instant(1_700_000_000 * SECOND), 2, 3)
+    assert Span.of(settings) == span
+    assert Span.of(FrameSettings()) == Span()
+
+
 def test_an_empty_range_says_where_the_images_lie(tmp_path: Path) -> None:
     path = drive(tmp_path / "drive.mcap", STAMPS)
     with pytest.raises(LogError, match=r"no frame in this range.*from 0.000 to 0.900"):
@@ -132,13 +149,13 @@ def test_a_file_of_a_folder_that_is_no_log_costs_its_part_only(tmp_path: Path) -
         assert "bag_1.mcap: the file is empty" in log.losses[0]
 
 
-@pytest.mark.parametrize("compression", list(CompressionType))
+@pytest.mark.parametrize("kind", list(CompressionType))
 def test_chunks_too_big_for_memory_are_read_all_the_same(
-    tmp_path: Path, compression: CompressionType, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, kind: CompressionType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = drive(tmp_path / "drive.mcap", STAMPS, STAMPS, compression=compression)
+    path = drive(tmp_path / "drive.mcap", STAMPS, STAMPS, compression=kind)
     monkeypatch.setattr(chunks, "BIG", 1000)
-    monkeypatch.setattr(chunks, "BLOCK", 100)
+    monkeypatch.setattr(compression, "BLOCK", 100)
     with open_log(path) as log:
         log.verify()
         frames = [frame.decode() for frame in log.frames(log.select())]
@@ -165,16 +182,16 @@ def test_a_stamp_that_cannot_be_read_is_told_from_every_time(
 ) -> None:
     path = ros2_log(tmp_path / "drive.mcap", [("/cam", i, compressed(i, b"")) for i in range(3)])
     with open_log(path) as log:
-        track = log._tracks["/cam"]
-        read = track.message
+        reader = log._readers["/cam"]
+        read = reader.message
 
         def message(position: int) -> Message:
             if position == 1:
                 raise FrameError("torn")
             return read(position)
 
-        monkeypatch.setattr(track, "message", message)
-        assert [track.stamp(i) for i in (0, 1, 2, 1)] == [0, UNREADABLE, 2, UNREADABLE]
+        monkeypatch.setattr(reader, "message", message)
+        assert [reader.stamp(i) for i in (0, 1, 2, 1)] == [0, UNREADABLE, 2, UNREADABLE]
 
 
 def test_truth_of_another_size_is_refused_and_the_remedy_named(tmp_path: Path) -> None:
@@ -184,9 +201,11 @@ def test_truth_of_another_size_is_refused_and_the_remedy_named(tmp_path: Path) -
     ]
     path = ros2_log(tmp_path / "small.mcap", messages)
     with open_log(path) as log:
-        with pytest.raises(LogError, match=r"/labels is 4x3, but /cam is 8x6: .*--resize-truth"):
+        with pytest.raises(
+            LogError, match=r"/labels is 4x3, but /cam is 8x6: .*topics.resize_truth"
+        ):
             log.select()
-        frame = next(log.frames(log.select(resize_truth=True))).decode()
+        frame = next(log.frames(log.select(TopicSettings(resize_truth=True)))).decode()
     assert frame.truth is not None
     assert frame.truth.shape == (6, 8)
 
@@ -211,7 +230,8 @@ def test_another_systems_masks_and_true_shadow_come_along(tmp_path: Path) -> Non
     ]
     path = ros2_log(tmp_path / "net.mcap", messages)
     with open_log(path) as log:
-        frame = next(log.frames(log.select(image="/cam", masks={"net": "/net/road"}))).decode()
+        topics = TopicSettings(image="/cam", masks={"net": "/net/road"})
+        frame = next(log.frames(log.select(topics))).decode()
     assert np.array_equal(frame.external["net"], mask // 255)
     assert frame.shadow_truth is not None
     assert np.array_equal(frame.shadow_truth, 1 - mask // 255)
@@ -220,12 +240,12 @@ def test_another_systems_masks_and_true_shadow_come_along(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("drive_name", "labels", "road"),
     [
-        ("camvid_0016E5_15hz", LabelValues((3,), (11,)), True),
-        ("camvid_0006R0_1hz", LabelValues(), True),
-        ("ford_shadows_unlabelled_raw", LabelValues(), False),
+        ("camvid_0016E5_15hz", LabelSettings((3,), (11,)), True),
+        ("camvid_0006R0_1hz", LabelSettings(), True),
+        ("ford_shadows_unlabelled_raw", LabelSettings(), False),
     ],
 )
-def test_real_drives(data: Path, drive_name: str, labels: LabelValues, road: bool) -> None:
+def test_real_drives(data: Path, drive_name: str, labels: LabelSettings, road: bool) -> None:
     with open_log(data / "drives" / f"{drive_name}.mcap") as log:
         stream = log.frames(log.select(labels=labels))
         frame = next(stream).decode()

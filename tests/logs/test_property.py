@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.logs import FrameError, LogError, open_log
+from roadeval.logs import FrameError, LogError, TopicSettings, open_log
 from roadeval.logs.container.file import OUTSIDE, Container
 from tests.logs.making import CAMERA, CONTAINERS, small_log
 
@@ -94,7 +94,7 @@ def read(path: Path) -> tuple[dict[int, tuple[int, bytes]], tuple[str, ...]]:
     found = {}
     with open_log(path) as log:
         log.verify()
-        for logged in log.frames(log.select(image=CAMERA, truth="")):
+        for logged in log.frames(log.select(TopicSettings(image=CAMERA, truth=""))):
             try:
                 frame = logged.decode()
             except FrameError:

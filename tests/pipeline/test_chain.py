@@ -1,42 +1,22 @@
 """Stages in a row: what each sees, and that a chain is a pure function of the image."""
 
+import dataclasses
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
-from roadeval.pipeline.chain import STAGES, Chain, layers_of, masks_of
-from roadeval.pipeline.stage import TrainingSet, View
+from roadeval.pipeline import beyond, paper
+from roadeval.pipeline.chain import STAGES, Pipeline
+from roadeval.pipeline.stage import View
 from tests.pipeline.images import IMAGES, noise
-
-NAMES = ("shadow", "similarity", "svm", "post")
-SETTINGS = {
-    "paper": {name: STAGES[name].settings() for name in NAMES},
-    "printed": {
-        "shadow": STAGES["shadow"].settings(
-            threshold="printed", inclusive=True, statistic="printed", colour_space="hsi"
-        ),
-        "similarity": STAGES["similarity"].settings(),
-        "svm": STAGES["svm"].settings(kernel="linear"),
-        "post": STAGES["post"].settings(operations=("close", "open")),
-    },
-}
-
-
-def fitted(settings):
-    rng = np.random.default_rng(0)
-    grey = rng.normal(110, 20, (60, 1)) + rng.normal(0, 6, (60, 3))
-    colours = np.concatenate([np.clip(grey, 0, 255).astype(np.uint8), noise(1, 60)[0]])
-    where = np.zeros(120, np.intp)
-    sample = TrainingSet((colours[None],), where, where, np.arange(120), np.arange(120) < 60)
-    return {name: STAGES[name].fit(sample, settings[name]) for name in ("similarity", "svm")}
+from tests.pipeline.making import NAMES, SETTINGS, chain_of
 
 
 @pytest.fixture(scope="module", params=SETTINGS.values(), ids=SETTINGS)
 def chains(request):
     """The chain with the filter and without, as each preset has it."""
-    parameters = fitted(request.param)
-    return [Chain(names, request.param, parameters) for names in (NAMES, NAMES[1:])]
+    return [chain_of(names, request.param) for names in (NAMES, NAMES[1:])]
 
 
 def arrays(chain, image):
@@ -78,7 +58,7 @@ def test_layers_are_the_ones_announced_in_shape_and_type(chains):
     for names, chain in zip((NAMES, NAMES[1:]), chains, strict=True):
         settings = {step.stage.name: step.settings for step in chain.steps}
         layers = [layer for _, output in chain.run(View.of(image)) for layer in output.layers]
-        assert tuple(layer.spec for layer in layers) == layers_of(names, settings)
+        assert tuple(layer.spec for layer in layers) == Pipeline(names, settings).layers()
         for layer in layers:
             assert layer.array.shape[:2] == image.shape[:2]
             wanted = np.float32 if layer.spec.name == "distance" else np.uint8
@@ -95,7 +75,7 @@ def test_a_stages_mask_is_the_layer_of_its_name(chains):
 
 
 def test_stages_that_yield_masks_are_all_but_the_filters():
-    assert masks_of(NAMES) == ("similarity", "svm", "post")
+    assert Pipeline.default(NAMES).masks() == ("similarity", "svm", "post")
 
 
 @pytest.mark.parametrize("image", IMAGES.values(), ids=IMAGES)
@@ -134,3 +114,43 @@ def test_what_was_handed_out_is_not_changed_by_the_next_image(chains):
         kept = [(name, array.copy()) for name, array in handed_out]
         arrays(chain, second)
         assert_same(handed_out, kept)
+
+
+# --- Pipelines ------------------------------------------------------------------------------------
+
+
+def test_a_stage_is_found_in_the_file_that_bears_its_name():
+    for name, stage in STAGES.items():
+        homes = [room for room in (paper, beyond) if hasattr(room, name)]
+        assert [getattr(room, name).STAGE for room in homes] == [stage]
+
+
+def test_without_its_filters_a_pipeline_keeps_the_other_settings():
+    pipeline = Pipeline.default(("exposure", *NAMES))
+    bare = pipeline.without_filter()
+    assert pipeline.has_filter
+    assert not bare.has_filter
+    assert bare.chain == ("exposure", "similarity", "svm", "post")
+    assert bare.settings == {name: pipeline.settings[name] for name in bare.chain}
+
+
+def test_what_is_learnt_depends_on_filters_and_on_stages_that_learn():
+    pipeline = Pipeline.default(NAMES)
+    assert pipeline.learning() == ("similarity", "svm")
+    assert list(pipeline.relevant()) == ["shadow", "similarity", "svm"]
+
+
+def test_what_is_learnt_does_not_depend_on_settings_of_inference_only(monkeypatch):
+    another = dataclasses.replace(STAGES["svm"], name="another", inference_only=("gamma", "c"))
+    monkeypatch.setitem(STAGES, "another", another)
+    kept = Pipeline.default(("another", "post")).relevant()
+    assert {name: set(own) for name, own in kept.items()} == {
+        "another": {"kernel", "standardise", "threshold"}
+    }
+
+
+@pytest.mark.parametrize("stage", STAGES.values(), ids=STAGES)
+def test_settings_of_inference_only_are_those_of_a_stage_that_learns(stage):
+    settings = {entry.name for entry in dataclasses.fields(stage.settings)}
+    assert settings >= set(stage.inference_only)
+    assert stage.fit is not None or not stage.inference_only

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from roadeval.pipeline import colour_table
+from roadeval.pipeline.colour_cube import Slabs
 from roadeval.pipeline.colour_table import FEW, ColourTable
-from roadeval.pipeline.cube import Slabs
 from tests.pipeline.images import noise
 
 GREEN, BLUE = np.indices((256, 256))

@@ -6,10 +6,10 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from roadeval.pipeline.chain import STAGES, Chain
+from roadeval.pipeline.chain import STAGES, Pipeline
 from roadeval.pipeline.stage import TrainingSet, View
 from tests.pipeline import reference
-from tests.pipeline.test_chain import SETTINGS
+from tests.pipeline.making import SETTINGS
 
 TRAINING, CHECKED = (0, 3, 6, 9), (12, 34, 56, 78, 100)
 ROAD, IGNORED = 3, 11
@@ -53,11 +53,11 @@ def test_every_layer_equals_the_plain_pipeline(drive, preset, filtered):
     images, truths = drive
     settings, printed = SETTINGS[preset], preset == "printed"
     names = ("shadow", "similarity", "svm", "post")[0 if filtered else 1 :]
-    before = Chain(names[:1] if filtered else (), settings, {})
+    before = Pipeline(names[:1] if filtered else (), settings).bind({})
     seen = [before.filtered(images[number]) for number in TRAINING]
     training = sample(seen, [truths[number] for number in TRAINING])
     fitted = {name: STAGES[name].fit(training, settings[name]) for name in ("similarity", "svm")}
-    chain = Chain(names, settings, fitted)
+    chain = Pipeline(names, settings).bind(fitted)
     model = reference.train(training.colours(), training.road, settings["svm"].kernel)
 
     for number in CHECKED if not printed else CHECKED[:2]:

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from roadeval.data.packed import Packed
-from roadeval.pipeline.chain import STAGES, Chain
-from roadeval.pipeline.paper import shadow
-from roadeval.pipeline.stage import View
+from roadeval.pipeline.chain import STAGES
+from roadeval.pipeline.paper import compensation
+from roadeval.pipeline.stage import Output, View
 from tests.pipeline.images import noise
-from tests.pipeline.test_chain import NAMES, SETTINGS, fitted
+from tests.pipeline.making import NAMES, SETTINGS, chain_of
 
 IMAGE = noise(40, 60)
 SEEN = View.of(IMAGE)
@@ -22,7 +22,7 @@ TRULY_DARK[:, 58:] = 255
 
 @pytest.fixture(scope="module", params=SETTINGS.values(), ids=SETTINGS)
 def chain(request):
-    return Chain(NAMES, request.param, fitted(request.param))
+    return chain_of(NAMES, request.param)
 
 
 def assert_same(found, expected, name=""):
@@ -48,15 +48,15 @@ def test_a_perfect_svm_is_the_truth_with_ignored_pixels_as_non_road_given_to_pos
     expected = STAGES["post"].bind(post.settings, None)
     told = oracles(chain)["svm"]
     assert list(told) == ["post"]
-    assert_same(told["post"], expected(View(IMAGE, IMAGE, given)).mask)
+    assert_same(told["post"], expected(SEEN.after(Output(mask=given))).mask)
 
 
 def test_a_perfect_filter_compensates_true_shadow_and_all_stages_follow(chain):
     settings = chain.steps[0].settings
-    image, *_ = shadow.lift(View.of(IMAGE), Packed.of(TRULY_DARK == 1), settings)
+    image, *_ = compensation.lift(View.of(IMAGE), Packed.of(TRULY_DARK == 1), settings)
     assert (image != IMAGE).any()
     own = {step.stage.name: step.settings for step in chain.steps}
-    after = Chain(NAMES[1:], own, fitted(own))
+    after = chain_of(NAMES[1:], own)
     told = oracles(chain)["shadow"]
     assert list(told) == ["similarity", "svm", "post"]
     for name, mask in masks(after, image).items():
@@ -78,7 +78,7 @@ def test_the_replaced_stage_sees_the_image_that_those_before_it_made(chain):
     names = ("exposure", *NAMES)
     settings = {step.stage.name: step.settings for step in chain.steps}
     settings["exposure"] = STAGES["exposure"].settings()
-    longer = Chain(names, settings, fitted(settings))
+    longer = chain_of(names, settings)
     outputs = [output for _, output in longer.run(SEEN)]
     assert outputs[0].image is not None
     assert (outputs[0].image != IMAGE).any()
@@ -90,7 +90,7 @@ def test_the_replaced_stage_sees_the_image_that_those_before_it_made(chain):
 def test_a_perfect_filter_leaves_a_frame_without_shadow_as_it_is(chain):
     own = {step.stage.name: step.settings for step in chain.steps}
     told = oracles(chain, np.zeros_like(TRULY_DARK))["shadow"]
-    expected = masks(Chain(NAMES[1:], own, fitted(own)), IMAGE)
+    expected = masks(chain_of(NAMES[1:], own), IMAGE)
     assert list(told) == list(expected)
     for name, mask in expected.items():
         assert_same(told[name], mask, name)
@@ -117,7 +117,7 @@ def test_variants_share_what_follows_a_perfect_mask_and_nothing_else(chain):
     again = dict(chain.oracles(SEEN, outputs, ROAD, TRULY_DARK, known))
     assert again["svm"] is first["svm"]
     assert again["shadow"] is not first["shadow"]
-    other = Chain(["svm", "post"], SETTINGS["printed"], fitted(SETTINGS["printed"]))
+    other = chain_of(["svm", "post"], SETTINGS["printed"])
     outputs = [output for _, output in other.run(SEEN)]
     alone = dict(other.oracles(SEEN, outputs, ROAD, None, {}))["svm"]
     shared = dict(other.oracles(SEEN, outputs, ROAD, None, known))["svm"]

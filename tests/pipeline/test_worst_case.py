@@ -5,11 +5,10 @@ from time import thread_time
 import numpy as np
 import pytest
 
-from roadeval.pipeline.chain import Chain
-from roadeval.pipeline.paper import post as morphology
-from roadeval.pipeline.stage import View
+from roadeval.pipeline.chain import Pipeline
+from roadeval.pipeline.paper import post
+from roadeval.pipeline.stage import Output, View
 from roadeval.runtime.threads import one_thread_each
-from tests.pipeline.test_chain import SETTINGS
 
 SMALL, LARGE = (180, 320), (1440, 2560)
 """One is 64 times the other: what grew with the square would take 64 times as long a pixel."""
@@ -29,14 +28,14 @@ def specks(shape):
 def components_and_seconds(shape, runs):
     """How many components the filter finds, and the least CPU time of filter and morphology."""
     image, seconds = specks(shape), []
-    chain = Chain(("shadow",), SETTINGS["paper"], {})
+    chain = Pipeline.default(["shadow"]).bind({})
     # Without the opening, which would remove the specks before they are labelled.
-    post = morphology.bind(morphology.MorphologySettings(operations=()), None)
+    process = post.bind(post.PostSettings(operations=()), None)
     with one_thread_each():
         for _ in range(runs):
             start = thread_time()
             ((_, output),) = chain.run(View.of(image))
-            post(View(image, image, output.regions["shadow"]))
+            process(View.of(image).after(Output(mask=output.regions["shadow"])))
             seconds.append(thread_time() - start)
     return output.facts["components"], min(seconds)
 

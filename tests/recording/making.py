@@ -1,6 +1,11 @@
 """A drive of tiny frames, and a pipeline's results on them, made by hand."""
 
+import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -14,6 +19,7 @@ from roadeval.data import (
     Layer,
     LayerKind,
     LayerSpec,
+    Output,
     Role,
     StageResult,
     Tally,
@@ -22,7 +28,8 @@ from roadeval.data import (
     mask_spec,
 )
 from roadeval.data.packed import Packed
-from roadeval.recording import Layout
+from roadeval.recording import Layout, Recorder, Recording
+from roadeval.recording.read.rrd_file import RrdFile
 
 HEIGHT, WIDTH = 6, 8
 
@@ -40,12 +47,15 @@ RINGS = LayerSpec(
 POST = mask_spec("post", "Road")
 VARIANT = VariantLayout("filtered", "with the filter", ("post",), (NDI, RINGS, POST))
 FRAMES_HEADER = "frame,variant,stage,ERR\n"
+SUMMARY = {"verdict": "It helps.", "totals": {}, "seconds": {"filtered": {"post": 0.5}}}
+RESULTS = {"summary": json.dumps(SUMMARY), "windows": "window,ERR\n0,0.25\n"}
+RERUN = Path(sys.executable).with_name("rerun")
 
 
 def layout(**changes):
     """The layout of the drive that `result` makes frames of."""
     plain = Layout(
-        "street", WIDTH, HEIGHT, (VARIANT,), rates=("ERR", "FNR"), tables={"frames": FRAMES_HEADER}
+        "street", WIDTH, HEIGHT, (VARIANT,), ("ERR", "FNR"), tables={"frames": FRAMES_HEADER}
     )
     return replace(plain, **changes)
 
@@ -67,11 +77,10 @@ def result(number, *, err=0.25, fnr=0.5, **changes):
     rings = draw.integers(0, 3, (HEIGHT, WIDTH), np.uint8)
     mask = draw.integers(0, 2, (HEIGHT, WIDTH), np.uint8)
     errors = draw.integers(0, 5, (HEIGHT, WIDTH), np.uint8)
-    filtering = StageResult(
-        "shadow", (Layer(NDI, ndi), Layer(RINGS, rings)), None, {}, {"components": 3.0}, 0.004
-    )
+    found = Output((Layer(NDI, ndi), Layer(RINGS, rings)), facts={"components": 3.0})
+    filtering = StageResult("shadow", found, 0.004)
     packed = Packed.of(mask)
-    final = StageResult("post", (Layer(POST, packed),), packed, {}, {}, 0.002)
+    final = StageResult("post", Output((Layer(POST, packed),), mask=packed), 0.002)
     tally = Tally("filtered", "post", Counts(1, 2, 3, 4), rates={"ERR": err, "FNR": fnr})
     plain = FrameResult(
         shown,
@@ -80,19 +89,25 @@ def result(number, *, err=0.25, fnr=0.5, **changes):
         errors={"filtered": Layer(ERRORS, errors)},
         tallies=(tally,),
         health={"filtered": Health.OK},
-        tables={"frames": f"{number},filtered,post,{err}\n"},
     )
     return replace(plain, **changes)
 
 
 def unscored(number, role=Role.TRAINING):
     """A frame that is recorded, but not counted."""
-    return result(number, role=role, errors={}, tallies=(), health={}, tables={})
+    return result(number, role=role, errors={}, tallies=(), health={})
+
+
+def lines(result):
+    """The frame's line of the table: one if it was scored."""
+    rows = (f"{result.frame.number},filtered,post,{t.rates['ERR']}\n" for t in result.tallies)
+    return {"frames": "".join(rows)} if result.tallies else {}
 
 
 def rows_of(recording, path, component):
     """How many values each frame's row of an entity has: none where nothing is to be shown."""
-    chunks = recording._stream().filter(content=path, components=component, is_static=False)
+    chunks = RrdFile(recording.path).stream()
+    chunks = chunks.filter(content=path, components=component, is_static=False)
     batches = [chunk.to_record_batch() for chunk in chunks]
     return {
         frame: len(values)
@@ -101,3 +116,26 @@ def rows_of(recording, path, component):
             batch.column("frame").to_pylist(), batch.column(component).to_pylist(), strict=True
         )
     }
+
+
+def some_frames():
+    """Two training frames, 17 evaluated ones with two notes on one."""
+    frames = [*map(unscored, range(2)), *map(result, range(2, 19))]
+    frames[5] = replace(frames[5], notes=("It rains.", "It pours."))
+    return frames
+
+
+def record(path, results, known=None, texts=None):
+    """Write a complete recording of these frames, and open it."""
+    with Recorder(path, known or layout()) as recorder:
+        for each in results:
+            recorder.write(recorder.encode(each, lines(each)))
+        recorder.finish(RESULTS if texts is None else texts)
+    return Recording(path)
+
+
+def rerun(*words):
+    """Run Rerun's own tool; its exit code."""
+    quiet = {**os.environ, "CI": "1"}
+    words = [RERUN, "rrd", *map(str, words)]
+    return subprocess.run(words, env=quiet, capture_output=True, check=False).returncode

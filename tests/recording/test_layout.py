@@ -2,7 +2,9 @@
 
 import pytest
 
+from roadeval.data import RESERVED
 from roadeval.recording import Layout, RecordingError
+from roadeval.recording.read.rrd_file import RrdFile
 from tests.recording.making import VARIANT, layout
 
 
@@ -35,8 +37,14 @@ def test_a_layout_survives_its_json():
     assert Layout.from_json(whole.to_json()) == whole
 
 
-@pytest.mark.parametrize("name", ["camera", "truth", "metrics", "state", "frame", "results"])
+@pytest.mark.parametrize("name", sorted(RESERVED))
 def test_a_variant_cannot_take_a_name_that_the_recording_uses(name):
     variant = type(VARIANT)(name, "", ("post",), VARIANT.layers)
     with pytest.raises(RecordingError, match=f"named '{name}'"):
         layout(variants=(variant,))
+
+
+def test_every_path_that_is_no_variants_begins_with_a_reserved_name(recording):
+    chunks = RrdFile(recording.path).stream()
+    tops = {str(chunk.entity_path).split("/")[1] for chunk in chunks}
+    assert tops - {"filtered", "__properties"} < RESERVED

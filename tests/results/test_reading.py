@@ -2,71 +2,96 @@
 
 import math
 
+import pandas as pd
 import pytest
 
-from roadeval.evaluation import metrics
-from roadeval.results.reading import RATES, TableError, read_table
+from roadeval.results.reading import ResultsError, fingerprint, read_table, table_of
+from roadeval.results.schema import TABLES
 
-COLUMNS = ("frame", "variant", "TP", "ERR", "pooled_FPR")
-HEADER = ",".join(COLUMNS) + "\n"
-KINDS = {"frame": "int64", "TP": "int64", "ERR": "float64", "pooled_FPR": "float64"}
+HEADER = TABLES["oracles"].header
+KINDS = {"frame": "int64", "TP": "int64", "ERR": "float64", "FPR": "float64"}
+
+
+def line(frame=1, variant="net", tp=2, err="0.5"):
+    return f"{frame},{variant},svm,post,{tp},4,0,0,6,0.5,{err},0.1,0.2,0.3,0.25\n"
 
 
 def kinds(table):
     return {name: str(table[name].dtype) for name in KINDS}
 
 
-def test_numbers_come_back_bit_by_bit():
+def test_numbers_come_back_bit_exactly():
     rates = [0.1 + 0.2, 1 / 3, 5e-324, 0.7142857142857143]
-    lines = "".join(f"{n},net,{2**62 + n},{rate},0.0\n" for n, rate in enumerate(rates))
-    table = read_table(HEADER + lines, COLUMNS)
+    lines = "".join(line(n, "net", 2**62 + n, rate) for n, rate in enumerate(rates))
+    table = read_table("oracles", HEADER + lines)
     assert table["ERR"].tolist() == rates
     assert table["TP"].tolist() == [2**62 + n for n in range(4)]
 
 
 @pytest.mark.parametrize("name", ["007", "NA", "nan", "null", "true"])
 def test_a_name_is_text_whatever_it_looks_like(name):
-    assert read_table(f"{HEADER}1,{name},2,0.5,0.5\n", COLUMNS)["variant"].tolist() == [name]
+    assert read_table("oracles", HEADER + line(variant=name))["variant"].tolist() == [name]
 
 
 def test_a_rate_that_is_undefined_everywhere_is_a_number_all_the_same():
-    table = read_table(f"{HEADER}1,net,2,,1\n", COLUMNS)
+    table = read_table("oracles", HEADER + line(err=""))
     assert math.isnan(table["ERR"][0])
     assert kinds(table) == KINDS
 
 
 @pytest.mark.parametrize("text", ["", HEADER])
 def test_a_table_without_rows_has_its_columns(text):
-    table = read_table(text, COLUMNS)
+    table = read_table("oracles", text)
     assert table.empty
-    assert tuple(table.columns) == COLUMNS
+    assert tuple(table.columns) == TABLES["oracles"].names
     assert kinds(table) == KINDS
 
 
 def test_a_file_is_read_like_its_text(tmp_path):
-    text = f"{HEADER}1,net,2,0.1,0.25\n"
-    (tmp_path / "frames.csv").write_text(text)
-    assert read_table(tmp_path / "frames.csv", COLUMNS).equals(read_table(text, COLUMNS))
+    text = HEADER + line()
+    (tmp_path / "oracles.csv").write_text(text)
+    assert read_table("oracles", tmp_path / "oracles.csv").equals(read_table("oracles", text))
 
 
-def test_the_rates_are_those_of_the_evaluation():
-    assert tuple(metrics.METRICS) == RATES
+def test_a_file_that_is_not_there_has_no_rows(tmp_path):
+    assert read_table("oracles", tmp_path / "oracles.csv").empty
+
+
+def test_a_metric_that_was_not_known_then_is_undefined():
+    old = HEADER.replace(",FPR", "") + line().replace(",0.25\n", "\n")
+    table = read_table("oracles", old)
+    assert math.isnan(table["FPR"][0])
+    assert kinds(table) == KINDS
+
+
+def test_rows_make_the_table_that_their_text_would():
+    row = (1, "net", "svm", "post", 2, 4, 0, 0, 6, 0.5, math.nan, 0.1, 0.2, 0.3, 0.25)
+    made = table_of("oracles", [row])
+    pd.testing.assert_frame_equal(made, read_table("oracles", HEADER + line(err="")))
+    pd.testing.assert_frame_equal(table_of("oracles", []), read_table("oracles", ""))
 
 
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("", "Empty CSV file"),
         (HEADER[:-10], "Empty CSV file"),
-        (f"{HEADER}1,net,2,0.1,0.25\n2,net", "Expected 5 columns, got 2"),
-        (f"{HEADER}1,net,2,0.1,0.2", "its last line is cut off"),
-        (f"{HEADER}1,net,two,0.1,0.25\n", "two"),
-        ("frame,variant\n1,net\n", "no column ERR, TP, pooled_FPR"),
+        (f"{HEADER}{line()}2,net", "Expected 15 columns, got 2"),
+        (f"{HEADER}{line()}"[:-2], "its last line is cut off"),
+        (f"{HEADER}{line(tp='two')}", "two"),
+        ("frame,variant\n1,net\n", "no column oracle, stage, TP"),
     ],
 )
 def test_a_damaged_file_is_named_in_one_line(text, why, tmp_path):
-    (tmp_path / "frames.csv").write_text(text)
-    with pytest.raises(TableError, match=why) as caught:
-        read_table(tmp_path / "frames.csv", COLUMNS)
-    assert str(caught.value).startswith(f"{tmp_path / 'frames.csv'}: damaged (")
+    (tmp_path / "oracles.csv").write_text(text)
+    with pytest.raises(ResultsError, match=why) as caught:
+        read_table("oracles", tmp_path / "oracles.csv")
+    assert str(caught.value).startswith(f"{tmp_path / 'oracles.csv'}: damaged (")
     assert "\n" not in str(caught.value)
+
+
+def test_text_that_is_not_the_summarys_is_refused_and_named():
+    text = HEADER + line(1) + line(2)
+    summary = {"tables": {"oracles": fingerprint(text.encode())}}
+    assert len(read_table("oracles", text, summary)) == 2
+    with pytest.raises(ResultsError, match=r"^the recording's table oracles: .* \(1 of 2 rows\)"):
+        read_table("oracles", HEADER + line(1), summary)

@@ -1,4 +1,4 @@
-"""Frames flow in order, bounded, and stop at the first error."""
+"""An ordered, bounded map over threads that stops at the first error."""
 
 import threading
 import time

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from roadeval.config import Config
 from roadeval.data import Frame
+from roadeval.pipeline.chain import Pipeline
 
 GREY, GREEN = (170, 170, 175), (40, 80, 35)
 
@@ -18,7 +18,7 @@ def frame(number: int = 0, *, labelled: bool = True) -> Frame:
     return Frame(number, number, number, image, image.tobytes(), truth=truth if labelled else None)
 
 
-def plans():
-    """Give the two default variants' plans."""
-    config = Config()
-    return {"filtered": config.plan(), "unfiltered": config.without_filter().plan()}
+def pipelines():
+    """The pipelines of the two default variants."""
+    pipeline = Pipeline.default(("shadow", "similarity", "svm", "post"))
+    return {"filtered": pipeline, "unfiltered": pipeline.without_filter()}

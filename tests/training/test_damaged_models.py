@@ -10,15 +10,16 @@ import numpy as np
 import pytest
 
 from roadeval.cli.app import main
-from roadeval.config import preset, variants_of
+from roadeval.config import pipelines_of, preset, variants_of
 from roadeval.errors import RoadevalError
-from roadeval.jobs.learning import from_file, plans_of
 from roadeval.training import TrainingSettings, fit, save_model
+from roadeval.training.learning import from_file
 from tests.e2e.commands import DEMO
 from tests.training.making import frame
 
 EXTRA = {name: preset(name) for name in ("printed", "gated", "robust")}
-VARIANTS = variants_of(preset("paper"), EXTRA)
+PIPELINES = pipelines_of(variants_of(preset("paper"), EXTRA))
+TWO = {name: PIPELINES[name] for name in ("filtered", "unfiltered")}
 
 
 def filled(value):
@@ -55,8 +56,8 @@ def arrays(tmp_path_factory):
     path = tmp_path_factory.mktemp("sound") / "city.model"
     prior = np.linspace(0, 1, 24 * 32, dtype=np.float32).reshape(24, 32)
     settings = TrainingSettings()
-    save_model(fit([frame(n) for n in range(3)], plans_of(VARIANTS), settings, prior), path)
-    from_file(path, VARIANTS)
+    save_model(fit([frame(n) for n in range(3)], PIPELINES, settings, prior), path)
+    from_file(path, PIPELINES)
     with np.load(path) as archive:
         return dict(archive)
 
@@ -67,7 +68,7 @@ def refusal(arrays, folder: Path) -> str:
     with path.open("wb") as file:
         np.savez(file, **arrays)
     with pytest.raises(RoadevalError) as caught:
-        from_file(path, VARIANTS)
+        from_file(path, PIPELINES)
     sentence = str(caught.value)
     assert sentence.startswith(f"{path}: ")
     assert "\n" not in sentence
@@ -152,7 +153,7 @@ def as_bytes(text: str):
 
 def test_no_flipped_byte_is_a_defect_of_the_program(arrays, tmp_path):
     path = tmp_path / "x.model"
-    save_model(fit([frame(n) for n in range(2)], plans_of(VARIANTS[:2]), TrainingSettings()), path)
+    save_model(fit([frame(n) for n in range(2)], TWO, TrainingSettings()), path)
     whole, rng = path.read_bytes(), np.random.default_rng(0)
     # The directory at the end, and places everywhere.
     for place in [*rng.integers(0, len(whole), 200), *range(len(whole) - 120, len(whole))]:
@@ -160,15 +161,15 @@ def test_no_flipped_byte_is_a_defect_of_the_program(arrays, tmp_path):
         spoilt[place] ^= 1 << rng.integers(8)
         path.write_bytes(spoilt)
         with suppress(RoadevalError):
-            from_file(path, VARIANTS[:2])
+            from_file(path, TWO)
 
 
 def test_a_machine_without_the_features_of_a_window_ends_with_one_line_and_code_1(
     tmp_path, capsys, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    plans = plans_of(variants_of(preset("robust"), {}))
-    sound = fit([frame(n) for n in range(3)], plans, TrainingSettings())
+    pipelines = pipelines_of(variants_of(preset("robust"), {}))
+    sound = fit([frame(n) for n in range(3)], pipelines, TrainingSettings())
     machine = sound.parameters["unfiltered"]["context"]
     narrow = replace(machine, planes=machine.planes[:, :-2])
     parameters = {"unfiltered": {**sound.parameters["unfiltered"], "context": narrow}}

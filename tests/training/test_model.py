@@ -12,13 +12,13 @@ from roadeval.config import Config, preset
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.beyond.context import ContextSettings
 from roadeval.training import Model, TrainingSettings, fit, load_model, save_model
-from tests.training.making import frame, plans
+from tests.training.making import frame, pipelines
 
 
 @pytest.fixture(scope="module")
 def model() -> Model:
     prior = np.linspace(0, 1, 24 * 32, dtype=np.float32).reshape(24, 32)
-    return fit([frame(n) for n in range(3)], plans(), TrainingSettings(), prior)
+    return fit([frame(n) for n in range(3)], pipelines(), TrainingSettings(), prior)
 
 
 @pytest.fixture
@@ -51,25 +51,25 @@ def test_nothing_is_left_beside_the_model(path):
 
 
 def test_the_settings_it_was_made_for_are_accepted(path):
-    for name, plan in plans().items():
-        load_model(path).require(name, plan, path)
+    for name, pipeline in pipelines().items():
+        load_model(path).require(name, pipeline, path)
 
 
 def test_other_settings_are_refused_by_name(path):
     config = Config()
     settings = dict(config.stages)
     settings["svm"] = type(settings["svm"])(gamma=2.0)
-    plan = dataclasses.replace(config.plan(), settings=settings)
+    pipeline = dataclasses.replace(config.pipeline, settings=settings)
     with pytest.raises(RoadevalError, match=r"settings of svm .*gamma 0.5 there, 2.0 here"):
-        load_model(path).require("filtered", plan, path)
+        load_model(path).require("filtered", pipeline, path)
 
 
 def test_settings_of_stages_that_learn_nothing_do_not_matter(path):
     config = Config()
     settings = dict(config.stages)
     settings["post"] = type(settings["post"])(element=9)
-    plan = dataclasses.replace(config.plan(), settings=settings)
-    load_model(path).require("filtered", plan, path)
+    pipeline = dataclasses.replace(config.pipeline, settings=settings)
+    load_model(path).require("filtered", pipeline, path)
 
 
 @pytest.mark.parametrize(
@@ -81,19 +81,23 @@ def test_settings_of_stages_that_learn_nothing_do_not_matter(path):
     ],
 )
 def test_settings_that_decide_and_teach_nothing_may_differ(tmp_path, name, stage, setting):
-    plan = preset(name).plan()
-    save_model(fit([frame(0)], {"x": plan}, TrainingSettings()), tmp_path / "x.model")
-    settings = {**plan.settings, stage: dataclasses.replace(plan.settings[stage], **setting)}
-    other = dataclasses.replace(plan, settings=settings)
+    pipeline = preset(name).pipeline
+    save_model(fit([frame(0)], {"x": pipeline}, TrainingSettings()), tmp_path / "x.model")
+    settings = {
+        **pipeline.settings,
+        stage: dataclasses.replace(pipeline.settings[stage], **setting),
+    }
+    other = dataclasses.replace(pipeline, settings=settings)
     load_model(tmp_path / "x.model").require("x", other, tmp_path / "x.model")
 
 
 @pytest.mark.parametrize("thresholds", [(None, 0.3), (0.3, None), (0.3, 0.2)])
 def test_a_threshold_that_is_learnt_or_given_in_its_place_must_agree(tmp_path, thresholds):
-    plan = preset("robust").plan()
+    pipeline = preset("robust").pipeline
     made, wanted = (
         dataclasses.replace(
-            plan, settings={**plan.settings, "context": ContextSettings(threshold=threshold)}
+            pipeline,
+            settings={**pipeline.settings, "context": ContextSettings(threshold=threshold)},
         )
         for threshold in thresholds
     )
@@ -104,7 +108,7 @@ def test_a_threshold_that_is_learnt_or_given_in_its_place_must_agree(tmp_path, t
 
 def test_a_variant_it_was_not_trained_for_is_refused(path):
     with pytest.raises(RoadevalError, match=r"no variant night .it has filtered, unfiltered"):
-        load_model(path).require("night", plans()["filtered"], path)
+        load_model(path).require("night", pipelines()["filtered"], path)
 
 
 def test_a_missing_file_is_one_line(tmp_path):

@@ -24,7 +24,7 @@ def detected(labelled: LabelledFrame) -> dict[str, Bits]:
     masks: dict[str, Packed] = {}
     for variant in labelled.variants:
         for result in variant.stages:
-            for name, mask in result.regions.items():
+            for name, mask in result.output.regions.items():
                 masks.setdefault(name, mask)
     return dict(zip(masks, labelled.truth.bits_of(masks.values()), strict=True))
 

@@ -11,7 +11,7 @@ def true_shadow(labelled: LabelledFrame) -> Bits | None:
     """Return the truly shadowed pixels, ``(H, words)``; None without a truth of shadow."""
     if labelled.frame.shadow_truth is None:
         return None
-    (bits,) = labelled.truth.bits_of([Packed.of(labelled.frame.shadow_truth == 1)])
+    bits: Bits = labelled.truth.bits_of([Packed.of(labelled.frame.shadow_truth == 1)])[0]
     return bits
 
 

@@ -1,16 +1,13 @@
-"""What is wrong with a log, in sentences that say where, when and what is lost."""
+"""Damage to a log: where it is, when, and which messages are lost."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from roadeval.logs.container.file import Container
-
-NS = 1_000_000_000
+from roadeval.logs.container.file import Container
+from roadeval.logs.times import NS
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,11 +23,11 @@ class Damage:
     lossy
         Whether messages are, or may be, lost or wrong by it.
     start_ns, end_ns
-        Log times of the messages before and after what is lost, None where nothing tells.
+        Log times of the messages before and after what is lost, None where unknown.
     lost
         Topics and numbers of messages that are known to be lost.
     log_start_ns
-        From where a sentence counts its seconds.
+        Log time from which the sentence counts seconds.
     """
 
     path: Path
@@ -52,7 +49,7 @@ class Damage:
         return text
 
     def _span(self) -> str:
-        """Say when, in seconds after the log's start."""
+        """Return when, in seconds after the log's start."""
         start, end = (
             None if time is None else f"{(time - self.log_start_ns) / NS:.3f}"
             for time in (self.start_ns, self.end_ns)

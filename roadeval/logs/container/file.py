@@ -1,4 +1,4 @@
-"""One MCAP file as a table of contents: what is in it, where, and what of it is lost."""
+"""The table of contents of one MCAP file: its channels, and where their messages lie."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
 from roadeval.logs.container.chunks import ChunkReader
+from roadeval.logs.container.readers import FileReader
 from roadeval.logs.container.records import (
     MESSAGE_HEAD,
     Chunk,
@@ -24,8 +25,7 @@ from roadeval.logs.container.records import (
     parse,
     walk,
 )
-from roadeval.logs.container.scan import Scan
-from roadeval.logs.container.source import Source
+from roadeval.logs.container.scan import IsWhole, Scan
 from roadeval.logs.container.summary import read_summary
 from roadeval.logs.errors import BadRecord
 
@@ -40,7 +40,7 @@ class ChannelLog:
     """Where the messages of one channel lie.
 
     ``blocks`` holds chunk numbers and entries in the order of the file; it stays empty for a
-    channel that nobody will read, of which only count and time range are kept.
+    channel that is not wanted, of which only count and time range are kept.
     """
 
     wanted: bool
@@ -61,17 +61,17 @@ class ChannelLog:
 
 
 class Container:
-    """One MCAP file, in whatever state it is.
+    """One MCAP file, damaged or not.
 
     Parameters
     ----------
     path
         The file.
     wanted
-        Tells, by a channel and its schema, whether its messages will be read.
+        Whether the messages of a channel, with its schema, will be read.
     is_whole
-        Tells, by a channel, its schema and a message, whether the message is of the right
-        length; asked only beside damage.
+        Whether a message, with its channel and schema, is of the right length; called only next
+        to damage.
     keep_corrupt
         Whether to read data whose checksum is wrong.
 
@@ -82,7 +82,7 @@ class Container:
     logs
         Where messages lie, by the number of their channel.
     summary, scan, reader
-        The file's parts: what it says itself, what was found, and what reads its chunks.
+        The summary at the file's end, what the walk found, and the reader of the chunks.
     misled
         Chunks whose message indexes were found to be wrong.
     saved_ns
@@ -95,23 +95,16 @@ class Container:
         self,
         path: Path,
         wanted: Callable[[Channel, Schema | None], bool],
-        is_whole: Callable[[Channel, Schema | None, Message], bool],
+        is_whole: IsWhole,
         *,
         keep_corrupt: bool = False,
     ) -> None:
         self.path = path
-        self.source = Source(path)
+        self.source = FileReader(path)
         self._wanted = wanted
         self.reader = ChunkReader(self.source, keep_corrupt=keep_corrupt)
         self.summary = read_summary(self.source)
-
-        def whole(scan: Scan, message: Message) -> bool:
-            channel = scan.channels.get(message.channel_id)
-            return channel is not None and is_whole(
-                channel, scan.schemas.get(channel.schema_id), message
-            )
-
-        self.scan = Scan(self.source, self.summary, whole)
+        self.scan = Scan(self.source, self.summary, is_whole)
         self.schemas, self.channels = self.scan.schemas, self.scan.channels
         self.data_is_right: bool | None = None
         self.saved_ns: int | None = None
@@ -130,7 +123,7 @@ class Container:
         return statistics.channel_message_counts if statistics else {}
 
     def topic(self, channel_id: int) -> str:
-        """Name the topic of a channel, or at least the channel."""
+        """Return the topic of a channel, or its number where it is not defined."""
         channel = self.channels.get(channel_id)
         return channel.topic if channel else f"channel {channel_id}"
 
@@ -162,14 +155,14 @@ class Container:
         return chunk != OUTSIDE and self.chunks[chunk].offset in self.reader.bad
 
     def verify(self) -> None:
-        """Read everything once, so that `damage` knows it all."""
+        """Read everything once, so that all damage is known."""
         for chunk in self.chunks:
             with suppress(BadRecord):
                 self.reader.read(chunk)
         self.verify_data()
 
     def read_all(self, take: Callable[[bytes], object]) -> None:
-        """Hand out the whole file in blocks; check the checksum of all data on the way."""
+        """Pass the whole file to ``take`` in blocks, and check the checksum of all data."""
         crc, end = 0, self.scan.data_end or 0
         for offset in range(0, self.source.size, BLOCK):
             block = self.source.read(offset, BLOCK)

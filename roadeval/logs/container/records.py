@@ -1,8 +1,8 @@
 """The records of an MCAP file, read strictly: a record that does not add up is refused.
 
-The layouts are those of https://mcap.dev/spec. Records that are met once (schemas, channels,
-statistics) are read by the `mcap` library; those met a thousand times a second are read here,
-from a few bytes and without a copy.
+The layouts are those of https://mcap.dev/spec. Schemas, channels and statistics are read by the
+`mcap` library. Messages, chunks and indexes are read here, where a length that contradicts another
+is an error, and from a few bytes, so that a file can be walked through without reading its data.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
-from roadeval.logs.container.source import Buffer, Bytes
+from roadeval.logs.container.readers import Buffer, ByteReader
 from roadeval.logs.errors import BadRecord
 
 MAGIC: Final = b"\x89MCAP0\r\n"
@@ -37,8 +37,13 @@ INDEX_HEAD: Final = struct.Struct("<HI")
 """Channel, bytes of entries."""
 LARGEST: Final = 1 << 28
 """Bytes of a message or definition; one that claims more is damaged."""
+PADDING: Final = 4
+"""A message may be padded at its end to a multiple of so many bytes, as CDR does."""
 LONGEST_NAME: Final = 64
 """No compression has a longer name; a chunk that claims so is damaged."""
+
+LONGEST_CHUNK_HEAD: Final = CHUNK_HEAD.size + LONGEST_NAME + 8
+"""Bytes of a chunk's body in which its head ends, whatever the compression."""
 
 Entries = npt.NDArray[np.int64]
 """``(n, 2)``: log times of messages, and offsets of their records in the chunk."""
@@ -68,9 +73,9 @@ class Chunk(NamedTuple):
 
     ``offset`` is the record's, ``data_offset`` and ``data_size`` the compressed data's, all in
     the file; ``size`` and ``crc`` are of the uncompressed records (CRC 0: not given); ``start``
-    and ``end`` are the log times of its messages, both closed. ``crc`` is None where it cannot
-    be told from damage. A chunk that is ``cut`` goes on beyond the end of the file; the head of
-    one that is ``repaired`` was damaged, and the file's summary told what it said.
+    and ``end`` are the log times of its messages, both closed. ``crc`` is None where it may
+    be damaged. A chunk that is ``cut`` continues beyond the end of the file; the head of one that
+    is ``repaired`` was damaged, and is taken from the file's summary.
     """
 
     offset: int
@@ -86,7 +91,7 @@ class Chunk(NamedTuple):
 
 
 class ChunkIndex(NamedTuple):
-    """The summary's word on a chunk: its head without the checksum, and where its record ends.
+    """A chunk in the file's summary: its head without the checksum, and where its record ends.
 
     ``index_offsets`` are packed pairs of a channel and the offset of its message index.
     """
@@ -165,7 +170,7 @@ def parse_chunk(place: Place, head: Buffer) -> Chunk:
 
 
 def parse_chunk_index(body: Buffer) -> ChunkIndex:
-    """Read what the summary says of a chunk.
+    """Read a chunk's index in the summary.
 
     Raises
     ------
@@ -204,7 +209,7 @@ def parse_message_index(body: Buffer) -> tuple[int, Entries]:
     return channel_id, entries.reshape(-1, 2)
 
 
-def message_at(records: Bytes, offset: int) -> Message:
+def message_at(records: ByteReader, offset: int) -> Message:
     """Read the message whose record begins at ``offset``.
 
     Raises
@@ -225,7 +230,7 @@ def message_at(records: Bytes, offset: int) -> Message:
     return Message(channel_id, sequence, log_time, publish_time, body[MESSAGE_HEAD.size :])
 
 
-def place_at(records: Bytes, offset: int) -> Place:
+def place_at(records: ByteReader, offset: int) -> Place:
     """Read the head of the record at ``offset``; it may claim to go beyond the end.
 
     Raises
@@ -240,7 +245,7 @@ def place_at(records: Bytes, offset: int) -> Place:
     return Place(opcode, offset, offset + HEAD.size, offset + HEAD.size + length)
 
 
-def walk(records: Bytes) -> Iterator[Place]:
+def walk(records: ByteReader) -> Iterator[Place]:
     """Yield the places of the records in a chunk, as far as they are whole."""
     offset = 0
     while offset + HEAD.size <= records.size:

@@ -1,8 +1,8 @@
-"""The walk from record to record through a file's data section, over whatever is damaged.
+"""The walk from record to record through a file's data section, across damage.
 
-The walk tells what is really there. Chunks are stepped over, by their own heads or, where those
-are damaged, by the summary's word. After a record that makes no sense the walk goes on at the
-next place that does.
+The walk finds what is really there. Chunks are stepped over by the lengths in their own heads or,
+where those are damaged, by the lengths in the summary. After a record that makes no sense, the
+walk continues at the next one that does.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from array import array
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
 from typing import Final
@@ -19,15 +18,15 @@ from typing import Final
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from roadeval.logs.container.heads import by_own_head, by_summary, is_within
+from roadeval.logs.container.readers import FileReader
 from roadeval.logs.container.records import (
-    CHUNK_HEAD,
     HEAD,
     INDEX_HEAD,
     LARGEST,
-    LONGEST_NAME,
+    LONGEST_CHUNK_HEAD,
     MAGIC,
     MESSAGE_HEAD,
+    PADDING,
     Chunk,
     Entries,
     Message,
@@ -37,13 +36,11 @@ from roadeval.logs.container.records import (
     parse_message_index,
     place_at,
 )
-from roadeval.logs.container.search import Search
-from roadeval.logs.container.source import Source
+from roadeval.logs.container.recovery.damaged_chunks import by_own_head, by_summary, is_within
+from roadeval.logs.container.recovery.next_record import RecordFinder
 from roadeval.logs.container.summary import Summary
 from roadeval.logs.errors import BadRecord
-from roadeval.logs.messages.layouts import PADDING
 
-CHUNK_HEAD_MAX: Final = CHUNK_HEAD.size + LONGEST_NAME + 8
 _DEFINITIONS: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
 _SKIPPED: Final = (Opcode.ATTACHMENT, Opcode.METADATA)
 _AFTER_DATA: Final = (
@@ -57,14 +54,18 @@ _AFTER_DATA: Final = (
     Opcode.FOOTER,
 )
 RECENT: Final = 8
-"""Messages whose log times tell whether another one's is likely."""
+"""Messages with whose log times another one's is compared."""
 PRIVATE: Final = 0x80
-"""From here on, opcodes are an application's own."""
+"""Opcodes from here on belong to applications."""
+
+
+IsWhole = Callable[[Channel, Schema | None, Message], bool]
+"""Whether a message, with its channel and schema, is as long as its own fields say."""
 
 
 @dataclass(slots=True)
 class Gap:
-    """Bytes from ``offset`` to ``end`` that make no sense, and the log times around them."""
+    """Bytes that make no sense, to ``end`` (excluded), and the log times around them."""
 
     offset: int
     end: int
@@ -96,9 +97,7 @@ class Scan:
         Its checksum, 0 if not given.
     """
 
-    def __init__(
-        self, source: Source, summary: Summary, is_whole: Callable[[Scan, Message], bool]
-    ) -> None:
+    def __init__(self, source: FileReader, summary: Summary, is_whole: IsWhole) -> None:
         self.chunks: list[Chunk] = []
         self.indexes: list[dict[int, Entries] | None] = []
         self.loose: dict[int, array[int]] = {}
@@ -112,9 +111,10 @@ class Scan:
         self._known_offsets = sorted(self._known)
         self._first_ns, self._final_ns = _time_range(summary)
         self._is_whole = is_whole
-        self._search = Search(source, self)
-        self._last_message: Place | None = None
         self.recent_ns: deque[int] = deque(maxlen=RECENT)
+        self._finder = RecordFinder(source, self.channels, self.recent_ns)
+        # The message right before the walk's position, and its channel; None after another record.
+        self._last_message: tuple[Place, int] | None = None
         self._run()
 
     def _run(self) -> None:
@@ -136,7 +136,7 @@ class Scan:
         if index is not None:
             return Place(Opcode.CHUNK, offset, offset + HEAD.size, index.end)
         place = place_at(self._source, offset)
-        if place.opcode >= PRIVATE and self._search.begins(place.end):
+        if place.opcode >= PRIVATE and self._finder.begins(place.end):
             return place
         if place.opcode > Opcode.DATA_END or place.opcode == 0:
             raise BadRecord(f"a record of unknown kind {place.opcode}")
@@ -153,9 +153,9 @@ class Scan:
 
     def _visit(self, place: Place) -> int:
         """Take in a record; return where the next one begins."""
-        end = place.end
+        end, message = place.end, None
         if place.opcode == Opcode.MESSAGE:
-            self._message(place)
+            message = place, self._message(place)
         elif place.opcode == Opcode.CHUNK:
             end = self._chunk(place)
         elif place.opcode == Opcode.MESSAGE_INDEX:
@@ -166,10 +166,11 @@ class Scan:
             self._data_end(place)
         elif not self._is_skipped(place):
             raise BadRecord("a record that should not be here")
-        self._last_message = place if place.opcode == Opcode.MESSAGE else None
+        self._last_message = message
         return end
 
-    def _message(self, place: Place) -> None:
+    def _message(self, place: Place) -> int:
+        """Note where a message outside chunks lies; return its channel."""
         if not MESSAGE_HEAD.size <= place.end - place.body <= LARGEST:
             raise BadRecord("a message of a length that cannot be")
         known = self._known.get(self.chunks[-1].offset) if self.chunks else None
@@ -181,12 +182,13 @@ class Scan:
             raise BadRecord("a message of a time outside the log's")
         self.loose.setdefault(channel_id, array("Q")).extend((log_time, place.offset))
         self._saw(log_time, log_time)
+        return int(channel_id)
 
     def _chunk(self, place: Place) -> int:
         index = self._known.get(place.offset)
-        head = bytes(self._source.peek(place.body, CHUNK_HEAD_MAX))
+        head = bytes(self._source.peek(place.body, LONGEST_CHUNK_HEAD))
         if index is None:
-            chunk = by_own_head(place, head, self._source.size, self._search.is_likely)
+            chunk = by_own_head(place, head, self._source.size, self._finder.is_likely)
         else:
             chunk = by_summary(place, head, index)
             outer = self._source.read(place.offset, HEAD.size)
@@ -207,7 +209,7 @@ class Scan:
             raise BadRecord("a message index of a length that cannot be")
         body = bytes(self._source.peek(place.body, place.end - place.body))
         channel_id, entries = parse_message_index(body)
-        if entries.nbytes + INDEX_HEAD.size != len(body) and not self._search.begins(place.end):
+        if entries.nbytes + INDEX_HEAD.size != len(body) and not self._finder.begins(place.end):
             raise BadRecord("a message index of the wrong length")
         index = self.indexes[-1] if self.indexes else None
         if index is None:
@@ -221,7 +223,7 @@ class Scan:
         if place.end - place.body > LARGEST:
             raise BadRecord("a definition of a length that cannot be")
         record = parse(place.opcode, self._source.peek(place.body, place.end - place.body))
-        if not self._search.begins(place.end):
+        if not self._finder.begins(place.end):
             raise BadRecord("a definition of the wrong length")
         known = self.schemas if isinstance(record, Schema) else self.channels
         known.setdefault(record.id, record)
@@ -236,40 +238,54 @@ class Scan:
 
     def _is_skipped(self, place: Place) -> bool:
         is_header = place.opcode == Opcode.HEADER and place.offset == len(MAGIC)
-        private = place.opcode >= PRIVATE and not self._search.is_message(place)
-        return is_header or private or (place.opcode in _SKIPPED and self._search.begins(place.end))
+        private = place.opcode >= PRIVATE and not self._finder.is_message(place)
+        return is_header or private or (place.opcode in _SKIPPED and self._finder.begins(place.end))
 
     def _recover(self, offset: int, reason: str) -> int:
-        """Find where the walk can go on, and note what lies between."""
+        """Find where the walk can continue after ``offset``, and note the gap between.
+
+        Either the record at ``offset`` is damaged, or the length of the message before it is, so
+        that ``offset`` lies in the midst of a record::
+
+            ... | message | damaged ...... | record        the message is whole
+                          ^ begin = offset ^ end
+
+            ... | message, of a wrong length | record      it is not: it is taken back
+                ^ begin                      ^ end
+
+        The message before it is the last thing that was noted, so that taking it back undoes one
+        step of the walk.
+        """
+        last, self._last_message = self._last_message, None
         if self.indexes:
             self.indexes[-1] = None
-        begin, seek = self._doubt_last_message(offset)
-        limit = int(min(self._next_known(offset), self._source.size))
-        chunk = self._search.disguised_chunk(offset)
+        chunk = self._finder.disguised_chunk(offset)
         if chunk is not None:
             return self._chunk(chunk)
-        end = self._search.next(seek, limit)
+        begin, seek = offset, offset + 1
+        if last is not None and self._is_intact(*last):
+            # A length that is too long by less than the padding does not show in the message.
+            seek = offset - PADDING + 1
+        elif last is not None:
+            message, channel_id = last
+            del self.loose[channel_id][-2:]
+            self.recent_ns.pop()
+            begin, seek = message.offset, message.offset + 1
+        end = self._finder.next(seek, int(min(self._next_known(offset), self._source.size)))
         lossy = end > offset and (not self._known or bool(self.loose))
         self._gap(begin, end, reason, lossy=lossy)
         return end
 
-    def _doubt_last_message(self, offset: int) -> tuple[int, int]:
-        """Take back the message before ``offset`` if its length was wrong, not what follows.
-
-        Returns where the damage begins, and from where to look for its end: a length that is
-        too long by less than a message's padding does not show in the message itself.
-        """
-        last, self._last_message = self._last_message, None
-        if last is None or last.end != offset:
-            return offset, offset + 1
-        with suppress(BadRecord):
-            if self._is_whole(self, message_at(self._source, last.offset)):
-                return offset, offset - PADDING + 1
-        for entries in self.loose.values():
-            if entries and entries[-1] == last.offset:
-                del entries[-2:]
-                self.recent_ns.pop()
-        return last.offset, last.offset + 1
+    def _is_intact(self, place: Place, channel_id: int) -> bool:
+        """Whether a message is as long as its own fields say."""
+        channel = self.channels.get(channel_id)
+        if channel is None:
+            return False
+        try:
+            message = message_at(self._source, place.offset)
+            return self._is_whole(channel, self.schemas.get(channel.schema_id), message)
+        except BadRecord:
+            return False
 
     def _gap(self, offset: int, end: int, reason: str, *, lossy: bool = True) -> None:
         before = self.recent_ns[-1] if self.recent_ns else None

@@ -1,4 +1,4 @@
-"""The summary at the end of an MCAP file: a second witness of what lies before it."""
+"""The summary at the end of an MCAP file, which repeats much of what lies before it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Footer, Schema, Statistics
 
 from roadeval.logs.container.chunks import crc_of
+from roadeval.logs.container.readers import FileReader, PartReader
 from roadeval.logs.container.records import (
     HEAD,
     LARGEST,
@@ -19,7 +20,6 @@ from roadeval.logs.container.records import (
     parse_chunk_index,
     walk,
 )
-from roadeval.logs.container.source import Part, Source
 from roadeval.logs.errors import BadRecord
 
 FOOTER_SIZE: Final = HEAD.size + 20 + len(MAGIC)
@@ -30,7 +30,7 @@ _CHECKED: Final = HEAD.size + 16
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What the summary says.
+    """The contents of the summary.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Summary:
     checked
         Whether its checksum is given, and right.
     problem
-        Why there is no summary to rely on, or empty; then all else is empty too.
+        Why the summary cannot be relied on, or empty; then all else is empty too.
     """
 
     schemas: dict[int, Schema] = field(default_factory=dict)
@@ -50,7 +50,7 @@ class Summary:
     problem: str = ""
 
 
-def read_summary(source: Source) -> Summary:
+def read_summary(source: FileReader) -> Summary:
     """Read the summary, if it can be relied on."""
     try:
         return _read(source)
@@ -58,7 +58,7 @@ def read_summary(source: Source) -> Summary:
         return Summary(problem=str(error))
 
 
-def _read(source: Source) -> Summary:
+def _read(source: FileReader) -> Summary:
     footer_at = source.size - FOOTER_SIZE
     tail = source.read(max(footer_at, 0), FOOTER_SIZE)
     if len(tail) < FOOTER_SIZE or not tail.endswith(MAGIC) or tail[0] != Opcode.FOOTER:
@@ -69,13 +69,13 @@ def _read(source: Source) -> Summary:
     size = footer_at - footer.summary_start
     if not 0 <= size <= LARGEST:
         raise BadRecord("its summary is not where it should be")
-    part = Part(source, footer.summary_start, size)
+    part = PartReader(source, footer.summary_start, size)
     if footer.summary_crc and zlib.crc32(tail[:_CHECKED], crc_of(part)) != footer.summary_crc:
         raise BadRecord("the checksum of its summary is wrong")
     return _collect(part, checked=footer.summary_crc != 0)
 
 
-def _collect(part: Part, *, checked: bool) -> Summary:
+def _collect(part: PartReader, *, checked: bool) -> Summary:
     summary, statistics, end = Summary(), None, 0
     for place in walk(part):
         end = place.end

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import base64
-import io
-import json
-from collections.abc import Callable
-from contextlib import redirect_stderr
-from types import SimpleNamespace
-from typing import Any, Final, NamedTuple
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
+from typing import NamedTuple
 
 from mcap.records import Channel, Schema
 
-from roadeval.logs.container.records import LARGEST, Message
-from roadeval.logs.container.source import Buffer
+from roadeval.logs.container.readers import Buffer
+from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage
-from roadeval.logs.messages.flatbuffer import flatbuffer_reader
-from roadeval.logs.messages.layouts import cdr_reader, is_whole, layout_of, ros1_reader, stamp_of
+from roadeval.logs.messages import encodings
+from roadeval.logs.messages.encoding import Encoding, MessageReader
 from roadeval.logs.messages.pictures import Picture, nanoseconds, picture_in
-
-_ZSTD: Final = b"\x28\xb5\x2f\xfd"
+from roadeval.logs.messages.schemas import KINDS, TopicKind, parts_of
+from roadeval.runtime.discovery import found_in
 
 
 class Decoder(NamedTuple):
@@ -32,43 +29,54 @@ class Decoder(NamedTuple):
     stamp: Callable[[Buffer], int]
 
 
+@cache
+def message_encodings() -> Mapping[str, Encoding]:
+    """Return the message encodings of the folder, by name."""
+    return {encoding.name: encoding for encoding in found_in(encodings, "ENCODING")}
+
+
+def kind_of(channel: Channel, schema: Schema | None) -> TopicKind:
+    """Return what a channel carries, by its schema's name."""
+    encoding = message_encodings().get(channel.message_encoding)
+    if schema is None:
+        return encoding.without_schema if encoding else TopicKind.OTHER
+    kinds = {**KINDS, **encoding.kinds} if encoding else KINDS
+    return kinds.get((parts_of(schema.name) or [""])[-1], TopicKind.OTHER)
+
+
 def decoder_for(channel: Channel, schema: Schema | None) -> Decoder:
     """Return what decodes the messages of a channel.
-
-    The `mcap` project's own decoders where they can, else the layout that the schema's name
-    stands for.
 
     Raises
     ------
     BadMessage
         If nothing decodes them.
     """
-    decode = _by_library(channel, schema) or _by_name(channel, schema)
-    if decode is None:
+    reader = _reader(channel, schema)
+    if reader is None:
         name = schema.encoding if schema else "no"
         raise BadMessage(
             f"{channel.message_encoding!r} messages with {name!r} schema are not readable"
         )
 
     def picture(data: Buffer) -> Picture:
-        try:
-            return picture_in(decode(_unpacked(channel, data)))
-        except BadMessage:
-            raise
-        except Exception as error:  # the libraries raise whatever their parsers stumble on
-            raise BadMessage(f"the message cannot be decoded: {_line(error)}") from error
+        with _one_error():
+            return picture_in(reader.decode(data))
 
-    layout = layout_of(schema.name) if schema else None
-    if layout is None or channel.message_encoding != "cdr":
-        return Decoder(picture, lambda data: picture(data).stamp_ns)
-    return Decoder(picture, lambda data: nanoseconds(stamp_of(layout, _unpacked(channel, data))))
+    def stamp(data: Buffer) -> int:
+        if reader.stamp is None:
+            return picture(data).stamp_ns
+        with _one_error():
+            return nanoseconds(reader.stamp(data))
+
+    return Decoder(picture, stamp)
 
 
 def message_is_whole(channel: Channel, schema: Schema | None, message: Message) -> bool:
-    """Whether a message is as long as its own fields say, as far as that can be told."""
-    layout = layout_of(schema.name) if schema else None
-    if layout and channel.message_encoding == "cdr":
-        return is_whole(layout, message.data)
+    """Whether a message is as long as its own fields say, as far as its encoding shows it."""
+    reader = _reader(channel, schema)
+    if reader is not None and reader.is_whole is not None:
+        return reader.is_whole(message.data)
     try:
         decoder_for(channel, schema).picture(message.data)
     except BadMessage:
@@ -76,61 +84,18 @@ def message_is_whole(channel: Channel, schema: Schema | None, message: Message) 
     return True
 
 
-def _by_library(channel: Channel, schema: Schema | None) -> Callable[[Buffer], Any] | None:
-    """Ask the libraries, with a new factory each time.
-
-    They remember schemas by number alone, and numbers repeat from file to file.
-    """
-    from mcap_protobuf.decoder import DecoderFactory as Protobuf
-    from mcap_ros1.decoder import DecoderFactory as Ros1
-    from mcap_ros2.decoder import DecoderFactory as Ros2
-
-    if schema is None or not schema.data:
-        return None
-    for factory in (Ros2(), Protobuf(), Ros1()):
-        try:
-            with redirect_stderr(io.StringIO()):  # the ROS parsers print what they stumble on
-                decode = factory.decoder_for(channel.message_encoding, schema)
-        except Exception:  # a schema can be wrong in any way; its name may still do
-            continue
-        if decode is not None:
-            return lambda data, decode=decode: decode(bytes(data))  # type: ignore[misc]
-    return None
+def _reader(channel: Channel, schema: Schema | None) -> MessageReader | None:
+    encoding = message_encodings().get(channel.message_encoding)
+    return encoding.reader(schema) if encoding else None
 
 
-def _by_name(channel: Channel, schema: Schema | None) -> Callable[[Buffer], Any] | None:
-    if channel.message_encoding == "json":
-        return _read_json
-    layout = layout_of(schema.name) if schema else None
-    if layout is None:
-        return None
-    readers = {"cdr": cdr_reader, "ros1": ros1_reader, "flatbuffer": flatbuffer_reader}
-    make = readers.get(channel.message_encoding)
-    return make(layout) if make else None
-
-
-def _read_json(data: Buffer) -> SimpleNamespace:
-    message: SimpleNamespace = json.loads(
-        bytes(data), object_hook=lambda fields: SimpleNamespace(**fields)
-    )
-    if isinstance(message.data, str):
-        message.data = base64.b64decode(message.data, validate=True)
-    else:
-        message.data = bytes(message.data)
-    return message
-
-
-def _unpacked(channel: Channel, data: Buffer) -> Buffer:
-    """Undo rosbag2's compression message by message; CDR itself never begins like zstd."""
-    if channel.message_encoding != "cdr" or bytes(data[:4]) != _ZSTD:
-        return data
-    import zstandard
-
-    if not 0 <= zstandard.frame_content_size(data) <= LARGEST:
-        raise BadMessage("a compressed message of a size that cannot be")
-    message: bytes = zstandard.ZstdDecompressor().decompress(data)
-    return message
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
+@contextmanager
+def _one_error() -> Iterator[None]:
+    """Turn whatever the libraries' parsers raise into a `BadMessage`."""
+    try:
+        yield
+    except BadMessage:
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise BadMessage(f"the message cannot be decoded: {reason}") from error

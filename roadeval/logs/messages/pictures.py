@@ -1,27 +1,15 @@
-"""What a camera's message carries, and what kinds of it there are."""
+"""Pictures as messages carry them: raw pixels, an image file, or a frame of a video."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Any, Final
 
-from mcap.records import Channel, Schema
-
 from roadeval.data import Rgb
-from roadeval.logs.container.source import Buffer
+from roadeval.logs.container.readers import Buffer
 from roadeval.logs.errors import BadMessage, LogError
-from roadeval.logs.topics.span import parse_time
-
-
-class Kind(StrEnum):
-    """What a topic carries."""
-
-    IMAGE = "image"
-    COMPRESSED = "compressed"
-    VIDEO = "video"
-    OTHER = "other"
+from roadeval.logs.times import parse_time
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,13 +45,6 @@ class DecodedPicture:
 
 Picture = RawPicture | CompressedPicture | DecodedPicture
 
-_KINDS: Final = {
-    "Image": Kind.IMAGE,
-    "RawImage": Kind.IMAGE,
-    "CompressedImage": Kind.COMPRESSED,
-    "CompressedVideo": Kind.VIDEO,
-    "FFMPEGPacket": Kind.VIDEO,
-}
 _SECONDS: Final = ("sec", "secs", "seconds")
 _NANOSECONDS: Final = ("nanosec", "nsec", "nsecs", "nanos", "nanoseconds")
 _CODECS: Final = {
@@ -79,18 +60,8 @@ _CODECS: Final = {
 _START_CODES: Final = (b"\x00\x00\x00\x01", b"\x00\x00\x01")
 
 
-def kind_of(channel: Channel, schema: Schema | None) -> Kind:
-    """Tell by its schema's name what a channel carries.
-
-    JSON without a schema may carry images (`Kind.COMPRESSED`); its first message tells.
-    """
-    if schema is None:
-        return Kind.COMPRESSED if channel.message_encoding == "json" else Kind.OTHER
-    return _KINDS.get(re.split(r"[/.:]", schema.name)[-1], Kind.OTHER)
-
-
 def codec_of(picture: Picture) -> str | None:
-    """Name the video codec of a packet, None for a picture that stands alone."""
+    """Return the video codec of a packet, None for a picture that stands alone."""
     if not isinstance(picture, CompressedPicture):
         return None
     words = re.split(r"[^a-z0-9]+", picture.format.lower())
@@ -101,7 +72,7 @@ def codec_of(picture: Picture) -> str | None:
 
 
 def picture_in(message: Any) -> Picture:
-    """Take the picture out of a decoded message by the names of its fields.
+    """Return the picture of a decoded message, by the names of its fields.
 
     Raises
     ------
@@ -109,25 +80,21 @@ def picture_in(message: Any) -> Picture:
         If it has not the fields of an image.
     """
     try:
-        return _picture_in(message)
+        stamp_ns = _stamp_ns(message)
+        if not hasattr(message, "height") or hasattr(message, "pts"):
+            name = message.format if hasattr(message, "format") else message.encoding
+            return CompressedPicture(stamp_ns, name, message.data)
+        return RawPicture(
+            stamp_ns,
+            int(message.width),
+            int(message.height),
+            message.encoding,
+            int(getattr(message, "step", 0)),
+            bool(getattr(message, "is_bigendian", False)),
+            message.data,
+        )
     except (AttributeError, StopIteration, TypeError, ValueError, LogError) as error:
         raise BadMessage("it has not the fields of an image") from error
-
-
-def _picture_in(message: Any) -> Picture:
-    stamp_ns = _stamp_ns(message)
-    if not hasattr(message, "height") or hasattr(message, "pts"):
-        name = message.format if hasattr(message, "format") else message.encoding
-        return CompressedPicture(stamp_ns, name, message.data)
-    return RawPicture(
-        stamp_ns,
-        int(message.width),
-        int(message.height),
-        message.encoding,
-        int(getattr(message, "step", 0)),
-        bool(getattr(message, "is_bigendian", False)),
-        message.data,
-    )
 
 
 def _stamp_ns(message: Any) -> int:

@@ -1,4 +1,4 @@
-"""From a picture as logged to pixels: RGB for a camera's, whole numbers for a label image."""
+"""Decoding pictures: a camera's to RGB, a label image to whole numbers."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Rgb
-from roadeval.logs.container.source import Buffer
+from roadeval.logs.container.readers import Buffer
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import CompressedPicture, DecodedPicture, Picture, RawPicture
-from roadeval.logs.messages.raw import eight_bits, layout_of, raw_to_rgb, rows_of
+from roadeval.logs.messages.pixel_formats import eight_bits, format_of, raw_to_rgb, rows_of
 
 Array = npt.NDArray[Any]
 
@@ -27,7 +27,7 @@ TAIL: Final = 4096
 
 
 def media_type(data: Buffer) -> str | None:
-    """Tell by its first bytes whether ``data`` is a JPEG or PNG file."""
+    """Return the media type of a JPEG or PNG file, by its first bytes."""
     head = bytes(data[:8])
     if head.startswith(JPEG):
         return "image/jpeg"
@@ -67,7 +67,7 @@ def to_labels(picture: Picture) -> Array:
     import cv2
 
     if isinstance(picture, RawPicture):
-        layout = layout_of(picture)
+        layout = format_of(picture)
         if layout.is_grey and layout.dtype != "f4":
             return rows_of(picture, layout)
     elif isinstance(picture, CompressedPicture):
@@ -86,7 +86,7 @@ def _grey(colours: Rgb) -> Array:
 
 
 def _indices(picture: CompressedPicture) -> Array:
-    """Read a PNG's palette indices, which OpenCV does not hand out."""
+    """Read a PNG's palette indices, which OpenCV replaces by colours."""
     from PIL import Image
 
     try:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from typing import Any, Final, Protocol
 
-from roadeval.logs.container.source import Buffer
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages.pictures import CompressedPicture, DecodedPicture, Picture, codec_of
 
@@ -15,13 +15,14 @@ FARTHEST_KEY: Final = 3000
 """Packets to look back for a keyframe."""
 _DECODERS: Final = {"av1": "libdav1d"}
 """Where the codec's own name is not a decoder that every machine can run."""
+_PARAMETERS: Final = {
+    "h264": re.compile(rb"\x00\x00\x01[\x07\x27\x47\x67]"),
+    "hevc": re.compile(rb"\x00\x00\x01[\x42\x43]"),
+}
+"""Heads of sequence parameters, which some encoders send in a packet of their own."""
 
 
-_HEVC_KEYS: Final = (*range(16, 22), 33)
-"""HEVC units of pictures that stand alone, and of sequence parameters."""
-
-
-class Pictures(Protocol):
+class PictureSequence(Protocol):
     """The pictures of a topic, by position."""
 
     def __len__(self) -> int: ...
@@ -32,12 +33,12 @@ class Pictures(Protocol):
 
 
 def import_av() -> Any:
-    """Import PyAV.
+    """Import PyAV, which is an optional dependency.
 
     Raises
     ------
     LogError
-        If it is not installed; says how to.
+        If it is not installed.
     """
     try:
         import av
@@ -55,7 +56,7 @@ class Video:
         If PyAV, which decodes video, is not installed.
     """
 
-    def __init__(self, packets: Pictures) -> None:
+    def __init__(self, packets: PictureSequence) -> None:
         self._av = import_av()
         self._packets = packets
         self._decoder: Any = None
@@ -164,54 +165,12 @@ class Video:
 
 
 def is_keyframe(packet: Picture) -> bool:
-    """Whether decoding can begin with this packet."""
+    """Whether decoding can begin with this packet: a keyframe, or parameters in front of one."""
     codec = codec_of(packet)
     if not isinstance(packet, CompressedPicture) or codec is None:
         return False
-    data = packet.data
-    if codec == "h264":
-        return any(unit & 31 in (5, 7) for unit in _units(data))
-    if codec == "hevc":
-        return any(unit >> 1 & 63 in _HEVC_KEYS for unit in _units(data))
-    if codec == "vp9":
-        return _vp9_key(data)
-    return _av1_key(data)
-
-
-def _units(data: Buffer) -> list[int]:
-    """First byte of each unit of an Annex B stream."""
-    raw = bytes(data)
-    found, at = [], raw.find(b"\x00\x00\x01")
-    while 0 <= at < len(raw) - 3:
-        found.append(raw[at + 3])
-        at = raw.find(b"\x00\x00\x01", at + 3)
-    return found
-
-
-def _vp9_key(data: Buffer) -> bool:
-    """Read the uncompressed header: marker, profile, existing-frame flag, frame type 0."""
-    head = data[0] if len(data) else 0
-    profile = (head >> 5 & 1) | (head >> 4 & 1) << 1
-    shift = 3 if profile < 3 else 2
-    return head >> 6 == 2 and not head >> shift & 1 and not head >> (shift - 1) & 1
-
-
-def _av1_key(data: Buffer) -> bool:
-    """Whether it brings a sequence header (OBU type 1), as every keyframe of a stream does."""
-    at = 0
-    while at < len(data):
-        head = data[at]
-        if head >> 3 & 15 == 1:
-            return True
-        size, at = _leb128(data, at + 1 + (head >> 2 & 1)) if head & 2 else (len(data), at)
-        at += size
-    return False
-
-
-def _leb128(data: Buffer, at: int) -> tuple[int, int]:
-    value = 0
-    for index, byte in enumerate(bytes(data[at : at + 8])):
-        value |= (byte & 127) << 7 * index
-        if not byte & 128:
-            return value, at + index + 1
-    return len(data), at
+    av, data = import_av(), bytes(packet.data)
+    if codec in _PARAMETERS and _PARAMETERS[codec].search(data):
+        return True
+    parser = av.CodecContext.create(codec, "r")
+    return any(part.is_keyframe for part in (*parser.parse(data), *parser.parse(None)))

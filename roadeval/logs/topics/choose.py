@@ -1,13 +1,13 @@
-"""Which topics to replay: what the user named, else what is plain; and why, in words."""
+"""The choice of topics to replay: those the user named, else those whose role is plain."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Iterable, Sequence
+from typing import Final, NamedTuple
 
 from roadeval.logs.errors import LogError
-from roadeval.logs.messages.pictures import Kind
+from roadeval.logs.messages.schemas import TopicKind
 from roadeval.logs.topics.description import TopicInfo
 
 
@@ -33,7 +33,14 @@ PLAIN_WORDS: Final = _set(
 )
 DEPTH_FORMATS: Final = _set("16uc1 32fc1")
 NO_TOPIC: Final = ""
-"""The name that means: none, even if one is plain."""
+"""The name that means none, even if the log has one whose role is plain."""
+
+
+class Choice(NamedTuple):
+    """A topic, or None, and why it was chosen."""
+
+    topic: TopicInfo | None
+    why: str
 
 
 def words(name: str) -> frozenset[str]:
@@ -44,7 +51,7 @@ def words(name: str) -> frozenset[str]:
 
 
 def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicInfo, str]:
-    """Choose the camera's topic; returns it and why.
+    """Choose the camera's topic; return it and why.
 
     Raises
     ------
@@ -52,7 +59,7 @@ def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicI
         If the one asked for is not there or no image, or if none or several are candidates.
     """
     if asked is not None:
-        return named(topics, asked, "--image-topic"), "asked for"
+        return named(topics, asked, "topics.image"), "asked for"
     images = [topic for topic in topics if topic.is_image and topic.count]
     candidates = [topic for topic in images if not _looks_like_label(topic)]
     cameras = [topic for topic in candidates if not _looks_like_depth(topic)] or candidates
@@ -61,14 +68,13 @@ def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicI
         return cameras[0], "the only camera image" if others else "the only image topic"
     if not cameras:
         raise LogError(_no_image(topics, images))
-    listed = ", ".join(topic.name for topic in cameras)
-    raise LogError(f"{len(cameras)} image topics: {listed}; choose one with --image-topic")
+    raise LogError(f"{len(cameras)} image topics: {_names(cameras)}; choose one with topics.image")
 
 
 def choose_truth(
     topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None, *, colors: bool = False
-) -> tuple[TopicInfo | None, str]:
-    """Choose the topic of the road truth; returns it, or None, and why.
+) -> Choice:
+    """Choose the topic of the road truth.
 
     An image of single values is preferred; one of ``colors`` where those are asked for, or
     where there is no other.
@@ -78,10 +84,8 @@ def choose_truth(
     LogError
         If the one asked for is not there or no image, or if several are candidates.
     """
-    if asked == NO_TOPIC:
-        return None, "asked to use none"
     if asked is not None:
-        return named(topics, asked, "--truth-topic"), "asked for"
+        return _asked_for(topics, asked, "topics.truth")
     labels = _label_topics(topics, image)
     roads = [topic for topic in labels if not words(topic.name) & SHADOW_WORDS]
     kinds = [
@@ -93,43 +97,45 @@ def choose_truth(
     plain = _most_alike(next((found for found in order if found), []), image)
     if len(plain) == 1:
         by = "colours" if plain[0].channels == 3 else "single channel"
-        return plain[0], f"the label image, by its name and its {by}"
+        return Choice(plain[0], f"the label image, by its name and its {by}")
     if plain:
-        listed = ", ".join(topic.name for topic in plain)
-        raise LogError(f"{len(plain)} label topics: {listed}; choose one with --truth-topic")
+        raise LogError(f"{len(plain)} label topics: {_names(plain)}; choose one with topics.truth")
     if roads:
-        listed = ", ".join(topic.name for topic in roads)
-        return None, f"no topic is plainly road truth; --truth-topic takes one of: {listed}"
-    return None, "no label topic"
+        why = f"no topic is plainly road truth; topics.truth takes one of: {_names(roads)}"
+        return Choice(None, why)
+    return Choice(None, "no label topic")
 
 
-def choose_shadow(
-    topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None
-) -> tuple[TopicInfo | None, str]:
-    """Choose the topic of the true shadow; returns it, or None, and why.
+def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None) -> Choice:
+    """Choose the topic of the true shadow.
 
     Raises
     ------
     LogError
         If the one asked for is not there or no image, or if several are candidates.
     """
-    if asked == NO_TOPIC:
-        return None, "asked to use none"
     if asked is not None:
-        return named(topics, asked, "--shadow-topic"), "asked for"
+        return _asked_for(topics, asked, "topics.shadow")
     labels = _label_topics(topics, image)
     shadows = [t for t in labels if words(t.name) & SHADOW_WORDS and t.channels == 1]
     shadows = _most_alike(shadows, image)
     if len(shadows) == 1:
-        return shadows[0], "the shadow mask, by its name and its single channel"
+        return Choice(shadows[0], "the shadow mask, by its name and its single channel")
     if shadows:
-        listed = ", ".join(topic.name for topic in shadows)
-        raise LogError(f"{len(shadows)} shadow topics: {listed}; choose one with --shadow-topic")
-    return None, "no shadow topic"
+        raise LogError(
+            f"{len(shadows)} shadow topics: {_names(shadows)}; choose one with topics.shadow"
+        )
+    return Choice(None, "no shadow topic")
 
 
-def named(topics: Sequence[TopicInfo], name: str, option: str) -> TopicInfo:
-    """Find the image topic a user named.
+def _asked_for(topics: Sequence[TopicInfo], name: str, setting: str) -> Choice:
+    if name == NO_TOPIC:
+        return Choice(None, "asked to use none")
+    return Choice(named(topics, name, setting), "asked for")
+
+
+def named(topics: Sequence[TopicInfo], name: str, setting: str) -> TopicInfo:
+    """Return the image topic that a setting names.
 
     Raises
     ------
@@ -139,10 +145,10 @@ def named(topics: Sequence[TopicInfo], name: str, option: str) -> TopicInfo:
     for topic in topics:
         if topic.name == name and topic.is_image:
             return topic
-    valid = ", ".join(topic.name for topic in topics if topic.is_image) or "none"
+    valid = _names(topic for topic in topics if topic.is_image) or "none"
     there = any(topic.name == name for topic in topics)
     what = "carries no images" if there else "is not in the log"
-    raise LogError(f"{option} {name}: {what}; its image topics are: {valid}")
+    raise LogError(f"{setting} {name}: {what}; its image topics are: {valid}")
 
 
 def _label_topics(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:
@@ -164,7 +170,7 @@ def _looks_like_label(topic: TopicInfo) -> bool:
 
 def _is_lossy(topic: TopicInfo) -> bool:
     name = topic.format.lower()
-    return topic.kind is Kind.VIDEO or "jpeg" in name or "jpg" in name
+    return topic.kind is TopicKind.VIDEO or "jpeg" in name or "jpg" in name
 
 
 def _looks_like_depth(topic: TopicInfo) -> bool:
@@ -190,8 +196,11 @@ def _most_alike(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo
 
 def _no_image(topics: Sequence[TopicInfo], images: Sequence[TopicInfo]) -> str:
     if images:
-        listed = ", ".join(topic.name for topic in images)
-        return f"only label images: {listed}; choose the camera's with --image-topic"
+        return f"only label images: {_names(images)}; choose the camera's with topics.image"
     found = ", ".join(f"{topic.name} ({topic.schema or 'no schema'})" for topic in topics[:8])
     more = ", ..." if len(topics) > 8 else ""
     return f"no image topic; the log has: {found or 'no topics at all'}{more}"
+
+
+def _names(topics: Iterable[TopicInfo]) -> str:
+    return ", ".join(topic.name for topic in topics)

@@ -1,22 +1,22 @@
-"""What the topics of a log are: kind, encoding, size, rate, gaps."""
+"""Descriptions of topics: kind, encoding, size, rate, gaps."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.logs.container.file import Container
 from roadeval.logs.errors import BadMessage, FrameError, LogError
-from roadeval.logs.messages.pictures import CompressedPicture, Kind, RawPicture, codec_of, kind_of
+from roadeval.logs.messages.decoders import kind_of
+from roadeval.logs.messages.pictures import CompressedPicture, RawPicture, codec_of
+from roadeval.logs.messages.pixel_formats import format_of
 from roadeval.logs.messages.pixels import to_labels
-from roadeval.logs.messages.raw import layout_of
+from roadeval.logs.messages.schemas import TopicKind
 from roadeval.logs.messages.video import Video
-from roadeval.logs.topics.span import NS
-from roadeval.logs.topics.track import Source, Track
+from roadeval.logs.times import NS
+from roadeval.logs.topics.reader import TopicReader
 
 PROBES: Final = 3
 """Messages to try before a topic counts as undecodable."""
@@ -55,7 +55,7 @@ class TopicInfo:
     name: str
     schema: str
     encoding: str
-    kind: Kind
+    kind: TopicKind
     count: int
     first_ns: int | None = None
     last_ns: int | None = None
@@ -69,38 +69,26 @@ class TopicInfo:
     @property
     def is_image(self) -> bool:
         """Whether its messages carry images, as pixels, files or video."""
-        return self.kind is not Kind.OTHER
+        return self.kind is not TopicKind.OTHER
 
 
-def describe_topic(name: str, sources: Sequence[Source], track: Track) -> TopicInfo:
+def describe_topic(reader: TopicReader) -> TopicInfo:
     """Describe a topic from its messages' places and the first one that can be decoded."""
-    container, channel_id = sources[0].container, sources[0].channel_id
-    channel = container.channels[channel_id]
-    schema = container.schemas.get(channel.schema_id)
-    logs = [s.container.logs[s.channel_id] for s in sources if s.channel_id in s.container.logs]
-    logs = [log for log in logs if log.count]
-    first = min((log.first_ns for log in logs), default=None)
-    last = max((log.last_ns for log in logs), default=None)
-    count = sum(log.count for log in logs)
-    kind = kind_of(channel, schema)
-    look = _Look(kind)
-    if kind is not Kind.OTHER:
-        look = _probe(track, kind, named=schema is not None)
-    return TopicInfo(
-        name,
-        schema.name if schema else "",
-        channel.message_encoding,
-        look.kind,
-        count,
-        first,
-        last,
-        _rate(track.log_times, first, last, count),
-        _gaps(track.log_times),
-        look.format,
-        look.size,
-        look.channels,
-        look.problem,
+    first_channel = reader.channels[0]
+    channel, schema = first_channel.channel, first_channel.schema
+    logs = [source.log for source in reader.channels if source.log.count]
+    topic = TopicInfo(
+        name=reader.name,
+        schema=schema.name if schema else "",
+        encoding=channel.message_encoding,
+        kind=kind_of(channel, schema),
+        count=sum(log.count for log in logs),
+        first_ns=min((log.first_ns for log in logs), default=None),
+        last_ns=max((log.last_ns for log in logs), default=None),
+        gaps=_gaps(reader.log_times),
     )
+    topic = replace(topic, rate_hz=_rate(reader.log_times, topic))
+    return _with_picture(topic, reader) if topic.is_image else topic
 
 
 def median_period(log_times: npt.NDArray[np.int64]) -> int:
@@ -108,14 +96,14 @@ def median_period(log_times: npt.NDArray[np.int64]) -> int:
     return int(np.median(np.diff(log_times))) if len(log_times) > 1 else 0
 
 
-def _rate(
-    log_times: npt.NDArray[np.int64], first: int | None, last: int | None, count: int
-) -> float | None:
+def _rate(log_times: npt.NDArray[np.int64], topic: TopicInfo) -> float | None:
     period = median_period(log_times)
     if period > 0:
         return NS / period
-    if count > 1 and first is not None and last is not None and last > first:
-        return (count - 1) * NS / (last - first)
+    # Of a topic that is not read, only the number of messages and their time range are known.
+    first, last = topic.first_ns, topic.last_ns
+    if topic.count > 1 and first is not None and last is not None and last > first:
+        return (topic.count - 1) * NS / (last - first)
     return None
 
 
@@ -127,54 +115,38 @@ def _gaps(log_times: npt.NDArray[np.int64]) -> tuple[tuple[int, int], ...]:
     return tuple((int(log_times[i]), int(log_times[i + 1])) for i in before)
 
 
-@dataclass(frozen=True, slots=True)
-class _Look:
-    kind: Kind
-    format: str = ""
-    size: tuple[int, int] | None = None
-    channels: int | None = None
-    problem: str = ""
-
-
-def _probe(track: Track, kind: Kind, *, named: bool) -> _Look:
-    """Look at the first messages; without a schema's name they alone tell what they are."""
+def _with_picture(topic: TopicInfo, reader: TopicReader) -> TopicInfo:
+    """Add what the first messages show; without a schema, they alone show whether it is images."""
     problem = ""
-    for position in range(min(PROBES, len(track))):
+    for position in range(min(PROBES, len(reader))):
         try:
-            return _look(track, position)
+            kind, name, size, channels = _look(reader, position)
         except (FrameError, BadMessage) as error:
             problem = problem or str(error)
-    return _Look(kind, problem=problem) if named else _Look(Kind.OTHER)
+        else:
+            return replace(topic, kind=kind, format=name, size=size, channels=channels)
+    return replace(topic, problem=problem) if topic.schema else replace(topic, kind=TopicKind.OTHER)
 
 
-def _look(track: Track, position: int) -> _Look:
-    picture = track.picture(position)
+def _look(reader: TopicReader, position: int) -> tuple[TopicKind, str, tuple[int, int] | None, int]:
+    """Return kind, format, size and number of channels of an image."""
+    picture = reader.picture(position)
     if isinstance(picture, RawPicture):
-        size = (picture.width, picture.height)
-        channels = 1 if layout_of(picture).is_grey else 3
-        return _Look(Kind.IMAGE, picture.encoding, size, channels)
+        channels = 1 if format_of(picture).is_grey else 3
+        return TopicKind.IMAGE, picture.encoding, (picture.width, picture.height), channels
     codec = codec_of(picture)
     if codec is not None:
-        return _Look(Kind.VIDEO, codec, _video_size(track), 3)
+        return TopicKind.VIDEO, codec, _video_size(reader), 3
     pixels = to_labels(picture)
     name = picture.format if isinstance(picture, CompressedPicture) else ""
     size = (pixels.shape[1], pixels.shape[0])
-    return _Look(Kind.COMPRESSED, name, size, 1 if pixels.ndim == 2 else 3)
+    return TopicKind.COMPRESSED, name, size, 1 if pixels.ndim == 2 else 3
 
 
-def _video_size(track: Track) -> tuple[int, int] | None:
-    """Size of the first frame, if video can be decoded here."""
+def _video_size(reader: TopicReader) -> tuple[int, int] | None:
+    """Return the size of the first frame, or None where video cannot be decoded."""
     try:
-        pixels = Video(track).picture(0).pixels
+        pixels = Video(reader).picture(0).pixels
     except (FrameError, LogError):
         return None
     return pixels.shape[1], pixels.shape[0]
-
-
-def sources_by_topic(containers: Sequence[Container]) -> dict[str, list[Source]]:
-    """Group the channels of all files by topic, in the order of the files."""
-    topics: dict[str, list[Source]] = {}
-    for container in containers:
-        for channel_id, channel in sorted(container.channels.items()):
-            topics.setdefault(channel.topic, []).append(Source(container, channel_id))
-    return topics

@@ -1,6 +1,6 @@
-"""Which label belongs to which image: by header stamp, in whole nanoseconds.
+"""Pairs of images and labels by header stamp, in whole nanoseconds.
 
-Labels may be logged long after their images, so log times do not tell. Stamps are read only
+Labels may be logged long after their images, so log times do not pair them. Stamps are read only
 where they are needed: around the stamp that is looked for.
 """
 
@@ -45,7 +45,7 @@ class Pairing:
         self._near_label = 0
 
     def begin_near(self, label: int) -> None:
-        """Look for the next partner around a label; saves reading the way there."""
+        """Search for the next partner around a label, without reading the stamps before it."""
         self._near_label = min(label, max(len(self._labels) - 1, 0))
 
     def partner(self, image: int) -> int | None:
@@ -68,44 +68,44 @@ class Pairing:
         return label if _closest(self._images, theirs, image) == image else None
 
 
-def _closest(track: Stamps, stamp: int, hint: int) -> int:
+def _closest(stamps: Stamps, stamp: int, hint: int) -> int:
     """Position whose stamp is nearest to ``stamp`` (the first of equals), sought from a hint."""
-    middle = _seek(track, stamp, hint)
-    around = range(max(middle - REACH, 0), min(middle + REACH + 1, len(track)))
-    return min(around, key=lambda position: (_distance(track, position, stamp), position))
+    middle = _seek(stamps, stamp, hint)
+    around = range(max(middle - REACH, 0), min(middle + REACH + 1, len(stamps)))
+    return min(around, key=lambda position: (_distance(stamps, position, stamp), position))
 
 
-def _distance(track: Stamps, position: int, stamp: int) -> int:
-    theirs = track.stamp(position)
+def _distance(stamps: Stamps, position: int, stamp: int) -> int:
+    theirs = stamps.stamp(position)
     return 2**64 if theirs == UNREADABLE else abs(theirs - stamp)
 
 
-def _equal(track: Stamps, stamp: int, middle: int) -> list[int]:
-    around = range(max(middle - REACH, 0), min(middle + REACH + 1, len(track)))
-    return [position for position in around if track.stamp(position) == stamp]
+def _equal(stamps: Stamps, stamp: int, middle: int) -> list[int]:
+    around = range(max(middle - REACH, 0), min(middle + REACH + 1, len(stamps)))
+    return [position for position in around if stamps.stamp(position) == stamp]
 
 
-def _seek(track: Stamps, stamp: int, hint: int) -> int:
+def _seek(stamps: Stamps, stamp: int, hint: int) -> int:
     """First position at or after ``stamp``, by ever longer steps from the hint, then halving."""
     low, high, step = hint, hint, 1
-    while low > 0 and _at(track, low) >= stamp:
+    while low > 0 and _at(stamps, low) >= stamp:
         low, high, step = max(low - step, 0), low, step * 2
     step = 1
-    while high < len(track) and _at(track, high) < stamp:
-        low, high, step = high, min(high + step, len(track)), step * 2
+    while high < len(stamps) and _at(stamps, high) < stamp:
+        low, high, step = high, min(high + step, len(stamps)), step * 2
     while low < high:
         middle = (low + high) // 2
-        if _at(track, middle) < stamp:
+        if _at(stamps, middle) < stamp:
             low = middle + 1
         else:
             high = middle
-    return min(low, len(track) - 1)
+    return min(low, len(stamps) - 1)
 
 
-def _at(track: Stamps, position: int) -> int:
+def _at(stamps: Stamps, position: int) -> int:
     """Stamp at a position, or of the next one that can be read."""
-    for candidate in range(position, min(position + REACH, len(track))):
-        stamp = track.stamp(candidate)
+    for candidate in range(position, min(position + REACH, len(stamps))):
+        stamp = stamps.stamp(candidate)
         if stamp != UNREADABLE:
             return stamp
     return UNREADABLE

@@ -1,4 +1,4 @@
-"""What of a log is to be replayed, settled before the first frame."""
+"""The selection: which topics of a log are replayed, and by which rules, before the first frame."""
 
 from __future__ import annotations
 
@@ -6,27 +6,35 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import partial
 from itertools import islice
 from typing import Final
 
 import numpy as np
 
 from roadeval.logs.errors import BadMessage, FrameError, LogError
-from roadeval.logs.logged import scaled_size
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.messages.pixels import to_rgb
-from roadeval.logs.topics.choose import choose_image, choose_shadow, choose_truth, named
+from roadeval.logs.scaling import scaled_size
+from roadeval.logs.settings import LabelSettings, TopicSettings
+from roadeval.logs.topics.choose import (
+    Choice,
+    choose_image,
+    choose_shadow,
+    choose_truth,
+    named,
+)
 from roadeval.logs.topics.description import TopicInfo, median_period
-from roadeval.logs.topics.labels import LabelMap, LabelValues, seen_in, understand
+from roadeval.logs.topics.labels import LabelMap, seen_in, understand
 from roadeval.logs.topics.pairing import UNREADABLE
-from roadeval.logs.topics.track import Track
+from roadeval.logs.topics.reader import TopicReader
 
 LOOKED_AT: Final = 10
 """Label images at the log's start, and as many spread over it, that settle what values mean."""
 
 
 class Clock(StrEnum):
-    """What tells which label belongs to which image."""
+    """By what images and labels are paired."""
 
     STAMP = "header stamps"
     LOG_TIME = "log times"
@@ -55,12 +63,12 @@ class Selection:
     tolerance_ns
         Largest difference of the header stamps of an image and its label.
     clock
-        What pairs images and labels: header stamps if they tell the images apart, else log
-        times, else their order.
+        By what images and labels are paired: header stamps if they differ, else log times, else
+        their order.
     resize_truth
         Whether label images of another size are scaled to the image's (nearest neighbour).
     scale
-        Of the frames that are handed out, relative to the camera's; at most 1.
+        Scale of the frames that are read, relative to the camera's; at most 1.
     notes
         Sentences for a person: every choice that was made, and why.
     """
@@ -78,12 +86,12 @@ class Selection:
 
     @property
     def size(self) -> tuple[int, int] | None:
-        """Width and height of the frames as they are handed out, if the log tells."""
+        """Width and height of the frames that are read, if known."""
         return None if self.image.size is None else scaled_size(self.image.size, self.scale)
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """One sentence a topic: what was picked and why."""
+        """Which topics were chosen and why, a sentence each."""
         lines = [f"image: {self.image.name} ({self.image_why})"]
         named = {"truth": self.truth, "shadow truth": self.shadow}
         named |= {f"mask {name}": topic for name, topic in self.masks.items()}
@@ -96,21 +104,13 @@ class Selection:
         return (*lines, *self.notes)
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """What the user said about topics and labels; see `roadeval.logs.Log.select`."""
-
-    image: str | None
-    truth: str | None
-    shadow: str | None
-    masks: Mapping[str, str]
-    labels: LabelValues
-    tolerance_ns: int | None
-    resize: bool
-    scale: float = 1.0
-
-
-def settle(topics: Sequence[TopicInfo], tracks: Mapping[str, Track], asked: Asked) -> Selection:
+def settle(
+    topics: Sequence[TopicInfo],
+    readers: Mapping[str, TopicReader],
+    asked: TopicSettings,
+    labels: LabelSettings,
+    scale: float,
+) -> Selection:
     """Settle what to replay of these topics.
 
     Raises
@@ -119,47 +119,65 @@ def settle(topics: Sequence[TopicInfo], tracks: Mapping[str, Track], asked: Aske
         As `roadeval.logs.Log.select` says.
     """
     image, why = choose_image(topics, asked.image)
-    check_readable(tracks[image.name], image)
-
-    def label(chosen: tuple[TopicInfo | None, str], labels: LabelValues) -> LabelTopic | None:
-        topic, why = chosen
-        if topic is None:
-            return None
-        meaning = look_at_labels(tracks[topic.name], topic, image, labels, resize=asked.resize)
-        return LabelTopic(topic, meaning, why)
-
-    truth = choose_truth(topics, image, asked.truth, colors=bool(asked.labels.road_colors))
+    images = readers[image.name]
+    check_readable(images, image)
+    truth = choose_truth(topics, image, asked.truth, colors=bool(labels.road_colors))
     shadow = choose_shadow(topics, image, asked.shadow)
     masks = {
-        name: (named(topics, topic, f"--mask-topic {name}"), "asked for")
+        name: Choice(named(topics, topic, f"topics.masks {name}"), "asked for")
         for name, topic in asked.masks.items()
     }
-    track = tracks[image.name]
-    clock = clock_of(track)
+    look = partial(_label_topic, readers, image, resize=asked.resize_truth)
+    clock = clock_of(images)
     return Selection(
-        image,
-        why,
-        label(truth, asked.labels),
-        label(shadow, LabelValues()),
-        {name: found for name, mask in masks.items() if (found := label(mask, LabelValues()))},
-        tolerance(track, asked.tolerance_ns),
-        clock,
-        asked.resize,
-        asked.scale,
-        _notes(truth, clock),
+        image=image,
+        image_why=why,
+        truth=look(truth, labels),
+        shadow=look(shadow),
+        masks={name: label for name, mask in masks.items() if (label := look(mask))},
+        tolerance_ns=tolerance(images, asked.sync_tolerance_ms),
+        clock=clock,
+        resize_truth=asked.resize_truth,
+        scale=scale,
+        notes=_notes(truth, clock),
     )
 
 
-def _notes(truth: tuple[TopicInfo | None, str], clock: Clock) -> tuple[str, ...]:
+def _label_topic(
+    readers: Mapping[str, TopicReader],
+    image: TopicInfo,
+    choice: Choice,
+    labels: LabelSettings | None = None,
+    *,
+    resize: bool,
+) -> LabelTopic | None:
+    """Look at some images of the chosen topic: their size must fit, and their values be known."""
+    topic, labels = choice.topic, labels or LabelSettings()
+    if topic is None:
+        return None
+    if not resize and topic.size and image.size and topic.size != image.size:
+        sizes = ["x".join(map(str, size)) for size in (topic.size, image.size)]
+        raise LogError(
+            f"{topic.name} is {sizes[0]}, but {image.name} is {sizes[1]}: "
+            "scale the labels with topics.resize_truth"
+        )
+    seen: set[int] = set()
+    for picture in _samples(readers[topic.name]):
+        with suppress(BadMessage):
+            seen |= seen_in(picture, labels, topic.name)
+    return LabelTopic(topic, understand(labels, seen, topic.name), choice.why)
+
+
+def _notes(truth: Choice, clock: Clock) -> tuple[str, ...]:
     notes = []
-    if truth[0] is None:
-        notes.append(f"no truth: {truth[1]}")
+    if truth.topic is None:
+        notes.append(f"no truth: {truth.why}")
     if clock is not Clock.STAMP:
         notes.append(f"the header stamps are all zero or equal: {clock} take their place")
     return tuple(notes)
 
 
-def check_readable(track: Track, topic: TopicInfo) -> None:
+def check_readable(reader: TopicReader, topic: TopicInfo) -> None:
     """Refuse a topic of which nothing can be decoded.
 
     Raises
@@ -169,63 +187,38 @@ def check_readable(track: Track, topic: TopicInfo) -> None:
     """
     if not topic.problem:
         return
-    for picture in _samples(track):
+    for picture in _samples(reader):
         with suppress(BadMessage):
             to_rgb(picture)
             return
     raise LogError(f"nothing of {topic.name} can be decoded: {topic.problem}")
 
 
-def look_at_labels(
-    track: Track, topic: TopicInfo, image: TopicInfo, labels: LabelValues, *, resize: bool
-) -> LabelMap:
-    """Look at some label images: settle what their values mean, and that their size fits.
-
-    Raises
-    ------
-    LogError
-        If the size differs and ``resize`` is off, or the values cannot be understood.
-    """
-    if not resize and None not in (topic.size, image.size) and topic.size != image.size:
-        theirs, ours = ("x".join(map(str, size or ())) for size in (topic.size, image.size))
-        raise LogError(
-            f"{topic.name} is {theirs}, but {image.name} is {ours}: "
-            "scale the labels with --resize-truth"
-        )
-    seen: set[int] = set()
-    for picture in _samples(track):
-        try:
-            seen |= seen_in(picture, labels, topic.name)
-        except BadMessage:
-            continue
-    return understand(labels, seen, topic.name)
-
-
-def clock_of(track: Track) -> Clock:
-    """Find what tells the first images of a topic apart."""
-    stamps = (track.stamp(position) for position in range(len(track)))
+def clock_of(reader: TopicReader) -> Clock:
+    """Return what differs among the first images of a topic."""
+    stamps = (reader.stamp(position) for position in range(len(reader)))
     known = [stamp for stamp in islice(stamps, LOOKED_AT) if stamp != UNREADABLE]
-    if len(set(known)) > 1 or (len(track) <= 1 and any(known)):
+    if len(set(known)) > 1 or (len(reader) <= 1 and any(known)):
         return Clock.STAMP
-    times = track.log_times[:LOOKED_AT]
+    times = reader.log_times[:LOOKED_AT]
     return Clock.LOG_TIME if len(times) <= 1 or times[0] != times[-1] else Clock.ORDER
 
 
-def tolerance(track: Track, asked_ns: int | None) -> int:
-    """Nanoseconds asked for, or else half the frame period."""
-    if asked_ns is not None:
-        return asked_ns
-    period = median_period(track.log_times)
+def tolerance(reader: TopicReader, asked_ms: float | None) -> int:
+    """Return the tolerance asked for, or else half the frame period, in nanoseconds."""
+    if asked_ms is not None:
+        return round(asked_ms * 1e6)
+    period = median_period(reader.log_times)
     if period == 0:
-        stamps = sorted(track.stamp(position) for position in range(min(LOOKED_AT, len(track))))
+        stamps = sorted(reader.stamp(position) for position in range(min(LOOKED_AT, len(reader))))
         known = [stamp for stamp in stamps if stamp != UNREADABLE]
         period = median_period(np.array(known, np.int64))
     return period // 2
 
 
-def _samples(track: Track) -> Iterator[Picture]:
+def _samples(reader: TopicReader) -> Iterator[Picture]:
     """Read the first label images and some spread over the rest."""
-    spread = np.linspace(0, max(len(track) - 1, 0), LOOKED_AT, dtype=int).tolist()
-    for position in sorted({*range(min(LOOKED_AT, len(track))), *spread}):
+    spread = np.linspace(0, max(len(reader) - 1, 0), LOOKED_AT, dtype=int).tolist()
+    for position in sorted({*range(min(LOOKED_AT, len(reader))), *spread}):
         with suppress(FrameError):
-            yield track.picture(position)
+            yield reader.picture(position)

@@ -1,4 +1,4 @@
-"""A folder of images, or a video, becomes a camera log."""
+"""Making a camera log of a folder of images, or of a video."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Final
 
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import natural
-from roadeval.logs.topics.span import NS
+from roadeval.logs.times import NS
 from roadeval.logs.writing.pack_video import VIDEO_SUFFIXES, frames_of
 from roadeval.logs.writing.writer import LogWriter
 
@@ -29,8 +29,8 @@ _TIME: Final = re.compile(r"(\d{10})(?:[._](\d{1,9}))?|(\d{13})|(\d{16})|(\d{19}
 
 
 @dataclass(frozen=True, slots=True)
-class Packed:
-    """What was packed.
+class PackResult:
+    """What was written to a log, and what was left out.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Packed:
     without_mask, without_image
         Names of images without a mask (if there are masks), and of masks without an image.
     stamps
-        Where the stamps come from, in words.
+        Source of the stamps, in words.
     """
 
     path: Path
@@ -59,7 +59,7 @@ def pack(
     masks: str | Path | None = None,
     rate_hz: float | None = None,
     start_ns: int = 0,
-) -> Packed:
+) -> PackResult:
     """Write a folder of images, or a video, as a log that Foxglove and Rerun open too.
 
     JPEGs and PNGs go in as they are, a video's frames as JPEGs of quality 95. Masks belong to
@@ -78,7 +78,7 @@ def pack(
         Images a second. By default a video's own; of images, the times in their names if every
         name is a time (seconds, or milli-, micro- or nanoseconds since 1970), else 10.
     start_ns
-        Stamp of the first image, unless the names tell.
+        Stamp of the first image, unless the names hold times.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def pack(
     """
     images, output = Path(images), Path(output)
     if rate_hz is not None and not 0 < rate_hz <= 1000:
-        raise LogError(f"--rate {rate_hz:g}: give images a second, above 0 and up to 1000")
+        raise LogError(f"{rate_hz:g} images a second: must be above 0 and at most 1000")
     if images.suffix.lower() in VIDEO_SUFFIXES and images.is_file():
         if masks is not None:
             raise LogError(f"{images}: masks go with a folder of images, not with a video")
@@ -99,7 +99,7 @@ def pack(
 
 def _pack_folder(
     images: Path, output: Path, masks: Path | None, rate_hz: float | None, start_ns: int
-) -> Packed:
+) -> PackResult:
     files = _listed(images)
     by_image = _pair(files, _listed(masks)) if masks else {}
     if masks and not by_image:
@@ -114,11 +114,11 @@ def _pack_folder(
     used = set(by_image.values())
     lonely = [file.name for file in _listed(masks) if file not in used] if masks else []
     unlabelled = [file.name for file in files if file not in by_image] if masks else []
-    return Packed(output, len(files), len(by_image), tuple(unlabelled), tuple(lonely), words)
+    return PackResult(output, len(files), len(by_image), tuple(unlabelled), tuple(lonely), words)
 
 
 def _stamps(files: list[Path], rate_hz: float | None, start_ns: int) -> tuple[dict[Path, int], str]:
-    """Give each file its stamp, in the order of the stamps, and say where they come from."""
+    """Return each file's stamp, in the order of the stamps, and their source in words."""
     times = {file: time for file in files if (time := _time_in(file.stem)) is not None}
     if rate_hz is None and len(times) == len(files) == len(set(times.values())):
         ordered = sorted(times.items(), key=lambda item: item[1])
@@ -128,7 +128,7 @@ def _stamps(files: list[Path], rate_hz: float | None, start_ns: int) -> tuple[di
     return regular, f"{rate:g} images a second"
 
 
-def _pack_video(video: Path, output: Path, rate_hz: float | None, start_ns: int) -> Packed:
+def _pack_video(video: Path, output: Path, rate_hz: float | None, start_ns: int) -> PackResult:
     count = 0
     with LogWriter(output) as log:
         for count, (time_ns, jpeg) in enumerate(frames_of(video), start=1):
@@ -138,7 +138,7 @@ def _pack_video(video: Path, output: Path, rate_hz: float | None, start_ns: int)
         if not count:
             raise LogError(f"{video}: a video without frames")
     words = "the video's own times" if rate_hz is None else f"{rate_hz:g} images a second"
-    return Packed(output, count, stamps=words)
+    return PackResult(output, count, stamps=words)
 
 
 def _listed(folder: Path) -> list[Path]:

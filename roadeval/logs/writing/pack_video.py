@@ -9,11 +9,11 @@ from typing import Final
 
 from roadeval.logs.errors import LogError
 from roadeval.logs.messages.video import import_av
-from roadeval.logs.topics.span import NS
+from roadeval.logs.times import NS
 
 VIDEO_SUFFIXES: Final = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".ts", ".mpg", ".mpeg")
 QUALITY: Final = 95
-"""Of the JPEGs that frames become, 0 to 100."""
+"""JPEG quality of the frames, 0 to 100."""
 
 
 def frames_of(video: Path) -> Iterator[tuple[int, bytes]]:

@@ -1,30 +1,26 @@
-"""Results back to MCAP: a log beside the log, for Foxglove and Lichtblick.
+"""The sidecar: a log of results beside the camera's log, for Foxglove and Lichtblick.
 
-Viewers merge files that are open together by their times, so the sidecar bears the images' own
-stamps and log times, and the log itself stays as it is.
+Viewers merge files that are open together by their times, so the sidecar's messages bear the
+images' own stamps and log times; the camera's log is not changed.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import Counts, Frame, FrameResult, Layer, Tally
+from roadeval.data import Frame, FrameResult, Layer, Tally
 from roadeval.logs.writing.writer import LogWriter
 
 ROOT: Final = "/roadeval"
 METRICS: Final = "roadeval.Metrics"
 _INTEGER: Final = {"type": "integer"}
 _RATE: Final = {"type": ["number", "null"], "description": "a fraction; null if undefined"}
-
-Rates = Callable[[Counts], Mapping[str, float]]
 
 
 class SidecarWriter:
@@ -38,8 +34,6 @@ class SidecarWriter:
     ----------
     path
         The file to write; it appears under its name when it is complete.
-    rates
-        Names and values of the rates of a frame's counts; NaN where undefined.
 
     Raises
     ------
@@ -47,10 +41,8 @@ class SidecarWriter:
         If it cannot be written.
     """
 
-    def __init__(self, path: str | Path, rates: Rates) -> None:
+    def __init__(self, path: str | Path) -> None:
         self._log = LogWriter(path)
-        self._rates = rates
-        self._schema = _schema(tuple(rates(Counts(1, 1, 1, 1))))
 
     @property
     def path(self) -> Path:
@@ -58,7 +50,7 @@ class SidecarWriter:
         return self._log.path
 
     def write(self, result: FrameResult) -> None:
-        """Write what became of a frame; frames in the order of their log times.
+        """Write a frame's results; frames come in the order of their log times.
 
         Raises
         ------
@@ -90,30 +82,25 @@ class SidecarWriter:
             "FN": counts.fn,
             "N": counts.n,
         }
-        rates = self._rates(counts).items()
+        rates = tally.rates.items()
         message |= {name: None if math.isnan(rate) else rate for name, rate in rates}
         topic = f"{ROOT}/metrics/{tally.variant}/{tally.stage}"
-        schema = (METRICS, self._schema)
+        schema = (METRICS, _schema(tuple(tally.rates)))
         self._log.json(topic, frame.stamp_ns, message, schema, log_time_ns=frame.log_time_ns)
 
     def close(self) -> None:
-        """Complete the file and give it its name."""
+        """Complete the file and move it to its path."""
         self._log.close()
 
     def __enter__(self) -> SidecarWriter:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._log.__exit__(kind, error, trace)
+    def __exit__(self, *error: Any) -> None:
+        self._log.__exit__(*error)
 
 
 class NoSidecar:
-    """Writes nothing, for a run that was not asked for one."""
+    """Writes nothing, for a run without a sidecar."""
 
     path: Final = None
 
@@ -136,7 +123,7 @@ def _coloured(layer: Layer) -> npt.NDArray[np.uint8]:
 
 
 def _schema(rates: tuple[str, ...]) -> str:
-    """Describe the metrics in JSON Schema, with Foxglove's own form of a time."""
+    """Return the JSON Schema of the metrics, with Foxglove's own form of a time."""
     time = {
         "type": "object",
         "title": "time",

@@ -1,4 +1,4 @@
-"""Writing camera logs that Foxglove and Rerun open too."""
+"""The writer of camera logs, which Foxglove and Rerun open too."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final
 
 import numpy as np
@@ -14,18 +13,18 @@ import numpy.typing as npt
 from mcap.writer import Writer
 
 from roadeval.logs.errors import LogError
-from roadeval.runtime import files as folders
 from roadeval.version import VERSION
 
 FORMATS: Final = ("jpeg", "png", "webp")
+FRAME_ID: Final = "camera"
+"""The camera's coordinate frame, by name."""
 
 
 class LogWriter:
     """Writes images to an MCAP file with Foxglove's protobuf schemas.
 
     The same calls give the same bytes. The file appears under its name when it is complete:
-    at the end of the ``with`` statement, and never if that ends by an exception. Then its folder
-    goes too if it was made for it.
+    at the end of the ``with`` statement, and never if that ends by an exception.
 
     Parameters
     ----------
@@ -44,8 +43,8 @@ class LogWriter:
         with self._explained():
             if self.path.is_dir():
                 raise LogError(f"{self.path}: is a folder; name a file in it, ending in .mcap")
-            with folders.made(self.path.parent) as self._made:
-                self._file = self._temporary.open("wb")
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = self._temporary.open("wb")
         self._writer = Writer(self._file)
         self._writer.start(library=f"roadeval {VERSION}")
         self._schemas: dict[str, int] = {}
@@ -59,21 +58,16 @@ class LogWriter:
         data: bytes,
         format: str,  # noqa: A002
         *,
-        frame_id: str = "camera",
         log_time_ns: int | None = None,
     ) -> None:
         """Write an image file as it is.
 
         Parameters
         ----------
-        topic
-            Where to.
-        stamp_ns
-            Header stamp.
+        topic, stamp_ns
+            Topic and header stamp.
         data, format
             The file's bytes, and ``jpeg``, ``png`` or ``webp``.
-        frame_id
-            The camera's coordinate frame.
         log_time_ns
             Log time; the stamp by default.
 
@@ -86,7 +80,7 @@ class LogWriter:
 
         if format not in FORMATS:
             raise LogError(f"{topic}: format {format!r} is none of {', '.join(FORMATS)}")
-        message = CompressedImage(frame_id=frame_id, data=data, format=format)
+        message = CompressedImage(frame_id=FRAME_ID, data=data, format=format)
         message.timestamp.FromNanoseconds(stamp_ns)
         channel = self._channels.get(topic) or self._protobuf_channel(topic, CompressedImage)
         data = message.SerializeToString(deterministic=True)
@@ -98,7 +92,6 @@ class LogWriter:
         stamp_ns: int,
         mask: npt.NDArray[np.uint8],
         *,
-        frame_id: str = "camera",
         log_time_ns: int | None = None,
     ) -> None:
         """Write a ``(H, W)`` mask, or an image in RGB or RGBA, uint8, as a PNG without loss.
@@ -113,9 +106,7 @@ class LogWriter:
         codes = {3: cv2.COLOR_RGB2BGR, 4: cv2.COLOR_RGBA2BGRA}
         stored = mask if mask.ndim == 2 else cv2.cvtColor(mask, codes[mask.shape[2]])
         _, png = cv2.imencode(".png", stored)
-        self.image(
-            topic, stamp_ns, png.tobytes(), "png", frame_id=frame_id, log_time_ns=log_time_ns
-        )
+        self.image(topic, stamp_ns, png.tobytes(), "png", log_time_ns=log_time_ns)
 
     def json(
         self,
@@ -162,7 +153,7 @@ class LogWriter:
         return self._channels[topic]
 
     def close(self) -> None:
-        """Complete the file and give it its name.
+        """Complete the file and move it to its path.
 
         Raises
         ------
@@ -181,24 +172,18 @@ class LogWriter:
     def __enter__(self) -> LogWriter:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_error: object) -> None:
         if kind is None:
             self.close()
         else:
             self._discard()
 
     def _discard(self) -> None:
-        """Leave nothing behind."""
-        # On a full disk closing fails as well, and what went wrong first is what counts.
+        """Remove the unfinished file, and its folder if it was made for it."""
+        # On a full disk closing fails as well, but the first error is the one to report.
         with suppress(OSError):
             self._file.close()
         self._temporary.unlink(missing_ok=True)
-        folders.remove(self._made)
 
     @contextmanager
     def _explained(self) -> Iterator[None]:

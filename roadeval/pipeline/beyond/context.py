@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Annotated, Final
 
 import cv2
@@ -29,12 +28,10 @@ from pydantic.dataclasses import dataclass as validated
 from roadeval.data import Layer, LayerKind, LayerSpec, Rgb
 from roadeval.data.packed import Packed
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.beyond.scale import reduced, stretched
-from roadeval.pipeline.beyond.shade import LOGS
-from roadeval.pipeline.paper.hsi import planes as colour_planes
+from roadeval.pipeline.beyond.context_features import BARE_FEATURES, Values, at_samples, features
+from roadeval.pipeline.beyond.working_image import reduced, stretched
 from roadeval.pipeline.paper.svm import SVM, Penalty
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
-from roadeval.pipeline.solvers import hyperplane
 from roadeval.pipeline.stage import (
     MisfitError,
     Output,
@@ -43,18 +40,12 @@ from roadeval.pipeline.stage import (
     View,
     perfect_mask,
 )
-from roadeval.runtime.processes import call
 
-Values = npt.NDArray[np.float32]
 Floats = npt.NDArray[np.float64]
 
 DECISION: Final = LayerSpec(
     "decision", LayerKind.SCALAR, "Decision value (Eq. 16)", value_range=(-2.0, 2.0), exact=False
 )
-
-BARE_FEATURES: Final = 9
-"""Three colours, two log-chromaticities, two coordinates, and two of the column below: what is not
-texture."""
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
@@ -68,7 +59,7 @@ class ContextSettings:
     windows
         Sides of the squares over which texture is averaged, in its pixels. Gravel and leaves show
         in a small one; what a larger one tells of a facade, the columns below it tell as well.
-        At most 8: for each number of features the machine's sum is compiled anew.
+        At most 8: the machine's sum is compiled for each number of features.
     planes
         Planes of the feature map. What a decision costs grows with them.
     spare
@@ -118,74 +109,12 @@ class RectifiedMachine:
             raise ValueError("planes has not nine columns and two for each window of texture")
 
 
-# --- Features -------------------------------------------------------------------------------------
-
-
-def features(image: Rgb, windows: tuple[int, ...]) -> Values:
-    """Colour, chromaticity, place, column and texture: ``(F, h, w)`` float32 of ``(h, w, 3)`` RGB.
-
-    The column is what `_columns` finds below a pixel. Texture is, for each window, the root of the
-    mean absolute slope of the log brightness across and down: kerbs, wheels and house fronts have
-    edges of one direction, leaves of both.
-    """
-    colours = colour_planes(image)
-    red, green, blue = (cv2.LUT(plane, LOGS) for plane in colours)
-    light = (red + green + blue) / np.float32(3)
-    slopes = [np.abs(cv2.Sobel(light, cv2.CV_32F, *order)) for order in ((1, 0), (0, 1))]
-    found: Values = np.empty((BARE_FEATURES + 2 * len(windows), *image.shape[:2]), np.float32)
-    found[:3] = colours
-    np.subtract(red, green, out=found[3])
-    np.subtract(blue, green, out=found[4])
-    found[5:7] = _places(*image.shape[:2])
-    _columns(light, slopes[1], found[7:9])
-    textures = (cv2.blur(slope, (side, side)) for side in windows for slope in slopes)
-    for plane, texture in zip(found[9:], textures, strict=True):
-        np.sqrt(texture, out=plane)
-    return found
-
-
-def _columns(light: Values, slope: Values, found: Values) -> None:
-    """Fill ``found``, ``(2, h, w)``, with what lies between each pixel and the image's lower edge.
-
-    The steepest edge across the column, as the root of the mean absolute slope down of a few
-    pixels, and the least log brightness: whoever drives up the column to the pixel meets no kerb
-    and no shadow under a car as long as there is road. ``light`` and ``slope`` are ``(h, w)``
-    float32.
-    """
-    edge, dark = found
-    np.sqrt(cv2.blur(slope, (5, 3)), out=edge)
-    cv2.blur(light, (5, 5), dst=dark)
-    KERNELS.climb(edge, dark)
-
-
-@lru_cache(maxsize=8)
-def _places(height: int, width: int) -> tuple[Values, Values]:
-    """Column from -1 to 1 and row from 0 to 1 of each pixel's centre, ``(height, width)`` each."""
-    down, across = np.mgrid[0:height, 0:width].astype(np.float32) + np.float32(0.5)
-    return across * np.float32(2 / width) - 1, down / np.float32(height)
-
-
-def sampled(sample: TrainingSet, settings: ContextSettings) -> Values:
-    """Features of the sampled pixels, ``(n, F)`` float32."""
-    rows = []
-    for index, image in enumerate(sample.images):
-        here = sample.frame == index
-        small = features(reduced(image, settings.width), settings.windows)
-        height, width = small.shape[1:]
-        row = sample.row[here] * height // image.shape[0]
-        column = sample.column[here] * width // image.shape[1]
-        rows.append((np.flatnonzero(here), small[:, row, column].T))
-    order = np.concatenate([where for where, _ in rows])
-    result: Values = np.concatenate([values for _, values in rows])[np.argsort(order)]
-    return result
-
-
 # --- Learning -------------------------------------------------------------------------------------
 
 
 def fit(sample: TrainingSet, settings: ContextSettings) -> RectifiedMachine:
     """Draw the planes, solve the linear machine (Eq. 13) on them, and learn the threshold."""
-    values = sampled(sample, settings)
+    values = at_samples(sample, settings.width, settings.windows)
     planes, bias = draw_planes(values, settings.planes + settings.spare, sample.seed)
     mapped = np.maximum(values @ planes.T + bias, 0)
     kept, weights, offset = solve(mapped, sample.road, settings)
@@ -240,12 +169,16 @@ def solve(
 
 
 def _solve(mapped: Values, road: npt.NDArray[np.bool_], c: float) -> tuple[Floats, float]:
-    found = call(hyperplane, features=mapped, road=road, c=c)
-    return found["weights"], float(found["offset"])
+    """Solve the primal of a linear machine with a squared hinge loss, with liblinear."""
+    # Only here: the import takes a second and 40 MiB, and a model from a file needs neither.
+    from sklearn.svm import LinearSVC
+
+    machine = LinearSVC(C=c, dual=False).fit(mapped, road)
+    return machine.coef_[0], float(machine.intercept_[0])
 
 
 def left_out(mapped: Values, sample: TrainingSet, settings: ContextSettings) -> Values:
-    """Decision value of each sampled pixel by a machine that has not seen its part of the drive.
+    """Return the decision value of each sampled pixel by a machine fitted without its part.
 
     The frames are cut into ``folds`` parts in their order: neighbouring frames look alike. NaN
     where the others show one class alone, or there are none.
@@ -262,7 +195,7 @@ def left_out(mapped: Values, sample: TrainingSet, settings: ContextSettings) -> 
 
 
 def threshold(values: Values, road: npt.NDArray[np.bool_]) -> float:
-    """Give the threshold with the least sum of FNR and FPR on left-out decision ``values``.
+    """Return the threshold with the least sum of FNR and FPR on left-out decision ``values``.
 
     Frames show more non-road than road, and the least ERR would be had a little higher; it is
     the same within its noise once phase 4 has removed the false positives that stand alone, and
@@ -296,7 +229,7 @@ def check_fit(machine: RectifiedMachine, settings: ContextSettings) -> None:
 
 
 def decision(image: Rgb, machine: RectifiedMachine, settings: ContextSettings) -> Values:
-    """Decision value (Eq. 16) of each pixel of ``(h, w, 3)`` uint8 RGB, ``(h, w)`` float32.
+    """Compute the decision value (Eq. 16) of ``(h, w, 3)`` uint8 RGB, ``(h, w)`` float32.
 
     A `MisfitError` if the machine is for other features than the settings'.
     """
@@ -324,7 +257,7 @@ def bind(settings: ContextSettings, machine: RectifiedMachine) -> Callable[[View
 
 
 def layers(_settings: ContextSettings) -> tuple[LayerSpec, ...]:
-    """Name the layers of the machine."""
+    """Return the layers of the machine."""
     return DECISION, SVM
 
 
@@ -337,7 +270,7 @@ STAGE: Final = Stage(
     fit=fit,
     parameters=RectifiedMachine,
     oracle=perfect_mask,
-    # Not the threshold: it is learnt, or takes the place of what would have been.
-    deciding=("smoothing",),
+    # Not the threshold: it is learnt, or replaces the one that would have been.
+    inference_only=("smoothing",),
     mask=SVM.name,
 )

@@ -1,7 +1,7 @@
 """Exposure and white balance: the ground in front of the vehicle gets the same grey in each frame.
 
-Not in the paper. A classifier of colours learns the exposure and the camera along with the road;
-the reference patch, which is road in nearly every frame, tells both.
+A classifier of colours learns the exposure and the camera along with the road. The reference patch,
+which is road in nearly every frame, is a measure of both.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Mask, Rgb
-from roadeval.kernels import KERNELS
-from roadeval.pipeline.patch import ReferencePatch, patch_mask
+from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View
 
 EXPOSED: Final = LayerSpec("exposed", LayerKind.RGB, "Exposure by the reference patch", exact=False)
@@ -57,7 +56,7 @@ class ExposureSettings:
 
 
 def gains(image: Rgb, settings: ExposureSettings) -> npt.NDArray[np.float64]:
-    """Gain of each channel, ``(3,)``, that brings the patch of ``(H, W, 3)`` RGB to the level."""
+    """Return the gains ``(3,)`` that bring the patch of an ``(H, W, 3)`` image to the level."""
     rows, columns, patch = _box(*image.shape[:2], settings.patch)
     around = image[rows, columns]
     medians = np.array([_median(around, channel, patch) for channel in range(3)])
@@ -69,7 +68,7 @@ def gains(image: Rgb, settings: ExposureSettings) -> npt.NDArray[np.float64]:
 
 @lru_cache(maxsize=16)
 def _box(height: int, width: int, patch: ReferencePatch) -> tuple[slice, slice, Mask]:
-    """Rows and columns of the smallest box around the patch, and the patch's mask in it."""
+    """Return rows and columns of the smallest box around the patch, and the patch's mask in it."""
     mask = patch_mask(height, width, patch)
     x, y, columns, rows = cv2.boundingRect(mask)
     here = slice(y, y + rows), slice(x, x + columns)
@@ -77,7 +76,7 @@ def _box(height: int, width: int, patch: ReferencePatch) -> tuple[slice, slice, 
 
 
 def _median(image: Rgb, channel: int, patch: Mask) -> float:
-    """Lower median of a channel over the patch."""
+    """Return the lower median of a channel over the patch."""
     counts = cv2.calcHist([image], [channel], patch, [256], [0, 256]).ravel().cumsum()
     return float(np.searchsorted(counts, counts[-1] / 2))
 
@@ -85,7 +84,7 @@ def _median(image: Rgb, channel: int, patch: Mask) -> float:
 def expose(image: Rgb, gain: npt.NDArray[np.float64]) -> Rgb:
     """Multiply the channels of an ``(H, W, 3)`` uint8 image by ``(3,)`` gains; rounded, clipped."""
     table = np.rint(np.arange(256)[:, None] * gain).clip(0, 255).astype(np.uint8)
-    exposed: Rgb = KERNELS.look_up_channels(image, table)
+    exposed: Rgb = cv2.LUT(image, table[None])
     return exposed
 
 
@@ -102,7 +101,7 @@ def bind(settings: ExposureSettings, _parameters: None) -> Callable[[View], Outp
 
 
 def layers(_settings: ExposureSettings) -> tuple[LayerSpec, ...]:
-    """Name the layer of the exposure."""
+    """Return the layer of the exposure."""
     return (EXPOSED,)
 
 
@@ -112,5 +111,5 @@ STAGE: Final[Stage[ExposureSettings, None]] = Stage(
     settings=ExposureSettings,
     bind=bind,
     layers=layers,
-    prepares=True,
+    preprocesses=True,
 )

@@ -3,7 +3,7 @@
 The paper's filter (`shadow`) takes whatever has a high NDI for shadow. This one keeps its four
 steps and asks at each whether what it sees can be a shadow on the road:
 
-1. candidates are dark pixels whose colour is the road's under skylight (`shade`);
+1. candidates are dark pixels whose colour is the road's under skylight (`road_light`);
 2. components are kept if they are as smooth as road, near enough to be judged, and neither too
    dark nor too bright for shade;
 3. rings begin beyond the penumbra and hold lit road alone;
@@ -24,8 +24,9 @@ import numpy.typing as npt
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb, Truth
 from roadeval.data.packed import Packed
-from roadeval.pipeline.beyond import shade
-from roadeval.pipeline.beyond.gates import (
+from roadeval.pipeline.beyond import road_light
+from roadeval.pipeline.beyond.road_light import RoadLight
+from roadeval.pipeline.beyond.shadow_gates import (
     ACCEPTED,
     NONE,
     VERDICTS,
@@ -37,8 +38,7 @@ from roadeval.pipeline.beyond.gates import (
     judge,
     look,
 )
-from roadeval.pipeline.beyond.scale import enlarged, reduced, stretched
-from roadeval.pipeline.beyond.shade import RoadLight
+from roadeval.pipeline.beyond.working_image import enlarged, reduced, stretched
 from roadeval.pipeline.paper.shadow import RING_COLOUR, SHADOW_COLOUR
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
 
@@ -69,7 +69,7 @@ COMPENSATED: Final = LayerSpec("compensated", LayerKind.RGB, "Compensated image"
 
 
 def gain_map(found: Components, verdicts: Verdicts, settings: GatedSettings) -> Map:
-    """Gain of each channel at each pixel, ``(h, w, 3)`` float32; 1 where nothing is to change.
+    """Return the gain of each channel at each pixel, ``(h, w, 3)`` float32; 1 is no change.
 
     In an accepted component it is ring over core, no less than 1 and no more than one over the
     least ratio; then averaged over a square, so that it rises softly at the edge. The outermost
@@ -136,7 +136,7 @@ def oracle(settings: GatedSettings, road: RoadLight) -> Callable[[View, Truth], 
 def _maps(
     scene: Scene, found: Components, verdicts: Verdicts, settings: GatedSettings
 ) -> dict[str, Mask]:
-    """Masks, label images and regions at the size of the working image, by name."""
+    """Return masks, label images and regions at the size of the working image, by name."""
     kinds = verdicts[found.labels]
     shadow = (kinds == ACCEPTED).view(np.uint8)
     side = 2 * settings.gap + 1
@@ -164,7 +164,7 @@ def _facts(shadow: Mask, verdicts: Verdicts, gain: Map) -> dict[str, float]:
 
 
 def layers(settings: GatedSettings) -> tuple[LayerSpec, ...]:
-    """Name the layers of the filter, in the order of its steps."""
+    """Return the layers of the filter, in the order of its steps."""
     span = (1.0, 1 / settings.ratio[0])
     gain = LayerSpec(
         "gain", LayerKind.SCALAR, "Greatest gain of a channel", value_range=span, exact=False
@@ -174,7 +174,7 @@ def layers(settings: GatedSettings) -> tuple[LayerSpec, ...]:
 
 def fit(sample: TrainingSet, _settings: GatedSettings) -> RoadLight:
     """Learn the road's colours in the sun and in the shade."""
-    return shade.fit(sample)
+    return road_light.fit(sample)
 
 
 STAGE: Final = Stage(

@@ -2,40 +2,27 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import Rgb
-
-Plane = npt.NDArray[np.uint8]
-Planes = tuple[Plane, Plane, Plane]
 Floats = npt.NDArray[np.float64]
 
 
-def planes(image: Rgb) -> Planes:
-    """Take an ``(H, W, 3)`` uint8 image apart: red, green and blue, ``(H, W)`` each."""
-    red, green, blue = apart = [np.empty(image.shape[:2], np.uint8) for _ in range(3)]
-    # Left to make the arrays itself, the library takes three times as long.
-    cv2.split(image, apart)
-    return red, green, blue
-
-
 def value(rgb: npt.NDArray[np.uint8]) -> Floats:
-    """V of ``(..., 3)`` uint8 RGB: ``(R + G + B) / 3`` over 255, in 0..1 (Eq. 3)."""
+    """Return V of ``(..., 3)`` uint8 RGB: ``(R + G + B) / 3`` over 255, in 0..1 (Eq. 3)."""
     result: Floats = rgb.sum(axis=-1, dtype=np.int64) / (3 * 255)
     return result
 
 
 def saturation(rgb: npt.NDArray[np.uint8]) -> Floats:
-    """S of ``(..., 3)`` uint8 RGB: ``1 - 3 min / (R + G + B)`` in 0..1; 0 for black (Eq. 4)."""
+    """Return S of ``(..., 3)`` uint8 RGB: ``1 - 3 min / (R + G + B)`` 0 for black (Eq. 4)."""
     total = rgb.sum(axis=-1, dtype=np.int64)
     low = rgb.min(axis=-1).astype(np.int64)
     return np.where(total > 0, 1.0 - 3.0 * low / np.maximum(total, 1), 0.0)
 
 
 def hue(rgb: npt.NDArray[np.uint8]) -> Floats:
-    """H of ``(..., 3)`` uint8 RGB in degrees, 0..360; 0 for greys (Eq. 5).
+    """Return H of ``(..., 3)`` uint8 RGB in degrees, 0..360; 0 for greys (Eq. 5).
 
     The printed equation gives both branches the condition ``B <= G``; the second one is
     ``360 - theta`` where ``B > G``.

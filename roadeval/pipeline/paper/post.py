@@ -17,7 +17,7 @@ from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, mask_sp
 from roadeval.data.arrays import Reach
 from roadeval.data.packed import Packed, everywhere
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.patch import ReferencePatch, patch_mask
+from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View
 
 POST: Final = mask_spec("post", "Road (Eq. 17-23)")
@@ -32,7 +32,7 @@ Odd = Annotated[int, Field(ge=1, le=999)]
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
-class MorphologySettings:
+class PostSettings:
     """Settings of phase 4.
 
     Parameters
@@ -77,12 +77,12 @@ class MorphologySettings:
 
 
 def element_side(width: int) -> int:
-    """Odd number nearest to 1 % of an image's width, at least 3."""
+    """Return the odd number nearest to 1 % of an image's width, at least 3."""
     return max(3, 2 * (width // 200) + 1)
 
 
 def structuring_element(side: int, shape: str) -> Reach:
-    """B of Eq. 17-22, of ``side`` pixels, odd; see `roadeval.data.arrays.Reach`."""
+    """Return B of Eq. 17-22, of ``side`` pixels, odd; see `roadeval.data.arrays.Reach`."""
     kind = cv2.MORPH_RECT if shape == "square" else cv2.MORPH_ELLIPSE
     below = cv2.getStructuringElement(kind, (side, side))[side // 2 :]
     reach: Reach = (np.count_nonzero(below, axis=1) - 1) // 2
@@ -90,12 +90,12 @@ def structuring_element(side: int, shape: str) -> Reach:
 
 
 def dilate(mask: Packed, element: Reach) -> Packed:
-    """Dilation (Eq. 17)."""
+    """Dilate a mask (Eq. 17)."""
     return Packed(KERNELS.grow(mask.bits, element, mask.width, False), mask.width)
 
 
 def erode(mask: Packed, element: Reach) -> Packed:
-    """Erosion (Eq. 18): what the dilation of non-road, which is all around the image, leaves."""
+    """Erode a mask (Eq. 18): the complement of non-road dilated, with non-road around the image."""
     image = everywhere(mask.shape)
     other = KERNELS.grow(image ^ mask.bits, element, mask.width, True)
     return Packed(image ^ other, mask.width)
@@ -122,7 +122,7 @@ def closing(mask: Packed, element: Reach) -> Packed:
 
 
 def boundary(mask: Packed, element: Reach) -> Packed:
-    """Boundary ``M - (M erode B)`` (Eq. 22)."""
+    """Return the boundary ``M - (M erode B)`` (Eq. 22)."""
     return Packed(mask.bits & ~erode(mask, element).bits, mask.width)
 
 
@@ -148,8 +148,8 @@ def fill_holes(mask: Packed) -> Packed:
     return Packed(KERNELS.fill_holes(mask.bits, mask.width), mask.width)
 
 
-def post_process(mask: Packed, settings: MorphologySettings) -> Packed:
-    """Section 4.4 on a road mask: open, close, keep one region, fill its holes."""
+def post_process(mask: Packed, settings: PostSettings) -> Packed:
+    """Open and close a road mask, keep one region, fill its holes (section 4.4)."""
     side = settings.element or element_side(mask.width)
     element = structuring_element(side, settings.shape)
     for operation in settings.operations:
@@ -160,7 +160,7 @@ def post_process(mask: Packed, settings: MorphologySettings) -> Packed:
     return fill_holes(mask) if settings.fill else mask
 
 
-def bind(settings: MorphologySettings, _parameters: None) -> Callable[[View], Output]:
+def bind(settings: PostSettings, _parameters: None) -> Callable[[View], Output]:
     """Return phase 4 as a pure function of the mask before it."""
     edge = structuring_element(settings.boundary_element, "square")
 
@@ -174,15 +174,15 @@ def bind(settings: MorphologySettings, _parameters: None) -> Callable[[View], Ou
     return run
 
 
-def layers(_settings: MorphologySettings) -> tuple[LayerSpec, ...]:
-    """Name the layers of phase 4."""
+def layers(_settings: PostSettings) -> tuple[LayerSpec, ...]:
+    """Return the layers of phase 4."""
     return POST, BOUNDARY
 
 
-STAGE: Final[Stage[MorphologySettings, None]] = Stage(
+STAGE: Final[Stage[PostSettings, None]] = Stage(
     name="post",
     title="Phase 4: morphology",
-    settings=MorphologySettings,
+    settings=PostSettings,
     bind=bind,
     layers=layers,
     sees_mask_alone=True,

@@ -61,15 +61,15 @@ def fit(sample: TrainingSet, _settings: SimilaritySettings) -> RoadColour:
 
 
 def limit(quantile: float) -> float:
-    """Greatest ``d^2`` of a road pixel: ``chi2.ppf(quantile, 3)``."""
-    # The same number as scipy.stats.chi2.ppf, without the seconds that importing it takes.
+    """Return the greatest ``d^2`` of a road pixel: ``chi2.ppf(quantile, 3)``."""
+    # The same number as scipy.stats.chi2.ppf, whose import takes a second.
     from scipy.special import chdtri
 
     return float(chdtri(3, 1.0 - quantile))
 
 
 def whitening(covariance: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """W, ``(3, 3)`` lower triangular, of a positive covariance S: ``W^T W = S^-1``.
+    """Return W, ``(3, 3)`` lower triangular, of a positive covariance S: ``W^T W = S^-1``.
 
     So the distance of Eq. 2 is ``|W (x - m)|``, which rounding can neither make negative nor blow
     up: even where S is singular but for the least ridge it is off by less than 0.01 in single
@@ -80,7 +80,7 @@ def whitening(covariance: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 
 def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Output]:
-    """Return phase 1 as a pure function of what it sees.
+    """Return phase 1 as a pure function of what it sees (Eq. 2).
 
     ``d = sqrt((x - m)^T S^-1 (x - m))`` with S regularised. The printed Eq. 2 is no distance
     (its brackets are misplaced).
@@ -90,7 +90,7 @@ def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Out
     spec = _distance(settings)
 
     def run(view: View) -> Output:
-        distance, near = KERNELS.mahalanobis(view.planes(), road.mean, factors, greatest)
+        distance, near = KERNELS.mahalanobis(view.planes, road.mean, factors, greatest)
         mask = Packed.of(near)
         return Output((Layer(spec, distance), Layer(SIMILARITY, mask)), mask=mask)
 
@@ -105,7 +105,7 @@ def _distance(settings: SimilaritySettings) -> LayerSpec:
 
 
 def layers(settings: SimilaritySettings) -> tuple[LayerSpec, ...]:
-    """Name the layers of phase 1."""
+    """Return the layers of phase 1."""
     return _distance(settings), SIMILARITY
 
 
@@ -117,5 +117,5 @@ STAGE: Final = Stage(
     layers=layers,
     fit=fit,
     parameters=RoadColour,
-    deciding=("quantile", "ridge"),
+    inference_only=("quantile", "ridge"),
 )

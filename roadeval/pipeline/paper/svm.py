@@ -14,12 +14,10 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerSpec, mask_spec
 from roadeval.data.packed import Packed
-from roadeval.pipeline import cube
+from roadeval.pipeline import colour_cube as cube
 from roadeval.pipeline.colour_table import ColourTable
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
-from roadeval.pipeline.solvers import support_vectors
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask
-from roadeval.runtime.processes import call
 
 Floats = npt.NDArray[np.float64]
 
@@ -96,22 +94,24 @@ def fit(sample: TrainingSet, settings: SvmSettings) -> SupportVectors:
     if settings.standardise:
         mean, scale = colours.mean(axis=0), colours.std(axis=0)
         scale = np.where(scale > 0, scale, 1.0)
-    found = call(
-        support_vectors,
-        features=(colours - mean) / scale,
-        road=sample.road,
-        c=settings.c,
-        kernel=settings.kernel,
-        gamma=settings.gamma,
+    # Only here: the import takes a second and 40 MiB, and a model from a file needs neither.
+    from sklearn.svm import SVC
+
+    machine = SVC(C=settings.c, kernel=settings.kernel, gamma=settings.gamma)
+    machine.fit((colours - mean) / scale, sample.road)
+    return SupportVectors(
+        mean,
+        scale,
+        np.ascontiguousarray(machine.support_vectors_),
+        np.ascontiguousarray(machine.dual_coef_[0]),
+        float(machine.intercept_[0]),
     )
-    offset = float(found["offset"])
-    return SupportVectors(mean, scale, found["vectors"], found["weights"], offset)
 
 
 def decision(
     colours: npt.NDArray[np.uint8], machine: SupportVectors, settings: SvmSettings
 ) -> Floats:
-    """Decision value ``sum_i lambda_i y_i K(x, x_i) + b`` of ``(n, 3)`` colours (Eq. 16).
+    """Compute ``sum_i lambda_i y_i K(x, x_i) + b`` of ``(n, 3)`` uint8 colours (Eq. 16).
 
     Returns ``(n,)`` float64, equal to scikit-learn's ``decision_function`` up to rounding. A
     colour's value does not depend on the colours that it is computed with.
@@ -129,7 +129,7 @@ def decision(
     for start in range(0, len(features), rows):
         block = slice(start, start + rows)
         squared = cdist(features[block], machine.vectors, "sqeuclidean")
-        # Row by row: a product with a matrix rounds a row differently in another company.
+        # Row by row: a matrix product would round a row depending on the other rows.
         terms = np.exp(-settings.gamma * squared) * machine.weights
         result[block] = terms.sum(axis=1) + machine.offset
     return result
@@ -137,12 +137,12 @@ def decision(
 
 @lru_cache(maxsize=4)
 def colour_table(machine: SupportVectors, settings: SvmSettings) -> ColourTable:
-    """Eq. 16 for every colour there is.
+    """Return the decision of Eq. 16 for every colour there is.
 
-    A pixel's features are its three colours alone, so this is all the machine can say. The last
-    tables are remembered, each 2 MiB, or 4 where many colours are open.
+    A pixel's features are its three channels alone, so this is the whole machine. The last four
+    tables are kept, each 2 MiB, or 4 where many colours are undecided.
     """
-    # Matrices this small gain nothing from threads, and lose all where other work needs a core.
+    # Matrices this small gain nothing from threads, which only compete with other work.
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1, "blas"):
@@ -153,7 +153,7 @@ def colour_table(machine: SupportVectors, settings: SvmSettings) -> ColourTable:
 
 
 def _margins(machine: SupportVectors, settings: SvmSettings) -> cube.Slabs:
-    """Decision values on the colour cube, less the threshold."""
+    """Return the decision values on the colour cube, less the threshold."""
     offset = machine.offset - settings.threshold
 
     def features(channel: int, levels: Floats) -> Floats:
@@ -181,14 +181,14 @@ def bind(settings: SvmSettings, machine: SupportVectors) -> Callable[[View], Out
     table = colour_table(machine, settings)
 
     def run(view: View) -> Output:
-        road = Packed.of(table.look_up(view.planes()))
+        road = Packed.of(table.look_up(view.planes))
         return Output((Layer(SVM, road),), mask=road)
 
     return run
 
 
 def layers(_settings: SvmSettings) -> tuple[LayerSpec, ...]:
-    """Name the layer of phase 3."""
+    """Return the layer of phase 3."""
     return (SVM,)
 
 
@@ -201,5 +201,5 @@ STAGE: Final = Stage(
     fit=fit,
     parameters=SupportVectors,
     oracle=perfect_mask,
-    deciding=("threshold",),
+    inference_only=("threshold",),
 )

@@ -1,1 +1,1 @@
-"""What the viewer shows: layout, words, colours."""
+"""What the viewer shows: its arrangement, texts and colours; and the viewer itself."""

@@ -1,4 +1,4 @@
-"""What the viewer shows when a recording is opened: the overview, and tabs with all the rest."""
+"""The viewer's blueprint: the overview, and tabs with all the rest."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from roadeval.recording.screen.views import PLOTTED, View
 
 
 def arrange(layout: Layout) -> rrb.Blueprint:
-    """Arrange the views of a recording."""
+    """Return the arrangement of a recording's views."""
     tabs = [overview(layout), *(_every_layer(layout, v) for v in layout.variants)]
     if layout.has_truth:
         tabs += [_rates(layout), _counts(layout)]
@@ -41,7 +41,7 @@ def _every_layer(layout: Layout, variant: VariantLayout) -> View:
 
 
 def _rates(layout: Layout) -> View:
-    """Give every stage a row, every rate a column."""
+    """Return graphs, a row a stage and a column a rate."""
     plots = [
         views.plot(
             f"{rate} of {stage}",
@@ -59,7 +59,7 @@ def _rates(layout: Layout) -> View:
 
 
 def _counts(layout: Layout) -> View:
-    """Give every variant a row, every stage a column."""
+    """Return graphs, a row a variant and a column a stage."""
     plots = [
         views.plot(f"{variant}: pixels of {stage}", [at.scalar_path("counts", variant, stage)])
         for variant, stage in layout.scored()
@@ -82,7 +82,7 @@ def _results() -> View:
 
 
 def _time_panel(layout: Layout) -> rrb.TimePanel:
-    """Open at the last frame, and play at the drive's own rate.
+    """Return a time panel that opens at the last frame and plays at the drive's own rate.
 
     The first frames may be training frames, whose error maps are empty, and a blueprint cannot
     name a frame to open at.

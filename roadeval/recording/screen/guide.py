@@ -1,4 +1,4 @@
-"""The words in a recording: what the viewer shows, and what came out."""
+"""Texts in the viewer: a guide to what it shows, and an overview of the results."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ _HANDLING: Final = """\
 
 
 def text(layout: Layout, verdict: str = "") -> str:
-    """Explain the overview, after the verdict on the drive if there is one yet."""
+    """Return the guide to the first tab, after the verdict on the drive if there is one yet."""
     parts = [_ERRORS, _ROWS, _CURVES] if layout.has_truth else [_NO_TRUTH, _ROWS]
     return "\n".join([f"### {layout.drive}", "", verdict, "", *parts, _HANDLING])
 
 
 def variant(layout: VariantLayout) -> str:
-    """Introduce a variant."""
+    """Return the introduction of a variant."""
     return f"### {layout.name}\n\n{layout.title}\n"
 
 
 def overview(layout: Layout, summary: Mapping[str, Any]) -> str:
-    """Tell a person what came out, from the content of ``summary.json``."""
+    """Return the results for people, from the content of ``summary.json``."""
     return "\n".join(
         [
             f"# {layout.drive}",

@@ -1,4 +1,4 @@
-"""The first tab: everything that matters on a screen of 1920x1080, nothing to touch.
+"""The viewer's first tab: everything that matters, on a screen of 1920x1080.
 
 From top to bottom: what the camera saw and what went wrong; a row a variant with its phases from
 left to right, equal phases below each other; the rates over time.
@@ -36,7 +36,7 @@ Cell = tuple[LayerSpec, ...]
 
 
 def overview(layout: Layout) -> View:
-    """Arrange the first tab."""
+    """Return the first tab."""
     rows = {variant.name: _cells(variant) for variant in layout.variants[:_ROWS]}
     columns = max(len(cells) for cells in rows.values())
     shortest = min(rows, key=lambda name: len(rows[name]))
@@ -59,7 +59,7 @@ def overview(layout: Layout) -> View:
 
 
 def _pictures(layout: Layout) -> list[View]:
-    """Show what the camera saw, what is true, and what each variant made of it."""
+    """Return views of the camera, the truth, and what each variant made of it."""
     return [
         views.camera(),
         *([views.truth()] if layout.has_truth else []),
@@ -74,7 +74,7 @@ def _top(pictures: Sequence[View], width: float) -> View:
 
 
 def _cells(variant: VariantLayout) -> list[Cell]:
-    """Group layers into pictures.
+    """Return the layers, grouped into pictures.
 
     An overlay joins the overlay before it, as rings join their shadow, unless it is a stage's
     mask: each of those begins a picture of its own.
@@ -90,10 +90,10 @@ def _cells(variant: VariantLayout) -> list[Cell]:
 
 
 def _row(variant: str, cells: Sequence[Cell], columns: int, aside: View | None) -> View:
-    """Fill a row from the right, so that equal phases of two variants stand below each other."""
+    """Return a variant's row, filled from the right: equal phases stand below each other."""
     width = (_WIDTH - _HEADER) / columns
     space = (columns - len(cells)) * width
-    # Titles must be short here: the layers' own names, which are also the paths' and the tables'.
+    # Titles must be short here: the layers' names.
     titles = (" + ".join(spec.name for spec in cell) for cell in cells)
     pictures = [views.layers(t, variant, c) for t, c in zip(titles, cells, strict=True)]
     header = views.document(at.guide_path(variant))
@@ -111,7 +111,7 @@ def _bottom(layout: Layout, aside: View | None) -> View:
 
 
 def _rate(layout: Layout, rate: str) -> View:
-    """Compare the final masks."""
+    """Return a graph that compares a rate of the final masks."""
     finals = [(variant.name, variant.stages[-1]) for variant in layout.variants]
     finals += [(BASELINE, FINAL_STAGE)] * layout.baseline
     paths = [at.scalar_path("metrics", *final, rate) for final in finals]

@@ -1,4 +1,4 @@
-"""The real viewer, at a given frame: in its own window, or as a picture without any screen.
+"""The viewer at a given frame: in its own window, or as a screenshot without any screen.
 
 Everything stays on this machine: the viewer listens on 127.0.0.1 alone, on a free port, and its
 usage statistics are off.
@@ -21,7 +21,7 @@ from rerun.experimental import ViewerClient
 
 from roadeval.recording import layout as at
 from roadeval.recording.layout import RecordingError
-from roadeval.runtime import files as folders
+from roadeval.runtime import files
 
 SIZE: Final = (1920, 1080)
 """Of a picture, in pixels; the recording's views are arranged for it."""
@@ -30,8 +30,8 @@ PACKAGE: Final = "mesa-vulkan-drivers"
 DRIVERS: Final = Path("/usr/share/vulkan/icd.d")
 _LOADING_S: Final = 120.0
 _SETTLING_S: Final = 2.0
-"""How long to wait for a recording, and for what is drawn to stand still: the first frames after
-a jump show pictures that are not decoded yet."""
+"""How long to wait for a recording, and for the drawing to settle: after a jump images are decoded
+first."""
 _POLL_S: Final = 0.25
 
 
@@ -52,7 +52,7 @@ def show(recording: Path, frame: int | None = None) -> None:
     """
     if os.name == "posix" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise RecordingError(
-            "no screen to open a window on; take a picture with --screenshot FILE.png, or open "
+            "no screen to open a window on; take a screenshot instead, or open "
             f"{recording} on another machine"
         )
     with _viewer(recording, []) as (process, client):
@@ -61,12 +61,12 @@ def show(recording: Path, frame: int | None = None) -> None:
 
 
 def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int | None:
-    """Draw the viewer's window into a PNG file, without a screen.
+    """Write what the viewer's window shows as a PNG file, without a screen.
 
     Returns
     -------
     int or None
-        The frame at which the viewer itself says it stands.
+        The frame that the viewer shows, as it reports itself.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int 
     """
     width, height = SIZE
     options = ["--headless", "--window-size", f"{width}x{height}"]
-    # How someone arranged their own viewer is kept in a folder of theirs; a picture knows none.
+    # The viewer reads a user's own settings from these folders; a screenshot has none.
     with tempfile.TemporaryDirectory() as home:
         surroundings = {**_driver(), "XDG_DATA_HOME": home, "XDG_RUNTIME_DIR": home}
         with _viewer(recording, options, **surroundings) as (_, client):
@@ -84,7 +84,7 @@ def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int 
             time.sleep(_SETTLING_S)
             png = client.take_screenshot()
     try:
-        folders.put(picture, png)
+        files.put(picture, png)
     except OSError as error:
         raise RecordingError(f"{picture}: cannot be written: {error.strerror}") from error
     return shown
@@ -102,7 +102,7 @@ def _viewer(
             [_program(), *address, *options, str(recording)],
             stdout=log,
             stderr=log,
-            # It takes a machine that runs tests for one that must not be counted.
+            # With CI set the viewer sends no usage statistics.
             env={**os.environ, "CI": "1", "NO_COLOR": "1", **environment},
         )
         try:
@@ -130,7 +130,7 @@ def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerCli
 
 
 def _go(client: ViewerClient, frame: int | None) -> int | None:
-    """Move the viewer to a frame; return where it says it stands then."""
+    """Move the viewer to a frame; return the frame that it then reports."""
     if frame is not None:
         client.set_time(at.FRAME, sequence=frame, play_state="paused")
     deadline = time.monotonic() + _SETTLING_S
@@ -143,7 +143,7 @@ def _go(client: ViewerClient, frame: int | None) -> int | None:
 
 
 def _driver() -> dict[str, str]:
-    """Choose the software driver, so that pictures look the same on every machine."""
+    """Return the variables that choose the software driver: pictures look the same everywhere."""
     if "VK_ICD_FILENAMES" in os.environ or os.name != "posix":
         return {}
     found = sorted(DRIVERS.glob("lvp_icd*.json"))
@@ -156,7 +156,7 @@ def _driver() -> dict[str, str]:
 
 
 def _program() -> str:
-    """Find the viewer itself: the command on the path is a wrapper that leaves it running."""
+    """Return the viewer's own path: the command on ``PATH`` is a wrapper that leaves it running."""
     folder = Path(rerun_cli.__file__).parent
     return str(next(path for path in (folder / "rerun", folder / "rerun.exe") if path.exists()))
 
@@ -169,7 +169,7 @@ def _free_port() -> int:
 
 
 def _reason(log: int) -> str:
-    """Give the last thing that the viewer said."""
+    """Return the last line that the viewer printed."""
     os.lseek(log, 0, os.SEEK_SET)
     said = os.read(log, 1 << 20).decode(errors="replace").split("\n")
     return next((line.strip() for line in reversed(said) if line.strip()), "it said nothing")

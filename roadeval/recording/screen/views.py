@@ -1,4 +1,4 @@
-"""The single views of which the viewer's tabs are made."""
+"""Single views, of which the viewer's tabs are made."""
 
 from __future__ import annotations
 
@@ -19,44 +19,44 @@ PLOTTED: Final[Mapping[str, str]] = {
     "FPR": "non-road called road",
     "FNR": "road that was missed",
 }
-"""The rates that are plotted, and what they say."""
+"""The rates that are plotted, in words: errors, of which the other rates are the complements."""
 
 
 def picture(title: str, paths: Sequence[str]) -> View:
-    """Draw images over each other."""
+    """Return a view of images drawn over each other."""
     return rrb.Spatial2DView(origin="/", contents=list(paths), name=title)
 
 
 def camera() -> View:
-    """Show the image as logged."""
+    """Return a view of the image as logged."""
     return picture("Camera", [at.CAMERA])
 
 
 def truth() -> View:
-    """Show which pixels are road."""
+    """Return a view of the truth: which pixels are road."""
     return picture("Truth: road", [at.CAMERA, at.TRUTH_PATH])
 
 
 def outcome(layout: Layout, variant: VariantLayout) -> View:
-    """Show where the variant is wrong, or without truth what it calls road."""
+    """Return a view of the variant's errors, or without truth of what it calls road."""
     name = ERRORS.name if layout.has_truth else variant.stages[-1]
     title = f"{variant.name}: {'errors' if layout.has_truth else 'road'}"
     return picture(title, [at.CAMERA, at.layer_path(variant.name, name)])
 
 
 def is_overlay(spec: LayerSpec) -> bool:
-    """Tell a layer that is drawn over the camera's image from one that stands alone."""
+    """Return whether a layer is drawn over the camera's image; others stand alone."""
     return spec.kind in (LayerKind.MASK, LayerKind.LABELS)
 
 
 def layers(title: str, variant: str, specs: Sequence[LayerSpec]) -> View:
-    """Show layers of a variant in one picture."""
+    """Return one view of layers of a variant."""
     below = [at.CAMERA] if is_overlay(specs[0]) else []
     return picture(title, [*below, *(at.layer_path(variant, spec.name) for spec in specs)])
 
 
 def plot(title: str, paths: Sequence[str]) -> View:
-    """Draw numbers over time."""
+    """Return a graph of numbers over time."""
     return rrb.TimeSeriesView(
         origin="/",
         contents=list(paths),
@@ -66,19 +66,19 @@ def plot(title: str, paths: Sequence[str]) -> View:
 
 
 def stage_times(variant: VariantLayout) -> View:
-    """Draw how long each stage of a variant took."""
+    """Return a graph of how long each stage of a variant took."""
     return plot(f"{variant.name}: milliseconds a stage", [f"/timing/{variant.name}/**"])
 
 
 def document(path: str, title: str | None = None) -> View:
-    """Show a text; without a title it has no title bar either."""
+    """Return a view of a text; without a title it has no title bar either."""
     return rrb.TextDocumentView(
         origin=path, contents=[path], name=title, titlebar=title is not None
     )
 
 
 def events(*, wide: bool) -> View:
-    """Say how frames were used, how each variant fared, and what is worth a note."""
+    """Return views of how frames were used, of each variant's health, and of the notes."""
     state = rrb.StateTimelineView(origin="/state", name="How it went")
     notes = rrb.TextLogView(
         origin=at.NOTES,

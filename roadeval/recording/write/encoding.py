@@ -1,58 +1,76 @@
-"""A frame's result becomes payloads and plain numbers: pure, heavy, safe in any thread."""
+"""A frame's result encoded for the recording: pure, heavy, safe in any thread."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Final
 
-from roadeval.data import ERRORS, Frame, FrameResult, Health, LayerKind, Pictures, Tally
+from roadeval.data import (
+    BASELINE,
+    ERRORS,
+    FINAL_STAGE,
+    Frame,
+    FrameResult,
+    Health,
+    LayerKind,
+    Tally,
+)
 from roadeval.recording import layout as at
-from roadeval.recording.codecs import CameraCodec, Codec, codec
+from roadeval.recording.codecs import CameraCodec, codecs_of
 from roadeval.recording.layout import Layout
 
 FLAT: Final = (LayerKind.MASK, LayerKind.LABELS)
-"""What `Pictures.MASKS` keeps of the layers: small, and without loss."""
+"""What `Images.MASKS` keeps of the layers: small, and without loss."""
+
+
+class Images(StrEnum):
+    """Which of a frame's images are recorded; its numbers always are."""
+
+    ALL = "all"
+    MASKS = "masks"
+    NONE = "none"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Encoded:
+class EncodedFrame:
     """A frame ready to be written.
 
     Every mapping is by entity path, but ``tables`` by name. ``states`` holds the state of every
-    lane, empty for none; ``notes`` pairs of a sentence and its level.
+    lane, empty for none; ``notes`` pairs of a sentence and its level. ``worst_error`` is what
+    `worst_error` computes.
     """
 
     number: int
     stamp_ns: int
     payloads: Mapping[str, bytes]
-    scalars: Mapping[str, float]
-    counts: Mapping[str, tuple[int, ...]]
-    states: Mapping[str, str]
-    notes: tuple[tuple[str, str], ...]
-    tables: Mapping[str, str]
+    scalars: Mapping[str, float] = field(default_factory=dict)
+    counts: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    states: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[tuple[str, str], ...] = ()
+    tables: Mapping[str, str] = field(default_factory=dict)
+    worst_error: float = -1.0
 
 
-class Encoder:
+class FrameEncoder:
     """Encodes the frames of a recording with this layout."""
 
     def __init__(self, layout: Layout) -> None:
-        self._camera = CameraCodec()
-        self.codecs: dict[str, Codec] = {
-            at.CAMERA: self._camera,
-            **{path: codec(spec, layout.width, layout.height) for path, spec in layout.images()},
-        }
+        self.codecs = codecs_of(layout)
         self._rates = frozenset(layout.rates)
         self._lanes = {variant.name: at.state_path(variant.name) for variant in layout.variants}
 
-    def __call__(self, result: FrameResult) -> Encoded:
-        """Encode one frame."""
+    def encode(
+        self, result: FrameResult, lines: Mapping[str, str], images: Images = Images.ALL
+    ) -> EncodedFrame:
+        """Encode a frame, with its lines of the tables by name."""
         level = "WARN" if set(result.health.values()) - {Health.OK} else "INFO"
-        return Encoded(
+        return EncodedFrame(
             number=result.frame.number,
             stamp_ns=result.frame.stamp_ns,
-            payloads=dict(self._pictures(result)),
+            payloads={} if images is Images.NONE else dict(self._payloads(result, images)),
             scalars=dict(self._scalars(result)),
             counts={at.scalar_path("counts", t.variant, t.stage): _row(t) for t in result.tallies},
             states={
@@ -60,34 +78,21 @@ class Encoder:
                 **{path: result.health.get(name, "") for name, path in self._lanes.items()},
             },
             notes=tuple((note, level) for note in result.notes),
-            tables=result.tables,
+            tables=lines,
+            worst_error=worst_error(result),
         )
 
-    def _photo(self, frame: Frame) -> bytes:
-        """Pass on the camera's own file where the log holds one, so that nothing is lost twice."""
-        if frame.media_type in ("image/jpeg", "image/png"):
-            return bytes(frame.payload)
-        return self._camera.encode(frame.image)
-
-    def _pictures(self, result: FrameResult) -> Iterator[tuple[str, bytes]]:
-        if result.pictures is Pictures.NONE:
-            return
-        yield at.CAMERA, self._photo(result.frame)
-        yield from self._layers(result)
-
-    def _layers(self, result: FrameResult) -> Iterator[tuple[str, bytes]]:
-        for path, mask in (
-            (at.TRUTH_PATH, result.frame.truth),
-            (at.TRUE_SHADOW, result.frame.shadow_truth),
-        ):
+    def _payloads(self, result: FrameResult, images: Images) -> Iterator[tuple[str, bytes]]:
+        frame = result.frame
+        yield at.CAMERA, _camera_file(frame)
+        for path, mask in ((at.TRUTH_PATH, frame.truth), (at.TRUE_SHADOW, frame.shadow_truth)):
             if mask is not None:
                 yield path, self.codecs[path].encode(mask)
         for variant in result.variants:
             for layer in variant.layers():
-                if result.pictures is Pictures.MASKS and layer.spec.kind not in FLAT:
-                    continue
-                path = at.layer_path(variant.variant, layer.spec.name)
-                yield path, self.codecs[path].encode(layer.content)
+                if images is Images.ALL or layer.spec.kind in FLAT:
+                    path = at.layer_path(variant.variant, layer.spec.name)
+                    yield path, self.codecs[path].encode(layer.content)
         for name, layer in result.errors.items():
             path = at.layer_path(name, ERRORS.name)
             yield path, self.codecs[path].encode(layer.array)
@@ -101,8 +106,21 @@ class Encoder:
             for stage in variant.stages:
                 where = variant.variant, stage.stage
                 yield at.scalar_path("timing", *where), stage.seconds * 1e3
-                for name, value in stage.facts.items():
+                for name, value in stage.output.facts.items():
                     yield at.scalar_path("facts", *where, name), value
+
+
+def worst_error(result: FrameResult) -> float:
+    """Return the greatest ERR of any variant's final mask; -1 for a frame not evaluated."""
+    finals = (t for t in result.tallies if t.stage == FINAL_STAGE and t.variant != BASELINE)
+    return max((t.rates["ERR"] for t in finals), default=-1.0)
+
+
+def _camera_file(frame: Frame) -> bytes:
+    """Return the camera's own file where the log holds one, so that nothing is lost twice."""
+    if frame.media_type in ("image/jpeg", "image/png"):
+        return bytes(frame.payload)
+    return CameraCodec().encode(frame.image)
 
 
 def _row(tally: Tally) -> tuple[int, ...]:

@@ -1,4 +1,4 @@
-"""Rerun out: frames become a recording that opens offline, in whatever state it was left."""
+"""Writes a recording while frames arrive: it opens offline, in whatever state a run left it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import shutil
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final, Self
 
 import rerun as rr
@@ -15,13 +14,11 @@ import rerun as rr
 from roadeval.data import FrameResult
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout, RecordingError
-from roadeval.recording.read.recording import indexed_chunks
-from roadeval.recording.screen import blueprint
-from roadeval.recording.screen import records as style
-from roadeval.recording.write import tracks
-from roadeval.recording.write.encoding import Encoded, Encoder
-from roadeval.recording.write.tracks import IMAGES_AND_WORDS, NUMBERS, Key, Tracks
-from roadeval.runtime import files as folders
+from roadeval.recording.read.rrd_file import indexed_chunks
+from roadeval.recording.screen import blueprint, static
+from roadeval.recording.write import columns
+from roadeval.recording.write.batching import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key
+from roadeval.recording.write.encoding import EncodedFrame, FrameEncoder, Images
 
 UNWRITTEN: Final = 4 << 20
 """Bytes that may wait for Rerun's own thread to write them; it would let any number wait."""
@@ -50,13 +47,13 @@ class Recorder:
         self.path = path
         self.partial = path.with_name(f"{path.stem}.partial.rrd")
         self._layout = layout
-        self._encoder = Encoder(layout)
-        self._rows, self._numbers = Tracks(IMAGES_AND_WORDS), Tracks(NUMBERS)
+        self._encoder = FrameEncoder(layout)
+        self._rows, self._numbers = Batcher(IMAGES_AND_TEXT), Batcher(NUMBERS)
         self._begun = False
         self._chunks = self._unwritten = 0
         self._states: dict[str, str] = {}
         self._shown: set[str] = set()
-        self._blank: Encoded | None = None
+        self._blank: EncodedFrame | None = None
         self._stream: rr.RecordingStream | None = None
 
     def __enter__(self) -> Self:
@@ -67,7 +64,7 @@ class Recorder:
         RecordingError
             If it cannot be written.
         """
-        self._make_room()
+        self._make_file()
         # The same input gives the same recording: its identity is its layout's, and properties
         # of the run, which Rerun would add, stay out.
         identity = hashlib.blake2b(self._layout.to_json().encode(), digest_size=16).hexdigest()
@@ -75,15 +72,10 @@ class Recorder:
         stream.save(self.partial, default_blueprint=blueprint.arrange(self._layout))
         stream.send_recording_name(self._layout.drive)
         self._stream = stream
-        self._static(style.records(self._layout, self._encoder.codecs))
+        self._log_static(static.before_the_first_frame(self._layout, self._encoder.codecs))
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         if error is not None and self.partial.exists():
             error.add_note(f"the partial recording is {self.partial}")
         try:
@@ -93,11 +85,13 @@ class Recorder:
             if error is None:
                 raise
 
-    def encode(self, result: FrameResult) -> Encoded:
-        """Encode a frame; the heavy part of the work, in any thread."""
-        return self._encoder(result)
+    def encode(
+        self, result: FrameResult, lines: Mapping[str, str], images: Images = Images.ALL
+    ) -> EncodedFrame:
+        """Encode a frame, with its lines of the tables; the heavy part, in any thread."""
+        return self._encoder.encode(result, lines, images)
 
-    def write(self, encoded: Encoded) -> None:
+    def write(self, encoded: EncodedFrame) -> None:
         """Append a frame. Frames come in order, from one thread.
 
         Raises
@@ -107,35 +101,35 @@ class Recorder:
         """
         if not self._begun:
             self._begun = True
-            self._static(style.timing(encoded.scalars))
+            self._log_static(static.timing_lines(encoded.scalars))
         self._add_images(encoded)
-        self._add_words(encoded)
+        self._add_texts(encoded)
         when = encoded.number, encoded.stamp_ns
         for path, number in encoded.scalars.items():
-            self._numbers.add(path, tracks.scalars, *when, number)
+            self._numbers.add(path, columns.scalars, *when, number)
         for path, numbers in encoded.counts.items():
-            self._numbers.add(path, tracks.counts, *when, numbers)
-        self._turn(self._rows)
-        self._turn(self._numbers)
+            self._numbers.add(path, columns.counts, *when, numbers)
+        self._end_frame(self._rows)
+        self._end_frame(self._numbers)
 
-    def write_pictures(self, held: Iterable[Encoded]) -> None:
-        """Append the pictures of frames whose numbers stand already, in order.
+    def write_images(self, frames: Iterable[EncodedFrame]) -> None:
+        """Append the images of frames whose numbers are written already, in order.
 
-        They are cleared right after their frame, so that no later one seems to show them. Whoever
-        is interrupted may call it again with those that are left.
+        They are cleared right after their frame, so that no later one seems to show them. After an
+        interrupt it may be called again with the frames that are left.
         """
-        for encoded in held:
+        for encoded in frames:
             if self._blank is not None and self._blank.number != encoded.number:
                 self._add_images(self._blank)
             self._add_images(encoded)
             number, stamp_ns = encoded.number + 1, encoded.stamp_ns + 1
             self._blank = replace(encoded, number=number, stamp_ns=stamp_ns, payloads={})
-            self._turn(self._rows)
+            self._end_frame(self._rows)
         if self._blank is not None:
             self._add_images(self._blank)
             self._blank = None
 
-    def settle(self) -> None:
+    def flush(self) -> None:
         """Write all that waits, once the last frame is written: its memory is needed for results.
 
         Raises
@@ -143,10 +137,10 @@ class Recorder:
         RecordingError
             If it cannot be written.
         """
-        for waiting in (self._rows, self._numbers):
-            for key in list(waiting):
-                self._send(waiting, key)
-        self._flush()
+        for batcher in (self._rows, self._numbers):
+            for key in list(batcher):
+                self._send(batcher, key)
+        self._flush_stream()
 
     def finish(self, results: Mapping[str, str]) -> None:
         """Add the results, close the file and give it its name.
@@ -162,80 +156,79 @@ class Recorder:
         RecordingError
             If the file did not become what was written to it, as on a full disk.
         """
-        self._static(style.results(self._layout, results))
+        self._log_static(static.after_the_last_frame(self._layout, results))
         self._close()
         if indexed_chunks(self.partial) < self._chunks:
             raise self._incomplete()
         self.partial.replace(self.path)
 
-    def check_room(self) -> None:
+    def check_disk_space(self) -> None:
         """Raise a `RecordingError` if the disk is full, or as good as full."""
         disk = shutil.disk_usage(self.path.parent)
-        # A place that is no disk, as /proc, has no room to tell of.
+        # A place that is no disk, as /proc, has no size.
         if disk.total and disk.free < LEAST_FREE + self._rows.size:
             raise RecordingError(f"{self.path}: cannot be written: the disk is full")
 
-    def _add_images(self, encoded: Encoded) -> None:
+    def _add_images(self, encoded: EncodedFrame) -> None:
         when = encoded.number, encoded.stamp_ns
         for path, payload in encoded.payloads.items():
-            columns = self._encoder.codecs[path].columns
-            self._rows.add(path, columns, *when, payload)
-        # The viewer goes on showing what it has; an image that this frame lacks must not stand.
+            self._rows.add(path, self._encoder.codecs[path].columns, *when, payload)
+        # The viewer goes on showing what it has; an image that this frame lacks must not stay.
         for path in sorted(self._shown - encoded.payloads.keys()):
-            self._rows.add(path, self._encoder.codecs[path].columns, *when, tracks.NOTHING)
+            self._rows.add(path, self._encoder.codecs[path].columns, *when, NOTHING)
         self._shown = set(encoded.payloads)
 
-    def _add_words(self, encoded: Encoded) -> None:
+    def _add_texts(self, encoded: EncodedFrame) -> None:
         when = encoded.number, encoded.stamp_ns
         for path, state in encoded.states.items():
             if self._states.get(path, "") != state:
-                self._rows.add(path, tracks.states, *when, state)
+                self._rows.add(path, columns.states, *when, state)
                 self._states[path] = state
         for note in encoded.notes:
-            self._rows.add(at.NOTES, tracks.notes, *when, note)
+            self._rows.add(at.NOTES, columns.notes, *when, note)
         for name, lines in encoded.tables.items():
-            self._rows.add(at.result_path(name), tracks.texts, *when, lines)
+            self._rows.add(at.result_path(name), columns.texts, *when, lines)
 
-    def _static(self, records: Iterable[tuple[str, list[Any]]]) -> None:
+    def _log_static(self, data: static.StaticData) -> None:
         stream = self._open_stream()
-        for path, archetypes in records:
+        for path, archetypes in data:
             stream.log(path, *archetypes, static=True, strict=True)
 
-    def _turn(self, waiting: Tracks) -> None:
-        """End a frame: write the tracks that have waited long enough."""
-        ended = waiting.turn()
-        for key in ended:
-            self.check_room()
-            self._send(waiting, key)
-        if ended:
-            self._flush()
+    def _end_frame(self, batcher: Batcher) -> None:
+        """Write the rows that have waited long enough."""
+        due = batcher.end_frame()
+        for key in due:
+            self.check_disk_space()
+            self._send(batcher, key)
+        if due:
+            self._flush_stream()
 
-    def _send(self, waiting: Tracks, key: Key) -> None:
-        track = waiting[key]
-        self._open_stream().send_chunks(track.chunk())
-        # Only now: of a run that is interrupted above, the end of the recording still sends it.
-        del waiting[key]
+    def _send(self, batcher: Batcher, key: Key) -> None:
+        rows = batcher[key]
+        self._open_stream().send_chunks(rows.chunk())
+        # Only now: if the run is interrupted above, the end of the recording still sends them.
+        del batcher[key]
         self._chunks += 1
-        self._unwritten += track.size
+        self._unwritten += rows.size
         if self._unwritten >= UNWRITTEN:
-            self._flush()
+            self._flush_stream()
 
     def _open_stream(self) -> rr.RecordingStream:
         if self._stream is None:
             raise RuntimeError("a recorder is used inside its 'with' block")
         return self._stream
 
-    def _make_room(self) -> None:
+    def _make_file(self) -> None:
         try:
             if self.path.is_dir():
                 raise RecordingError(f"{self.path}: is a folder; name a file in it, ending in .rrd")
-            with folders.made(self.path.parent):
-                self.check_room()
-                self.partial.touch()
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self.check_disk_space()
+            self.partial.touch()
         except OSError as error:
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
 
-    def _flush(self) -> None:
+    def _flush_stream(self) -> None:
         self._unwritten = 0
         try:
             self._open_stream().flush()
@@ -246,7 +239,7 @@ class Recorder:
         if self._stream is None:
             return
         try:
-            self.settle()
+            self.flush()
         finally:
             self._stream.disconnect()
             self._stream = None
@@ -261,17 +254,17 @@ class NullRecorder:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *error: object) -> None:
-        """Nothing is open."""
+    def __exit__(self, *error: Any) -> None:
+        """Close nothing."""
 
-    def encode(self, result: FrameResult, position: int) -> None:
+    def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> None:
         """Encode nothing."""
 
     def write(self, encoded: None) -> None:
         """Write nothing."""
 
-    def settle(self) -> None:
-        """Nothing waits."""
+    def flush(self) -> None:
+        """Flush nothing."""
 
     def finish(self, results: Mapping[str, str]) -> None:
         """Keep nothing."""

@@ -58,8 +58,7 @@ def write_figures(folder: Path, data: FigureData) -> list[Path]:
         If the folder cannot be written to.
     """
     try:
-        with files.made(folder):
-            return [path for figure in figures() for path in _write(folder, figure, data)]
+        return [path for figure in figures() for path in _write(folder, figure, data)]
     except OSError as error:
         raise FiguresError(
             f"{error.filename or folder}: cannot write figures ({error.strerror}); "

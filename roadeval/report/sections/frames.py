@@ -76,8 +76,8 @@ def _frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
     for row in frame.layers:
         pictures = [(image.title, jpeg(image, SMALL)) for image in row]
         yield ImageGrid(pictures, columns, skip=columns - len(row))
-    if findings.pictured:
-        yield Command(findings.inspect(frame.frame))
+    if findings.pictured and findings.commands:
+        yield Command(findings.commands.inspect(frame.frame))
 
 
 def _sentences(frame: NotableFrame) -> Iterator[str]:

@@ -16,8 +16,8 @@ def section(findings: Findings) -> Iterator[Block]:
     if log := summary.get("log"):
         yield Text(f"Log: {log['path']}")
         yield Text(f"SHA-256: {log['sha256']}")
-    if findings.again:
-        yield Command(findings.again)
+    if log and findings.commands:
+        yield Command(findings.commands.again(log["path"]))
         yield Text(
             "run.toml lies in the results folder and holds the whole configuration of the run; "
             "the same log, configuration and versions give the same numbers.",
@@ -30,7 +30,8 @@ def section(findings: Findings) -> Iterator[Block]:
         yield Text("; ".join(f"{name}: {value}" for name, value in known.items()), "note")
     yield from _versions_and_seconds(summary)
     if summary.get("settings"):
-        rows = settings_rows(summary["settings"])
+        shared = {name: summary["run"].get(name, {}) for name in ("training", "evaluation")}
+        rows = settings_rows({name: each | shared for name, each in summary["settings"].items()})
         half = -(-len(rows) // 2)
         left, right = (_words(["setting", "value"], part) for part in (rows[:half], rows[half:]))
         yield KeepTogether([Heading("Settings", 2), TwoColumns([left], [right])])

@@ -83,8 +83,7 @@ def regions_table(
 
 
 def _note(findings: Findings) -> str:
-    settings = findings.summary["settings"].values()
-    width = next((each["evaluation"]["boundary_width"] for each in settings), None)
+    width = findings.summary["run"].get("evaluation", {}).get("boundary_width")
     near = f"within {width} pixels of" if width else "near"
     return (
         "Shadow is what the filter took for shadow, right or wrong; where it is not true shadow, "

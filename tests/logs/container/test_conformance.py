@@ -11,6 +11,7 @@ from mcap.opcode import Opcode
 from roadeval.logs.container.chunks import ChunkReader
 from roadeval.logs.container.damage import damage_of
 from roadeval.logs.container.file import Container
+from roadeval.logs.container.readers import ByteReader, FileReader, PartReader
 from roadeval.logs.container.records import (
     MAGIC,
     Message,
@@ -20,7 +21,6 @@ from roadeval.logs.container.records import (
     parse_chunk,
     walk,
 )
-from roadeval.logs.container.source import Bytes, Part, Source
 
 FOLDERS = (
     "NoData",
@@ -46,7 +46,7 @@ def fields(record: Any) -> dict[str, Any]:
     return {key: plain(value) for key, value in named.items()}
 
 
-def records(source: Bytes, chunks: ChunkReader) -> Iterator[tuple[str, dict[str, Any]]]:
+def records(source: ByteReader, chunks: ChunkReader) -> Iterator[tuple[str, dict[str, Any]]]:
     """Every record as the suite lists them: chunks unpacked, message indexes left out."""
     for place in walk(source):
         body = source.read(place.body, place.end - place.body)
@@ -66,8 +66,8 @@ def test_every_file_reads_as_expected(data: Path, folder: str) -> None:
     assert paths
     for path in paths:
         expected = json.loads(path.with_suffix(".json").read_text())["records"]
-        source = Source(path)
-        inner = Part(source, len(MAGIC), source.size - 2 * len(MAGIC))
+        source = FileReader(path)
+        inner = PartReader(source, len(MAGIC), source.size - 2 * len(MAGIC))
         found = list(records(inner, ChunkReader(source)))
         source.close()
         assert found == [(r["type"], dict(r["fields"])) for r in expected], path.name

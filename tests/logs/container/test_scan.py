@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.logs import LogError, open_log
+from roadeval.logs import LogError, TopicSettings, open_log
 from tests.logs.making import CAMERA, FRAMES, small_log
 
 MESSAGE = b"\x05"
@@ -15,7 +15,10 @@ LENGTH_AT = 1
 def kept(path: Path) -> list[int]:
     """Positions in the good log of the images that are kept whole."""
     with open_log(path) as log:
-        frames = [frame.decode() for frame in log.frames(log.select(image=CAMERA, truth=""))]
+        frames = [
+            frame.decode()
+            for frame in log.frames(log.select(TopicSettings(image=CAMERA, truth="")))
+        ]
     return [round(float(frame.image.mean()) / 20) for frame in frames]
 
 

@@ -11,7 +11,7 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from mcap_protobuf.writer import Writer
 
 from roadeval.data import Frame
-from roadeval.logs import FrameError, Instant, Kind, LogError, Span, open_log
+from roadeval.logs import FrameError, Instant, LogError, Span, TopicKind, open_log
 from roadeval.logs.messages.pictures import CompressedPicture, Picture
 from roadeval.logs.messages.video import Video, is_keyframe
 
@@ -30,7 +30,7 @@ def video(data: Path, request: pytest.FixtureRequest) -> Path:
 
 def test_its_size_is_known_before_the_first_frame(video: Path) -> None:
     with open_log(video) as log:
-        assert log.topics[0].kind is Kind.VIDEO
+        assert log.topics[0].kind is TopicKind.VIDEO
         assert log.topics[0].size == (320, 240)
 
 
@@ -166,3 +166,13 @@ def test_every_codec_is_decoded_from_any_frame(tmp_path: Path, codec: str) -> No
     assert [frame.number for frame in found] == list(range(10))
     assert all(np.abs(f.image.astype(int) - ramp(f.number)).mean() < 5 for f in found)
     assert all(np.array_equal(a.image, b.image) for a, b in zip(late, found[6:], strict=True))
+
+
+def test_parameters_in_a_packet_of_their_own_announce_a_keyframe(data: Path) -> None:
+    first = Packets(data / "mcap" / "flavours" / "fox_pb_CompressedVideo_h264.mcap", set()).packets[
+        0
+    ]
+    whole = bytes(first.data)
+    parameters = whole[: whole.index(b"\x00\x00\x01\x65")]
+    assert is_keyframe(CompressedPicture(0, "h264", parameters))
+    assert not is_keyframe(CompressedPicture(0, "h264", b"no video"))

@@ -2,25 +2,27 @@
 
 import pytest
 
-from roadeval.logs import Kind, LogError, TopicInfo
+from roadeval.logs import LogError, TopicInfo, TopicKind
 from roadeval.logs.topics.choose import choose_image, choose_shadow, choose_truth
 
 
 def camera(name: str) -> TopicInfo:
-    return TopicInfo(name, "CompressedImage", "cdr", Kind.COMPRESSED, 5, format="jpeg", channels=3)
+    return TopicInfo(
+        name, "CompressedImage", "cdr", TopicKind.COMPRESSED, 5, format="jpeg", channels=3
+    )
 
 
 def label(name: str) -> TopicInfo:
-    return TopicInfo(name, "Image", "cdr", Kind.IMAGE, 5, format="mono8", channels=1)
+    return TopicInfo(name, "Image", "cdr", TopicKind.IMAGE, 5, format="mono8", channels=1)
 
 
 def other(name: str) -> TopicInfo:
-    return TopicInfo(name, "sensor_msgs/msg/Imu", "cdr", Kind.OTHER, 5)
+    return TopicInfo(name, "sensor_msgs/msg/Imu", "cdr", TopicKind.OTHER, 5)
 
 
 def truth_of(*labels: TopicInfo, image: str = "/front/image") -> str | None:
     topics = [camera(image), *labels]
-    topic, _ = choose_truth(topics, topics[0], None)
+    topic = choose_truth(topics, topics[0], None).topic
     return topic.name if topic else None
 
 
@@ -40,19 +42,19 @@ def test_a_grey_camera_is_a_camera() -> None:
 
 
 def test_depth_is_picked_only_where_there_is_nothing_else() -> None:
-    depth = TopicInfo("/cam/depth", "Image", "cdr", Kind.IMAGE, 5, format="16UC1", channels=1)
+    depth = TopicInfo("/cam/depth", "Image", "cdr", TopicKind.IMAGE, 5, format="16UC1", channels=1)
     assert choose_image([camera("/cam/rgb"), depth], None)[0].name == "/cam/rgb"
     assert choose_image([depth], None)[0].name == "/cam/depth"
 
 
-def test_two_cameras_are_listed_with_the_option() -> None:
-    with pytest.raises(LogError, match=r"/left/image, /right/image; .*--image-topic"):
+def test_two_cameras_are_listed_with_the_setting() -> None:
+    with pytest.raises(LogError, match=r"/left/image, /right/image; .*topics.image"):
         choose_image([camera("/left/image"), camera("/right/image")], None)
 
 
 def test_an_unknown_topic_lists_the_valid_ones() -> None:
     topics = [camera("/left"), camera("/right"), other("/imu")]
-    with pytest.raises(LogError, match=r"--image-topic /lef: is not in the log; .*: /left, /right"):
+    with pytest.raises(LogError, match=r"topics.image /lef: is not in the log; .*: /left, /right"):
         choose_image(topics, "/lef")
     with pytest.raises(LogError, match=r"/imu: carries no images"):
         choose_image(topics, "/imu")
@@ -87,17 +89,17 @@ def test_the_labels_of_the_chosen_camera_are_taken() -> None:
     assert truth_of(*labels, image="/rear/image") == "/rear/labels"
 
 
-def test_two_label_topics_are_listed_with_the_option() -> None:
-    with pytest.raises(LogError, match=r"/a/labels, /b/labels; .*--truth-topic"):
+def test_two_label_topics_are_listed_with_the_setting() -> None:
+    with pytest.raises(LogError, match=r"/a/labels, /b/labels; .*topics.truth"):
         truth_of(label("/a/labels"), label("/b/labels"))
 
 
 def test_shadow_truth_is_told_from_road_truth_by_its_name() -> None:
     topics = [camera("/cam"), label("/truth/road"), label("/truth/shadow")]
-    assert choose_truth(topics, topics[0], None)[0] == topics[1]
-    assert choose_shadow(topics, topics[0], None)[0] == topics[2]
+    assert choose_truth(topics, topics[0], None).topic == topics[1]
+    assert choose_shadow(topics, topics[0], None).topic == topics[2]
 
 
 def test_an_empty_name_takes_none() -> None:
     topics = [camera("/cam"), label("/labels")]
-    assert choose_truth(topics, topics[0], "")[0] is None
+    assert choose_truth(topics, topics[0], "").topic is None

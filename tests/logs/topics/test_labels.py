@@ -1,12 +1,14 @@
 """What the values of a label image mean."""
 
 import io
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
+from pydantic import ValidationError
 
-from roadeval.logs import LabelValues, LogError
+from roadeval.logs import LabelSettings, LogError
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import CompressedPicture
 from roadeval.logs.messages.pixels import to_labels
@@ -14,8 +16,8 @@ from roadeval.logs.topics.labels import seen_in, understand
 from tests.logs.making import grey, jpeg, png
 
 
-def truth(values: list[int], labels: LabelValues | None = None) -> list[int]:
-    table = understand(labels or LabelValues(), values, "/labels")
+def truth(values: list[int], labels: LabelSettings | None = None) -> list[int]:
+    table = understand(labels or LabelSettings(), values, "/labels")
     return table.of_values(np.array([values], np.uint8))[0].tolist()
 
 
@@ -34,39 +36,54 @@ def test_a_mask_is_understood_by_itself(values: list[int], expected: list[int]) 
 
 
 def test_class_ids_are_asked_for_with_the_values_seen() -> None:
-    with pytest.raises(LogError, match=r"/labels holds the values 0 3 11: .*--road-label"):
+    with pytest.raises(LogError, match=r"/labels holds the values 0 3 11: .*labels.road"):
         truth([0, 3, 11])
 
 
 def test_given_values_become_road_and_ignore_and_all_others_non_road() -> None:
-    labels = LabelValues(road=(3, 4), ignore=(11,))
+    labels = LabelSettings(road=(3, 4), ignore=(11,))
     assert truth([0, 3, 4, 11, 255], labels) == [0, 1, 1, 255, 0]
 
 
 def test_a_sixteen_bit_value_is_understood() -> None:
-    table = understand(LabelValues(road=(300,)), [0, 300], "/labels")
+    table = understand(LabelSettings(road=(300,)), [0, 300], "/labels")
     assert table.of_values(np.array([[0, 300, 44]], np.uint16)).tolist() == [[0, 1, 0]]
 
 
 @pytest.mark.parametrize(
-    ("labels", "option"),
+    ("labels", "setting"),
     [
-        (LabelValues(road=(7,)), "--road-label 7"),
-        (LabelValues(road=(3,), ignore=(9,)), "--ignore-label 9"),
+        (LabelSettings(road=(7,)), "labels.road 7"),
+        (LabelSettings(road=(3,), ignore=(9,)), "labels.ignore 9"),
     ],
 )
-def test_a_given_value_that_never_occurs_is_refused(labels: LabelValues, option: str) -> None:
-    with pytest.raises(LogError, match=rf"{option} does not occur in /labels.* 0 3"):
+def test_a_given_value_that_never_occurs_is_refused(labels: LabelSettings, setting: str) -> None:
+    with pytest.raises(LogError, match=rf"{setting} does not occur in /labels.* 0 3"):
         truth([0, 3], labels)
 
 
 def test_a_value_cannot_mean_both() -> None:
-    with pytest.raises(LogError, match="label 3 cannot mean road and ignore"):
-        LabelValues(road=(3,), ignore=(3,))
+    with pytest.raises(ValidationError, match="label 3 cannot mean road and ignore"):
+        LabelSettings(road=(3,), ignore=(3,))
+
+
+def test_ignore_needs_road() -> None:
+    with pytest.raises(ValidationError, match=r"labels\.ignore needs labels\.road"):
+        LabelSettings(ignore=(3,))
+    with pytest.raises(ValidationError, match=r"labels\.ignore_colors needs labels\.road_colors"):
+        LabelSettings(ignore_colors=(ROAD,))
+
+
+@pytest.mark.parametrize(
+    "given", [{"road": (65536,)}, {"road": (-1,)}, {"road_colors": ((0, 0, 256),)}]
+)
+def test_a_label_that_cannot_occur_is_refused(given: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError):
+        LabelSettings(**given)
 
 
 def test_a_mask_that_later_holds_another_value_is_not_guessed_at() -> None:
-    table = understand(LabelValues(), [0, 255], "/mask")
+    table = understand(LabelSettings(), [0, 255], "/mask")
     with pytest.raises(BadMessage, match="holds the value 7"):
         table.of_values(np.array([[0, 7]], np.uint8))
 
@@ -88,7 +105,7 @@ ROAD, LANE, SKY, CAR = (64, 32, 32), (255, 0, 0), (0, 0, 255), (204, 0, 255)
 
 def test_colours_can_mean_road_and_ignore() -> None:
     picture = colors([ROAD, LANE, SKY, CAR])
-    labels = LabelValues(road_colors=(ROAD, LANE), ignore_colors=(CAR,))
+    labels = LabelSettings(road_colors=(ROAD, LANE), ignore_colors=(CAR,))
     table = understand(labels, seen_in(picture, labels, "/labels"), "/labels")
     assert table.read(picture).tolist() == [[1, 1, 0, 255]]
     assert table.words == "road is 64,32,32 255,0,0, 204,0,255 is ignored"
@@ -96,26 +113,26 @@ def test_colours_can_mean_road_and_ignore() -> None:
 
 def test_colours_are_asked_for_with_those_seen() -> None:
     with pytest.raises(
-        LogError, match=r"/labels holds the colours 0,0,255 64,32,32: .*--road-color R,G,B"
+        LogError, match=r"/labels holds the colours 0,0,255 64,32,32: .*labels.road_colors"
     ):
-        seen_in(colors([ROAD, SKY]), LabelValues(), "/labels")
+        seen_in(colors([ROAD, SKY]), LabelSettings(), "/labels")
 
 
 def test_a_colour_that_never_occurs_is_refused() -> None:
-    labels = LabelValues(road_colors=(LANE,))
-    with pytest.raises(LogError, match="--road-color 255,0,0 does not occur in /labels"):
+    labels = LabelSettings(road_colors=(LANE,))
+    with pytest.raises(LogError, match=r"labels\.road_colors 255,0,0 does not occur in /labels"):
         understand(labels, seen_in(colors([ROAD, SKY]), labels, "/labels"), "/labels")
 
 
 def test_values_and_colours_cannot_be_mixed() -> None:
-    with pytest.raises(LogError, match="as values or as colours"):
-        LabelValues(road=(1,), road_colors=(ROAD,))
+    with pytest.raises(ValidationError, match="as values or as colours"):
+        LabelSettings(road=(1,), road_colors=(ROAD,))
 
 
 def test_of_a_palette_the_indices_count_or_its_colours_as_asked() -> None:
     picture = palette_png([[0, 1, 2]], [*SKY, *ROAD, *CAR])
     assert to_labels(picture).tolist() == [[0, 1, 2]]
-    labels = LabelValues(road_colors=(ROAD,))
+    labels = LabelSettings(road_colors=(ROAD,))
     table = understand(labels, seen_in(picture, labels, "/labels"), "/labels")
     assert table.read(picture).tolist() == [[0, 1, 0]]
 

@@ -8,7 +8,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from roadeval.logs import LabelValues, LogError, open_log, pack
+from roadeval.logs import LabelSettings, LogError, open_log, pack
 from tests.logs.making import grey, jpeg, png
 
 HALF_SECOND = 500_000_000
@@ -77,7 +77,7 @@ def test_what_cannot_be_packed_is_refused(tmp_path: Path) -> None:
         ({"masks": lossy}, "a JPEG blurs its labels"),
         ({"masks": other}, "no mask has the name of an image"),
         ({"masks": empty}, "no image in it"),
-        ({"rate_hz": 0}, "--rate 0"),
+        ({"rate_hz": 0}, "0 images a second"),
     ):
         with pytest.raises(LogError, match=said):
             pack(images, out, **arguments)
@@ -95,9 +95,9 @@ def test_a_file_that_is_no_video_is_refused(tmp_path: Path) -> None:
 def test_images_and_colour_masks_of_the_road(data: Path, tmp_path: Path) -> None:
     source = data / "comma10k_mini"
     packed = pack(source / "imgs", tmp_path / "comma.mcap", masks=source / "masks")
-    labels = LabelValues(road_colors=((64, 32, 32), (255, 0, 0)), ignore_colors=((204, 0, 255),))
+    labels = LabelSettings(road_colors=((64, 32, 32), (255, 0, 0)), ignore_colors=((204, 0, 255),))
     with open_log(packed.path) as log:
-        with pytest.raises(LogError, match=r"/truth/road.*--road-color R,G,B"):
+        with pytest.raises(LogError, match=r"/truth/road.*labels\.road_colors"):
             log.select()
         frames = [frame.decode() for frame in log.frames(log.select(labels=labels))]
     first = cv2.imread(str(min((source / "masks").glob("*.png"))))[..., ::-1]

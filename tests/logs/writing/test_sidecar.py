@@ -15,6 +15,7 @@ from roadeval.data import (
     Frame,
     FrameResult,
     Layer,
+    Output,
     Role,
     StageResult,
     Tally,
@@ -24,27 +25,24 @@ from roadeval.data.packed import Packed
 from roadeval.logs import SidecarWriter
 
 MASK = np.array([[0, 1]], np.uint8)
+RATES = {"ERR": 0.5, "TNR": math.nan}
 STAMP, LOGGED = 1_700_000_000_000_000_005, 1_700_000_000_007_000_000
 
 
 def result() -> FrameResult:
     frame = Frame(3, STAMP, LOGGED, np.zeros((1, 2, 3), np.uint8), b"")
-    stage = StageResult("post", (), Packed.of(MASK), {}, {}, 0.0)
+    stage = StageResult("post", Output(mask=Packed.of(MASK)), 0.0)
     return FrameResult(
         frame,
         Role.EVALUATED,
         (VariantResult("filtered", (stage,)),),
         errors={"filtered": Layer(ERRORS, np.array([[2, 1]], np.uint8))},
-        tallies=(Tally("filtered", "post", Counts(tp=1, fp=1)),),
+        tallies=(Tally("filtered", "post", Counts(tp=1, fp=1), rates=RATES),),
     )
 
 
-def rates(counts: Counts) -> dict[str, float]:
-    return {"ERR": counts.fp / counts.n if counts.n else math.nan, "TNR": math.nan}
-
-
 def write(path: Path) -> Path:
-    with SidecarWriter(path, rates) as sidecar:
+    with SidecarWriter(path) as sidecar:
         sidecar.write(result())
     return path
 

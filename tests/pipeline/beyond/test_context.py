@@ -7,7 +7,8 @@ import pytest
 from roadeval.kernels import compiled, plain
 from roadeval.pipeline.beyond import context
 from roadeval.pipeline.beyond.context import ContextSettings
-from roadeval.pipeline.chain import STAGES, layers_of, masks_of
+from roadeval.pipeline.beyond.context_features import at_samples, features
+from roadeval.pipeline.chain import STAGES, Pipeline
 from roadeval.pipeline.stage import TrainingSet, View
 
 PLAIN = ContextSettings(planes=32, spare=0, smoothing=1)
@@ -27,7 +28,7 @@ def every_pixel(images, truths, seed=0):
 
 def fit_and_run(images, truths, image, settings=PLAIN):
     machine = context.fit(every_pixel(images, truths), settings)
-    return context.bind(settings, machine)(View(image, image)).mask.pixels()
+    return context.bind(settings, machine)(View.of(image)).mask.pixels()
 
 
 # --- Features -------------------------------------------------------------------------------------
@@ -35,18 +36,18 @@ def fit_and_run(images, truths, image, settings=PLAIN):
 
 def test_colours_come_first_as_they_are():
     image = np.random.default_rng(0).integers(0, 256, (5, 7, 3), dtype=np.uint8)
-    np.testing.assert_array_equal(context.features(image, (3,))[:3], np.moveaxis(image, 2, 0))
+    np.testing.assert_array_equal(features(image, (3,))[:3], np.moveaxis(image, 2, 0))
 
 
 def test_chromaticity_does_not_depend_on_brightness():
     colour = np.array([[[52, 92, 32]], [[112, 192, 72]]], np.uint8)  # with 8 added, one is double
-    chroma = context.features(colour, (1,))[3:5, :, 0]
+    chroma = features(colour, (1,))[3:5, :, 0]
     np.testing.assert_allclose(chroma[:, 0], np.log([60 / 100, 40 / 100]), atol=1e-6)
     np.testing.assert_allclose(chroma[:, 1], chroma[:, 0], atol=1e-6)
 
 
 def test_place_is_the_pixels_centre_across_and_down():
-    across, down = context.features(np.zeros((2, 4, 3), np.uint8), (1,))[5:7]
+    across, down = features(np.zeros((2, 4, 3), np.uint8), (1,))[5:7]
     np.testing.assert_allclose(across[0], [-0.75, -0.25, 0.25, 0.75])
     np.testing.assert_allclose(down[:, 0], [0.25, 0.75])
 
@@ -54,8 +55,8 @@ def test_place_is_the_pixels_centre_across_and_down():
 def test_texture_tells_upright_edges_from_level_ones():
     stripes = np.zeros((20, 20, 3), np.uint8)
     stripes[:, ::4] = stripes[:, 1::4] = 200
-    upright = context.features(stripes, (5,))[9:, 10, 10]
-    level = context.features(np.ascontiguousarray(stripes.transpose(1, 0, 2)), (5,))[9:, 10, 10]
+    upright = features(stripes, (5,))[9:, 10, 10]
+    level = features(np.ascontiguousarray(stripes.transpose(1, 0, 2)), (5,))[9:, 10, 10]
     assert upright[0] > 1
     assert upright[1] == 0
     np.testing.assert_allclose(level, upright[::-1], atol=1e-6)
@@ -64,15 +65,13 @@ def test_texture_tells_upright_edges_from_level_ones():
 def test_texture_is_the_same_at_half_the_light():
     light = np.random.default_rng(0).integers(60, 120, (20, 20, 3), dtype=np.uint8)
     bright, dim = ((light * share - 8).astype(np.uint8) for share in (2, 1))
-    np.testing.assert_allclose(
-        context.features(bright, (5,))[9:], context.features(dim, (5,))[9:], rtol=1e-3
-    )
+    np.testing.assert_allclose(features(bright, (5,))[9:], features(dim, (5,))[9:], rtol=1e-3)
 
 
 def test_an_edge_is_known_to_all_that_lies_above_it_and_to_nothing_below():
     image = np.full((40, 12, 3), 90, np.uint8)
     image[20:22] = 220
-    edge = context.features(image, ())[7, :, 6]
+    edge = features(image, ())[7, :, 6]
     assert edge[30:].max() < 1e-3
     np.testing.assert_array_equal(edge[:18], edge[18])
     assert edge[18] > 0.5
@@ -81,14 +80,14 @@ def test_an_edge_is_known_to_all_that_lies_above_it_and_to_nothing_below():
 def test_the_steepest_edge_below_counts_wherever_it_lies():
     image = np.full((40, 12, 3), 90, np.uint8)
     image[30:32], image[10:12] = 220, 120
-    edge = context.features(image, ())[7, :, 6]
+    edge = features(image, ())[7, :, 6]
     np.testing.assert_array_equal(edge[:28], edge[28])
 
 
 def test_the_darkest_place_below_is_kept_up_the_column_alone():
     image = np.full((40, 24, 3), 90, np.uint8)
     image[18:25, :8] = 20
-    dark = context.features(image, ())[8]
+    dark = features(image, ())[8]
     np.testing.assert_allclose(dark[:20, 3], np.log(28), atol=1e-5)
     np.testing.assert_allclose(dark[30:, 3], np.log(98), atol=1e-5)
     np.testing.assert_allclose(dark[:, 16], np.log(98), atol=1e-5)
@@ -112,7 +111,7 @@ def test_a_kerb_tells_a_smooth_pavement_from_the_road_of_the_same_grey():
 
 def test_there_are_two_textures_a_window():
     image = grey()
-    assert len(context.features(image, (3, 9, 21))) == 9 + 6
+    assert len(features(image, (3, 9, 21))) == 9 + 6
 
 
 def test_sampled_features_are_the_images_at_the_sampled_pixels_in_their_order():
@@ -121,9 +120,9 @@ def test_sampled_features_are_the_images_at_the_sampled_pixels_in_their_order():
     sample = TrainingSet(
         tuple(images), *(np.array(v) for v in where.values()), np.array([True, False, True])
     )
-    maps = [context.features(image, PLAIN.windows) for image in images]
+    maps = [features(image, PLAIN.windows) for image in images]
     expected = [maps[1][:, 3, 31], maps[0][:, 23, 5], maps[1][:, 0, 0]]
-    np.testing.assert_array_equal(context.sampled(sample, PLAIN), expected)
+    np.testing.assert_array_equal(at_samples(sample, PLAIN.width, PLAIN.windows), expected)
 
 
 # --- What it can tell apart -----------------------------------------------------------------------
@@ -181,7 +180,7 @@ def test_spare_planes_are_drawn_but_not_kept():
     sample = every_pixel([grey(), grey(seed=1)], [truth, truth])
     settings = ContextSettings(planes=16, spare=16)
     machine = context.fit(sample, settings)
-    values = context.sampled(sample, settings)
+    values = at_samples(sample, settings.width, settings.windows)
     planes, bias = context.draw_planes(values, 32, sample.seed)
     kept, *_ = context.solve(np.maximum(values @ planes.T + bias, 0), sample.road, settings)
     assert kept.tolist() != list(range(16))
@@ -219,7 +218,7 @@ def test_the_decision_is_the_linear_machines_on_the_written_out_map():
     truth[12:] = 1
     machine = context.fit(every_pixel([grey()], [truth]), PLAIN)
     image = grey(seed=2)
-    x = context.features(image, PLAIN.windows).reshape(11, -1).T.astype(np.float64)
+    x = features(image, PLAIN.windows).reshape(11, -1).T.astype(np.float64)
     expected = np.maximum(x @ machine.planes.T + machine.bias, 0) @ machine.weights + machine.offset
     found = context.decision(image, machine, PLAIN).ravel()
     np.testing.assert_allclose(found, expected, atol=1e-3)
@@ -257,7 +256,7 @@ def test_a_wide_image_is_decided_at_the_working_width():
     settings = ContextSettings(width=32, planes=32, spare=0, smoothing=1)
     small = cv2.resize(large, (32, 24), interpolation=cv2.INTER_AREA)
     expected = cv2.resize(context.decision(small, machine, PLAIN), (128, 96))
-    values = context.bind(settings, machine)(View(large, large)).layers[0].array
+    values = context.bind(settings, machine)(View.of(large)).layers[0].array
     np.testing.assert_array_equal(values, expected)
 
 
@@ -307,7 +306,7 @@ def test_left_out_values_come_from_machines_that_have_not_seen_the_frame():
     images = [grey(seed=seed) for seed in range(4)]
     settings = ContextSettings(planes=32, spare=0, folds=4)
     sample = every_pixel(images, truths)
-    values = context.sampled(sample, settings)
+    values = at_samples(sample, settings.width, settings.windows)
     planes, bias = context.draw_planes(values, 32, 0)
     found = context.left_out(np.maximum(values @ planes.T + bias, 0), sample, settings)
     right = (found > 0) == sample.road
@@ -354,5 +353,5 @@ def test_there_are_at_most_eight_windows():
 def test_its_mask_is_tabled_as_svm():
     names = ("exposure", "similarity", "context", "post")
     settings = {name: STAGES[name].settings() for name in names}
-    assert masks_of(names) == ("similarity", "svm", "post")
-    assert [spec.name for spec in layers_of(("context",), settings)] == ["decision", "svm"]
+    assert Pipeline.default(names).masks() == ("similarity", "svm", "post")
+    assert [spec.name for spec in Pipeline(("context",), settings).layers()] == ["decision", "svm"]

@@ -5,8 +5,8 @@ import pytest
 
 from roadeval.pipeline.beyond import exposure
 from roadeval.pipeline.beyond.exposure import ExposureSettings
-from roadeval.pipeline.chain import STAGES, Chain
-from roadeval.pipeline.patch import patch_mask
+from roadeval.pipeline.chain import STAGES, Pipeline
+from roadeval.pipeline.reference_patch import patch_mask
 from roadeval.pipeline.stage import View
 
 
@@ -17,7 +17,7 @@ def scene(road, elsewhere=(10, 200, 90), shape=(40, 60)):
 
 
 def run(image, **settings):
-    return exposure.bind(ExposureSettings(**settings), None)(View(image, image))
+    return exposure.bind(ExposureSettings(**settings), None)(View.of(image))
 
 
 def test_the_patch_turns_grey():
@@ -71,5 +71,5 @@ def test_it_prepares_the_image_in_every_variant_and_makes_no_mask():
     assert not stage.yields_mask
     assert not stage.is_filter
     image = scene((48, 96, 192))
-    chain = Chain(("exposure",), {"exposure": ExposureSettings()}, {})
+    chain = Pipeline.default(["exposure"]).bind({})
     np.testing.assert_array_equal(chain.filtered(image), run(image).image)

@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from roadeval.pipeline.beyond import gated, shade
-from roadeval.pipeline.beyond.gates import VERDICTS, GatedSettings, components, judge, look
-from roadeval.pipeline.beyond.shade import RoadLight
-from roadeval.pipeline.chain import STAGES, Chain
+from roadeval.pipeline.beyond import gated, road_light
+from roadeval.pipeline.beyond.road_light import RoadLight
+from roadeval.pipeline.beyond.shadow_gates import VERDICTS, GatedSettings, components, judge, look
+from roadeval.pipeline.chain import STAGES, Pipeline
 from roadeval.pipeline.stage import TrainingSet, View
 
 HEIGHT, WIDTH = 120, 160
@@ -29,7 +29,7 @@ def road(spot=None, where=PATCH, noise=2.0):
 
 
 def run(image, model=GREY, **settings):
-    output = gated.bind(GatedSettings(**settings), model)(View(image, image))
+    output = gated.bind(GatedSettings(**settings), model)(View.of(image))
     return output, {layer.spec.name: layer.array for layer in output.layers}
 
 
@@ -261,7 +261,7 @@ def test_the_ratio_must_be_two_shares_in_order():
 
 def told(image, shadow, **settings):
     """What the filter makes of an image once it knows what is shadow."""
-    return gated.oracle(GatedSettings(**settings), GREY)(View(image, image), shadow).image
+    return gated.oracle(GatedSettings(**settings), GREY)(View.of(image), shadow).image
 
 
 def truth(*spots):
@@ -360,18 +360,18 @@ def training_set(*frames):
 def test_lit_and_shaded_road_are_told_apart_within_a_frame():
     bright, dull = [200, 190, 180], [100, 95, 90]
     sample = training_set([bright] * 900 + [[60, 60, 60]] * 900, [dull] * 900)
-    model = shade.fit(sample)
+    model = road_light.fit(sample)
     logs = np.log(np.array([bright, dull]) + 8.0)
     lit = (logs[:, [0, 2]] - logs[:, [1]]).mean(axis=0)
     np.testing.assert_allclose(model.mean, lit, atol=1e-6)
     # 900 grey pixels, against what 100 pixels of skylight would say.
-    expected = (900 * (0 - lit) + shade.SKYLIGHT_WEIGHT * shade.SKYLIGHT) / 1000
+    expected = (900 * (0 - lit) + road_light.SKYLIGHT_WEIGHT * road_light.SKYLIGHT) / 1000
     np.testing.assert_allclose(model.shift, expected, atol=1e-6)
 
 
 def test_without_shaded_road_the_shift_is_skylights():
-    model = shade.fit(training_set([[120, 120, 120]] * 50))
-    np.testing.assert_array_equal(model.shift, shade.SKYLIGHT)
+    model = road_light.fit(training_set([[120, 120, 120]] * 50))
+    np.testing.assert_array_equal(model.shift, road_light.SKYLIGHT)
 
 
 def test_the_distance_to_lit_road_is_mahalanobis():
@@ -380,33 +380,35 @@ def test_the_distance_to_lit_road_is_mahalanobis():
     logs = np.log(image + 8.0)
     away = logs[..., [0, 2]] - logs[..., [1]] - model.mean
     expected = np.einsum("hwi,ij,hwj->hw", away, np.linalg.inv(model.covariance), away)
-    np.testing.assert_allclose(shade.likeness(image, model).lit, expected, rtol=1e-3, atol=1e-4)
+    np.testing.assert_allclose(
+        road_light.likeness(image, model).lit, expected, rtol=1e-3, atol=1e-4
+    )
 
 
 def test_the_distance_to_shaded_road_is_the_least_along_the_segment():
     model = RoadLight(np.array([0.1, -0.2]), np.array([[0.02, 0.01], [0.01, 0.03]]), GREY.shift)
     image = np.random.default_rng(0).integers(0, 256, (4, 5, 3), dtype=np.uint8)
     along = [
-        shade.likeness(
+        road_light.likeness(
             image, RoadLight(model.mean + share * model.shift, model.covariance, GREY.shift)
         ).lit
         for share in np.linspace(0, 1, 201)
     ]
-    found = shade.likeness(image, model).shaded
+    found = road_light.likeness(image, model).shaded
     np.testing.assert_allclose(found, np.min(along, axis=0), rtol=0.02, atol=2e-3)
 
 
 def test_excess_green_and_brightness_by_hand():
     image = np.array([[[10, 40, 30], [0, 0, 0]]], np.uint8)
-    total = shade.brightness(image)
+    total = road_light.brightness(image)
     assert total.tolist() == [[80, 0]]
-    np.testing.assert_allclose(shade.excess_green(image, total), [[0.5, 0.0]])
+    np.testing.assert_allclose(road_light.excess_green(image, total), [[0.5, 0.0]])
 
 
 def test_quantiles_are_taken_of_the_masked_pixels_alone():
     values, mask = np.array([[1, 2, 3, 4, 700]], np.uint16), np.array([[1, 1, 1, 1, 0]], np.uint8)
-    assert [shade.quantile(values, mask, share) for share in (0.25, 0.5, 1.0)] == [1, 2, 4]
-    assert shade.quantile(values, 0 * mask, 0.5) == 0
+    assert [road_light.quantile(values, mask, share) for share in (0.25, 0.5, 1.0)] == [1, 2, 4]
+    assert road_light.quantile(values, 0 * mask, 0.5) == 0
 
 
 def test_the_stage_learns_and_runs_in_a_chain():
@@ -414,4 +416,4 @@ def test_the_stage_learns_and_runs_in_a_chain():
     sample = training_set([[120, 120, 120]] * 90 + [[46, 48, 53]] * 10)
     parameters = {"gated": STAGES["gated"].fit(sample, settings["gated"])}
     image = road(ROAD * SHADE)
-    assert (Chain(("gated",), settings, parameters).filtered(image) != image).any()
+    assert (Pipeline(("gated",), settings).bind(parameters).filtered(image) != image).any()

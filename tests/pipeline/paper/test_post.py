@@ -8,12 +8,18 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from roadeval.data.packed import Packed
-from roadeval.pipeline.paper import post as morphology
-from roadeval.pipeline.paper.post import MorphologySettings
-from roadeval.pipeline.patch import ReferencePatch
-from roadeval.pipeline.stage import View
+from roadeval.pipeline.paper import post
+from roadeval.pipeline.paper.post import PostSettings
+from roadeval.pipeline.reference_patch import ReferencePatch
+from roadeval.pipeline.stage import Output, View
 from tests.pipeline import reference
 from tests.pipeline.images import mask, masks
+
+
+def seen(road):
+    """What post-processing sees after a stage with this mask."""
+    view = View.of(np.zeros((*road.shape, 3), np.uint8))
+    return view.after(Output(mask=Packed.of(road)))
 
 
 def on_masks(operation):
@@ -21,13 +27,13 @@ def on_masks(operation):
     return lambda road, *rest: operation(Packed.of(road), *rest).pixels()
 
 
-dilate, erode = on_masks(morphology.dilate), on_masks(morphology.erode)
-opening, closing = on_masks(morphology.opening), on_masks(morphology.closing)
-boundary, fill_holes = on_masks(morphology.boundary), on_masks(morphology.fill_holes)
-keep_region = on_masks(morphology.keep_region)
+dilate, erode = on_masks(post.dilate), on_masks(post.erode)
+opening, closing = on_masks(post.opening), on_masks(post.closing)
+boundary, fill_holes = on_masks(post.boundary), on_masks(post.fill_holes)
+keep_region = on_masks(post.keep_region)
 
 elements = st.builds(
-    morphology.structuring_element,
+    post.structuring_element,
     st.sampled_from([1, 3, 5]),
     st.sampled_from(["square", "ellipse"]),
 )
@@ -47,7 +53,7 @@ def as_mask(element):
 
 
 def post_process(road, **options):
-    return on_masks(morphology.post_process)(road, MorphologySettings(**options))
+    return on_masks(post.post_process)(road, PostSettings(**options))
 
 
 # --- Eq. 17-22 ------------------------------------------------------------------------------------
@@ -75,12 +81,12 @@ def test_dilation_erosion_opening_and_closing_equal_scipys(road, element):
 def test_they_equal_scipys_where_a_word_of_pixels_ends(width, share):
     road = (np.random.default_rng(width).random((20, width)) < share).astype(np.uint8)
     for shape in ("square", "ellipse"):
-        assert_as_scipy(road, morphology.structuring_element(5, shape))
+        assert_as_scipy(road, post.structuring_element(5, shape))
 
 
 @given(masks)
 def test_dilation_and_erosion_equal_the_set_definitions(road):
-    square = morphology.structuring_element(3, "square")
+    square = post.structuring_element(3, "square")
     offsets = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
     m = {(int(y), int(x)) for y, x in zip(*np.nonzero(road), strict=True)}
     every = [(y, x) for y in range(road.shape[0]) for x in range(road.shape[1])]
@@ -93,7 +99,7 @@ def test_dilation_and_erosion_equal_the_set_definitions(road):
 
 def test_closing_keeps_road_along_the_border():
     road = mask("####", "####", "....")
-    assert (closing(road, morphology.structuring_element(3, "square")) == road).all()
+    assert (closing(road, post.structuring_element(3, "square")) == road).all()
 
 
 @pytest.mark.parametrize("reach", [1, 32, 63, 64, 65, 128, 129, 250])
@@ -110,7 +116,7 @@ def test_closing_fills_gaps_no_wider_than_the_element_and_keeps_the_border_as_it
 
 def test_the_boundary_is_the_inner_edge_and_runs_along_the_image_border():
     road = mask("....", ".###", ".###", ".###")
-    edge = boundary(road, morphology.structuring_element(3, "square"))
+    edge = boundary(road, post.structuring_element(3, "square"))
     assert (edge == mask("....", ".###", ".#.#", ".###")).all()
 
 
@@ -124,7 +130,7 @@ def test_the_boundary_equals_scipys(road, element):
 @pytest.mark.parametrize("side", range(1, 16, 2))
 @pytest.mark.parametrize("shape", ["square", "ellipse"])
 def test_structuring_elements_are_symmetric_and_hold_their_centre(side, shape):
-    element = as_mask(morphology.structuring_element(side, shape))
+    element = as_mask(post.structuring_element(side, shape))
     kind = cv2.MORPH_RECT if shape == "square" else cv2.MORPH_ELLIPSE
     np.testing.assert_array_equal(element, cv2.getStructuringElement(kind, (side, side)))
     assert element[side // 2, side // 2]
@@ -133,7 +139,7 @@ def test_structuring_elements_are_symmetric_and_hold_their_centre(side, shape):
 
 @given(st.integers(1, 5000))
 def test_the_elements_side_is_the_odd_number_nearest_to_1_percent_of_the_width(width):
-    side = morphology.element_side(width)
+    side = post.element_side(width)
     odd = range(3, 101, 2)
     assert side in odd
     assert abs(side - width / 100) == min(abs(n - width / 100) for n in odd)
@@ -251,9 +257,9 @@ def test_every_step_can_be_left_out():
     rng = np.random.default_rng(5)
     road = (rng.random((30, 40)) > 0.4).astype(np.uint8)
     nothing = {"operations": (), "region": "all", "fill": False}
-    square = morphology.structuring_element(3, "square")
+    square = post.structuring_element(3, "square")
     opened, closed = opening(road, square), closing(road, square)
-    ellipse = morphology.structuring_element(7, "ellipse")
+    ellipse = post.structuring_element(7, "ellipse")
     for step, expected in (
         ({}, road),
         ({"operations": ("close",), "element": 7, "shape": "ellipse"}, closing(road, ellipse)),
@@ -265,7 +271,7 @@ def test_every_step_can_be_left_out():
         ({"fill": True}, fill_holes(road)),
         (
             {"operations": ("close",), "element": 5},
-            closing(road, morphology.structuring_element(5, "square")),
+            closing(road, post.structuring_element(5, "square")),
         ),
     ):
         np.testing.assert_array_equal(post_process(road, **nothing | step), expected)
@@ -274,36 +280,34 @@ def test_every_step_can_be_left_out():
 @pytest.mark.parametrize("key", ["element", "boundary_element"])
 def test_an_even_side_is_refused(key):
     with pytest.raises(ValueError, match="must be odd"):
-        MorphologySettings(**{key: 4})
+        PostSettings(**{key: 4})
 
 
 def test_the_boundary_layer_is_of_the_result():
     road = (np.random.default_rng(2).random((30, 40)) > 0.3).astype(np.uint8)
-    output = morphology.bind(MorphologySettings(), None)(View(None, None, Packed.of(road)))
+    output = post.bind(PostSettings(), None)(seen(road))
     layers = {layer.spec.name: layer.array for layer in output.layers}
     np.testing.assert_array_equal(layers["post"], output.mask.pixels())
     np.testing.assert_array_equal(layers["boundary"], reference.boundary(layers["post"] > 0))
-    assert tuple(layer.spec for layer in output.layers) == morphology.layers(MorphologySettings())
+    assert tuple(layer.spec for layer in output.layers) == post.layers(PostSettings())
 
 
 def test_post_processing_needs_a_mask_before_it():
     with pytest.raises(ValueError, match="road mask before it"):
-        morphology.bind(MorphologySettings(), None)(View(None, None))
+        post.bind(PostSettings(), None)(View.of(np.zeros((3, 4, 3), np.uint8)))
 
 
 def test_opencvs_own_border_would_differ():
     # Why the border is stated: OpenCV's default lets road beyond the border keep road alive.
     road = np.ones((4, 4), np.uint8)
     assert cv2.erode(road, np.ones((3, 3), np.uint8)).all()
-    assert erode(road, morphology.structuring_element(3, "square")).sum() == 4
+    assert erode(road, post.structuring_element(3, "square")).sum() == 4
 
 
 def test_the_boundarys_width_is_a_setting():
     road = (np.random.default_rng(2).random((30, 40)) > 0.01).astype(np.uint8)
-    output = morphology.bind(MorphologySettings(boundary_element=7), None)(
-        View(None, None, Packed.of(road))
-    )
+    output = post.bind(PostSettings(boundary_element=7), None)(seen(road))
     layers = {layer.spec.name: layer.array for layer in output.layers}
-    expected = boundary(layers["post"], morphology.structuring_element(7, "square"))
+    expected = boundary(layers["post"], post.structuring_element(7, "square"))
     assert expected.sum() > boundary(layers["post"], np.array([1, 1])).sum()
     np.testing.assert_array_equal(layers["boundary"], expected)

@@ -29,7 +29,7 @@ def grey_road(n=300, seed=0, spread=4.0):
 
 
 def run(image, road, settings=None):
-    output = similarity.bind(settings or SimilaritySettings(), road)(View(image, image))
+    output = similarity.bind(settings or SimilaritySettings(), road)(View.of(image))
     distance, mask = (layer.array for layer in output.layers)
     np.testing.assert_array_equal(mask, output.mask.pixels())
     return distance, mask

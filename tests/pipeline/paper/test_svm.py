@@ -8,7 +8,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
-from roadeval.pipeline.paper import svm as classify
+from roadeval.pipeline.paper import svm
 from roadeval.pipeline.paper.svm import SvmSettings
 from roadeval.pipeline.stage import TrainingSet, View
 from tests.pipeline.images import IMAGES, noise
@@ -48,13 +48,13 @@ def scikit_learns(settings, training):
 def case(request):
     """Settings, the machine that was fitted, its stage, and scikit-learn's own."""
     settings, training = request.param, sample()
-    machine = classify.fit(training, settings)
-    return settings, machine, classify.bind(settings, machine), scikit_learns(settings, training)
+    machine = svm.fit(training, settings)
+    return settings, machine, svm.bind(settings, machine), scikit_learns(settings, training)
 
 
 def road(stage, colours):
     """What the stage makes of ``(n, 3)`` colours, as an image of one row."""
-    return stage(View(colours[None], colours[None])).mask.pixels()[0]
+    return stage(View.of(colours[None])).mask.pixels()[0]
 
 
 COLOURS = np.concatenate([noise(1, 8000)[0], sample().colours(), sample(seed=1).colours()])
@@ -62,7 +62,7 @@ COLOURS = np.concatenate([noise(1, 8000)[0], sample().colours(), sample(seed=1).
 
 def test_decision_values_equal_scikit_learns(case):
     settings, machine, _, theirs = case
-    ours = classify.decision(COLOURS, machine, settings)
+    ours = svm.decision(COLOURS, machine, settings)
     np.testing.assert_allclose(ours, theirs.decision_function(COLOURS), rtol=0, atol=ROUNDING)
 
 
@@ -80,7 +80,7 @@ def test_the_greatest_penalty_that_is_allowed_breaks_no_bound_of_what_is_learnt(
     training = sample(10)
     contradiction = replace(training, road=np.arange(20) % 2 == 0)
     settings = SvmSettings(kernel=kernel, c=1e6)
-    assert np.abs(classify.fit(contradiction, settings).weights).max() <= 1e6
+    assert np.abs(svm.fit(contradiction, settings).weights).max() <= 1e6
 
 
 def test_a_penalty_beyond_is_refused():
@@ -91,12 +91,12 @@ def test_a_penalty_beyond_is_refused():
 @pytest.mark.parametrize("red", [0, 110, 255])
 def test_the_mask_equals_the_definition_next_to_the_threshold(case, red):
     settings, machine, stage, _ = case
-    margins = classify._margins(machine, settings)
+    margins = svm._margins(machine, settings)
     assert margins.error < 1e-5  # or the bound would decide nothing
     quick = margins.of_red(red).ravel()
     near = np.argsort(np.abs(quick))[:1000]
     colours = np.stack([np.full(1000, red), near // 256, near % 256], axis=1).astype(np.uint8)
-    exact = classify.decision(colours, machine, settings) - settings.threshold
+    exact = svm.decision(colours, machine, settings) - settings.threshold
     assert np.abs(quick[near] - exact).max() <= margins.error
     clear = np.abs(exact) > ROUNDING
     assert clear.mean() > 0.9
@@ -108,30 +108,30 @@ def test_the_mask_equals_the_definition_next_to_the_threshold(case, red):
 def test_a_colour_on_the_threshold_is_decided_by_the_definition(kernel, colour):
     # The threshold is put so near that the quick value, whatever it is, cannot tell the side.
     settings = SvmSettings(kernel=kernel)
-    machine = classify.fit(sample(40), settings)
+    machine = svm.fit(sample(40), settings)
     pixel = np.array([colour], np.uint8)
-    value = classify.decision(pixel, machine, settings).item()
+    value = svm.decision(pixel, machine, settings).item()
     for offset, expected in ((-1e-13, 1), (1e-13, 0)):
-        stage = classify.bind(replace(settings, threshold=value + offset), machine)
+        stage = svm.bind(replace(settings, threshold=value + offset), machine)
         assert road(stage, pixel).item() == expected
 
 
 def indifferent():
     """A machine whose value is 0, the threshold, at every colour."""
-    return classify.SupportVectors(
+    return svm.SupportVectors(
         np.zeros(3), np.ones(3), np.full((2, 3), 100.0), np.array([1.0, -1.0]), 0.0
     )
 
 
 def test_a_machine_that_learnt_nothing_decides_only_the_colours_that_occur(monkeypatch):
     asked = []
-    exact = classify.decision
+    exact = svm.decision
     monkeypatch.setattr(
-        classify,
+        svm,
         "decision",
         lambda colours, *rest: asked.append(len(colours)) or exact(colours, *rest),
     )
-    stage = classify.bind(SvmSettings(), indifferent())
+    stage = svm.bind(SvmSettings(), indifferent())
     image = noise(1, 50)[0]
     colours = len(np.unique(image, axis=0))
     assert not road(stage, image).any()
@@ -141,8 +141,8 @@ def test_a_machine_that_learnt_nothing_decides_only_the_colours_that_occur(monke
 
 def test_a_colour_is_decided_alike_whatever_is_decided_with_it(case):
     settings, machine, *_ = case
-    whole = classify.decision(COLOURS[:500], machine, settings)
-    alone = [classify.decision(COLOURS[i : i + 1], machine, settings).item() for i in range(500)]
+    whole = svm.decision(COLOURS[:500], machine, settings)
+    alone = [svm.decision(COLOURS[i : i + 1], machine, settings).item() for i in range(500)]
     assert whole.tolist() == alone
 
 
@@ -160,19 +160,19 @@ def test_the_machine_is_scikit_learns(case):
 def test_features_are_standardised_over_the_training_set():
     training = sample()
     colours = training.colours()
-    machine = classify.fit(training, SvmSettings())
+    machine = svm.fit(training, SvmSettings())
     np.testing.assert_allclose(machine.mean, colours.mean(axis=0))
     np.testing.assert_allclose(machine.scale, colours.std(axis=0))
-    machine = classify.fit(training, SvmSettings(standardise=False))
+    machine = svm.fit(training, SvmSettings(standardise=False))
     assert (machine.mean.tolist(), machine.scale.tolist()) == ([0, 0, 0], [1, 1, 1])
 
 
 def test_a_channel_that_never_varies_does_not_divide_by_zero():
     training = sample()
     training.images[0][..., 2] = 77
-    machine = classify.fit(training, SvmSettings())
+    machine = svm.fit(training, SvmSettings())
     assert machine.scale[2] == 1
-    assert np.isfinite(classify.decision(COLOURS, machine, SvmSettings())).all()
+    assert np.isfinite(svm.decision(COLOURS, machine, SvmSettings())).all()
 
 
 def test_a_linear_machine_cannot_cut_a_mid_grey_out_and_an_rbf_machine_can():
@@ -180,7 +180,7 @@ def test_a_linear_machine_cannot_cut_a_mid_grey_out_and_an_rbf_machine_can():
     accuracy = {}
     for kernel in ("linear", "rbf"):
         settings = SvmSettings(kernel=kernel)
-        values = classify.decision(training.colours(), classify.fit(training, settings), settings)
+        values = svm.decision(training.colours(), svm.fit(training, settings), settings)
         accuracy[kernel] = ((values > 0) == training.road).mean()
     assert accuracy["linear"] < 0.8
     assert accuracy["rbf"] > 0.9
@@ -188,22 +188,22 @@ def test_a_linear_machine_cannot_cut_a_mid_grey_out_and_an_rbf_machine_can():
 
 def test_decision_values_do_not_depend_on_the_block_size(monkeypatch):
     settings = SvmSettings()
-    machine = classify.fit(sample(), settings)
-    whole = classify.decision(COLOURS[:100], machine, settings)
-    monkeypatch.setattr(classify, "_BLOCK", 1000)
-    np.testing.assert_array_equal(classify.decision(COLOURS[:100], machine, settings), whole)
+    machine = svm.fit(sample(), settings)
+    whole = svm.decision(COLOURS[:100], machine, settings)
+    monkeypatch.setattr(svm, "_BLOCK", 1000)
+    np.testing.assert_array_equal(svm.decision(COLOURS[:100], machine, settings), whole)
 
 
 def test_the_mask_is_the_machine_at_every_pixel(case):
     settings, machine, stage, _ = case
     for image in IMAGES.values():
-        output = stage(View(image, image))
+        output = stage(View.of(image))
         (layer,) = output.layers
         assert layer.array.dtype == np.uint8
         assert layer.array.shape == image.shape[:2]
-        values = classify.decision(image.reshape(-1, 3), machine, settings)
+        values = svm.decision(image.reshape(-1, 3), machine, settings)
         clear = np.abs(values - settings.threshold) > ROUNDING
         expected = values > settings.threshold
         np.testing.assert_array_equal(layer.array.ravel()[clear], expected[clear])
         np.testing.assert_array_equal(layer.array, output.mask.pixels())
-        assert layer.spec == classify.SVM
+        assert layer.spec == svm.SVM

@@ -1,0 +1,100 @@
+"""From the words of a command line to the configuration of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from roadeval.cli.options import Given, with_flags
+from roadeval.errors import RoadevalError
+
+if TYPE_CHECKING:
+    from roadeval.config import RunConfig
+
+Drive = Annotated[
+    Path, typer.Argument(metavar="DRIVE", show_default=False, help="A camera log (MCAP).")
+]
+Result = Annotated[
+    Path,
+    typer.Argument(
+        metavar="RESULT", show_default=False, help="A recording (.rrd), or a results folder."
+    ),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print the result on stdout as JSON.")]
+Quiet = Annotated[
+    bool, typer.Option("-q", "--quiet", help="No progress and no table; warnings stay.")
+]
+
+
+@contextmanager
+def usage() -> Iterator[None]:
+    """Turn a known problem inside the block into wrong usage."""
+    try:
+        yield
+    except RoadevalError as error:
+        raise typer.BadParameter(with_flags(str(error))) from error
+
+
+def configuration(given: Given) -> RunConfig:
+    """Return the configuration of a preset, a file, and options on top of both.
+
+    What can be seen to be wrong without opening a file is wrong usage.
+
+    Raises
+    ------
+    typer.BadParameter
+        For an option's value that cannot be used, or options that do not go together.
+    RoadevalError
+        For a file that cannot be used.
+    """
+    from roadeval.config import Variant, configure, read_tables
+
+    if "training.model" in given and {"training.frames", "training.gap"} & given.keys():
+        raise typer.BadParameter("--train-frames and --train-gap do not go with --model")
+    named = [*given.get("variants", ()), *given.get("topics.masks", ())]
+    with usage():
+        _check_names([name for name, _ in named])
+        base = configure(_preset(given)) if "config" not in given else None
+    config = _from_file(given) if base is None else base
+    variants = [
+        Variant.of(name, read_tables(path), path) for name, path in given.get("variants", ())
+    ]
+    with usage():
+        return config.override(_tables(given)).with_variants(variants)
+
+
+def _preset(given: Given) -> dict[str, str]:
+    return {"preset": given["preset"]} if "preset" in given else {}
+
+
+def _from_file(given: Given) -> RunConfig:
+    from roadeval.config import ConfigError, configure, read_tables
+
+    path = given["config"]
+    tables = read_tables(path)
+    preset = given.get("preset")
+    if preset is not None and tables.get("preset", preset) != preset:
+        raise ConfigError(f"{path}: starts from preset {tables['preset']}, not from {preset}")
+    return configure({**_preset(given), **tables}, where=str(path))
+
+
+def _check_names(names: Sequence[str]) -> None:
+    from roadeval.config import check_variant_name
+    from roadeval.data import FILTERED, UNFILTERED
+
+    for place, name in enumerate(names):
+        check_variant_name(name, [FILTERED, UNFILTERED, *names[:place]])
+
+
+def _tables(given: Given) -> dict[str, dict[str, Any]]:
+    """Arrange the values of ``table.key`` settings as a TOML file has them."""
+    tables: dict[str, dict[str, Any]] = {}
+    for setting, value in given.items():
+        table, _, key = setting.partition(".")
+        if key:
+            tables.setdefault(table, {})[key] = dict(value) if key == "masks" else value
+    return tables

@@ -1,0 +1,99 @@
+"""``roadeval compare``: what changed between results, and a guard for a merge."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from roadeval.cli import arguments, console, messages
+from roadeval.cli.commands.report import PaperName
+from roadeval.cli.exit_codes import ExitCode
+
+
+def _condition(texts: list[str] | None) -> list[str] | None:
+    from roadeval.evaluation.conditions import Condition
+
+    with arguments.usage():
+        for text in texts or ():
+            Condition.parse(text)
+    return texts
+
+
+def _ending(paths: list[Path] | None) -> list[Path] | None:
+    for path in paths or ():
+        if path.suffix.lower() not in (".pdf", ".md", ".json"):
+            raise typer.BadParameter(f"{path}: end it in .pdf, .md or .json")
+    return paths
+
+
+def compare(
+    results: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="BASE NEW...",
+            show_default=False,
+            help="Recordings or results folders; of a single one its variants are compared.",
+        ),
+    ],
+    *,
+    variant: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--variant",
+            metavar="NAME",
+            help="Only this one; of a single result the first is the base. Repeatable.",
+        ),
+    ] = None,
+    fail_if: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fail-if",
+            metavar="CONDITION",
+            callback=_condition,
+            help="As 'post.filtered.ERR > +0.5pp' (change) or '> 20%' (level). Repeatable.",
+        ),
+    ] = None,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            callback=_ending,
+            help="Write it as .pdf, .md or .json, by the ending. Repeatable.",
+        ),
+    ] = None,
+    paper: Annotated[
+        PaperName, typer.Option("--paper", metavar="a4|letter", help="Default: a4.")
+    ] = PaperName.A4,
+    json: arguments.Json = False,
+    quiet: arguments.Quiet = False,
+) -> int:
+    """Compare results of one drive, or the variants of one result.
+
+    Frame by frame; those that either trained on are left out. Results of different drives are put
+    side by side without differences. Exit code 4 if a --fail-if condition holds; 1 if one cannot be
+    judged, as where two results have fewer than ten frames in common, or fewer than half of those
+    of the shorter one.
+    """
+    from roadeval.cli import changes
+    from roadeval.jobs import compare as comparing
+    from roadeval.report.pdf.typeset import Paper
+
+    compared = comparing.compare(results, variants=variant, fail_if=fail_if or ())
+    for path in output or ():
+        comparing.write(compared, path, paper=Paper(paper))
+    if json:
+        console.emit(comparing.as_json(compared).rstrip())
+    elif not quiet:
+        changes.show(compared.content, console.results())
+    for warning in compared.content["warnings"]:
+        messages.warning(warning)
+    for sentence in compared.held:
+        messages.error(sentence)
+    return ExitCode.CONDITION_HELD if compared.held else ExitCode.DONE
+
+
+COMMAND: Final = compare

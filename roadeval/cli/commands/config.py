@@ -1,0 +1,29 @@
+"""``roadeval config``: the whole effective configuration, to read and to edit."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from roadeval.cli import arguments, console
+from roadeval.cli.exit_codes import ExitCode
+from roadeval.cli.options import Given, takes
+
+
+@takes(
+    *("preset", "config", "variants"),
+    *("output", "training", "topics", "labels", "frames", "run"),
+)
+def config(*, given: Given) -> int:
+    """Print the whole effective configuration as TOML.
+
+    Each setting with its meaning and range; the file that it makes can be edited and given to
+    --config.
+    """
+    settings = arguments.configuration(given)
+    from roadeval.config.document import documented
+
+    console.emit(documented(settings).rstrip())
+    return ExitCode.DONE
+
+
+COMMAND: Final = config

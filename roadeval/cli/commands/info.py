@@ -1,0 +1,34 @@
+"""``roadeval info``: what is in a log, and what replay would pick of it and why."""
+
+from __future__ import annotations
+
+from json import dumps
+from typing import Final
+
+from roadeval.cli import arguments, console, messages
+from roadeval.cli.options import Given, takes
+
+
+@takes("topics", "labels", "frames.keep_corrupt")
+def info(drive: arguments.Drive, *, given: Given, json: arguments.Json = False) -> int:
+    """Show what is in a log and what replay would pick.
+
+    Topics with their kind, size, number and rate of messages, gaps and damage; and why replay
+    would pick what it picks, or what it would ask for.
+    """
+    config = arguments.configuration(given)
+    from roadeval.cli import contents
+    from roadeval.jobs.info import info as describe
+
+    found = describe(drive, config)
+    if json:
+        console.emit(dumps(found.as_dict(), indent=2, ensure_ascii=False))
+    else:
+        contents.show(found.as_dict(), console.results())
+    for damage in found.damage:
+        if damage not in found.losses:
+            messages.warning(damage)
+    return messages.losses(found.losses)
+
+
+COMMAND: Final = info

@@ -1,0 +1,113 @@
+"""``roadeval inspect``: the worst frames, and the viewer opened at one."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from json import dumps
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from roadeval.cli import arguments, console, messages
+from roadeval.cli.exit_codes import ExitCode
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from roadeval.jobs.inspect import Suspect
+
+
+def inspect(
+    recording: arguments.Result,
+    *,
+    listed: Annotated[
+        bool, typer.Option("--list", help="Print the worst frames with reasons.")
+    ] = False,
+    frame: Annotated[
+        int | None, typer.Option("--frame", metavar="N", min=0, help="Open at frame N.")
+    ] = None,
+    worst: Annotated[
+        int | None,
+        typer.Option("--worst", metavar="K", min=1, help="Open at the K-th worst frame."),
+    ] = None,
+    variant: Annotated[
+        str | None,
+        typer.Option(
+            "--variant", metavar="NAME", help="Whose failures count. Default: the first variant's."
+        ),
+    ] = None,
+    screenshot: Annotated[
+        Path | None,
+        typer.Option(
+            "--screenshot",
+            metavar="FILE.png",
+            help="No window: draw it into a file instead. Without a frame, the worst pictured.",
+        ),
+    ] = None,
+    json: arguments.Json = False,
+) -> int:
+    """Open the viewer at a frame, or list the frames worth opening.
+
+    The viewer works offline and listens on 127.0.0.1 alone. Of neighbouring frames only the worst
+    is listed.
+    """
+    from roadeval.jobs import inspect as inspecting
+    from roadeval.jobs.result import Opened
+
+    if frame is not None and worst is not None:
+        raise typer.BadParameter("give --frame or --worst, not both")
+    if listed and (frame is not None or screenshot is not None):
+        raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
+    opened = Opened(recording)
+    if listed:
+        _list(inspecting.suspects(opened, worst or inspecting.LISTED, variant), as_json=json)
+        return ExitCode.DONE
+    chosen = ""
+    if worst is not None:
+        ranked = inspecting.suspects(opened, worst, variant)
+        frame = ranked[-1].frame
+    elif frame is None and screenshot is not None and (bad := inspecting.worst(opened, variant)):
+        (first,) = inspecting.suspects(opened, 1, variant)
+        which = "the worst" if bad.frame == first.frame else "the worst that has pictures"
+        frame, chosen = bad.frame, f", {which} (--frame N or --worst K takes another)"
+    if frame is not None and (said := inspecting.unpictured(opened, frame)):
+        messages.warning(said)
+    shown = inspecting.view(opened, frame, screenshot)
+    if screenshot is not None:
+        console.emit(f"{screenshot}: frame {shown}{chosen}")
+    return ExitCode.DONE
+
+
+def _list(found: list[Suspect], *, as_json: bool) -> None:
+    if as_json:
+        console.emit(dumps([asdict(each) for each in found], indent=2, ensure_ascii=False))
+    else:
+        console.results().print(_table(found))
+
+
+def _table(found: list[Suspect]) -> Table:
+    """Tabulate the frames: rates, where ERR comes from, and the recording's notes."""
+    from rich import box
+    from rich.table import Table
+
+    from roadeval.cli.outcome import percent
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    for name in ("", "frame", "ERR", "FPR", "FNR"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("why", overflow="fold")
+    for each in found:
+        rates = (percent(each.rates[rate]) for rate in ("ERR", "FPR", "FNR"))
+        table.add_row(str(each.rank), str(each.frame), *rates, _why(each), end_section=True)
+    return table
+
+
+def _why(suspect: Suspect) -> str:
+    first, *rest = suspect.parts.items()
+    terms = [f"{first[0]} {100 * first[1]:.1f}"]
+    terms += [f"{name} {100 * value:+.1f}" for name, value in rest]
+    return " ".join([f"{', '.join(terms)} pp.", *suspect.notes])
+
+
+COMMAND: Final = inspect

@@ -1,0 +1,63 @@
+"""``roadeval pack``: a folder of images, or a video, becomes a log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from roadeval.cli import arguments, console, messages
+from roadeval.cli.exit_codes import ExitCode
+
+
+def pack(
+    images: Annotated[
+        Path,
+        typer.Argument(
+            metavar="IMAGES", show_default=False, help="A folder of images, or a video file."
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DRIVE.mcap", help="Where the log lands.")
+    ],
+    *,
+    truth: Annotated[
+        Path | None,
+        typer.Option("--truth", metavar="MASKS", help="A folder of masks, paired by name."),
+    ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            "--rate",
+            metavar="HZ",
+            help="Images a second. Default: the times in the names, a video's own, or 10.",
+        ),
+    ] = None,
+    quiet: arguments.Quiet = False,
+) -> int:
+    """Make a log of a folder of images or a video.
+
+    Foxglove and Rerun open it too: JPEGs as they are, masks as PNG, Foxglove's protobuf schemas.
+    """
+    from roadeval.logs import describe
+    from roadeval.logs import pack as run
+
+    packed = run(images, output, masks=truth, rate_hz=rate)
+    _warn_of(packed.without_mask, "images without a mask")
+    _warn_of(packed.without_image, "masks without an image")
+    if truth and (problem := describe(packed.path).problem):
+        messages.warning(f"packed, but replay needs to be told more: {problem}")
+    if not quiet:
+        masks = f", {packed.labelled} with a mask" if truth else ""
+        console.emit(f"{packed.path}: {packed.frames} images{masks}; {packed.stamps}")
+    return ExitCode.DONE
+
+
+def _warn_of(names: tuple[str, ...], what: str) -> None:
+    if names:
+        some = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
+        messages.warning(f"{what}: {some} ({len(names)} in all)")
+
+
+COMMAND: Final = pack

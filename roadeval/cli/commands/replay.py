@@ -1,0 +1,43 @@
+"""``roadeval replay``: the main job at the terminal."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from roadeval.cli import arguments, console, messages, progress
+from roadeval.cli.options import Given, takes
+
+
+@takes(
+    *("output", "preset", "config", "variants"),
+    *("training", "topics", "labels", "frames", "run"),
+)
+def replay(
+    drive: arguments.Drive,
+    *,
+    given: Given,
+    json: arguments.Json = False,
+    quiet: arguments.Quiet = False,
+) -> int:
+    """Replay a log; record, score and plot every step.
+
+    Every intermediate goes into a recording for the Rerun viewer. Where the log has truth, each
+    stage is scored against it, with the shadow filter and without.
+    """
+    config = arguments.configuration(given)
+    from roadeval.cli import outcome
+    from roadeval.jobs.replay import replay as run
+    from roadeval.results.summary import summary_text
+
+    with progress.watched(quiet) as watch:
+        found = run(drive, config, on_progress=watch)
+    if json:
+        console.emit(summary_text(found.summary).rstrip())
+    elif not quiet:
+        outcome.show(found, console.results())
+    for warning in found.warnings:
+        messages.warning(warning)
+    return messages.losses(found.losses)
+
+
+COMMAND: Final = replay

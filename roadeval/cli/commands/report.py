@@ -1,0 +1,70 @@
+"""``roadeval report``: everything a result has to tell, as one PDF."""
+
+from __future__ import annotations
+
+import shlex
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from roadeval.cli import arguments, console, messages
+from roadeval.cli.exit_codes import ExitCode
+
+if TYPE_CHECKING:
+    from roadeval.report.findings import Commands
+
+
+class PaperName(StrEnum):
+    """Sizes of paper."""
+
+    A4 = "a4"
+    LETTER = "letter"
+
+
+def report(
+    result: arguments.Result,
+    *,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE.pdf",
+            help="Default: report.pdf in reports/<drive>/, or in the results folder given.",
+        ),
+    ] = None,
+    paper: Annotated[
+        PaperName, typer.Option("--paper", metavar="a4|letter", help="Default: a4.")
+    ] = PaperName.A4,
+    quiet: arguments.Quiet = False,
+) -> int:
+    """Write the report of a drive as a PDF.
+
+    Does the filter help, where are the errors, which stage broke it, and the frames to look at;
+    from the recording alone, or from a results folder, then without pictures.
+    """
+    from roadeval.jobs.report import report as write
+    from roadeval.jobs.result import Opened
+    from roadeval.report.pdf.typeset import Paper
+
+    opened = Opened(result)
+    path = write(opened, output, paper=Paper(paper), commands=_commands(result))
+    if not quiet:
+        console.emit(str(path))
+    if not opened.complete:
+        messages.warning(f"{result}: a partial recording; the report covers what can be read of it")
+    return ExitCode.DONE
+
+
+def _commands(result: Path) -> Commands:
+    from roadeval.report.findings import Commands
+
+    return Commands(
+        lambda log: shlex.join(["roadeval", "replay", log, "--config", "run.toml"]),
+        lambda frame: shlex.join(["roadeval", "inspect", str(result), "--frame", str(frame)]),
+    )
+
+
+COMMAND: Final = report

@@ -1,0 +1,52 @@
+"""``roadeval train``: a model from some drives, for use on others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from roadeval.cli import arguments, console, messages, progress
+from roadeval.cli.exit_codes import ExitCode
+from roadeval.cli.options import Given, takes
+
+
+@takes(
+    *("preset", "config", "variants", "training.frames"),
+    *("topics.image", "topics.truth", "topics.sync_tolerance_ms", "topics.resize_truth", "labels"),
+    *("frames.scale", "frames.keep_corrupt", "frames.start", "frames.end"),
+)
+def train(
+    drives: Annotated[
+        list[Path], typer.Argument(metavar="DRIVE", help="Camera logs (MCAP), mostly with truth.")
+    ],
+    *,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="MODEL", help="Where the model lands.")
+    ],
+    given: Given,
+    quiet: arguments.Quiet = False,
+) -> int:
+    """Train a model on some drives, for use on others.
+
+    The training frames are labelled ones, spread evenly over each drive. Where no drive has road
+    truth, or training.source is "patch", the ground in front of the vehicle is taken for road.
+    Replay never evaluates the training frames, on whatever drive it meets them.
+    """
+    config = arguments.configuration(given)
+    from roadeval.jobs.train import train as run
+
+    with progress.watched(quiet) as watch:
+        model = run(drives, output, config, on_progress=watch)
+    for warning in model.warnings:
+        messages.warning(warning)
+    if not quiet:
+        console.emit(
+            f"{output}: {', '.join(model.parameters)}; trained on {len(model.digests)} frames, "
+            f"{model.pixels} pixels, by the {model.source}"
+        )
+    return ExitCode.DONE
+
+
+COMMAND: Final = train

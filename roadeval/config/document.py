@@ -1,0 +1,105 @@
+"""The whole effective configuration as TOML with each setting's documentation and range."""
+
+from __future__ import annotations
+
+import dataclasses
+import textwrap
+import types
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin, get_type_hints
+
+from roadeval.config.run import RunConfig
+from roadeval.config.settings import SECTIONS
+from roadeval.config.toml import without_none
+from roadeval.pipeline.chain import STAGES, Pipeline
+
+WIDTH: Final = 100
+_BOUNDS: Final = {"ge": "at least {}", "gt": "above {}", "le": "at most {}", "lt": "below {}"}
+
+
+def documented(config: RunConfig) -> str:
+    """Write a configuration as TOML that can be edited, each setting with its meaning and range.
+
+    A setting without a value stands in a comment.
+    """
+    import tomlkit
+
+    head = [f"preset = {tomlkit.item(config.preset).as_string()}", *_chain(config.pipeline)]
+    parts = ["\n".join(head), *_stages(config.pipeline, "")]
+    for variant in config.extra:
+        named = tomlkit.item(variant.preset).as_string()
+        parts.append(f"[variants.{variant.name}]\npreset = {named}")
+        parts[-1] += "\n" + "\n".join(_chain(variant.pipeline))
+        parts += _stages(variant.pipeline, f"variants.{variant.name}.")
+    parts += [_table(name, getattr(config, name)) for name in SECTIONS]
+    return "\n\n".join(parts) + "\n"
+
+
+def _chain(pipeline: Pipeline) -> Iterator[str]:
+    yield from _comment(f"The stages in the order they run; there are {', '.join(STAGES)}.")
+    yield f"chain = [{', '.join(f'{name!r}' for name in pipeline.chain)}]".replace("'", '"')
+
+
+def _stages(pipeline: Pipeline, prefix: str) -> list[str]:
+    return [_table(f"{prefix}{name}", pipeline.settings[name]) for name in pipeline.chain]
+
+
+def _table(name: str, settings: Any) -> str:
+    """Write the table of a settings dataclass; those within it follow as tables of their own."""
+    from docstring_parser import DocstringStyle, parse
+
+    parsed = parse(type(settings).__doc__ or "", DocstringStyle.NUMPYDOC)
+    meanings = {
+        each.strip(): parameter.description or ""
+        for parameter in parsed.params
+        for each in parameter.arg_name.split(",")
+    }
+    hints = get_type_hints(type(settings), include_extras=True)
+    lines, inner = [f"# {parsed.short_description}", f"[{name}]"], []
+    for field in dataclasses.fields(settings):
+        value = getattr(settings, field.name)
+        if dataclasses.is_dataclass(value):
+            inner.append(_table(f"{name}.{field.name}", value))
+            continue
+        allowed = _allowed(hints[field.name])
+        lines += ["", *_comment(" ".join(filter(None, (meanings.get(field.name), allowed))))]
+        lines.append(_assignment(field.name, value))
+    return "\n\n".join(["\n".join(lines), *inner])
+
+
+def _assignment(name: str, value: Any) -> str:
+    import tomlkit
+
+    if value is None:
+        return f"# {name} ="
+    if isinstance(value, Mapping):
+        table = tomlkit.inline_table()
+        table.update(without_none(value))
+        return f"{name} = {table.as_string()}"
+    return f"{name} = {tomlkit.item(without_none(value)).as_string()}"
+
+
+def _comment(text: str) -> list[str]:
+    words = " ".join(text.replace("``", "").split())
+    return textwrap.wrap(words, WIDTH, initial_indent="# ", subsequent_indent="# ")
+
+
+def _allowed(hint: Any) -> str:
+    """Describe the values that a setting's type admits; empty where every one of its kind is."""
+    if get_origin(hint) in (Union, types.UnionType):
+        known = (_allowed(each) for each in get_args(hint) if each is not type(None))
+        return next(filter(None, known), "")
+    if get_origin(hint) is Literal:
+        return f"One of {', '.join(map(str, get_args(hint)))}."
+    if get_origin(hint) is not Annotated:
+        return ""
+    kind, *metadata = get_args(hint)
+    bounds = [
+        text.format(getattr(each, name))
+        for constraint in metadata
+        for each in (getattr(constraint, "metadata", None) or [constraint])
+        for name, text in _BOUNDS.items()
+        if hasattr(each, name)
+    ]
+    named = _allowed(kind)
+    return " ".join(filter(None, (named, f"{', '.join(bounds).capitalize()}." if bounds else "")))

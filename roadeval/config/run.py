@@ -1,0 +1,208 @@
+"""The configuration of a run: one validated, frozen object that holds every option.
+
+In a TOML file, and in the mapping that `configure` takes, it has this shape::
+
+    preset = "paper"
+
+    [shadow]                # a table for each stage of the chain
+    ring_width = 3
+
+    [variants.wide]         # a further variant: a preset, a chain, tables of its stages
+    preset = "gated"
+
+    [frames]                # and [topics], [labels], [training], [evaluation], [output], [run]
+    every = 2
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from roadeval.config.errors import ConfigError
+from roadeval.config.override import override
+from roadeval.config.presets import PRESETS
+from roadeval.config.settings import SECTIONS, ExecutionSettings, OutputSettings
+from roadeval.config.variants import (
+    Variant,
+    check_tables,
+    check_variant_name,
+    pipeline_of,
+    preset_of,
+    variants_of,
+)
+from roadeval.errors import RoadevalError
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.logs.settings import FrameSettings, LabelSettings, TopicSettings
+from roadeval.pipeline.chain import Pipeline
+from roadeval.training.settings import TrainingSettings
+
+
+def _paper() -> Pipeline:
+    return pipeline_of(None, PRESETS["paper"], "")
+
+
+@dataclass(frozen=True, slots=True)
+class RunConfig:
+    """Every option of a run.
+
+    Parameters
+    ----------
+    preset
+        The preset that it started from.
+    pipeline
+        The chain of stages of the variants ``filtered`` and ``unfiltered``, and their settings.
+    extra
+        Further variants.
+    topics, labels, frames
+        What is asked of the log.
+    training, evaluation
+        How every variant is trained and scored.
+    output
+        Where the results are written.
+    run
+        How the run is executed.
+
+    Raises
+    ------
+    ConfigError
+        If the parts do not go together.
+    """
+
+    preset: str = "paper"
+    pipeline: Pipeline = field(default_factory=_paper)
+    extra: tuple[Variant, ...] = ()
+    topics: TopicSettings = field(default_factory=TopicSettings)
+    labels: LabelSettings = field(default_factory=LabelSettings)
+    frames: FrameSettings = field(default_factory=FrameSettings)
+    training: TrainingSettings = field(default_factory=TrainingSettings)
+    evaluation: EvaluationSettings = field(default_factory=EvaluationSettings)
+    output: OutputSettings = field(default_factory=OutputSettings)
+    run: ExecutionSettings = field(default_factory=ExecutionSettings)
+
+    def __post_init__(self) -> None:
+        names = {variant.name for variant in self.variants()}
+        for name in self.topics.masks:
+            check_variant_name(name, names)
+        if self.output.record != OutputSettings().record:
+            from roadeval.recording import RecordRule  # with it comes the viewer's library
+
+            try:
+                RecordRule.parse(self.output.record)
+            except RoadevalError as error:
+                raise ConfigError(str(error)) from error
+        if self.output.mcap is not None and self.frames.scale != 1:
+            raise ConfigError(
+                "output.mcap and frames.scale do not go together: reduced masks would not lie over "
+                "the log's images"
+            )
+
+    def variants(self) -> tuple[Variant, ...]:
+        """Return every variant that is computed: the two by default, then the extra ones."""
+        return variants_of(self.pipeline, self.extra)
+
+    def pipelines(self) -> dict[str, Pipeline]:
+        """Return the pipeline of every variant, by name."""
+        return {variant.name: variant.pipeline for variant in self.variants()}
+
+    def override(self, tables: Mapping[str, Any], where: str = "") -> RunConfig:
+        """Return the configuration with the values of some tables in place.
+
+        Parameters
+        ----------
+        tables
+            In the shape of a TOML file, without ``preset``. A variant of a name that is there is
+            replaced.
+        where
+            The file, for messages.
+
+        Raises
+        ------
+        ConfigError
+            For a key or a value that cannot be used; names it, and what is allowed.
+        """
+        pipeline = pipeline_of(self.pipeline, tables, where)
+        check_tables(tables, ("chain", *pipeline.chain, "variants", *SECTIONS), where)
+        try:
+            return replace(
+                self,
+                pipeline=pipeline,
+                extra=self._with_variants(tables.get("variants", {}), where),
+                **{name: override(getattr(self, name), tables, name, where) for name in SECTIONS},
+            )
+        except ConfigError as error:
+            if where and not str(error).startswith(where):
+                raise ConfigError(f"{where}: {error}") from error
+            raise
+
+    def with_variants(self, variants: Iterable[Variant]) -> RunConfig:
+        """Return the configuration with further variants; one of a name that is there replaces it.
+
+        A `ConfigError` if a name is taken by something else.
+        """
+        extra = {variant.name: variant for variant in (*self.extra, *variants)}
+        return replace(self, extra=tuple(extra.values()))
+
+    def ignored(self) -> tuple[str, ...]:
+        """Name what presets of further variants ask for, and what holds for the whole run."""
+        return tuple(
+            f"{variant.name}: preset {variant.preset} asks for {section}.{key} = {value}, but all "
+            f"variants of a run are trained and scored alike ({getattr(own, key)})"
+            for variant in self.extra
+            for section in SECTIONS
+            for key, value in PRESETS[variant.preset].get(section, {}).items()
+            if getattr(own := getattr(self, section), key) != value
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return every effective setting as plain data, in the shape of a TOML file.
+
+        A setting that is None has no value in such a file, and is left out there.
+        """
+        return {
+            "preset": self.preset,
+            **self.pipeline.as_dict(),
+            "variants": {
+                each.name: {"preset": each.preset, **each.pipeline.as_dict()} for each in self.extra
+            },
+            **{name: dataclasses.asdict(getattr(self, name)) for name in SECTIONS},
+        }
+
+    def _with_variants(self, tables: Any, where: str) -> tuple[Variant, ...]:
+        begin = f"{where}: " if where else ""
+        if not isinstance(tables, Mapping):
+            raise ConfigError(f"{begin}[variants] must hold a table for each variant")
+        for name, own in tables.items():
+            if not isinstance(own, Mapping):
+                raise ConfigError(f"{begin}[variants.{name}] must be a table")
+        made = [Variant.of(name, own, f"{begin}[variants.{name}]") for name, own in tables.items()]
+        return self.with_variants(made).extra
+
+
+def configure(tables: Mapping[str, Any] | None = None, *, where: str = "") -> RunConfig:
+    """Return the configuration of a preset with the values of some tables in place.
+
+    Parameters
+    ----------
+    tables
+        In the shape of a TOML file; ``preset`` names what they start from, ``paper`` by default.
+    where
+        The file, for messages.
+
+    Raises
+    ------
+    ConfigError
+        For a key or a value that cannot be used; names it, and what is allowed.
+
+    Examples
+    --------
+    >>> config = configure({"preset": "gated", "frames": {"every": 2}})
+    >>> config.pipeline.chain
+    ('gated', 'similarity', 'svm', 'post')
+    """
+    tables = tables or {}
+    name = preset_of(tables, "paper", where)
+    base = replace(RunConfig(), preset=name).override(PRESETS[name], f"preset {name}")
+    return base.override({key: value for key, value in tables.items() if key != "preset"}, where)

@@ -1,0 +1,63 @@
+"""Configurations as TOML files, both ways."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from roadeval.config.errors import ConfigError
+from roadeval.config.run import RunConfig, configure
+
+
+def load_config(path: str | Path, preset: str | None = None) -> RunConfig:
+    """Read the configuration of a run from a TOML file.
+
+    Parameters
+    ----------
+    path
+        The file, in the shape that `roadeval.config.run` describes.
+    preset
+        The preset to start from where the file names none; ``paper`` otherwise.
+
+    Raises
+    ------
+    ConfigError
+        If the file is missing, no TOML, or holds a key or a value that cannot be used.
+    """
+    base = {} if preset is None else {"preset": preset}
+    return configure({**base, **read_tables(path)}, where=str(path))
+
+
+def read_tables(path: str | Path) -> dict[str, Any]:
+    """Read the tables of a TOML file; a `ConfigError` if there are none to read."""
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise ConfigError(f"{path}: there is no such configuration file") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: not valid TOML: {error}") from error
+
+
+def run_toml(config: RunConfig, drive: str, version: str) -> str:
+    """Write the TOML file that makes a run again, with every effective setting."""
+    import tomlkit
+
+    document = tomlkit.document()
+    document.add(
+        tomlkit.comment(f"The configuration of a replay of {drive} by roadeval {version}:")
+    )
+    document.add(tomlkit.comment("given to roadeval replay as its configuration, it runs again."))
+    for key, value in without_none(config.as_dict()).items():
+        document.add(key, value)
+    return tomlkit.dumps(document)
+
+
+def without_none(value: Any) -> Any:
+    """Return plain data as TOML has it: without settings that are None, and with lists."""
+    if isinstance(value, Mapping):
+        return {key: without_none(item) for key, item in value.items() if item is not None}
+    return [without_none(item) for item in value] if isinstance(value, list | tuple) else value

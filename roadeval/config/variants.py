@@ -1,0 +1,139 @@
+"""Variants: named pipelines that run side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from roadeval.config.errors import ConfigError
+from roadeval.config.override import either, override
+from roadeval.config.presets import PRESETS
+from roadeval.config.settings import SECTIONS
+from roadeval.data import FILTERED, FINAL_STAGE, RESERVED, UNFILTERED, VariantLayout
+from roadeval.pipeline.chain import STAGES, Pipeline
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """A name, a pipeline, and the preset that it started from."""
+
+    name: str
+    pipeline: Pipeline
+    preset: str = "paper"
+
+    @classmethod
+    def of(cls, name: str, tables: Mapping[str, Any], where: str = "") -> Variant:
+        """Make a variant from tables in the shape of a TOML file: ``preset``, ``chain``, stages.
+
+        Raises
+        ------
+        ConfigError
+            For a key or a value that cannot be used. ``where`` begins the message.
+        """
+        preset = preset_of(tables, "paper", where)
+        rest = {key: value for key, value in tables.items() if key != "preset"}
+        base = pipeline_of(None, PRESETS[preset], where)
+        for section in SECTIONS:
+            if section in rest:
+                raise ConfigError(
+                    f"{_prefix(where)}[{section}] holds for the whole run: it belongs in the "
+                    "configuration of the run"
+                )
+        check_tables(rest, ("chain", *_chain(rest.get("chain", base.chain), where)), where)
+        return cls(name, pipeline_of(base, rest, where), preset)
+
+    def layout(self) -> VariantLayout:
+        """Describe the variant as recording and tables need to know it beforehand."""
+        titles = [STAGES[n].title for n in self.pipeline.chain if STAGES[n].is_filter]
+        return VariantLayout(
+            self.name,
+            f"with {', '.join(titles)}" if titles else "without the filter",
+            self.pipeline.masks(),
+            self.pipeline.layers(),
+        )
+
+
+def variants_of(pipeline: Pipeline, extra: Iterable[Variant]) -> tuple[Variant, ...]:
+    """Return a run's variants: with the pipeline's filters, without them, and the extra ones.
+
+    A pipeline without a filter gives the unfiltered variant alone.
+
+    Raises
+    ------
+    ConfigError
+        If an extra variant's name is taken, reserved, or no plain word.
+    """
+    variants = [Variant(FILTERED, pipeline)] if pipeline.has_filter else []
+    variants.append(Variant(UNFILTERED, pipeline.without_filter()))
+    for variant in extra:
+        check_variant_name(variant.name, {v.name for v in variants})
+        variants.append(variant)
+    return tuple(variants)
+
+
+def check_variant_name(name: str, taken: Collection[str]) -> None:
+    """Refuse, as a `ConfigError`, a variant's name that an entity path cannot bear."""
+    if not name.replace("_", "").replace("-", "").isalnum() or not name.isascii():
+        raise ConfigError(f"variant {name!r}: a name is made of letters, digits, '-' and '_' alone")
+    if name in RESERVED:
+        raise ConfigError(f"variant {name!r}: the name is reserved ({either(RESERVED)})")
+    if name in taken:
+        raise ConfigError(f"variant {name!r}: the name is taken; choose another")
+
+
+def preset_of(tables: Mapping[str, Any], default: str, where: str) -> str:
+    """Return the name of the preset that tables start from; a `ConfigError` if there is none."""
+    name = tables.get("preset", default)
+    if not isinstance(name, str) or name not in PRESETS:
+        raise ConfigError(f"{_prefix(where)}preset: there is no {name!r}; choose {either(PRESETS)}")
+    return name
+
+
+def check_tables(tables: Mapping[str, Any], known: Collection[str], where: str) -> None:
+    """Refuse, as a `ConfigError`, a table or key at the top that is not known."""
+    for key in tables:
+        if key not in known:
+            names = [name for name in known if name != "chain"]
+            raise ConfigError(f"{_prefix(where)}[{key}] is no table here; choose {either(names)}")
+
+
+def pipeline_of(base: Pipeline | None, tables: Mapping[str, Any], where: str) -> Pipeline:
+    """Override a pipeline's chain and its stages' settings by tables in the shape of a TOML file.
+
+    Raises
+    ------
+    ConfigError
+        For a chain that cannot run, or a setting that cannot be used.
+    """
+    chain = _chain(tables.get("chain", base.chain if base else ()), where)
+    current = {} if base is None else base.settings
+    settings = {
+        name: override(current.get(name) or STAGES[name].settings(), tables, name, where)
+        for name in chain
+    }
+    return Pipeline(chain, settings)
+
+
+def _chain(names: Any, where: str) -> tuple[str, ...]:
+    """Check a chain: known stages, each once, one mask of a name, and the final one last."""
+    begin = f"{_prefix(where)}chain"
+    if not isinstance(names, list | tuple) or not names:
+        raise ConfigError(f"{begin} must be a list of stages; choose {either(STAGES)}")
+    for name in names:
+        if name not in STAGES:
+            raise ConfigError(f"{begin}: there is no stage {name!r}; choose {either(STAGES)}")
+    if len(set(names)) < len(names):
+        raise ConfigError(f"{begin}: a stage can occur only once")
+    masks = [STAGES[name].reported for name in names if STAGES[name].yields_mask]
+    if len(set(masks)) < len(masks):
+        twice = next(mask for mask in masks if masks.count(mask) > 1)
+        both = [name for name in names if STAGES[name].reported == twice]
+        raise ConfigError(f"{begin}: {' and '.join(both)} both make the mask {twice}")
+    if names[-1] != FINAL_STAGE:
+        raise ConfigError(f"{begin} must end with {FINAL_STAGE}, whose mask is the answer")
+    return tuple(names)
+
+
+def _prefix(where: str) -> str:
+    return f"{where}: " if where else ""

@@ -1,0 +1,108 @@
+"""What the drive's final masks are worth beyond counts: their edges, and their steadiness."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Mapping
+from typing import Any, Final
+
+from roadeval.data import FrameResult, Role, TruthBits
+from roadeval.data.packed import Packed, ones
+
+
+class Flicker:
+    """How much of a drive's masks changes from one frame to the next.
+
+    ``flicker = sum |m_t != m_(t-1)| / sum |L_t|`` over all pairs of consecutive frames, where
+    ``L_t`` are the pixels that both truths label. The truth's own, counted alike, stands beside
+    it: what moves must change, and only what is more than that is unrest. Motion is not taken
+    out, as it is in [1]_ by optical flow.
+
+    References
+    ----------
+    .. [1] S. Varghese et al., Unsupervised Temporal Consistency Metric for Video Segmentation in
+       Highly-Automated Driving, CVPR Workshops 2020.
+    """
+
+    def __init__(self) -> None:
+        self._before: tuple[TruthBits, Mapping[str, Packed]] | None = None
+        self._pairs: Final[Counter[str]] = Counter()
+        self._labelled: Final[Counter[str]] = Counter()
+        self._changed: Final[Counter[str]] = Counter()
+        self._true: Final[Counter[str]] = Counter()
+
+    def add(self, now: TruthBits, masks: Mapping[str, Packed]) -> None:
+        """Add the next frame: its truth and the final masks."""
+        before, self._before = self._before, (now, masks)
+        if before is None or before[0].shape != now.shape:
+            return
+        labelled = now.labelled & before[0].labelled
+        count, moved = ones(labelled), ones((now.road ^ before[0].road) & labelled)
+        for name in masks.keys() & before[1].keys():
+            self._pairs[name] += 1
+            self._labelled[name] += count
+            self._true[name] += moved
+            self._changed[name] += ones((masks[name].bits ^ before[1][name].bits) & labelled)
+
+    def interrupt(self) -> None:
+        """Say that the next frame does not follow the one before."""
+        self._before = None
+
+    def totals(self, name: str) -> dict[str, Any]:
+        """Give ``flicker``, ``truth_flicker`` and the number of ``pairs``; None without a pair."""
+        labelled = self._labelled[name]
+        return {
+            "flicker": self._changed[name] / labelled if labelled else None,
+            "truth_flicker": self._true[name] / labelled if labelled else None,
+            "pairs": self._pairs[name],
+        }
+
+
+class EdgesAndFlicker:
+    """Sums up boundary F and flicker of every final mask.
+
+    Parameters
+    ----------
+    width
+        The tolerance of boundary F in pixels.
+    """
+
+    def __init__(self, width: int) -> None:
+        self._width: Final = width
+        self._contours: Final[defaultdict[str, list[float]]] = defaultdict(lambda: [0.0, 0])
+        self._flicker: Final = Flicker()
+
+    def add(self, result: FrameResult) -> None:
+        """Add a frame, in the drive's order. One that is not evaluated interrupts the flicker."""
+        if result.role is not Role.EVALUATED or result.truth_bits is None:
+            self._flicker.interrupt()
+            return
+        for name, score in result.contours.items():
+            total = self._contours[name]
+            if not math.isnan(score):
+                total[0] += score
+                total[1] += 1
+        finals = {v.variant: mask for v in result.variants for _, mask in v.masks()}
+        self._flicker.add(result.truth_bits, finals)
+
+    def interrupt(self) -> None:
+        """Say that a frame was lost here."""
+        self._flicker.interrupt()
+
+    def totals(self) -> dict[str, dict[str, Any]]:
+        """Give by variant: mean ``boundary_F`` over ``frames`` that have it, and the flicker.
+
+        The baseline, whose mask is always the same, has no flicker.
+
+        See `roadeval.evaluation.contours.boundary_f` and `Flicker`.
+        """
+        return {
+            name: {
+                "boundary_F": total / count if count else None,
+                "frames": count,
+                "width": self._width,
+                **self._flicker.totals(name),
+            }
+            for name, (total, count) in self._contours.items()
+        }

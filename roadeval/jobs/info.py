@@ -1,0 +1,21 @@
+"""Describe a log, and what a replay would pick of it."""
+
+from __future__ import annotations
+
+from roadeval import logs
+from roadeval.config import RunConfig
+from roadeval.jobs.outputs import AnyPath
+
+
+def info(drive: AnyPath, config: RunConfig | None = None) -> logs.LogDescription:
+    """Describe a log: topics, rates, gaps, damage, and what a replay would pick and why.
+
+    Raises
+    ------
+    RoadevalError
+        If it is no log, or cannot be read.
+    """
+    config = config or RunConfig()
+    return logs.describe(
+        drive, config.topics, config.labels, keep_corrupt=config.frames.keep_corrupt
+    )

@@ -1,0 +1,26 @@
+"""How far a job has come."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a job is: ``done`` of ``total`` frames of ``stage``.
+
+    ``stage`` is ``compiling`` (the first time on a machine), ``training``, ``replaying``,
+    ``writing`` or ``rendering``; ``total`` is None where it is not known.
+    """
+
+    done: int
+    total: int | None
+    stage: str
+
+
+OnProgress = Callable[[Progress], None]
+
+
+def ignore(_progress: Progress) -> None:
+    """Show nothing."""

@@ -1,0 +1,142 @@
+"""The content of ``summary.json``: what a run found, on which frames, by which settings."""
+
+from __future__ import annotations
+
+import platform
+from collections import Counter
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any, Final
+
+from roadeval.data import Role
+from roadeval.jobs.run import Run
+from roadeval.version import VERSION
+
+PACKAGES: Final = (
+    *("mcap", "numpy", "opencv-python-headless", "scikit-learn", "scipy"),
+    *("numba", "rerun-sdk", "pandas", "matplotlib"),
+)
+"""The packages whose version can change a number or a file."""
+
+
+def of(run: Run) -> dict[str, Any]:
+    """Return the content of ``summary.json``, but for its format, of a run at its end."""
+    return run.board.summary() | {
+        "drive": _drive(run),
+        "frames": _accounting(run),
+        "training": _training(run),
+        "warnings": list(warnings(run)),
+        "losses": list(losses(run)),
+        "run": run.config.as_dict(),
+        "settings": {each.name: each.pipeline.as_dict() for each in run.variants},
+        "versions": versions(),
+        "log": {"path": str(run.log.path), "sha256": run.log.sha256()},
+    }
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of roadeval, Python and the packages that matter."""
+    found = {"roadeval": VERSION, "python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def warnings(run: Run) -> tuple[str, ...]:
+    """List what a user should know before believing the results."""
+    unlabelled = (
+        ()
+        if run.selection.truth
+        else ("the log has no road truth: there is nothing to score, only masks to look at",)
+    )
+    return (
+        *unlabelled,
+        *_sizes(run),
+        *run.config.ignored(),
+        *_near_training(run),
+        *run.model.warnings,
+    )
+
+
+def losses(run: Run) -> tuple[str, ...]:
+    """List the parts of the log that were lost."""
+    frames = sorted(run.read.accounting.undecodable.items())
+    return (*run.log.losses, *(f"frame {number}: {reason}" for number, reason in frames))
+
+
+def _sizes(run: Run) -> tuple[str, ...]:
+    """Warn where the frames are not the camera's own, or not of the model's size."""
+    warned = []
+    selection, prior = run.selection, run.model.prior
+    scale = run.config.frames.scale
+    if scale != 1 and selection.image.size:
+        width, height = selection.image.size
+        warned.append(
+            f"the frames, {width}x{height} in the log, are reduced to "
+            f"{scale:g} of it: the numbers are not those of full frames"
+        )
+    if run.config.training.model is not None and prior is not None and selection.size:
+        width, height = selection.size
+        if prior.shape != (height, width):
+            warned.append(
+                f"the model learnt from frames of {prior.shape[1]}x{prior.shape[0]}, and these "
+                f"are {width}x{height}: texture and sizes in pixels mean something else there"
+            )
+    return tuple(warned)
+
+
+def _near_training(run: Run) -> tuple[str, ...]:
+    """Warn where frames next to those that trained a model file are evaluated."""
+    roles = Counter(run.board.roles())
+    own = roles[Role.TRAINING]
+    if run.config.training.model is None or not own or not roles[Role.EVALUATED]:
+        return ()
+    return (
+        f"{own} of the model's {len(run.model.digests)} training frames lie in this drive; "
+        "their neighbours are evaluated and look alike, which flatters the result: use a "
+        "model of other drives",
+    )
+
+
+def _drive(run: Run) -> dict[str, Any]:
+    width, height = run.selection.size or (0, 0)
+    return {
+        "name": run.log.name,
+        "width": width,
+        "height": height,
+        "rate_hz": run.selection.image.rate_hz,
+        "topics": list(run.selection.reasons),
+    }
+
+
+def _accounting(run: Run) -> dict[str, Any]:
+    """Account for every frame of the image topic: evaluated, or skipped and why."""
+    seen, roles = run.read.accounting, Counter(run.board.roles())
+    skipped = {
+        "outside the range": seen.in_log - seen.in_range,
+        "not read (stride or limit)": seen.in_range - seen.read,
+        "undecodable": len(seen.undecodable),
+        "trained on": roles[Role.TRAINING],
+        "gap after training": roles[Role.GAP],
+        "unlabelled": roles[Role.UNLABELLED],
+    }
+    return {
+        "in_log": seen.in_log,
+        "read": seen.read,
+        "decoded": seen.read - len(seen.undecodable),
+        "labelled": seen.labelled,
+        "trained_on": roles[Role.TRAINING],
+        "evaluated": roles[Role.EVALUATED],
+        "skipped": {reason: number for reason, number in skipped.items() if number},
+    }
+
+
+def _training(run: Run) -> dict[str, Any]:
+    return {
+        "source": run.model.source,
+        "frames": len(run.model.digests),
+        "pixels": run.model.pixels,
+        "model": run.config.training.model,
+    }

@@ -1,0 +1,73 @@
+"""CDR, the encoding of ROS 2: of either byte order, or XCDR2; compressed by rosbag2 or not."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from mcap.records import Schema
+
+from roadeval.logs.container.readers import Buffer
+from roadeval.logs.container.records import LARGEST, PADDING
+from roadeval.logs.errors import BadMessage
+from roadeval.logs.messages.encoding import Encoding, MessageReader, decode_by_library
+from roadeval.logs.messages.encodings._fields import FieldReader
+from roadeval.logs.messages.schemas import Fields, fields_of
+
+_ZSTD: Final = b"\x28\xb5\x2f\xfd"
+
+
+def _reader(schema: Schema | None) -> MessageReader | None:
+    from mcap_ros2.decoder import DecoderFactory
+
+    decode = decode_by_library(DecoderFactory(), "cdr", schema)
+    fields = fields_of(schema)
+    if fields is None:
+        return None if decode is None else MessageReader(lambda data: decode(_uncompressed(data)))
+    read = decode or (lambda data: _after_head(data).read(fields))
+    return MessageReader(
+        lambda data: read(_uncompressed(data)),
+        lambda data: _stamp(fields, _uncompressed(data)),
+        lambda data: _is_whole(fields, data),
+    )
+
+
+def _stamp(fields: Fields, data: Buffer) -> Any:
+    """Read only the first field, which is the stamp or a header that holds it."""
+    first = _after_head(data).read(fields[:1])
+    return first.timestamp if hasattr(first, "timestamp") else first.header.stamp
+
+
+def _is_whole(fields: Fields, data: Buffer) -> bool:
+    try:
+        reader = _after_head(data)
+        reader.read(fields)
+    except BadMessage:
+        return False
+    return reader.left < PADDING
+
+
+def _after_head(data: Buffer) -> FieldReader:
+    """Begin after the encapsulation: its second byte names byte order and version."""
+    if len(data) < 4:
+        raise BadMessage("a message without a head")
+    kind = data[1]
+    order = "<" if kind & 1 else ">"
+    version_2 = kind >= 6
+    delimited = kind in (8, 9)
+    start = 8 if delimited else 4
+    return FieldReader(data, order, start, aligned=True, widest=4 if version_2 else 8)
+
+
+def _uncompressed(data: Buffer) -> Buffer:
+    """Undo rosbag2's compression message by message; CDR itself never begins like zstd."""
+    if bytes(data[:4]) != _ZSTD:
+        return data
+    import zstandard
+
+    if not 0 <= zstandard.frame_content_size(data) <= LARGEST:
+        raise BadMessage("a compressed message of a size that cannot be")
+    message: bytes = zstandard.ZstdDecompressor().decompress(data)
+    return message
+
+
+ENCODING = Encoding("cdr", _reader)

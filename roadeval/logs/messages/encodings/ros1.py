@@ -1,0 +1,22 @@
+"""The encoding of ROS 1: fields in the machine's order, without alignment."""
+
+from __future__ import annotations
+
+from mcap.records import Schema
+
+from roadeval.logs.messages.encoding import Encoding, MessageReader, decode_by_library
+from roadeval.logs.messages.encodings._fields import FieldReader
+from roadeval.logs.messages.schemas import fields_of
+
+
+def _reader(schema: Schema | None) -> MessageReader | None:
+    from mcap_ros1.decoder import DecoderFactory
+
+    decode = decode_by_library(DecoderFactory(), "ros1", schema)
+    fields = fields_of(schema)
+    if decode is None and fields is not None:
+        return MessageReader(lambda data: FieldReader(data, "<", 0, aligned=False).read(fields))
+    return None if decode is None else MessageReader(decode)
+
+
+ENCODING = Encoding("ros1", _reader)

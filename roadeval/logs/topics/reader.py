@@ -1,0 +1,188 @@
+"""The messages of one topic, in the order of their log times."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from mcap.records import Channel, Schema
+
+from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container
+from roadeval.logs.container.records import Message
+from roadeval.logs.errors import BadMessage, BadRecord, FrameError
+from roadeval.logs.messages.decoders import Decoder, decoder_for
+from roadeval.logs.messages.pictures import Picture
+from roadeval.logs.topics.pairing import UNREADABLE
+
+UNREAD: Final = UNREADABLE - 1
+"""A stamp not read yet."""
+
+
+@dataclass(frozen=True, slots=True)
+class FileChannel:
+    """A channel of one file of the log."""
+
+    container: Container
+    channel_id: int
+
+    @property
+    def channel(self) -> Channel:
+        """The channel's record."""
+        return self.container.channels[self.channel_id]
+
+    @property
+    def schema(self) -> Schema | None:
+        """The schema of its messages, if it has one."""
+        return self.container.schemas.get(self.channel.schema_id)
+
+    @property
+    def log(self) -> ChannelLog:
+        """Where its messages lie."""
+        return self.container.logs.get(self.channel_id, ChannelLog(wanted=False))
+
+
+class TopicReader:
+    """The messages of one topic, from all files and channels that carry it.
+
+    Reading is for one thread at a time.
+
+    Attributes
+    ----------
+    name, channels
+        The topic, and the channels that carry it.
+    log_times
+        ``(n,)`` int64 nanoseconds, ascending; equal ones in the order of the file.
+    """
+
+    def __init__(self, name: str, channels: Sequence[FileChannel]) -> None:
+        self.name = name
+        self.channels = channels
+        self._decoders: dict[int, Decoder | BadMessage] = {}
+        rows = [np.empty((0, 4), np.int64)]
+        for number, source in enumerate(channels):
+            for chunk, entries in source.log.blocks:
+                place = np.full((len(entries), 2), (number, chunk), np.int64)
+                rows.append(np.hstack([entries, place]))
+        table = np.concatenate(rows)
+        table = table[np.argsort(table[:, 0], kind="stable")]
+        self.log_times: npt.NDArray[np.int64] = np.ascontiguousarray(table[:, 0])
+        self._offsets = table[:, 1]
+        self._numbers = table[:, 2].astype(np.int16)
+        self._chunks = table[:, 3].astype(np.int32)
+        # An array of Python's own: each image asks for some thirty stamps, one by one.
+        self._stamps = array("q", [UNREAD]) * len(table)
+
+    def __len__(self) -> int:
+        return len(self.log_times)
+
+    def message(self, position: int) -> Message:
+        """Read a message.
+
+        Raises
+        ------
+        FrameError
+            If it cannot be read.
+        """
+        message = self._read(position)
+        if message is None and int(self._chunks[position]) != OUTSIDE:
+            self._correct(position)
+            message = self._read(position)
+        if message is None:
+            raise self._error(position, "no message where the index says")
+        return message
+
+    def _read(self, position: int) -> Message | None:
+        """Read a message, if it is the one that the index promises."""
+        source = self.channels[self._numbers[position]]
+        chunk, offset = int(self._chunks[position]), int(self._offsets[position])
+        try:
+            message: Message = source.container.message(chunk, offset)
+        except BadRecord as error:
+            if source.container.is_bad(chunk):
+                raise self._error(position, str(error)) from error
+            return None
+        same_time = message.log_time == int(self.log_times[position]) % 2**64
+        return message if same_time and message.channel_id == source.channel_id else None
+
+    def _correct(self, position: int) -> None:
+        """Correct the places of a chunk's messages by looking into the chunk."""
+        number, chunk = self._numbers[position], self._chunks[position]
+        source = self.channels[number]
+        here = np.flatnonzero((self._numbers == number) & (self._chunks == chunk))
+        promised = {(int(self.log_times[i]), int(self._offsets[i])): i for i in here}
+        found = source.container.look(int(chunk), source.channel_id).tolist()
+        missed = [entry for entry in found if tuple(entry) not in promised]
+        wrong = sorted(set(promised) - {tuple(entry) for entry in found})
+        for promise, (log_time, offset) in zip(wrong, missed, strict=False):
+            self.log_times[promised[promise]] = log_time
+            self._offsets[promised[promise]] = offset
+
+    def picture(self, position: int) -> Picture:
+        """Read the picture of a message.
+
+        Raises
+        ------
+        FrameError
+            If it cannot be read or decoded.
+        """
+        message = self.message(position)
+        try:
+            return self._decoder(position).picture(message.data)
+        except BadMessage as error:
+            raise self._error(position, str(error)) from error
+
+    def stamp(self, position: int) -> int:
+        """Header stamp of a message in nanoseconds, or `UNREADABLE`."""
+        stamp = self._stamps[position]
+        if stamp == UNREAD:
+            try:
+                data = self.message(position).data
+                stamp = self._decoder(position).stamp(data)
+            except (FrameError, BadMessage):
+                stamp = UNREADABLE
+            self._stamps[position] = stamp
+        return stamp
+
+    def expected(self) -> int:
+        """How many messages there should be, by the files' own statistics."""
+        return sum(s.container.expected.get(s.channel_id, 0) for s in self.channels)
+
+    def readable(self) -> int:
+        """Messages that are in the log, less those in chunks found to be damaged."""
+        lost = sum(
+            source.container.is_bad(int(chunk)) * int(count)
+            for number, source in enumerate(self.channels)
+            for chunk, count in zip(
+                *np.unique(self._chunks[self._numbers == number], return_counts=True), strict=True
+            )
+        )
+        return len(self) - lost
+
+    def _decoder(self, position: int) -> Decoder:
+        number = int(self._numbers[position])
+        if number not in self._decoders:
+            source = self.channels[number]
+            try:
+                self._decoders[number] = decoder_for(source.channel, source.schema)
+            except BadMessage as error:
+                self._decoders[number] = error
+        decoder = self._decoders[number]
+        if isinstance(decoder, BadMessage):
+            raise decoder
+        return decoder
+
+    def _error(self, position: int, reason: str) -> FrameError:
+        return FrameError(f"{self.name} message {position}: {reason}")
+
+
+def topic_readers(containers: Sequence[Container]) -> dict[str, TopicReader]:
+    """Return a reader for each topic, over the channels that carry it in the files' order."""
+    channels: dict[str, list[FileChannel]] = {}
+    for container in containers:
+        for channel_id, channel in sorted(container.channels.items()):
+            channels.setdefault(channel.topic, []).append(FileChannel(container, channel_id))
+    return {topic: TopicReader(topic, found) for topic, found in channels.items()}

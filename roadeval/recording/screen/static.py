@@ -1,0 +1,117 @@
+"""Static data of a recording, logged once, whatever the frames: colours, names, documents."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import cycle
+from typing import Any, Final
+
+import rerun as rr
+
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, Health, Role, colours
+from roadeval.data.colours import Colour
+from roadeval.recording import layout as at
+from roadeval.recording.codecs import Codec
+from roadeval.recording.layout import Layout
+from roadeval.recording.screen import guide
+
+StaticData = Iterator[tuple[str, list[Any]]]
+"""Entity paths, and the archetypes to log there."""
+
+_VARIANTS: Final[Mapping[str, Colour]] = {
+    FILTERED: colours.FILTERED,
+    UNFILTERED: colours.UNFILTERED,
+    BASELINE: colours.BLIND,
+}
+_STAGES: Final = (colours.ORANGE, *colours.EXTRA)
+_STATES: Final[Mapping[str, Colour]] = {
+    Health.OK: colours.GREEN,
+    Health.DEGRADED: colours.ORANGE,
+    Health.FAILED: colours.VERMILLION,
+    Role.EVALUATED: colours.SKY_BLUE,
+    Role.TRAINING: colours.PURPLE,
+    Role.GAP: colours.DARK_GREY,
+    Role.UNLABELLED: colours.GREY,
+}
+_COUNTS: Final[Mapping[str, Colour]] = {
+    "TP": colours.TP,
+    "TN": colours.TN,
+    "FP": colours.FP,
+    "FN": colours.FN,
+    "N": colours.GREY,
+}
+
+
+def _colours(layout: Layout) -> dict[str, Colour]:
+    """Return the colour of every variant, the baseline included."""
+    extra = cycle(colours.EXTRA)
+    names = [variant.name for variant in layout.variants]
+    return {name: _VARIANTS.get(name) or next(extra) for name in (*names, BASELINE)}
+
+
+def before_the_first_frame(layout: Layout, codecs: Mapping[str, Codec]) -> StaticData:
+    """Yield what is known before the first frame."""
+    for path, codec in codecs.items():
+        yield path, list(codec.style())
+    yield at.LAYOUT, [rr.TextDocument(layout.to_json())]
+    yield at.GUIDE, [_markdown(guide.text(layout))]
+    for variant in layout.variants:
+        yield at.guide_path(variant.name), [_markdown(guide.variant(variant))]
+    yield at.PROPERTIES, [rr.AnyValues(format=at.FORMAT, **layout.properties)]
+    for name, header in layout.tables.items():
+        yield at.result_path(name), [rr.AnyValues(header=header.rstrip())]
+    yield from _lanes(layout)
+    yield from _lines(layout)
+
+
+def timing_lines(paths: Iterable[str]) -> StaticData:
+    """Yield the colours of every stage that is timed, in the order in which they run."""
+    stages: dict[str, Colour] = {}
+    for path in paths:
+        if path.startswith("/timing/"):
+            stage = path.rpartition("/")[2]
+            colour = stages.setdefault(stage, _STAGES[len(stages) % len(_STAGES)])
+            yield path, [_line(stage, colour)]
+
+
+def after_the_last_frame(layout: Layout, texts: Mapping[str, str]) -> StaticData:
+    """Yield what is known after the last frame.
+
+    The seconds that a run took are kept apart from its summary, among the timing: everything
+    else is the same when the same log is replayed again.
+    """
+    summary = json.loads(texts.get(at.SUMMARY, "{}"))
+    verdict = str(summary.get("verdict", ""))
+    yield at.GUIDE, [_markdown(guide.text(layout, verdict))]
+    yield at.result_path(at.OVERVIEW), [_markdown(guide.overview(layout, summary))]
+    yield at.SECONDS, [rr.TextDocument(json.dumps(summary.pop("seconds", {})))]
+    kept = {at.SUMMARY: json.dumps(summary, indent=2)} if summary else {}
+    for name, text in {**texts, **kept}.items():
+        yield at.result_path(name), [rr.TextDocument(text)]
+
+
+def _markdown(text: str) -> rr.TextDocument:
+    return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
+
+
+def _lanes(layout: Layout) -> StaticData:
+    lanes: dict[str, tuple[str, ...]] = {at.ROLE: tuple(Role)}
+    lanes |= {at.state_path(variant.name): tuple(Health) for variant in layout.variants}
+    for path, states in lanes.items():
+        colours = [_STATES[state] for state in states]
+        yield path, [rr.StateConfiguration(values=states, colors=colours)]
+
+
+def _lines(layout: Layout) -> StaticData:
+    variants = _colours(layout)
+    lines = rr.SeriesLines(names=list(_COUNTS), colors=list(_COUNTS.values()))
+    for variant, stage in layout.scored():
+        for rate in layout.rates:
+            line = _line(variant, variants[variant])
+            yield at.scalar_path("metrics", variant, stage, rate), [line]
+        yield at.scalar_path("counts", variant, stage), [lines]
+
+
+def _line(name: str, colour: Colour) -> rr.SeriesLines:
+    return rr.SeriesLines(names=name, colors=colour, widths=2.0)

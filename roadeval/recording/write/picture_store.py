@@ -1,0 +1,80 @@
+"""Images of frames put aside on the disk, until it is known which of them are kept."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+from zipfile import BadZipFile, ZipFile
+
+from roadeval.recording.layout import RecordingError
+from roadeval.recording.write.encoding import EncodedFrame
+
+
+class PictureStore:
+    """Frames' images by number, one file a frame, in a folder that is removed at the end.
+
+    Parameters
+    ----------
+    folder
+        Made when the first frame comes.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder: Final = folder
+        self._stamps: Final[dict[int, int]] = {}
+
+    def put(self, encoded: EncodedFrame) -> None:
+        """Put a frame's images here; its numbers and texts are left out.
+
+        Raises
+        ------
+        RecordingError
+            If they cannot be written.
+        """
+        with self._explained():
+            self._folder.mkdir(exist_ok=True)
+            with ZipFile(self._file(encoded.number), "w") as file:
+                for path, payload in encoded.payloads.items():
+                    file.writestr(path, payload)
+        self._stamps[encoded.number] = encoded.stamp_ns
+
+    def drop(self, number: int) -> None:
+        """Remove a frame."""
+        with self._explained():
+            self._file(number).unlink()
+        del self._stamps[number]
+
+    def get(self, number: int) -> EncodedFrame:
+        """Return a frame that was put here and not dropped, with its images alone.
+
+        Raises
+        ------
+        RecordingError
+            If they cannot be read.
+        """
+        with self._explained(), ZipFile(self._file(number)) as file:
+            payloads = {path: file.read(path) for path in file.namelist()}
+        return EncodedFrame(number, self._stamps[number], payloads)
+
+    def clear(self) -> None:
+        """Remove the folder, also one that a killed run has left.
+
+        What cannot be removed is only clutter, and no reason to fail.
+        """
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _file(self, number: int) -> Path:
+        return self._folder / str(number)
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, BadZipFile) as error:
+            raise RecordingError(
+                f"{self._folder}: the images put aside cannot be written or read ({error}); "
+                "is the disk full?"
+            ) from error

@@ -1,0 +1,98 @@
+"""Rows of the tables, and their lines of CSV. Numbers are written so that they read back the same.
+
+An undefined rate is an empty cell. No cell needs quoting: variant, stage and region names hold no
+comma.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+
+from roadeval.data import Change, Counts, FrameResult, Step, Tally
+from roadeval.evaluation.maps import HeatMap
+from roadeval.evaluation.scoreboard import Sums
+from roadeval.evaluation.windows import Window
+
+Row = tuple[str | int | float, ...]
+"""A row's cells in the order of the table's columns."""
+
+
+def lines(result: FrameResult) -> dict[str, str]:
+    """Return a frame's lines of each table that grows frame by frame; none if it is not evaluated.
+
+    They are written out, cell by cell, for there are hundreds a frame.
+    """
+    frame = result.frame
+    times = f"{frame.number},{frame.stamp_ns},{frame.log_time_ns}"
+    texts = {
+        "frames": "".join(
+            f"{times},{tally.variant},{tally.stage},{_counts(tally.counts)},{_rates(tally)}\n"
+            for tally in result.tallies
+        ),
+        "regions": "".join(
+            f"{frame.number},{tally.variant},{tally.stage},{region},{_counts(counts)}\n"
+            for tally in result.tallies
+            for region, counts in tally.regions.items()
+        ),
+        "oracles": "".join(
+            f"{frame.number},{tally.variant},{oracle},{tally.stage},"
+            f"{_counts(tally.counts)},{_rates(tally)}\n"
+            for oracle, tallies in result.oracles.items()
+            for tally in tallies
+        ),
+    }
+    return {name: text for name, text in texts.items() if text}
+
+
+def sum_lines(sums: Sums) -> dict[str, str]:
+    """Return the lines of each table that sums up the drive; none where nothing was scored."""
+    rows = {
+        "windows": window_rows(sums.windows),
+        "changes": change_rows(sums.changes),
+        "heat": heat_rows(sums.heat),
+    }
+    texts = {name: "".join(map(_line, each)) for name, each in rows.items()}
+    return {name: text for name, text in texts.items() if text}
+
+
+def window_rows(windows: Iterable[Window]) -> Iterator[Row]:
+    """Yield the rows of ``windows.csv``."""
+    for row in windows:
+        yield (
+            *(row.number, row.first_frame, row.last_frame, row.frames, row.variant, row.stage),
+            *row.rates.values(),
+            *row.pooled.values(),
+        )
+
+
+def change_rows(changes: Mapping[Step, Change]) -> Iterator[Row]:
+    """Yield the rows of ``changes.csv``."""
+    for step, change in changes.items():
+        yield (*step, change.repaired, change.spoiled, change.labelled)
+
+
+def heat_rows(heat: Mapping[str, HeatMap]) -> Iterator[Row]:
+    """Yield the rows of ``heat.csv``, without cells that are never labelled."""
+    for variant, each in heat.items():
+        side, sums = each.cells()
+        for row, column in zip(*sums[0].nonzero(), strict=True):
+            place = int(row) * side, int(column) * side
+            yield (variant, *place, side, *sums[:, row, column].tolist())
+
+
+def _counts(counts: Counts) -> str:
+    return f"{counts.tp},{counts.tn},{counts.fp},{counts.fn},{counts.n}"
+
+
+def _rates(tally: Tally) -> str:
+    return ",".join(map(_cell, tally.rates.values()))
+
+
+def _line(cells: Iterable[str | int | float]) -> str:
+    return ",".join(map(_cell, cells)) + "\n"
+
+
+def _cell(value: str | int | float) -> str:
+    """Write a cell: the shortest decimal that reads back as the same number."""
+    return "" if isinstance(value, float) and math.isnan(value) else str(value)

@@ -1,0 +1,133 @@
+"""The summary of a run: ``summary.json``."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from roadeval.results.reading import ResultsError
+
+FORMAT: Final = {"name": "roadeval-summary", "version": 2}
+SUMMARY: Final = "summary.json"
+PARTS: Final = (
+    *("format", "verdict", "drive", "frames", "totals", "beyond", "difference", "oracles"),
+    *("windows", "health", "training", "seconds", "warnings", "losses"),
+    *("run", "settings", "versions", "log", "tables"),
+)
+"""The parts of the summary, in the file's order."""
+LATER: Final = frozenset({"tables"})
+"""Parts that version 1 did not write, and that readers must do without."""
+_SELECTION: Final[Mapping[str, Mapping[str, str]]] = {
+    "topics": {
+        "image": "image_topic",
+        "truth": "truth_topic",
+        "shadow": "shadow_topic",
+        "masks": "mask_topics",
+        "sync_tolerance_ms": "sync_tolerance_ms",
+        "resize_truth": "resize_truth",
+    },
+    "labels": {
+        "road": "road_labels",
+        "ignore": "ignore_labels",
+        "road_colors": "road_colors",
+        "ignore_colors": "ignore_colors",
+    },
+    "frames": {
+        name: name for name in ("start", "end", "every", "max_frames", "scale", "keep_corrupt")
+    },
+    "output": {"record": "record"},
+}
+"""What version 1 called the settings of a run, by their tables."""
+
+
+def summary_text(parts: Mapping[str, Any]) -> str:
+    """Write a summary as JSON; undefined numbers become null.
+
+    Raises
+    ------
+    ValueError
+        If a part is unknown or missing (see `PARTS`; ``format`` is added here).
+    """
+    document = {"format": FORMAT} | dict(parts)
+    if wrong := (document.keys() ^ set(PARTS)) - (LATER - document.keys()):
+        raise ValueError(f"summary: unknown or missing {sorted(wrong)}")
+    ordered = {name: plain(document[name]) for name in PARTS if name in document}
+    return json.dumps(ordered, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def read_summary(path: Path) -> dict[str, Any]:
+    """Read ``summary.json``.
+
+    Raises
+    ------
+    ResultsError
+        If there is none, or it is damaged or of another format.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ResultsError(
+            f"{path.parent}: no results here ({SUMMARY}: {error.strerror}); "
+            "make some with roadeval replay"
+        ) from error
+    except ValueError as error:
+        raise ResultsError(f"{path}: not a summary ({error}); make it anew") from error
+    return parse_summary(text, path)
+
+
+def parse_summary(text: str, where: object) -> dict[str, Any]:
+    """Read the text of a summary; one of version 1 takes the shape of today's.
+
+    Raises
+    ------
+    ResultsError
+        If it is damaged or of another format. ``where`` begins the message.
+    """
+    try:
+        summary = json.loads(text)
+    except ValueError as error:
+        raise ResultsError(f"{where}: not a summary ({error}); make it anew") from error
+    form = summary.get("format") if isinstance(summary, dict) else None
+    if form == {**FORMAT, "version": 1}:
+        return _of_version_1(summary)
+    if form != FORMAT:
+        raise ResultsError(
+            f"{where}: not a summary of format {FORMAT['name']} {FORMAT['version']}; "
+            "make it anew with this version of roadeval replay"
+        )
+    return dict(summary)
+
+
+def _of_version_1(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Bring a summary of version 1 to today's shape.
+
+    There every variant carried the run's training and evaluation among its settings, and what was
+    asked of the log stood under ``selection``; summaries made before that have no such part.
+    """
+    asked = summary.get("selection", {})
+    run: dict[str, Any] = {
+        table: {key: asked[old] for key, old in keys.items() if old in asked}
+        for table, keys in _SELECTION.items()
+    }
+    settings = {}
+    for variant, own in summary.get("settings", {}).items():
+        run |= {table: own[table] for table in ("training", "evaluation") if table in own}
+        shared = ("preset", "training", "evaluation")
+        settings[variant] = {key: value for key, value in own.items() if key not in shared}
+        run.setdefault("preset", own.get("preset"))
+    rest = {key: value for key, value in summary.items() if key != "selection"}
+    return {**rest, "format": FORMAT, "run": run, "settings": settings}
+
+
+def plain(value: Any) -> Any:
+    """Turn mappings, sequences, paths and undefined numbers into what JSON has."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value

@@ -1,0 +1,175 @@
+"""The configuration of a run: presets, overriding, variants, and what is refused."""
+
+from pathlib import Path
+
+import pytest
+
+from roadeval.config import PRESETS, ConfigError, RunConfig, Variant, configure, load_config
+from roadeval.config.settings import SECTIONS
+from roadeval.data import RESERVED
+from roadeval.pipeline.chain import STAGES
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "c.toml"
+    path.write_text(text)
+    return path
+
+
+def test_paper_is_the_default():
+    assert RunConfig() == configure() == configure({"preset": "paper"})
+
+
+def test_printed_takes_the_misprints_literally():
+    printed = configure({"preset": "printed"}).pipeline.settings
+    assert printed["shadow"].threshold == "printed"
+    assert printed["shadow"].inclusive
+    assert printed["shadow"].statistic == "printed"
+    assert printed["shadow"].colour_space == "hsi"
+    assert printed["svm"].kernel == "linear"
+
+
+def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
+    config = load_config(write(tmp_path, "[shadow]\nring_width = 3\n[training]\nframes = 20"))
+    assert config.pipeline.settings["shadow"].ring_width == 3
+    assert config.pipeline.settings["shadow"].connectivity == 8
+    assert config.pipeline.settings["svm"] == RunConfig().pipeline.settings["svm"]
+    assert config.training.frames == 20
+
+
+def test_a_file_may_start_from_a_preset(tmp_path):
+    config = load_config(write(tmp_path, 'preset = "printed"\n[svm]\nc = 3'))
+    assert config.preset == "printed"
+    assert config.pipeline.settings["svm"].kernel == "linear"
+    assert config.pipeline.settings["svm"].c == 3
+
+
+def test_the_caller_s_preset_is_used_where_the_file_names_none(tmp_path):
+    config = load_config(write(tmp_path, "[svm]\nc = 3"), preset="printed")
+    assert config.pipeline.settings["svm"].kernel == "linear"
+
+
+def test_a_nested_table_overrides_a_part(tmp_path):
+    post = load_config(write(tmp_path, "[post.patch]\ntop = 0.6")).pipeline.settings["post"]
+    assert post.patch.top == 0.6
+    assert post.patch.bottom == RunConfig().pipeline.settings["post"].patch.bottom
+
+
+def test_overriding_twice_keeps_what_the_first_said():
+    config = configure({"frames": {"every": 2}}).override({"frames": {"max_frames": 7}})
+    assert (config.frames.every, config.frames.max_frames) == (2, 7)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[shadow]\nring_width = 0", r"\[shadow\] ring_width: .* \(given: 0\)"),
+        ("[shadow]\nring = 1", r"\[shadow\] ring: there is no such setting; choose .*ring_width"),
+        ("[shadows]\nring_width = 1", r"\[shadows\] is no table here; choose .*shadow"),
+        ("shadow = 3", r"\[shadow\] must be a table"),
+        ("[svm]\ngamma = nan", r"\[svm\] gamma: .*finite"),
+        ("[svm]\nkernel = 'poly'", r"\[svm\] kernel: .*'rbf' or 'linear'"),
+        ("[post]\nelement = 4", r"\[post\] element: must be odd"),
+        ("[post.patch]\ntop = 0.99", r"\[post\] patch: top must lie above bottom"),
+        ("[training]\nframes = 'ten'", r"\[training\] frames: .*integer"),
+        ("[evaluation]\nwindow = 0", r"\[evaluation\] window: "),
+        ("[frames]\nscale = 1.5", r"\[frames\] scale: .*\(given: 1.5\)"),
+        ("[frames]\nstart = 'noon'", "'noon' is no time"),
+        ("[labels]\nroad = [3]\nignore = [3]", "label 3 cannot mean road and ignore at once"),
+        ("[labels]\nroad_colors = [[1, 2]]", r"\[labels\] road_colors.0.2: field required"),
+        ("[output]\nrecord = 'some'", "choose all, masks, worst:K, every:N or none"),
+        ("[run]\njobs = 0", r"\[run\] jobs: "),
+        ("[output]\nmcap = 'm.mcap'\n[frames]\nscale = 0.5", "output.mcap and frames.scale do not"),
+        ("[topics.masks]\ntruth = '/x'", "variant 'truth': the name is reserved"),
+        ("variants = 3", r"\[variants\] must hold a table for each variant"),
+        ("[variants]\nwide = 3", r"\[variants.wide\] must be a table"),
+        ("[variants.wide.svm]\nc = 0", r"\[variants.wide\]: \[svm\] c: "),
+        ("[variants.wide.training]\nframes = 3", r"\[training\] holds for the whole run"),
+        ("[variants.wide.shadows]\nx = 3", r"\[shadows\] is no table here"),
+        ("[variants.filtered]\nchain = ['svm', 'post']", "the name is taken"),
+        ("chain = ['svm', 'blur', 'post']", r"no stage 'blur'; choose .*shadow"),
+        ("chain = ['svm']", "chain must end with post"),
+        ("chain = ['svm', 'svm', 'post']", "a stage can occur only once"),
+        ("chain = ['svm', 'context', 'post']", "svm and context both make the mask svm"),
+        ("chain = 'svm'", "chain must be a list"),
+        ("preset = 'best'", r"preset: there is no 'best'; choose .*paper"),
+        ("preset = 3", "preset: there is no 3"),
+        ("x = ", "not valid TOML"),
+    ],
+)
+def test_a_bad_key_or_value_is_named(tmp_path, text, message):
+    with pytest.raises(ConfigError, match=message) as caught:
+        load_config(write(tmp_path, text))
+    assert str(caught.value).startswith(f"{tmp_path / 'c.toml'}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_without_a_file_a_setting_is_named_by_table_and_key():
+    with pytest.raises(ConfigError, match=r"^frames\.every: input should be greater"):
+        configure({"frames": {"every": 0}})
+
+
+def test_a_missing_file_is_one_line(tmp_path):
+    with pytest.raises(ConfigError, match="no such configuration file"):
+        load_config(tmp_path / "none.toml")
+
+
+def test_a_file_that_is_no_text_is_one_line(tmp_path):
+    (tmp_path / "c.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ConfigError, match="cannot be read"):
+        load_config(tmp_path / "c.toml")
+
+
+def test_a_chain_may_leave_stages_out(tmp_path):
+    pipeline = load_config(write(tmp_path, 'chain = ["svm", "post"]')).pipeline
+    assert pipeline.chain == ("svm", "post")
+    assert not pipeline.has_filter
+
+
+def test_the_two_variants_differ_by_the_filter_alone():
+    filtered, unfiltered = RunConfig().variants()
+    assert (filtered.name, unfiltered.name) == ("filtered", "unfiltered")
+    assert set(filtered.pipeline.chain) - set(unfiltered.pipeline.chain) == {"shadow"}
+    assert filtered.pipeline.without_filter() == unfiltered.pipeline
+
+
+def test_a_chain_without_a_filter_is_one_variant():
+    assert [v.name for v in configure({"preset": "robust"}).variants()] == ["unfiltered"]
+
+
+def test_extra_variants_come_last_and_a_later_one_of_a_name_replaces_it():
+    config = configure({"variants": {"wide": {"shadow": {"ring_width": 3}}, "gated": {}}})
+    assert [v.name for v in config.variants()] == ["filtered", "unfiltered", "wide", "gated"]
+    (wide, _) = config.override({"variants": {"wide": {"shadow": {"ring_width": 5}}}}).extra
+    assert wide.pipeline.settings["shadow"].ring_width == 5
+
+
+@pytest.mark.parametrize("name", sorted(RESERVED))
+def test_reserved_names_are_refused(name):
+    with pytest.raises(ConfigError, match="reserved"):
+        configure({"variants": {name: {}}})
+
+
+@pytest.mark.parametrize("name", ["a/b", "", "ä", "a b", "-", "../x"])
+def test_names_that_are_no_plain_word_are_refused(name):
+    with pytest.raises(ConfigError, match="letters, digits"):
+        configure({"variants": {name: {}}})
+
+
+def test_a_layout_lists_layers_and_masks_in_order():
+    layout = RunConfig().variants()[0].layout()
+    assert layout.stages == ("similarity", "svm", "post")
+    assert [spec.name for spec in layout.layers] == [
+        *("ndi", "shadow", "rings", "compensated"),
+        *("distance", "similarity", "svm", "post", "boundary"),
+    ]
+
+
+def test_a_variant_starts_from_its_own_preset():
+    variant = Variant.of("mine", {"preset": "gated", "svm": {"c": 3}})
+    assert variant.pipeline.chain == PRESETS["gated"]["chain"]
+    assert variant.pipeline.settings["svm"].c == 3
+
+
+def test_no_stage_is_called_like_a_table_of_the_run():
+    assert not STAGES.keys() & {*SECTIONS, "chain", "preset", "variants"}

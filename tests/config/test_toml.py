@@ -1,0 +1,103 @@
+"""A run's configuration as a file that makes the same run again, and as a documented one."""
+
+import tomllib
+from dataclasses import fields
+from itertools import pairwise
+
+import pytest
+
+from roadeval.cli.options import OPTIONS
+from roadeval.config import PRESETS, RunConfig, configure, load_config
+from roadeval.config.document import documented
+from roadeval.config.settings import SECTIONS
+from roadeval.config.toml import run_toml
+
+OTHER = {
+    "output.save": "out.rrd",
+    "output.reports": "tables",
+    "output.mcap": "masks.mcap",
+    "output.record": "worst:7",
+    "preset": "gated",
+    "variants": {"wide": {"preset": "printed", "shadow": {"ring_width": 3}}},
+    "training.model": "city.model",
+    "training.frames": 4,
+    "training.gap": 2,
+    "topics.image": "/left/image",
+    "topics.truth": '/a "quoted" topic',
+    "topics.shadow": "/shadow",
+    "topics.masks": {"net": "/net/mask"},
+    "topics.sync_tolerance_ms": 2.5,
+    "topics.resize_truth": True,
+    "labels.road": [3, 4],
+    "labels.ignore": [11],
+    "labels.road_colors": [[128, 64, 128]],
+    "labels.ignore_colors": [[0, 0, 0]],
+    "frames.start": "2013-05-01T12:00:00Z",
+    "frames.end": "90",
+    "frames.every": 3,
+    "frames.max_frames": 50,
+    "frames.scale": 0.5,
+    "frames.keep_corrupt": True,
+    "run.jobs": 1,
+}
+"""A value other than the default for every option of the command line."""
+
+NEEDS = {
+    "labels.ignore": {"labels": {"road": [3]}},
+    "labels.ignore_colors": {"labels": {"road_colors": [[1, 1, 1]]}},
+}
+
+
+def tables(setting: str) -> dict:
+    table, _, key = setting.partition(".")
+    made = {table: {key: OTHER[setting]} if key else OTHER[setting]}
+    for name, more in NEEDS.get(setting, {}).items():
+        made[name] = {**more, **made.get(name, {})}
+    return made
+
+
+def test_every_option_is_tried_here():
+    assert OTHER.keys() == {option.setting for option in OPTIONS} - {"config"}
+
+
+@pytest.mark.parametrize("setting", OTHER)
+@pytest.mark.parametrize("write", [lambda c: run_toml(c, "drive", "1.0"), documented])
+def test_the_file_of_a_run_gives_the_same_configuration_again(setting, write, tmp_path):
+    config = configure(tables(setting))
+    assert config != RunConfig()
+    (tmp_path / "run.toml").write_text(write(config), encoding="utf-8")
+    assert load_config(tmp_path / "run.toml") == config
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_preset_reads_back_from_its_file(preset, tmp_path):
+    config = configure({"preset": preset})
+    for text in (run_toml(config, "d", "1"), documented(config)):
+        (tmp_path / "run.toml").write_text(text)
+        assert load_config(tmp_path / "run.toml") == config
+
+
+def test_the_file_of_a_run_holds_every_setting_that_has_a_value():
+    config = configure({"preset": "robust"})
+    plain = tomllib.loads(run_toml(config, "d", "1"))
+    assert plain["chain"] == list(config.pipeline.chain)
+    for name in SECTIONS:
+        settings = getattr(config, name)
+        given = {f.name for f in fields(settings) if getattr(settings, f.name) is not None}
+        assert plain[name].keys() == given
+
+
+def test_every_setting_is_documented_with_its_range():
+    text = documented(configure({"variants": {"gated": {"preset": "gated"}}}))
+    lines = text.splitlines()
+    undocumented = [
+        line
+        for before, line in pairwise(lines)
+        if (" = " in line or line.endswith(" =")) and not before.startswith("#")
+    ]
+    assert undocumented == ['preset = "gated"']
+    assert "# Worker threads; one per CPU core by default. At least 1.\n# jobs =\n" in text
+    assert "One of auto, truth, patch.\nsource" in text.replace("\n# ", " ")
+    assert "Above 0, at most 1.\nscale = 1.0\n" in text
+    assert "``" not in text
+    assert max(map(len, lines)) <= 100

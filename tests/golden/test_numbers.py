@@ -1,0 +1,500 @@
+"""The numbers that people read, computed again from the tables by plain arithmetic.
+
+A golden text says that nothing has changed; these say that it is right. Nothing of the project
+computes here: tables come by pandas, masks as pictures, and each formula stands here again.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from roadeval import Recording
+from tests.golden import drive, texts
+from tests.golden.commands import Told
+
+MINUS: Final = "\N{MINUS SIGN}"
+RUNS: Final = ("paper", "printed")
+PDFS: Final = {"paper": "paper.pdf", "printed": "printed/report.pdf"}
+OUTS: Final = {"paper": "replay", "printed": "replay_net"}
+PAIRS: Final = ("svm", "filter", "post")
+
+
+# --- Plain arithmetic -----------------------------------------------------------------------------
+
+
+def with_rates(table: pd.DataFrame) -> pd.DataFrame:
+    """Rates from counts alone; a rate that divides by zero is undefined."""
+    road, other = table.TP + table.FN, table.TN + table.FP
+    return table.assign(
+        ERR=(table.FP + table.FN) / (road + other),
+        ACC=(table.TP + table.TN) / (road + other),
+        FPR=table.FP / other.where(other > 0),
+        FNR=table.FN / road.where(road > 0),
+    )
+
+
+def totals(table: pd.DataFrame) -> dict[tuple[str, str], pd.Series]:
+    """By variant and stage: the frames, the means of their rates, and the sums' own rates."""
+    found = {}
+    for mask, rows in table.groupby(["variant", "stage"], sort=False):
+        sums = rows[["TP", "TN", "FP", "FN"]].sum().to_frame().T
+        means = with_rates(rows)[["ERR", "ACC", "FPR", "FNR"]].mean()
+        pooled = with_rates(sums).iloc[0]
+        tp, fp, fn = sums[["TP", "FP", "FN"]].iloc[0]
+        overlap = pd.Series(
+            {"IoU": tp / (tp + fp + fn), "F1": 2 * tp / (2 * tp + fp + fn), "P": tp / (tp + fp)}
+        )
+        found[mask] = pd.concat([means, pooled.add_prefix("pooled_"), overlap])
+        found[mask]["frames"] = len(rows)
+    return found
+
+
+def percent(fraction: float, digits: int = 2) -> str:
+    return f"{100 * fraction:.{digits}f}"
+
+
+def points(fraction: float) -> str:
+    text = f"{100 * fraction:+.2f}"
+    return "0.00" if text in ("+0.00", "-0.00") else text.replace("-", MINUS)
+
+
+def finals(told: Told, run: str) -> pd.DataFrame:
+    """The rates of each variant's final mask: frames by variants, with a level a rate."""
+    rows = with_rates(told.table("frames", run)).query("stage == 'post'")
+    return rows.pivot_table(index="frame", columns="variant", values=["ERR", "ACC", "FPR", "FNR"])
+
+
+def variants(told: Told, run: str) -> list[str]:
+    return told.table("frames", run)["variant"].unique().tolist()
+
+
+@pytest.fixture(scope="module")
+def lines(told):
+    """The lines of each report."""
+    return {run: "\n".join(texts.pages(told.folder / PDFS[run])).splitlines() for run in RUNS}
+
+
+@pytest.fixture(scope="module")
+def masks(told):
+    """By frame: each variant's and stage's mask, and the truth."""
+    recording = Recording(told.folder / "paper.rrd")
+    evaluated = told.table("frames")["frame"].unique().tolist()
+    return {
+        number: {
+            (variant, stage): (
+                recording.layer(variant, stage, number) == 1,
+                recording.truth(number),
+            )
+            for variant in ("filtered", "unfiltered")
+            for stage in ("similarity", "svm", "post")
+        }
+        for number in evaluated
+    }
+
+
+# --- The terminal ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_the_terminal_s_table(run, told):
+    shown = [line.split() for line in told.out(OUTS[run]).splitlines()]
+    for (variant, stage), total in totals(told.table("frames", run)).items():
+        names = ("ERR", "pooled_ERR", "ACC", "FPR", "FNR")
+        cells = [cell for name in names for cell in (percent(total[name]), "%")]
+        row = [stage, str(int(total["frames"])), *cells]
+        assert row in shown or [variant, *row] in shown
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_the_terminal_names_the_lowest_error_and_what_the_filter_changed(run, told):
+    means = finals(told, run).mean()
+    lowest = means["ERR"].idxmin()
+    aside = ", which never looks at the image" if lowest == "blind" else ""
+    out = told.out(OUTS[run])
+    assert f"Lowest ERR: {lowest}{aside}, {percent(means['ERR'].min())} %\n" in out
+    for rate in ("ERR", "FPR", "FNR"):
+        change = (finals(told, run)[rate].filtered - finals(told, run)[rate].unfiltered).mean()
+        assert f"\n  {rate}  {100 * change:+.2f} pp  95 % interval " in out.replace("pp   ", "pp  ")
+    verb = "raises" if means["ERR"].filtered > means["ERR"].unfiltered else "lowers"
+    change = abs(means["ERR"].filtered - means["ERR"].unfiltered)
+    assert f"the filter {verb} ERR of post by {100 * change:.1f} pp" in out
+
+
+def accounts(read: range, trained: int, gap: int) -> dict[str, int]:
+    """What becomes of the frames of a range, from the drive's own list of its oddities."""
+    decoded = [number for number in read if number != drive.BROKEN]
+    usable = [number for number in decoded if number not in drive.UNLABELLED]
+    last = usable[trained - 1]
+    left_out = [number for number in decoded if last < number <= last + gap]
+    return {
+        "in log": drive.FRAMES,
+        "read": len(read),
+        "decoded": len(decoded),
+        # Labels are counted whether their image can be decoded or not.
+        "labelled": len(set(read) - set(drive.UNLABELLED)),
+        "evaluated": len(usable) - trained - len(left_out),
+        "outside the range": read[0],
+        "not read (--every, --max-frames)": drive.FRAMES - 1 - read[-1],
+        "undecodable": len(read) - len(decoded),
+        "trained on": trained,
+        "gap after training": len(left_out),
+        "unlabelled": len(decoded) - len(usable),
+    }
+
+
+# From 0.25 s on, the frames of 0.3 s and later, whose log times begin when the drive's do.
+ACCOUNTS: Final = {"paper": accounts(range(3, 52), 5, 2), "printed": accounts(range(3, 56), 5, 0)}
+KEPT: Final = ("in log", "read", "decoded", "labelled", "trained on", "evaluated")
+
+
+def accounted(run: str) -> Iterator[tuple[str, bool, int]]:
+    """Each count that is told: its name, whether those frames were skipped, and the number."""
+    for name, count in ACCOUNTS[run].items():
+        if name in KEPT:
+            yield name, False, count
+        if name not in KEPT or name == "trained on":
+            yield name, True, count
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_every_frame_is_accounted_for_alike_in_summary_terminal_report_and_guide(run, told, lines):
+    account = ACCOUNTS[run]
+    skipped = {name: n for name, was_skipped, n in accounted(run) if was_skipped and n}
+    kept = {name.replace(" ", "_"): account[name] for name in KEPT}
+    assert told.summary(run)["frames"] == kept | {"skipped": skipped}
+    assert account["in log"] == account["evaluated"] + sum(skipped.values())
+
+    windows = -(-account["evaluated"] // 10)
+    words = [f"{account['read']} of {account['in log']} frames read"]
+    words += [f"{count} {name}" for name, count in skipped.items()]
+    words += [f"{account['evaluated']} evaluated in {windows} windows"]
+    first = told.out(OUTS[run]).partition("\n\n")[0]
+    assert " ".join(first.split()) == f"tiny: {', '.join(words)}"
+
+    guide = texts.documents(told.folder / f"{run}.rrd")["/results/overview"].splitlines()
+    for name, was_skipped, count in accounted(run):
+        if count or not was_skipped:
+            assert f"{'skipped: ' if was_skipped else ''}{name} {count}" in lines[run]
+            assert f"- {'skipped, ' if was_skipped else ''}{name}: {count}" in guide
+
+
+def test_what_json_prints_is_the_file_s_text_and_the_recording_s(told):
+    assert json.loads(told.out("replay_json")) == told.summary("model")
+    assert Recording(told.folder / "paper.rrd").summary == told.summary()
+
+
+# --- The report -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_the_report_s_key_table_and_its_best_in_bold(run, told, lines):
+    found, beyond = totals(told.table("frames", run)), told.summary(run)["beyond"]
+    columns = ("ERR", "FPR", "FNR", "ACC", "pooled_ERR", "IoU", "F1", "P")
+    table = {
+        variant: [*(found[variant, "post"][c] for c in columns), beyond[variant]["boundary_F"]]
+        for variant in variants(told, run)
+    }
+    for variant, row in table.items():
+        frames = int(found[variant, "post"]["frames"])
+        assert " ".join([variant, str(frames), *map(percent, row)]) in lines[run]
+    lower_is_better = [True, True, True, False, True, False, False, False, False]
+    best = [
+        (min if lower else max)(table, key=lambda variant: table[variant][place])
+        for place, lower in enumerate(lower_is_better)
+    ]
+    # The table is set row by row.
+    wanted = [
+        percent(value)
+        for variant, row in table.items()
+        for value, winner in zip(row, best, strict=True)
+        if winner == variant
+    ]
+    assert "".join(texts.bold(told.folder / PDFS[run], 1)) == "".join(wanted)
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_the_report_s_rows_over_the_drive(run, told, lines):
+    table, names = finals(told, run), variants(told, run)
+    rows = [table.iloc[begin : begin + 10] for begin in range(0, len(table), 10)]
+    shown = [(f"{row.index[0]}\N{EN DASH}{row.index[-1]}", row.mean()) for row in rows]
+    shown.append(("all", table.mean()))
+    rates = ("ERR", "FPR", "FNR", "ACC")
+    together = [rates] if len(names) <= 3 else [(rate,) for rate in rates]
+    for span, means in shown:
+        for group in together:
+            cells = [percent(means[rate, name]) for rate in group for name in names]
+            assert " ".join([span, *cells]) in lines[run]
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_the_report_s_paired_differences(run, told, lines):
+    table, text = finals(told, run), " ".join(lines[run])
+    for rate in ("ACC", "ERR", "FNR", "FPR"):
+        mine, theirs = table[rate].filtered, table[rate].unfiltered
+        cells = [percent(mine.mean()), percent(theirs.mean()), points((mine - theirs).mean())]
+        row = next(line for line in lines[run] if line.startswith(" ".join([rate, *cells])))
+        assert row.split()[-2] == str((mine - theirs).count())
+    change = table["ERR"].filtered - table["ERR"].unfiltered
+    for verb, frames in (
+        ("lowers ERR on", (change < 0).sum()),
+        ("raises it on", (change > 0).sum()),
+    ):
+        noun = " frames" if "lowers" in verb else ""
+        assert f"{verb} {frames}{noun} ({100 * frames / len(change):.0f} %)" in text
+    assert f"Of {len(change)} frames the filter " in text
+    rows = told.table("frames", run).query("stage == 'post'")
+    wrong = (rows.FP + rows.FN).groupby(rows.variant).sum()
+    net = wrong.filtered - wrong.unfiltered
+    word = "more" if net > 0 else "fewer"
+    assert f"that leaves {abs(net):,} {word} wrong pixels in all." in text
+
+
+def test_the_two_reports_tell_of_more_and_of_fewer_wrong_pixels_beyond_a_thousand(lines):
+    assert "1,268 more wrong pixels" in " ".join(lines["paper"])
+    assert " fewer wrong pixels" in " ".join(lines["printed"])
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_the_report_s_table_against_the_guess(run, told, lines):
+    table = finals(told, run)["ERR"]
+    for name in variants(told, run)[:-1]:
+        change = table[name] - table.blind
+        begin = " ".join([name, percent(table[name].mean()), points(change.mean())])
+        end = f" {(change < 0).sum()} {(change > 0).sum()}"
+        assert any(line.startswith(begin) and line.endswith(end) for line in lines[run])
+    worse = [name for name in variants(told, run) if table[name].mean() > table.blind.mean()]
+    told_so = f"worse than blind (ERR {percent(table.blind.mean())}"
+    assert (told_so in " ".join(lines[run])) == bool(worse)
+
+
+REGIONS: Final = {
+    "shadow": "inside detected shadow",
+    "shadow_edge": "at the edge of detected shadow",
+    "lit": "in light",
+    "true_shadow": "inside true shadow",
+    "boundary": "near the road's edge",
+    "interior": "away from the road's edge",
+    "band_0": "image rows 0\N{EN DASH}9, the top",
+    "band_1": "image rows 10\N{EN DASH}19",
+    "band_2": "image rows 20\N{EN DASH}28",
+    "band_3": "image rows 29\N{EN DASH}38",
+    "band_4": "image rows 39\N{EN DASH}47, the bottom",
+}
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_the_report_s_table_of_regions(run, told, lines):
+    rows = told.table("regions", run).query("stage == 'post'")
+    sums = rows.groupby(["variant", "region"])[["TP", "TN", "FP", "FN"]].sum()
+    wrong, pixels = sums.FP + sums.FN, sums.sum(axis=1)
+    names = variants(told, run)
+    assert set(REGIONS) == set(rows["region"])
+    halves = (["boundary", "interior"],)
+    for region, title in REGIONS.items():
+        first = names[0]
+        share = percent(pixels[first, region] / pixels[first].loc[halves].sum(), 1)
+        within = [percent(wrong[n, region] / pixels[n, region], 1) for n in names]
+        errors = [percent(wrong[n, region] / wrong[n].loc[halves].sum(), 1) for n in names]
+        groups = [within + errors] if len(names) <= 3 else [within, errors]
+        for cells in groups:
+            assert " ".join([title, share, *cells]) in lines[run]
+
+
+def test_the_report_s_table_of_stages(told, lines, masks):
+    for (variant, stage), total in totals(told.table("frames")).items():
+        cells = [percent(total[name]) for name in ("ERR", "FPR", "FNR", "IoU")]
+        stages = ["similarity", "svm", "post"]
+        before = stages[stages.index(stage) - 1] if stage != "similarity" else None
+        moved = ["\N{EN DASH}"] * 2
+        if before and variant != "blind":
+            moved = list(map(percent, shares(masks, (variant, before), (variant, stage))))
+        row = " ".join([stage, *cells, *moved])
+        assert row in lines["paper"] or f"{variant} {row}" in lines["paper"]
+
+
+def shares(masks, before: tuple[str, str], after: tuple[str, str]) -> tuple[float, float]:
+    """The shares of labelled pixels that are newly right and newly wrong."""
+    right = wrong = labelled = 0
+    for found in masks.values():
+        (old, truth), (new, _) = found[before], found[after]
+        known = truth != 255
+        was, is_now = (old == truth), (new == truth)
+        right += (known & ~was & is_now).sum()
+        wrong += (known & was & ~is_now).sum()
+        labelled += known.sum()
+    return right / labelled, wrong / labelled
+
+
+def test_the_report_says_which_pixels_the_filter_mended_and_which_it_spoiled(told, lines, masks):
+    right, wrong = shares(masks, ("unfiltered", "post"), ("filtered", "post"))
+    text = " ".join(lines["paper"])
+    assert f"evaluated frames, {percent(right)} % are newly right with the filter" in text
+    assert f"and {percent(wrong)} % newly wrong" in text
+
+
+def test_the_report_s_flicker(told, lines, masks):
+    numbers = list(masks)
+    pairs = [(a, b) for a, b in pairwise(numbers) if b == a + 1]
+    assert pairs
+    for variant in ("filtered", "unfiltered"):
+        changed = moved = labelled = 0
+        for a, b in pairs:
+            (old, before), (new, after) = masks[a][variant, "post"], masks[b][variant, "post"]
+            known = (before != 255) & (after != 255)
+            changed += (old != new)[known].sum()
+            moved += ((before == 1) != (after == 1))[known].sum()
+            labelled += known.sum()
+        own, true = changed / labelled, moved / labelled
+        shown = [percent(own), percent(true), points(own - true), str(len(pairs))]
+        assert " ".join([variant, *shown]) in lines["paper"]
+
+
+def parts(told: Told) -> pd.DataFrame:
+    """How each frame's ERR of the filtered mask came about."""
+    rows = with_rates(told.table("frames"))
+    errors = rows.pivot_table(index="frame", columns=["variant", "stage"], values="ERR")
+    return pd.DataFrame(
+        {
+            "svm": errors["unfiltered", "svm"],
+            "filter": errors["filtered", "svm"] - errors["unfiltered", "svm"],
+            "post": errors["filtered", "post"] - errors["filtered", "svm"],
+            "ERR": errors["filtered", "post"],
+        }
+    )
+
+
+def test_the_report_s_sum_of_parts(told, lines):
+    mean = parts(told).mean()
+    cells = [percent(mean.svm), points(mean["filter"]), points(mean.post), percent(mean.ERR)]
+    assert f"filtered {' '.join(cells)}" in lines["paper"]
+
+
+def test_the_report_s_oracles(told, lines):
+    rows = with_rates(told.table("oracles")).query("stage == 'post'")
+    as_is = finals(told, "paper").mean()["ERR"]
+    for (variant, oracle), own in rows.groupby(["variant", "oracle"]):
+        mean = own[["ERR", "FPR", "FNR"]].mean()
+        cells = [percent(as_is[variant]), percent(mean.ERR), points(mean.ERR - as_is[variant])]
+        cells += [percent(mean.FPR), percent(mean.FNR), str(len(own))]
+        assert " ".join([variant, "perfect", oracle, *cells]) in lines["paper"]
+
+
+# --- The worst frames -----------------------------------------------------------------------------
+
+
+def apart(ranked: pd.Series, count: int) -> list[int]:
+    """The first frames of a ranking, of neighbours (up to 0.13 s) only the first."""
+    taken: list[int] = []
+    for frame in ranked.index:
+        if len(taken) < count and all(abs(frame - other) > 1 for other in taken):
+            taken.append(frame)
+    return taken
+
+
+def test_the_list_of_the_worst_frames(told):
+    table, causes = finals(told, "paper"), parts(told)
+    worst = apart(table["ERR"].filtered.sort_values(ascending=False), 10)
+    text = " ".join(told.out("inspect").split())
+    for rank, frame in enumerate(worst, 1):
+        own = table.loc[frame]
+        rates = [own[rate].filtered for rate in ("ERR", "FPR", "FNR")]
+        cells = ["-" if np.isnan(rate) else f"{percent(rate)} %" for rate in rates]
+        first, *rest = (100 * causes.loc[frame, part] for part in PAIRS)
+        why = f"svm {first:.1f}, filter {rest[0]:+.1f}, post {rest[1]:+.1f} pp."
+        assert f"{rank} {frame} {' '.join(cells)} {why}" in text
+
+
+def test_the_report_shows_the_worst_the_most_helped_and_the_most_harmed(told, lines):
+    errors = finals(told, "paper")["ERR"]
+    change = (errors.filtered - errors.unfiltered).sort_values()
+    wanted = apart(errors.filtered.sort_values(ascending=False), 6)
+    wanted += apart(change[change < 0], 3) + apart(change[change > 0][::-1], 3)
+    shown = [line.split()[1] for line in lines["paper"] if line.startswith("Frame ")]
+    assert shown == [str(frame) for frame in wanted]
+    text = " ".join(lines["paper"])
+    for frame in wanted[6:]:
+        assert f"The filter changes ERR by {points(change[frame])} pp." in text
+
+
+# --- The recording --------------------------------------------------------------------------------
+
+
+def test_the_guide_s_table_of_rates(told):
+    guide = texts.documents(told.folder / "printed.rrd")["/results/overview"].splitlines()
+    for (variant, stage), total in totals(told.table("frames", "printed")).items():
+        rates = (total[name] for name in ("ERR", "FPR", "FNR", "pooled_ERR"))
+        cells = [f"{percent(rate)} %" for rate in rates]
+        assert f"| {' | '.join([variant, stage, *cells])} |" in guide
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_the_viewer_s_curves_are_the_table_s_numbers(run, told):
+    curves = texts.by_frame(told.folder / f"{run}.rrd", "Scalars:scalars")
+    table = told.table("frames", run)
+    for (variant, stage), rows in table.groupby(["variant", "stage"]):
+        own = rows.set_index("frame")
+        counts = dict(curves[f"/counts/{variant}/{stage}"])
+        assert counts == {
+            n: row.tolist() for n, row in own[["TP", "TN", "FP", "FN", "N"]].iterrows()
+        }
+        for rate in ("ACC", "ERR", "TPR", "FNR", "TNR", "FPR"):
+            shown = {n: value for n, (value,) in curves[f"/metrics/{variant}/{stage}/{rate}"]}
+            assert shown == pytest.approx(own[rate].dropna().to_dict())
+
+
+# --- The comparison -------------------------------------------------------------------------------
+
+
+def test_the_comparison_s_table_is_of_the_frames_that_both_evaluated(told):
+    base, new = (with_rates(told.table("frames", run)) for run in RUNS)
+    both = base.merge(new, on=["stamp_ns", "variant", "stage"], suffixes=("_base", "_new"))
+    shown = [" ".join(line.split()) for line in told.out("compare").splitlines()]
+    for (variant, stage), rows in both.groupby(["variant", "stage"]):
+        before, after = rows.ERR_base.mean(), rows.ERR_new.mean()
+        row = f"{variant} {stage} {percent(before)} % {percent(after)} % "
+        row += f"{100 * (after - before) + 0.0:+.2f} pp"
+        assert any(line.startswith(row) for line in shown)
+    left_out = new["frame"].nunique() - both["frame_new"].nunique()
+    assert f"warning: {left_out} frames that printed evaluated" in told.texts["compare"]["err"]
+
+
+def test_the_conditions_are_judged_by_the_same_numbers(told):
+    base, new = (with_rates(told.table("frames", run)) for run in RUNS)
+    own = "variant == 'filtered' and stage == 'post'"
+    both = base.query(own).merge(new.query(own), on="stamp_ns", suffixes=("_base", "_new"))
+    before, after = both.ERR_base.mean(), both.ERR_new.mean()
+    assert (
+        f"error: post.filtered.ERR of printed changed by {100 * (after - before):+.2f} pp "
+        f"({percent(before)} % to {percent(after)} %): post.filtered.ERR>+0.5pp holds\n"
+    ) in told.texts["compare"]["err"]
+    level = new.query("variant == 'unfiltered' and stage == 'svm'").FNR.mean()
+    assert f"FNR of printed is {percent(level)} %: " in told.out("compare")
+    assert told.texts["compare"]["code"] == 4
+
+
+@pytest.mark.parametrize("name", ["compared", "variants"])
+def test_the_comparison_names_the_frames_that_changed_most(name, told):
+    paper, printed = (finals(told, run)["ERR"] for run in RUNS)
+    before, after = {
+        "compared": (paper.filtered, printed.filtered),
+        "variants": (printed.unfiltered, printed.filtered),
+    }[name]
+    change = (after - before).dropna().sort_values()
+    wanted = apart(change[change > 0][::-1], 5) + apart(change[change < 0], 5)
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in (told.folder / f"{name}.md").read_text().splitlines()
+        if " UTC " in line
+    ]
+    rows = [row for row in rows if "filtered" in row]
+    shown = [[*row[-5:-4], *row[-3:]] for row in rows]
+    assert shown == [
+        [str(n), percent(before[n]), percent(after[n]), points(change[n])] for n in wanted
+    ]

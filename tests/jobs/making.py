@@ -1,0 +1,52 @@
+"""Small logs and short ways to say how they are replayed."""
+
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+
+from roadeval import RunConfig, configure
+from roadeval.logs import LogWriter
+from tests.training.making import frame
+
+FRAMES: Final = 26
+NS: Final = 100_000_000
+
+TABLES: Final = {
+    **dict.fromkeys(("start", "end", "every", "max_frames", "scale", "keep_corrupt"), "frames"),
+    **dict.fromkeys(("masks", "resize_truth", "sync_tolerance_ms", "image", "truth"), "topics"),
+    **dict.fromkeys(("road", "ignore", "road_colors", "ignore_colors"), "labels"),
+    **dict.fromkeys(("model", "gap", "train_frames", "source"), "training"),
+    "record": "output",
+    "jobs": "run",
+}
+
+
+def settings(**values: Any) -> RunConfig:
+    """A configuration by its keys alone; ``train_frames`` is ``training.frames``."""
+    tables: dict[str, Any] = {}
+    for key, value in values.items():
+        if key in TABLES:
+            plain = str(value) if isinstance(value, Path) else value
+            tables.setdefault(TABLES[key], {})[key.removeprefix("train_")] = plain
+        else:
+            tables[key] = value
+    return configure(tables)
+
+
+def write_log(path: Path, *, truth: bool = True, net: bool = False, broken: int = -1) -> Path:
+    """Write a log of small frames; some have no truth, one may be broken."""
+    with LogWriter(path) as writer:
+        for number in range(FRAMES):
+            made, stamp = frame(number), (number + 1) * NS
+            # The verge creeps over the road, so that no fixed mask is right everywhere.
+            made.image[12 : 12 + number // 8] = made.image[0]
+            made.truth[12 : 12 + number // 8] = 0
+            _, png = cv2.imencode(".png", made.image[..., ::-1])
+            data = b"no image" if number == broken else png.tobytes()
+            writer.image("/camera/image", stamp, data, "png")
+            if truth and number != 20:
+                writer.mask("/truth/road", stamp, made.truth * 255)
+            if net:
+                writer.mask("/net/road_mask_prediction", stamp, made.truth * 255)
+    return path

@@ -1,0 +1,45 @@
+"""Moments as people write them."""
+
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from roadeval.logs import FrameSettings, Instant, LogError, parse_time
+
+SECOND = 1_000_000_000
+
+
+@pytest.mark.parametrize(
+    ("text", "ns", "relative"),
+    [
+        ("2.5", 2_500_000_000, True),
+        ("90", 90 * SECOND, True),
+        (".25", 250_000_000, True),
+        ("0", 0, True),
+        ("12s", 12 * SECOND, True),
+        ("12ns", 12, False),
+        ("1700000000123456789", 1_700_000_000_123_456_789, False),
+        ("2.123456789", 2_123_456_789, True),
+        ("1970-01-01T00:00:01.000000005Z", SECOND + 5, False),
+        ("2023-11-14T23:13:20+01:00", 1_700_000_000 * SECOND, False),
+    ],
+)
+def test_a_time_is_read_to_the_nanosecond(text: str, ns: int, relative: bool) -> None:
+    assert parse_time(text) == Instant(ns, relative)
+
+
+@pytest.mark.parametrize(
+    "text", ["", ".", "soon", "-3", "1e9", "2023-11-14", "2023-13-01T00:00:00Z"]
+)
+def test_anything_else_is_refused(text: str) -> None:
+    with pytest.raises(LogError, match="is no time"):
+        parse_time(text)
+
+
+@pytest.mark.parametrize(
+    "given", [{"start": "soon"}, {"end": "-3"}, {"every": 0}, {"max_frames": 0}]
+)
+def test_settings_of_frames_are_checked(given: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError, match=next(iter(given))):
+        FrameSettings(**given)

@@ -1,0 +1,235 @@
+"""What was recorded is read back: images, numbers and texts, of this format and of earlier ones."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+import rerun as rr
+
+from roadeval.data import Health, Role
+from roadeval.recording import Recorder, Recording, RecordingError
+from roadeval.recording.codecs import codecs_of
+from roadeval.recording.read.rrd_file import RrdFile
+from roadeval.recording.write.encoding import Images
+from tests.recording.making import (
+    HEIGHT,
+    RESULTS,
+    SUMMARY,
+    WIDTH,
+    frame,
+    layout,
+    lines,
+    record,
+    rerun,
+    result,
+    rows_of,
+    unscored,
+)
+
+
+def test_masks_and_labels_of_every_frame_come_back_equal(drive, recording):
+    for each in drive:
+        for layer in each.variants[0].layers():
+            if layer.spec.name != "ndi":
+                back = recording.layer("filtered", layer.spec.name, each.frame.number)
+                np.testing.assert_array_equal(back, layer.array)
+
+
+def test_ndi_comes_back_to_its_code(drive, recording):
+    codes = next(drive[3].variants[0].layers()).array
+    np.testing.assert_allclose(recording.layer("filtered", "ndi", 3), codes / 127.5 - 1, atol=1e-6)
+
+
+def test_truth_and_error_map_come_back_equal(drive, recording):
+    np.testing.assert_array_equal(recording.truth(4), drive[4].frame.truth)
+    errors = recording.layer("filtered", "errors", 4)
+    np.testing.assert_array_equal(errors, drive[4].errors["filtered"].array)
+
+
+def test_the_cameras_own_file_is_passed_on(tmp_path):
+    shown = frame(0)
+    jpeg = cv2.imencode(".jpg", shown.image, [cv2.IMWRITE_JPEG_QUALITY, 30])[1].tobytes()
+    logged = replace(shown, payload=memoryview(jpeg), media_type="image/jpeg")
+    back = record(tmp_path / "out.rrd", [replace(unscored(0), frame=logged)]).image(0)
+    decoded = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR_RGB)
+    np.testing.assert_array_equal(back, decoded)
+
+
+def test_a_raw_image_is_recorded_in_its_own_size(recording):
+    assert recording.image(0).shape == (HEIGHT, WIDTH, 3)
+
+
+def test_a_layer_that_a_frame_lacks_is_not_shown_from_the_frame_before(drive, tmp_path):
+    bare = replace(drive[3], variants=(), errors={})
+    recording = record(tmp_path / "out.rrd", [drive[2], bare, drive[4]])
+    with pytest.raises(RecordingError, match="/filtered/post has nothing on frame 3"):
+        recording.layer("filtered", "post", 3)
+    assert rows_of(recording, "/filtered/post", "EncodedImage:blob") == {2: 1, 3: 0, 4: 1}
+
+
+def test_frames_without_pictures_end_what_is_shown_and_are_not_among_those_that_have_some(
+    drive, tmp_path
+):
+    pictured = [4, 5, 11]
+    with Recorder(tmp_path / "out.rrd", layout()) as recorder:
+        for each in drive:
+            images = Images.ALL if each.frame.number in pictured else Images.NONE
+            recorder.write(recorder.encode(each, lines(each), images))
+        recorder.finish(RESULTS)
+    recording = Recording(recorder.path)
+    assert recording.frame_numbers == tuple(pictured)
+    assert list(recording.roles) == pictured
+    np.testing.assert_array_equal(recording.truth(11), drive[11].frame.truth)
+    with pytest.raises(RecordingError, match="/truth has nothing on frame 6"):
+        recording.truth(6)
+    for path, component in (
+        ("/camera", "EncodedImage:blob"),
+        ("/filtered/ndi", "EncodedDepthImage:blob"),
+        ("/filtered/rings", "SegmentationImage:buffer"),
+    ):
+        assert rows_of(recording, path, component) == {4: 1, 5: 1, 6: 0, 11: 1, 12: 0}
+
+
+def test_the_tables_lines_come_back_as_a_table(recording):
+    assert list(recording.frames.frame) == list(range(2, 19))
+    assert list(recording.frames.columns) == ["frame", "variant", "stage", "ERR"]
+
+
+def test_a_drive_without_rows_gives_an_empty_table_with_its_columns(tmp_path):
+    frames = record(tmp_path / "out.rrd", [unscored(0)]).frames
+    assert frames.empty
+    assert "ERR" in frames.columns
+
+
+def test_results_come_back(recording):
+    assert recording.complete
+    assert recording.summary == SUMMARY
+    assert recording.windows.ERR.tolist() == [0.25]
+
+
+def test_rates_facts_and_milliseconds_are_series(recording):
+    assert recording.scalars("/metrics/filtered/post/ERR").tolist() == [0.25] * 17
+    assert recording.scalars("/timing/filtered/shadow").tolist() == [4.0] * 19
+    assert recording.scalars("/facts/filtered/shadow/components")[18] == 3.0
+
+
+def test_counts_are_five_numbers_a_frame(recording):
+    (batch,) = RrdFile(recording.path).batches(
+        "/counts/filtered/post", "Scalars:scalars", static=False
+    )
+    assert batch.column("Scalars:scalars").to_pylist() == [[1, 2, 3, 4, 10]] * 17
+
+
+def test_an_undefined_rate_leaves_a_gap(tmp_path):
+    frames = [result(0, fnr=0.5), result(1, fnr=float("nan")), result(2, fnr=0.75)]
+    series = record(tmp_path / "out.rrd", frames).scalars("/metrics/filtered/post/FNR")
+    assert series.to_dict() == {0: 0.5, 2: 0.75}
+
+
+def test_notes_belong_to_their_frame(recording):
+    assert recording.notes(5) == ("It rains.", "It pours.")
+    assert recording.notes(6) == ()
+
+
+def test_roles_are_known_for_every_frame(recording):
+    assert recording.frame_numbers == tuple(range(19))
+    assert recording.roles[1] == Role.TRAINING
+    assert recording.roles[18] == Role.EVALUATED
+
+
+def test_a_lane_holds_changes_only_and_ends_where_nothing_is_known(tmp_path):
+    states = [Health.OK, Health.OK, Health.FAILED, None, Health.OK]
+    frames = [
+        result(number, health={"filtered": state} if state else {})
+        for number, state in enumerate(states)
+    ]
+    recording = record(tmp_path / "out.rrd", frames)
+    lane = dict(RrdFile(recording.path).rows("/state/filtered", "StateChange:state"))
+    assert lane == {0: "ok", 2: "failed", 3: "", 4: "ok"}
+
+
+def recorded_in(version, folder, monkeypatch):
+    """A recording whose arrangement is said to be of this version."""
+    with monkeypatch.context() as patched:
+        patched.setattr("roadeval.recording.layout.FORMAT", version)
+        record(folder / "out.rrd", [unscored(0)])
+    return folder / "out.rrd"
+
+
+def test_the_arrangement_of_a_recording_has_a_version(recording, tmp_path, monkeypatch):
+    assert recording.format == 3
+    earlier = Recording(recorded_in(1, tmp_path, monkeypatch))
+    assert (earlier.format, earlier.frame_numbers) == (1, (0,))
+
+
+def test_truths_and_errors_of_the_second_version_were_labels(drive, tmp_path, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr("roadeval.recording.layout.FORMAT", 2)
+        patched.setattr("roadeval.recording.write.encoding.codecs_of", lambda it: codecs_of(it, 2))
+        shadow = drive[3].frame.truth
+        shown = replace(drive[3], frame=replace(drive[3].frame, shadow_truth=shadow))
+        record(tmp_path / "out.rrd", [*drive[:3], shown], layout(has_shadow_truth=True))
+    earlier = Recording(tmp_path / "out.rrd")
+    np.testing.assert_array_equal(earlier.true_shadow(3), shadow)
+    assert rows_of(earlier, "/truth", "SegmentationImage:buffer") == dict.fromkeys(range(4), 1)
+    np.testing.assert_array_equal(earlier.truth(3), drive[3].frame.truth)
+    errors = earlier.layer("filtered", "errors", 3)
+    np.testing.assert_array_equal(errors, drive[3].errors["filtered"].array)
+    np.testing.assert_array_equal(
+        earlier.layer("filtered", "post", 3), next(drive[3].variants[0].masks())[1].pixels()
+    )
+
+
+def test_a_recording_that_tells_no_version_is_of_the_first(recording, tmp_path):
+    words = ["--drop-entity", "/__properties/roadeval", recording.path, "-o", tmp_path / "out.rrd"]
+    assert rerun("filter", *words) == 0
+    first = Recording(tmp_path / "out.rrd")
+    assert (first.format, len(first.frame_numbers)) == (1, 19)
+
+
+def test_a_recording_of_a_later_version_is_one_line(tmp_path, monkeypatch):
+    path = recorded_in(4, tmp_path, monkeypatch)
+    with pytest.raises(RecordingError) as caught:
+        Recording(path)
+    assert str(caught.value) == f"{path}: made by a later version of roadeval: update it"
+
+
+def test_an_unknown_layer_is_answered_with_those_that_exist(recording):
+    with pytest.raises(RecordingError, match=r"no /filtered/depth; there are .*/filtered/ndi"):
+        recording.layer("filtered", "depth", 3)
+
+
+def test_an_unknown_frame_is_told(recording):
+    with pytest.raises(RecordingError, match="nothing on frame 99"):
+        recording.image(99)
+
+
+@pytest.mark.parametrize("content", [b"", b"RR", b"\x89MCAP0\r\n", b"frame,stamp_ns\n"])
+def test_a_file_that_is_no_recording_is_told(content, tmp_path):
+    (tmp_path / "x.rrd").write_bytes(content)
+    with pytest.raises(RecordingError, match=r"x\.rrd: not a recording"):
+        Recording(tmp_path / "x.rrd")
+
+
+def test_a_missing_file_is_told(tmp_path):
+    with pytest.raises(RecordingError, match="no such recording"):
+        Recording(tmp_path / "x.rrd")
+
+
+def test_a_recording_by_another_program_is_told(tmp_path):
+    other = rr.RecordingStream("someone_else")
+    other.save(tmp_path / "x.rrd")
+    other.log("words", rr.TextDocument("hello"))
+    other.flush()
+    other.disconnect()
+    with pytest.raises(RecordingError, match="by someone_else, not by roadeval"):
+        Recording(tmp_path / "x.rrd")
+
+
+def test_a_torn_file_is_told_with_the_way_to_mend_it(recording, tmp_path):
+    whole = recording.path.read_bytes()
+    # In the middle of a picture: cut between two chunks, a file has nothing torn in it.
+    (tmp_path / "torn.rrd").write_bytes(whole[: whole.rindex(b"\x89PNG") + 30])
+    with pytest.raises(RecordingError, match="rerun rrd optimize --continue-on-error"):
+        Recording(tmp_path / "torn.rrd")

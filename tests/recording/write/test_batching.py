@@ -1,0 +1,73 @@
+"""How long rows wait, and that few chunks come of many frames."""
+
+import pytest
+
+from roadeval.recording.write.batching import (
+    CHUNK_BYTES,
+    IMAGES_AND_TEXT,
+    NUMBERS,
+    Batcher,
+    WaitLimits,
+)
+from roadeval.recording.write.columns import notes, scalars, states, texts
+
+WAIT = WaitLimits(8, 64)
+
+
+def rows_of(pending):
+    return pending.chunk().to_record_batch().column("frame").to_pylist()
+
+
+def run(frames, rows, limits=WAIT):
+    """Feed frames, each a row of ``rows(frame)`` by path; yield what is due, and after which."""
+    batcher = Batcher(limits)
+    for frame in range(frames):
+        for path, columns, value in rows(frame):
+            batcher.add(path, columns, frame, frame, value)
+        for key in batcher.end_frame():
+            yield frame, key[0], rows_of(batcher[key])
+            del batcher[key]
+    for key in batcher:
+        yield frames, key[0], rows_of(batcher[key])
+
+
+@pytest.mark.parametrize(("frames", "waits"), [(0, 8), (71, 8), (80, 10), (511, 63), (9999, 64)])
+def test_rows_wait_for_a_part_of_the_frames_so_far(frames, waits):
+    assert WAIT.after(frames) == waits
+
+
+def test_every_row_comes_once_and_in_order_and_waits_no_longer_than_it_may():
+    ended = list(run(1000, lambda frame: [("/a", scalars, frame)]))
+    assert [row for *_, rows in ended for row in rows] == list(range(1000))
+    for after, _, rows in ended[:-1]:
+        assert after - rows[0] + 1 == WAIT.after(after + 1)
+
+
+def test_entities_are_due_together_whenever_they_began():
+    ended = list(run(40, lambda frame: [("/a", states, "on")] if frame in (0, 9, 11) else []))
+    assert ended == [(7, "/a", [0]), (15, "/a", [9, 11])]
+
+
+def test_an_entity_is_full_by_its_bytes_and_others_wait_on():
+    half = "x" * (CHUNK_BYTES // 2)
+    ended = list(run(8, lambda _: [("/large", texts, half), ("/small", texts, "x")]))
+    assert [rows for _, path, rows in ended if path == "/large"] == [[0, 1], [2, 3], [4, 5], [6, 7]]
+    assert [rows for _, path, rows in ended if path == "/small"] == [list(range(8))]
+
+
+def test_the_bytes_that_wait_are_known():
+    batcher = Batcher(WAIT)
+    for frame, text in enumerate(("four", "five5")):
+        batcher.add("/a", texts, frame, frame, text)
+        batcher.add("/b", scalars, frame, frame, 0.5)
+        batcher.add("/c", notes, frame, frame, ("It rains.", "INFO"))
+    assert batcher.size == 9 + 2 * 13
+    del batcher["/a", texts]
+    assert batcher.size == 2 * 13
+
+
+@pytest.mark.parametrize(("limits", "most"), [(IMAGES_AND_TEXT, 320), (NUMBERS, 70)])
+def test_an_hour_of_small_rows_makes_few_chunks(limits, most):
+    ended = list(run(36_000, lambda _: [("/a", states, "on")], limits))
+    assert sum(len(rows) for *_, rows in ended) == 36_000
+    assert len(ended) < most

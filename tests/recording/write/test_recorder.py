@@ -1,0 +1,271 @@
+"""The recording as a file: complete under its name, partial where a run ended early."""
+
+import json
+import signal
+import subprocess
+import sys
+import textwrap
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError
+from roadeval.recording.read.rrd_file import RrdFile
+from roadeval.recording.write.batching import CHUNK_BYTES, PendingRows
+from roadeval.recording.write.recorder import LEAST_FREE, UNWRITTEN
+from tests.recording.making import (
+    RESULTS,
+    SUMMARY,
+    layout,
+    lines,
+    record,
+    rerun,
+    result,
+    rows_of,
+)
+
+
+def test_nothing_stands_under_the_final_name_before_the_end(drive, tmp_path):
+    with Recorder(tmp_path / "new" / "out.rrd", layout()) as recorder:
+        recorder.write(recorder.encode(drive[0], lines(drive[0])))
+        assert not recorder.path.exists()
+        assert recorder.partial.parent == recorder.path.parent
+        recorder.finish(RESULTS)
+        assert recorder.path.exists()
+    assert not recorder.partial.exists()
+
+
+def test_reruns_own_tool_finds_no_fault(recording):
+    assert rerun("verify", recording.path) == 0
+
+
+def test_the_same_input_gives_the_same_recording_but_for_the_timing(drive, tmp_path):
+    slower = [
+        replace(each, variants=tuple(_slower(variant) for variant in each.variants))
+        for each in drive
+    ]
+    hours = {**RESULTS, "summary": json.dumps({**SUMMARY, "seconds": {"filtered": {"post": 9}}})}
+    record(tmp_path / "a.rrd", drive)
+    record(tmp_path / "b.rrd", slower, texts=hours)
+    assert rerun("compare", "--unordered", tmp_path / "a.rrd", tmp_path / "b.rrd") != 0
+    timing = ["/timing/filtered/shadow", "/timing/filtered/post", "/timing/summary"]
+    drops = [word for path in timing for word in ("--drop-entity", path)]
+    for name in ("a", "b"):
+        words = [*drops, tmp_path / f"{name}.rrd", "-o", tmp_path / f"{name}.same.rrd"]
+        assert rerun("filter", *words) == 0
+    same = [tmp_path / "a.same.rrd", tmp_path / "b.same.rrd"]
+    assert rerun("compare", "--unordered", *same) == 0
+
+
+def test_when_the_run_took_place_is_not_recorded(recording):
+    file = RrdFile(recording.path)
+    assert file.static("/__properties", "RecordingInfo:start_time") is None
+    assert file.static("/__properties", "RecordingInfo:name") == "street"
+
+
+def _slower(variant):
+    stages = tuple(replace(stage, seconds=stage.seconds * 3) for stage in variant.stages)
+    return replace(variant, stages=stages)
+
+
+def test_flushed_frames_wait_no_more(drive, tmp_path):
+    with Recorder(tmp_path / "out.rrd", layout()) as recorder:
+        for each in drive[:5]:
+            recorder.write(recorder.encode(each, lines(each)))
+        recorder.flush()
+        partial = Recording(recorder.partial)
+        assert partial.frame_numbers == (0, 1, 2, 3, 4)
+        assert list(partial.frames.frame) == [2, 3, 4]
+        recorder.finish(RESULTS)
+    assert Recording(recorder.path).frame_numbers == (0, 1, 2, 3, 4)
+
+
+@pytest.mark.parametrize("stop", [RuntimeError, KeyboardInterrupt, SystemExit])
+def test_an_exception_leaves_a_partial_recording_with_every_frame_so_far(stop, drive, tmp_path):
+    recorder = Recorder(tmp_path / "out.rrd", layout())
+    with pytest.raises(stop):
+        _record_and_stop(recorder, drive[:5], stop)
+    partial = Recording(recorder.partial)
+    assert not partial.complete
+    assert partial.frame_numbers == (0, 1, 2, 3, 4)
+    assert list(partial.frames.frame) == [2, 3, 4]
+    assert partial.summary == {}
+    assert not recorder.path.exists()
+    assert rerun("verify", recorder.partial) == 0
+
+
+def _record_and_stop(recorder, results, stop):
+    with recorder:
+        for each in results:
+            recorder.write(recorder.encode(each, lines(each)))
+        raise stop
+
+
+@pytest.mark.parametrize("at", [1, 5])
+def test_who_stops_a_run_while_a_chunk_is_made_loses_no_frame_of_it(
+    at, drive, tmp_path, monkeypatch
+):
+    calls, usual = [], PendingRows.chunk
+
+    def interrupted(track):
+        calls.append(track)
+        if len(calls) == at:
+            raise KeyboardInterrupt
+        return usual(track)
+
+    monkeypatch.setattr(PendingRows, "chunk", interrupted)
+    recorder = _recorder(tmp_path / "out.rrd")
+    with pytest.raises(KeyboardInterrupt):
+        _record_and_stop(recorder, drive, SystemExit)
+    partial = Recording(recorder.partial)
+    assert partial.frame_numbers == tuple(range(8))
+    for path in ("/camera", "/truth", "/filtered/post"):
+        assert rows_of(partial, path, "EncodedImage:blob") == dict.fromkeys(range(8), 1)
+    assert list(partial.frames.frame) == [2, 3, 4, 5, 6, 7]
+
+
+KILLED = """
+    import os, pathlib, signal, sys
+    from roadeval.recording import Recorder
+    from tests.recording.making import layout, lines, result
+    with Recorder(pathlib.Path(sys.argv[1]), layout()) as recorder:
+        for number in range(int(sys.argv[2])):
+            recorder.write(recorder.encode(result(number), lines(result(number))))
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.parametrize(("frames", "images", "numbers"), [(20, 16, 0), (100, 94, 64)])
+def test_a_killed_run_leaves_all_but_the_frames_that_wait(frames, images, numbers, tmp_path):
+    written = [sys.executable, "-c", textwrap.dedent(KILLED), tmp_path / "out.rrd", str(frames)]
+    root = Path(__file__).resolve().parents[3]
+    assert subprocess.run(written, cwd=root, check=False).returncode == -signal.SIGKILL
+    partial = Recording(tmp_path / "out.partial.rrd")
+    assert not partial.complete
+    assert partial.frame_numbers == tuple(range(images))
+    assert partial.unsure == tuple(range(images))
+    assert list(partial.frames.frame) == list(range(images))
+    assert len(partial.scalars("/metrics/filtered/post/ERR")) == numbers
+    last = images - 1
+    assert partial.is_whole(last, scored=True)
+    assert not partial.is_whole(images, scored=False)
+    back = partial.layer("filtered", "post", last)
+    np.testing.assert_array_equal(back, next(result(last).variants[0].masks())[1].pixels())
+
+
+def test_of_a_complete_recording_no_frame_is_unsure(recording):
+    assert recording.unsure == ()
+
+
+def test_a_disk_that_is_full_from_the_start_is_told_at_once(tmp_path, monkeypatch):
+    leave_free(monkeypatch, 1 << 20)
+    for path in (tmp_path / "out.rrd", tmp_path / "new" / "er" / "out.rrd"):
+        with pytest.raises(RecordingError, match="the disk is full"), _recorder(path):
+            pass
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_a_disk_that_fills_up_is_told_while_the_partial_recording_can_still_be_closed(
+    drive, tmp_path, monkeypatch
+):
+    given = []
+
+    def write_until_it_is_full(recorder):
+        with recorder:
+            for each in drive:
+                leave_free(monkeypatch, (1 << 30) if each.frame.number < 10 else (1 << 20))
+                given.append(each.frame.number)
+                recorder.write(recorder.encode(each, lines(each)))
+
+    recorder = _recorder(tmp_path / "out.rrd")
+    with pytest.raises(RecordingError, match="the disk is full"):
+        write_until_it_is_full(recorder)
+    assert rerun("verify", recorder.partial) == 0
+    assert Recording(recorder.partial).frame_numbers == tuple(given)
+    assert 10 < len(given) < len(drive)
+
+
+def test_what_waits_has_its_room_on_the_disk_beside_the_least(drive, tmp_path, monkeypatch):
+    with _recorder(tmp_path / "out.rrd") as recorder:
+        leave_free(monkeypatch, LEAST_FREE + 1)
+        recorder.check_disk_space()
+        recorder.write(recorder.encode(drive[3], lines(drive[3])))
+        with pytest.raises(RecordingError, match="the disk is full"):
+            recorder.check_disk_space()
+
+
+def test_few_bytes_ever_wait_for_reruns_own_thread(tmp_path, monkeypatch):
+    sent = []
+    flush = Recorder._flush_stream
+
+    def counted(recorder):
+        sent.append(recorder._unwritten)
+        flush(recorder)
+
+    monkeypatch.setattr(Recorder, "_flush_stream", counted)
+    with _recorder(tmp_path / "out.rrd") as recorder:
+        first = recorder.encode(result(0), {})
+        large = replace(first, payloads=dict.fromkeys(first.payloads, bytes(CHUNK_BYTES - 1)))
+        for number in range(2):
+            recorder.write(replace(large, number=number))
+    assert len(first.payloads) > 4
+    assert max(sent) < UNWRITTEN + 2 * CHUNK_BYTES
+
+
+def leave_free(monkeypatch, size):
+    monkeypatch.setattr(
+        "shutil.disk_usage", lambda folder: SimpleNamespace(total=1 << 40, free=size)
+    )
+
+
+TOO_LARGE = """
+import resource, signal, sys
+from pathlib import Path
+from roadeval.recording import RecordingError
+from tests.recording.making import record, some_frames
+
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
+try:
+    record(Path(sys.argv[1]), some_frames())
+except RecordingError as error:
+    print(error)
+"""
+
+
+def test_a_file_whose_index_could_not_be_written_does_not_get_its_name(recording, tmp_path):
+    # In a process of its own, for the limit on the size of files holds for all of it.
+    limit = recording.path.stat().st_size * 9 // 10
+    command = [sys.executable, "-c", TOO_LARGE, str(tmp_path / "out.rrd"), str(limit)]
+    root = Path(__file__).resolve().parents[3]
+    done = subprocess.run(
+        command, cwd=root, check=False, capture_output=True, text=True, timeout=60
+    )
+    assert "is the disk full" in done.stdout, done.stderr
+    assert not (tmp_path / "out.rrd").exists()
+
+
+def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(RecordingError, match="cannot be written"), _recorder(tmp_path / "file/out"):
+        pass
+    with pytest.raises(RecordingError, match="is a folder"), _recorder(tmp_path):
+        pass
+    long = tmp_path / f"{300 * 'a'}.rrd"
+    with pytest.raises(RecordingError, match="File name too long"), _recorder(long):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def _recorder(path):
+    return Recorder(path, layout())
+
+
+def test_no_recording_is_made_by_the_recorder_that_does_nothing(drive):
+    with NullRecorder() as recorder:
+        recorder.write(recorder.encode(drive[0], 0, {}))
+        recorder.flush()
+        recorder.finish(RESULTS)

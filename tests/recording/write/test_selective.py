@@ -1,0 +1,163 @@
+"""Which frames' images are kept by a rule, whatever ends the run."""
+
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from roadeval.recording import Recorder, Recording, RecordingError, RecordRule, SelectiveRecorder
+from roadeval.recording.write.picture_store import PictureStore
+from tests.recording.making import layout, lines, result, rows_of
+
+RESULTS = {"summary": "{}"}
+ERRORS = [0.1, 0.5, 0.3, 0.5, 0.2, 0.4, 0.0]
+
+
+def selective(path, rule):
+    return SelectiveRecorder(path, layout(), RecordRule.parse(rule))
+
+
+def write(recorder):
+    for number, err in enumerate(ERRORS):
+        each = result(number, err=err)
+        recorder.write(recorder.encode(each, number, lines(each)))
+
+
+def keep(path, rule):
+    """Record frames of these ERR by a rule."""
+    with selective(path, rule) as recorder:
+        write(recorder)
+        recorder.finish(RESULTS)
+    return Recording(path)
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("rule", "frames"),
+    [("worst:1", [1]), ("worst:2", [1, 3]), ("worst:4", [1, 2, 3, 5]), ("worst:99", range(7))],
+)
+def test_the_worst_frames_pictures_are_kept_and_of_equals_the_earlier(rule, frames, tmp_path):
+    recording = keep(tmp_path / "out.rrd", rule)
+    assert list(recording.frame_numbers) == list(frames)
+    assert list(recording.frames.frame) == list(range(7))
+    for number in frames:
+        mask = next(result(number).variants[0].masks())[1].pixels()
+        np.testing.assert_array_equal(recording.layer("filtered", "post", number), mask)
+
+
+def test_flushed_pictures_are_the_worst(tmp_path):
+    with selective(tmp_path / "out.rrd", "worst:2") as recorder:
+        write(recorder)
+        recorder.flush()
+        assert set(Recording(recorder.partial).frame_numbers) == {1, 3}
+        recorder.finish(RESULTS)
+    assert list(Recording(recorder.path).frame_numbers) == [1, 3]
+
+
+def test_images_wait_in_a_folder_that_is_gone_at_the_end(tmp_path):
+    with selective(tmp_path / "out.rrd", "worst:3") as recorder:
+        assert names(tmp_path) == ["out.partial.rrd"]
+        write(recorder)
+        assert names(tmp_path) == ["out.partial.images", "out.partial.rrd"]
+        recorder.finish(RESULTS)
+    assert names(tmp_path) == ["out.rrd"]
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, SystemExit, ValueError])
+def test_a_run_that_is_stopped_keeps_the_worst_so_far(stop, tmp_path):
+    def stopped(recorder):
+        with recorder:
+            write(recorder)
+            raise stop
+
+    with pytest.raises(stop):
+        stopped(selective(tmp_path / "out.rrd", "worst:3"))
+    assert names(tmp_path) == ["out.partial.rrd"]
+    partial = Recording(tmp_path / "out.partial.rrd")
+    assert not partial.complete
+    assert partial.frame_numbers == (1, 3, 5)
+
+
+@pytest.mark.parametrize("at", [1, 2, 3])
+@pytest.mark.parametrize("owner", [(PictureStore, "get"), (Recorder, "_end_frame")])
+def test_who_stops_a_run_while_the_worst_are_written_keeps_the_rest_of_them(
+    owner, at, tmp_path, monkeypatch
+):
+    calls = []
+    usual = getattr(*owner)
+
+    def interrupted(*given):
+        calls.append(given)
+        if len(calls) == at:
+            raise KeyboardInterrupt
+        return usual(*given)
+
+    def stopped(recorder):
+        with recorder:
+            write(recorder)
+            monkeypatch.setattr(*owner, interrupted)
+            recorder.finish(RESULTS)
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped(selective(tmp_path / "out.rrd", "worst:3"))
+    assert names(tmp_path) == ["out.partial.rrd"]
+    partial = Recording(tmp_path / "out.partial.rrd")
+    assert partial.frame_numbers == (1, 3, 5)
+    shown = rows_of(partial, "/filtered/post", "EncodedImage:blob")
+    assert shown == {1: 1, 2: 0, 3: 1, 4: 0, 5: 1, 6: 0}
+
+
+@pytest.mark.parametrize("rule", ["all", "masks", "every:2", "worst:1"])
+def test_what_a_killed_run_left_goes_whatever_the_next_ones_rule(rule, tmp_path):
+    (tmp_path / "out.partial.images").mkdir()
+    (tmp_path / "out.partial.images" / "3").write_bytes(b"whatever")
+    keep(tmp_path / "out.rrd", rule)
+    assert names(tmp_path) == ["out.rrd"]
+
+
+def test_a_name_that_is_too_long_for_the_folder_alone_will_do_where_no_image_waits(tmp_path):
+    path = tmp_path / f"{240 * 'a'}.rrd"
+    assert keep(path, "all").complete
+
+
+def test_memory_holds_few_pictures_however_many_are_kept(tmp_path):
+    size, count = 1 << 20, 40
+    with selective(tmp_path / "out.rrd", "worst:40") as recorder:
+        plain = recorder.encode(result(0), 0, {})
+        tracemalloc.start()
+        for number in range(count):
+            large = {path: payload.ljust(size, b"0") for path, payload in plain.payloads.items()}
+            recorder.write(replace(plain, number=number, payloads=large))
+        del large
+        held, _ = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+    assert held < 2 * size * len(plain.payloads)
+
+
+def test_frames_that_are_dropped_take_no_room(tmp_path):
+    with selective(tmp_path / "out.rrd", "worst:2") as recorder:
+        plain = recorder.encode(result(0), 0, {})
+        for number in range(50):
+            large = {"/camera": bytes(1 << 20)}
+            recorder.write(replace(plain, number=number, payloads=large, worst_error=number / 50))
+        assert len(names(tmp_path / "out.partial.images")) == 2
+
+
+def test_a_disk_that_fills_up_ends_the_run_with_one_line_and_a_readable_part(tmp_path, monkeypatch):
+    def fail(self, encoded):
+        raise RecordingError("the disk is full")
+
+    def fill(recorder):
+        with recorder:
+            recorder.write(recorder.encode(result(0), 0, {}))
+            monkeypatch.setattr(PictureStore, "put", fail)
+            recorder.write(recorder.encode(result(1), 1, {}))
+
+    recorder = selective(tmp_path / "out.rrd", "worst:3")
+    with pytest.raises(RecordingError, match="the disk is full"):
+        fill(recorder)
+    assert Recording(recorder.partial).frame_numbers == (0,)

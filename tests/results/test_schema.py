@@ -1,0 +1,29 @@
+"""One schema a table: what is written, read and documented is the same."""
+
+import pytest
+
+from roadeval.evaluation.metrics import METRICS
+from roadeval.results.schema import TABLES, Kind, documentation, streamed
+
+
+def test_the_tables_that_grow_frame_by_frame():
+    assert list(streamed()) == ["frames", "regions", "oracles"]
+
+
+@pytest.mark.parametrize("name", ["frames", "oracles", "windows"])
+def test_every_metric_is_a_column(name):
+    rates = [column.name for column in TABLES[name].columns if column.kind is Kind.RATE]
+    assert rates[: len(METRICS)] == list(METRICS)
+
+
+@pytest.mark.parametrize("table", TABLES.values(), ids=TABLES)
+def test_every_column_has_a_name_of_its_own_and_a_line_of_documentation(table):
+    assert len(set(table.names)) == len(table.names)
+    for column in table.columns:
+        assert column.doc
+        assert f"| `{column.name}` | {column.kind} | {column.doc} |" in documentation()
+
+
+def test_the_documentation_is_a_markdown_table_a_table():
+    for name in TABLES:
+        assert f"### {name}.csv" in documentation().splitlines()

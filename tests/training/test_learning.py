@@ -1,0 +1,191 @@
+"""Which frames train, which are left out, and which are evaluated."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import pytest
+
+from roadeval.data import Frame, Role
+from roadeval.errors import RoadevalError
+from roadeval.training import TrainingError, TrainingSettings, held, save_model
+from roadeval.training.learning import from_drives, from_file, from_log, spread
+from roadeval.training.schedule import Schedule
+from tests.training.making import frame, pipelines
+
+PIPELINES = pipelines()
+
+
+@dataclass
+class Logged:
+    """A frame of a log, as `logs` would hand it out."""
+
+    frame: Frame
+    broken: bool = False
+
+    @property
+    def number(self) -> int:
+        return self.frame.number
+
+    @property
+    def labelled(self) -> bool:
+        return self.frame.truth is not None
+
+    def decode(self) -> Frame:
+        if self.broken:
+            raise RoadevalError("cannot be decoded")
+        return self.frame
+
+
+def log(count: int, unlabelled: tuple[int, ...] = (), broken: tuple[int, ...] = ()):
+    return [Logged(frame(n, labelled=n not in unlabelled), n in broken) for n in range(count)]
+
+
+def roles(frames, schedule: Schedule) -> str:
+    """Give the roles' first letters: t(raining), g(ap), u(nlabelled), e(valuated)."""
+    return "".join(schedule.role(f.frame)[0] for f in frames)
+
+
+def learn(logged, *, labelled: bool = True, **settings):
+    wanted = TrainingSettings(**settings)
+    return from_log(lambda: logged, PIPELINES, wanted, lambda done: None, labelled=labelled)
+
+
+def test_the_first_labelled_frames_train_and_the_rest_is_evaluated():
+    frames = log(8, unlabelled=(0, 2))
+    _, schedule = learn(frames, frames=2)
+    assert roles(frames, schedule) == "ututeeee"
+
+
+def test_frames_right_after_training_can_be_left_out():
+    frames = log(8)
+    _, schedule = learn(frames, frames=2, gap=3)
+    assert roles(frames, schedule) == "ttgggeee"
+    assert schedule.first == 5
+
+
+def test_a_frame_that_cannot_be_decoded_is_replaced_by_the_next():
+    frames = log(6, broken=(1,))
+    model, schedule = learn(frames, frames=2)
+    assert model.digests == {frames[0].frame.digest(), frames[2].frame.digest()}
+    assert schedule.first == 3
+
+
+def test_without_truth_the_first_frames_train():
+    frames = log(5, unlabelled=tuple(range(5)))
+    model, schedule = learn(frames, labelled=False, frames=2)
+    assert model.source == "patch"
+    assert roles(frames, schedule) == "ttuuu"
+
+
+def test_where_the_truth_labels_nothing_in_the_range_the_first_frames_train():
+    frames = log(5, unlabelled=tuple(range(5)))
+    model, schedule = learn(frames, frames=2)
+    assert model.source == "patch"
+    assert roles(frames, schedule) == "ttuuu"
+    assert "no frame of the range has road truth: the model learnt from" in model.warnings[0]
+
+
+def test_who_insists_on_truth_is_not_given_the_patch():
+    with pytest.raises(TrainingError, match="no truth to train on"):
+        learn(log(5, unlabelled=tuple(range(5))), frames=2, source="truth")
+
+
+def test_training_frames_are_bounded_in_memory(monkeypatch):
+    # A frame of 24x32 takes three images of 2304 bytes, a truth of 768, and its payload of 2304.
+    monkeypatch.setattr(held, "GREATEST_MEMORY", 3 * 9984)
+    assert not learn(log(6), frames=3)[0].warnings
+    frames = log(6)
+    model, schedule = learn(frames, frames=5, gap=1)
+    assert roles(frames, schedule) == "tttgee"
+    assert "trained on 3 of 5 frames: training holds its frames decoded" in model.warnings[0]
+    monkeypatch.setattr(held, "GREATEST_MEMORY", 9000)
+    with pytest.raises(TrainingError, match=r"more than 0 of them would take .*frames.scale"):
+        learn(log(6), frames=3)
+
+
+@pytest.mark.parametrize(("frames", "gap"), [(4, 0), (2, 2), (9, 0)])
+def test_leaving_no_frame_to_evaluate_is_an_error(frames, gap):
+    with pytest.raises(TrainingError, match=r"none is left to evaluate; lower training\.frames"):
+        learn(log(4), frames=frames, gap=gap)
+
+
+def test_an_image_that_trained_is_recognised_wherever_it_lies():
+    frames = log(5)
+    _, schedule = learn(frames, frames=2)
+    elsewhere = replace(frames[1].frame, number=77, stamp_ns=5)
+    assert schedule.role(elsewhere) is Role.TRAINING
+
+
+def test_a_model_from_a_file_leaves_its_own_frames_out(tmp_path):
+    frames = log(6)
+    model, _ = learn(frames, frames=2)
+    save_model(model, tmp_path / "m.model")
+    _, schedule = from_file(tmp_path / "m.model", PIPELINES)
+    assert roles(frames, schedule) == "tteeee"
+
+
+def test_training_frames_are_spread_over_a_drive():
+    frames = log(20, unlabelled=(0,))
+    chosen = [f.number for f in spread(lambda: frames, 4, labelled=True)]
+    assert chosen == [1, 5, 10, 15]
+
+
+def test_training_frames_reach_the_end_of_a_drive_hardly_longer_than_their_number():
+    chosen = [f.number for f in spread(lambda: log(19), 10, labelled=True)]
+    assert len(chosen) == 10
+    assert chosen[-1] >= 17
+
+
+def test_a_short_drive_gives_what_it_has():
+    assert len(list(spread(lambda: log(3), 10, labelled=True))) == 3
+
+
+def test_all_frames_are_spread_where_the_truth_is_not_asked_for_or_there_is_none():
+    half = log(20, unlabelled=tuple(range(10)))
+    assert [f.number for f in spread(lambda: half, 4, labelled=False)] == [0, 5, 10, 15]
+    bare = log(20, unlabelled=tuple(range(20)))
+    assert [f.number for f in spread(lambda: bare, 4, labelled=True)] == [0, 5, 10, 15]
+
+
+LABELLED = [frame(n) for n in range(2)]
+BARE = [frame(n, labelled=False) for n in range(2, 4)]
+
+
+def of_drives(source: str, **frames):
+    drives = {Path(name): own for name, own in frames.items()}
+    return from_drives(drives, PIPELINES, TrainingSettings(source=source))
+
+
+def test_drives_without_truth_train_by_the_patch_and_this_is_said():
+    model = of_drives("auto", a=BARE)
+    assert model.source == "patch"
+    assert "no drive has road truth in the range: the model learnt from" in model.warnings[0]
+
+
+def test_who_asks_for_the_patch_gets_it_without_a_word():
+    model = of_drives("patch", a=BARE, b=LABELLED)
+    assert (model.source, model.warnings) == ("patch", ())
+
+
+@pytest.mark.parametrize(
+    ("source", "frames"),
+    [
+        ("auto", {"a": LABELLED, "b": BARE}),
+        ("auto", {"a": LABELLED, "b": []}),
+        ("truth", {"b": BARE}),
+    ],
+)
+def test_a_drive_without_truth_among_others_is_named(source, frames):
+    with pytest.raises(TrainingError, match=r"^b: no road truth to train on in the range"):
+        of_drives(source, **frames)
+
+
+def test_a_frame_of_another_size_than_the_training_frames_is_not_hashed(monkeypatch):
+    mine = frame(3)
+    digests = frozenset([mine.digest()])
+    known, unknown = Schedule(digests, sizes=frozenset([len(mine.payload)])), Schedule(digests)
+    assert known.role(mine) is unknown.role(mine) is Role.TRAINING
+    other = replace(mine, payload=bytes(mine.payload) + b"x")
+    assert unknown.role(other) is Role.EVALUATED
+    monkeypatch.setattr(Frame, "digest", lambda _frame: pytest.fail("it was hashed"))
+    assert known.role(other) is Role.EVALUATED
