@@ -1,11 +1,15 @@
 """Charts of the PDF: each number where it belongs, in its own colour."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.colors import to_hex
 
 from roadeval.data import colours
+from roadeval.evaluation.compared import MaskComparison
+from roadeval.evaluation.uncertainty import Difference
 from roadeval.report.figures import charts
 from roadeval.report.findings import ErrorHeatmap
 
@@ -74,13 +78,11 @@ def test_the_covered_share_is_in_percent():
 
 
 def test_a_comparison_shows_changes_with_their_intervals_and_levels_without():
-    change = {"mean": 0.01, "low": -0.02, "high": 0.04}
-    row = {
-        "result": "new",
-        "variant": "filtered",
-        "difference": {"ERR": change, "FPR": change | {"low": None}, "FNR": change},
-        "new": {"ERR": 0.1, "FPR": 0.2, "FNR": 0.3},
-    }
+    change = Difference(0.01, -0.02, 0.04, 0.95, None, 12, None, None, None)
+    unsure = replace(change, low=None, high=None)
+    new = {"ERR": 0.1, "FPR": 0.2, "FNR": 0.3}
+    changes = {"ERR": change, "FPR": unsure, "FNR": change}
+    row = MaskComparison("new", "filtered", "post", True, 12, {}, new, changes)
     first, second, _ = charts.forest([row]).axes
     mean, interval, _ = first.lines
     assert mean.get_xdata() == pytest.approx([1])
