@@ -1,15 +1,16 @@
 """Logged-replay evaluation and visualisation of road recognition.
 
-For a notebook::
+A drive is replayed, and its recording read, without the terminal:
 
-    import roadeval
-
-    outcome = roadeval.replay("drive.mcap", save="out.rrd")
-    outcome.summary["totals"]["filtered"]["post"]["ERR"]
-
-    recording = roadeval.Recording("out.rrd")
-    recording.frames.groupby("variant").ERR.mean()
-    recording.layer("filtered", "ndi", frame=40)
+>>> import roadeval
+>>> outcome = roadeval.replay("drive.mcap", save="out.rrd")
+>>> 0 <= outcome.summary["totals"]["filtered"]["post"]["ERR"] <= 1
+True
+>>> recording = roadeval.Recording("out.rrd")
+>>> sorted(recording.frames.groupby("variant").ERR.mean().index)
+['blind', 'filtered', 'unfiltered']
+>>> recording.layer("filtered", "ndi", frame=12).shape
+(48, 64)
 """
 
 from importlib import import_module

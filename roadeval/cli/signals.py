@@ -1,10 +1,10 @@
-"""SIGINT and SIGTERM become one exception that unwinds the work, so that it ends tidily."""
+"""SIGINT and SIGTERM as an exception that unwinds the work, so that outputs are closed."""
 
 from __future__ import annotations
 
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Final, NoReturn
 
@@ -17,7 +17,7 @@ EXIT_CODES: Final = {
 
 
 class Stopped(SystemExit):
-    """The user or the system asked us to stop; open outputs are closed on the way out."""
+    """The user or the system asked the process to stop."""
 
     def __init__(self, exit_code: ExitCode) -> None:
         super().__init__(int(exit_code))
@@ -26,8 +26,16 @@ class Stopped(SystemExit):
 
 @contextmanager
 def raised() -> Iterator[None]:
-    """Turn the first SIGINT or SIGTERM into `Stopped`; a second one ends the process at once."""
-    before = {number: signal.signal(number, _stop) for number in EXIT_CODES}
+    """Turn the first SIGINT or SIGTERM into `Stopped`; a second one ends the process at once.
+
+    Python accepts handlers from the main thread only. In any other thread the signals keep the
+    handlers that they have.
+    """
+    before = {}
+    # `signal.signal` raises a ValueError outside the main thread.
+    with suppress(ValueError):
+        for number in EXIT_CODES:
+            before[number] = signal.signal(number, _stop)
     try:
         yield
     finally:

@@ -1,4 +1,4 @@
-"""The facts that travel between the rooms: frozen, typed, and free of any library but NumPy.
+"""The types that are passed between the packages: frozen, typed, with no library but NumPy.
 
 Images are ``(H, W, 3)`` uint8 RGB, masks ``(H, W)`` uint8 with 1 for road (or shadow) and 0
 otherwise, or `Packed`. Times are integer nanoseconds since the Unix epoch, or whatever epoch the

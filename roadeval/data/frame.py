@@ -1,4 +1,4 @@
-"""A camera frame as it travels: image, times, truth, and what it is used for."""
+"""A camera frame: image, times, truth, and what it is used for."""
 
 from __future__ import annotations
 

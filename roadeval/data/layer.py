@@ -1,4 +1,4 @@
-"""Layers: the named arrays that stages hand out, and how each is to be read and coloured."""
+"""Layers: the named arrays that stages return, and how each is read and coloured."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Masks with 64 pixels a word: what is asked of a mask is asked of so many pixels at once."""
+"""Masks packed as bits, 64 pixels a word."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Packed:
         return len(self.bits), self.width
 
     def pixels(self) -> Plane:
-        """Give ``(H, W)`` uint8, 0 or 1."""
+        """Return ``(H, W)`` uint8, 0 or 1."""
         return unpack(self.bits, self.width)
 
     def area(self) -> int:
@@ -55,14 +55,14 @@ def ones(bits: Bits) -> int:
 
 @lru_cache(maxsize=8)
 def everywhere(shape: tuple[int, int]) -> Bits:
-    """Give the mask that holds every pixel of an image of ``shape`` (H, W): shared, read-only."""
+    """Return the mask that holds every pixel of an image of ``shape`` (H, W): shared, read-only."""
     bits = pack(np.ones(shape, np.uint8))
     bits.flags.writeable = False
     return bits
 
 
 def unpack(bits: Bits, width: int) -> Plane:
-    """Give the ``(H, width)`` uint8 mask, 0 or 1, that was packed."""
+    """Return the ``(H, width)`` uint8 mask, 0 or 1, that was packed."""
     return np.unpackbits(bits.view(np.uint8), axis=1, count=width, bitorder="little")
 
 
@@ -86,7 +86,7 @@ class TruthBits:
         return self.road | self.other
 
     def bits_of(self, masks: Iterable[Packed]) -> Bits:
-        """Lay the bits of masks of the truth's shape one behind the other: ``(K, H, words)``.
+        """Stack the bits of masks of the truth's shape: ``(K, H, words)``.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""What the variants made of a frame, stage by stage, and how it was scored."""
+"""Results of a frame: what each variant's stages computed, and its score."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class VariantResult:
             yield from result.output.layers
 
     def final(self) -> Mask:
-        """Give the pixels of the last stage's mask, ``(H, W)`` uint8."""
+        """Return the pixels of the last stage's mask, ``(H, W)`` uint8."""
         *_, (_, mask) = self.masks()
         return mask.pixels()
 
@@ -121,7 +121,7 @@ class FrameResult:
     oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)
 
     def without_layers(self) -> FrameResult:
-        """Give what is left to sum up once the pictures, which take most memory, are encoded."""
+        """Return the result without layers, which take most memory, for summing up."""
         variants = tuple(
             VariantResult(v.variant, tuple(stage.without_layers() for stage in v.stages))
             for v in self.variants

@@ -1,1 +1,1 @@
-"""Counts and rates against the truth (Eq. 24-29), and what can be said of them."""
+"""Counts and metrics against the truth (Eq. 24-29), regions, intervals and comparisons."""

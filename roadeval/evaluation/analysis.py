@@ -1,4 +1,4 @@
-"""What the tables say, read again: totals, rows, pairs, regions, and which stage broke a frame.
+"""Analysis of the tables: totals, windows, paired differences, regions, causes, worst frames.
 
 Everything is computed from ``frames.csv`` and ``regions.csv`` alone, so that a recording of a run
 that was killed is understood as well as a complete one.
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 OUTCOMES: Final = ("TP", "TN", "FP", "FN")
 FILTER: Final = "filter"
-"""Stands among the stages for what the shadow filter changed in the mask of a stage after it."""
+"""The part of an error rate that the filter caused, beside the stages'."""
 
 
 def settings_of(summary: Mapping[str, Any]) -> EvaluationSettings:
@@ -191,7 +191,7 @@ def causes(frames: pd.DataFrame, variant: str) -> pd.DataFrame:
 
 
 def _errors(frames: pd.DataFrame, variant: str) -> pd.DataFrame:
-    """Spread a variant's ERR: a row a frame, a column a stage, in the order the stages ran."""
+    """Return a variant's ERR: a row a frame, a column a stage, in the order the stages ran."""
     rows = frames[frames["variant"] == variant]
     stages = rows["stage"].unique()
     # Where ERR is undefined on every frame there are rows and columns all the same.

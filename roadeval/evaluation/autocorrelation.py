@@ -1,10 +1,10 @@
-"""How much the frames of a drive say about a mean: they resemble their neighbours.
+"""The standard error of a mean over frames that resemble their neighbours.
 
 The standard error is that of the Γ-method [1]_: the autocovariances are summed up to a window that
 weighs what is left out against the noise of what is taken in, and corrected for having subtracted
-the sample's own mean. It assumes no shape of the correlation. Whether there are frames enough to
-trust it is asked of a first-order autoregression as well, which is steadier on a short series, and
-of both at two standard errors to the cautious side.
+the sample's own mean. It assumes no shape of the correlation. The effective number of frames is
+estimated by a first-order autoregression as well, which is steadier on a short series; the smaller
+of both, each two standard errors below its estimate, is the cautious number.
 
 References
 ----------
@@ -79,7 +79,7 @@ def error_of_mean(series: Series) -> MeanError:
 
 
 def autocovariance(series: Series) -> Series:
-    """Give the autocovariances at lags 0 to n-1, each a sum of products over n (not n minus lag).
+    """Compute the autocovariances at lags 0 to n-1, each a sum of products over n, not n - lag.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def _sum(covariance: Series, window: int) -> float:
 
 
 def _cautious_autoregression(covariance: Series, n: int) -> float:
-    """Give the effective frames of a first-order autoregression, its coefficient freed of bias [2].
+    """Compute the effective frames of a first-order autoregression, bias-corrected [2].
 
     The coefficient is taken two standard errors above its estimate.
     """

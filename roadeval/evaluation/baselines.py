@@ -1,4 +1,4 @@
-"""The baseline: what a mask is worth that never looks at the image."""
+"""The baseline: a mask from the training frames' truth alone, whatever the image shows."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ class BlindPrior:
         return cls(np.divide(road, labelled, out=np.zeros_like(road), where=labelled > 0))
 
     def mask(self, shape: tuple[int, int]) -> Packed:
-        """Give the baseline's mask for a frame of ``shape`` (height, width): road from one half.
+        """Return the baseline's mask for a frame of ``shape`` (height, width): road from one half.
 
-        The same mask is given again for the same shape; it is not to be written to.
+        It is computed once for a shape, and read-only.
         """
         if shape not in self._masks:
             mask = Packed.of(_resized(self.road, shape, _LINEAR) >= 0.5)

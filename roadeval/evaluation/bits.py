@@ -1,4 +1,4 @@
-"""What is asked of masks as bits, 64 pixels a word, so that many are counted in one pass."""
+"""Operations on masks packed as bits, 64 pixels a word."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ def grow(bits: Bits, reach: Reach, truth: TruthBits) -> Bits:
 
 @lru_cache(maxsize=8)
 def square(radius: int) -> Reach:
-    """Give the element of ``radius`` pixels in chessboard distance, ``(radius + 1,)`` int64."""
+    """Return the element of ``radius`` pixels in chessboard distance, ``(radius + 1,)`` int64."""
     return np.full(radius + 1, radius)
 
 
 @lru_cache(maxsize=8)
 def disk(radius: int) -> Reach:
-    """Give the element of ``radius`` pixels in Euclidean distance, ``(radius + 1,)`` int64."""
+    """Return the element of ``radius`` pixels in Euclidean distance, ``(radius + 1,)`` int64."""
     return np.array([isqrt(radius**2 - row**2) for row in range(radius + 1)])
 
 

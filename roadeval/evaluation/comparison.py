@@ -1,4 +1,4 @@
-"""Two or more results side by side: what changed, on the same frames, and how sure that is.
+"""Comparison of results: what changed on the same frames, with intervals.
 
 Results of the same log are matched frame by frame, by their stamps; a frame that either trained
 on, or that either lacks, is left out of both. Results of different logs are only put side by side:

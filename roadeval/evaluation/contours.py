@@ -1,4 +1,4 @@
-"""How well a mask follows the road's edge, however large the areas on either side of it are."""
+"""Boundary F: how well a mask follows the road's edge, whatever the areas beside it."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def edge_of(labels: TruthBits) -> Bits:
 
 
 def _f_measure(edge: Bits, near_truth: Bits, true_edge: Bits, near: Bits) -> float:
-    """Give F of two edges and their neighbourhoods."""
+    """Compute F of two edges and their neighbourhoods."""
     p, q = ones(edge), ones(true_edge)
     if not p or not q:
         return 0.0 if p or q else math.nan

@@ -38,7 +38,7 @@ def count(masks: Bits, truth: TruthBits, regions: Sequence[Bits]) -> Sums:
 
 
 def error_map(mask: Mask, truth: Truth) -> Layer:
-    """Say of each pixel how it came out, in the classes of `roadeval.data.ERRORS`.
+    """Classify each pixel by its outcome, as in `roadeval.data.ERRORS`.
 
     Parameters
     ----------

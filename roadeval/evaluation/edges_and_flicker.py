@@ -1,4 +1,4 @@
-"""What the drive's final masks are worth beyond counts: their edges, and their steadiness."""
+"""Boundary F and flicker of a drive's final masks, averaged over its frames."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Flicker:
 
     ``flicker = sum |m_t != m_(t-1)| / sum |L_t|`` over all pairs of consecutive frames, where
     ``L_t`` are the pixels that both truths label. The truth's own, counted alike, stands beside
-    it: what moves must change, and only what is more than that is unrest. Motion is not taken
+    it: moving things must change, and only what exceeds that is flicker. Motion is not taken
     out, as it is in [1]_ by optical flow.
 
     References
@@ -46,11 +46,11 @@ class Flicker:
             self._changed[name] += ones((masks[name].bits ^ before[1][name].bits) & labelled)
 
     def interrupt(self) -> None:
-        """Say that the next frame does not follow the one before."""
+        """Note that the next frame does not follow the one before."""
         self._before = None
 
     def totals(self, name: str) -> dict[str, Any]:
-        """Give ``flicker``, ``truth_flicker`` and the number of ``pairs``; None without a pair."""
+        """Return ``flicker`` and ``truth_flicker``, None without a pair, and the ``pairs``."""
         labelled = self._labelled[name]
         return {
             "flicker": self._changed[name] / labelled if labelled else None,
@@ -87,11 +87,11 @@ class EdgesAndFlicker:
         self._flicker.add(result.truth_bits, finals)
 
     def interrupt(self) -> None:
-        """Say that a frame was lost here."""
+        """Note that a frame was lost here."""
         self._flicker.interrupt()
 
     def totals(self) -> dict[str, dict[str, Any]]:
-        """Give by variant: mean ``boundary_F`` over ``frames`` that have it, and the flicker.
+        """Return by variant: mean ``boundary_F`` over ``frames`` that have it, and the flicker.
 
         The baseline, whose mask is always the same, has no flicker.
 

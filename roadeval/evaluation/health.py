@@ -1,4 +1,4 @@
-"""How a variant fared on a frame: a verdict for the state lanes, and sentences for a person."""
+"""A variant's health on a frame (ok, degraded, failed), and notes for a person."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ Rates = Mapping[str, float]
 
 
 def judge(rates: Rates, blind: Rates | None, settings: EvaluationSettings) -> Health:
-    """Judge a variant's final mask by its rates and those of the baseline, if there is one.
+    """Return a variant's health by its final mask's rates and the baseline's, if there is one.
 
-    An undefined rate speaks neither for nor against it. The thresholds and their reasons stand in
+    An undefined rate counts neither for nor against it. The thresholds and their reasons stand in
     `EvaluationSettings`.
     """
     if rates["ERR"] >= settings.failed_err or rates["FNR"] >= settings.failed_fnr:
@@ -27,7 +27,7 @@ def judge(rates: Rates, blind: Rates | None, settings: EvaluationSettings) -> He
 def notes(
     finals: Mapping[str, Rates], blind: Rates | None, settings: EvaluationSettings
 ) -> tuple[str, ...]:
-    """Say what a person should know of a frame.
+    """Return what a person should know of a frame, in sentences.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where and when pixels go wrong, summed up over masks: heat maps, and what a step changed."""
+"""Heat maps of errors, and the pixels that one mask repairs or spoils against another."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class HeatMap:
             np.add(total, found, out=total)
 
     def cells(self) -> tuple[int, Sums]:
-        """Give the sums.
+        """Return the sums.
 
         Returns
         -------

@@ -82,7 +82,7 @@ def score_frame(
 def tally(
     names: Sequence[Name], masks: Bits, truth: TruthBits, found: Mapping[str, Bits]
 ) -> tuple[Tally, ...]:
-    """Count named masks in the regions ``found``, and prove that no pixel was lost.
+    """Count named masks in the regions ``found``, and check that no pixel was lost.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def tally(
         whole.
     """
     counted = counts.count(masks, truth, list(found.values()))
-    prove(names, counted, list(found), ones(truth.labelled))
+    check_conserved(names, counted, list(found), ones(truth.labelled))
     tallies = []
     for (variant, stage), rows in zip(names, counted.tolist(), strict=True):
         whole, *parts = (Counts(*row) for row in rows)
@@ -100,8 +100,10 @@ def tally(
     return tuple(tallies)
 
 
-def prove(names: Sequence[Name], counted: Sums, found: Sequence[str], labelled: int) -> None:
-    """Prove ``TP + TN + FP + FN = N = pixels - ignored``, and that the regions are parts of it.
+def check_conserved(
+    names: Sequence[Name], counted: Sums, found: Sequence[str], labelled: int
+) -> None:
+    """Check that ``TP + TN + FP + FN = N = pixels - ignored``, and that the regions add up.
 
     Where regions that together are the frame are among those ``found``, as the row bands are,
     their counts must add up to the whole's. ``counted`` is as `roadeval.evaluation.counts.count`

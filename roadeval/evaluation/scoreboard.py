@@ -1,4 +1,4 @@
-"""The scoreboard of a drive: frames are scored one by one, added in order, and summed up."""
+"""The scoreboard of a drive: frames are scored one by one, added in order and summed up."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ COMPARED: Final = tuple(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sums:
+class DriveSums:
     """What the drive's tables of sums hold: its windows, changes of masks, and heat maps."""
 
     windows: Sequence[windows.Window]
@@ -109,12 +109,12 @@ class Scoreboard:
         self._frames.append(result.frame.number)
 
     def lose(self) -> None:
-        """Say that a frame was read here and could not be decoded."""
+        """Note that a frame was read here and could not be decoded."""
         self._beyond.interrupt()
 
-    def sums(self) -> Sums:
+    def sums(self) -> DriveSums:
         """Sum up the drive for its tables; nothing without a score."""
-        return Sums(tuple(self.windows()), self._maps.changes, self._maps.heat)
+        return DriveSums(tuple(self.windows()), self._maps.changes, self._maps.heat)
 
     def roles(self) -> dict[str, int]:
         """Count the frames added so far by role."""
@@ -141,7 +141,7 @@ class Scoreboard:
         return heapq.merge(*rows, key=attrgetter("number"))
 
     def differences(self) -> dict[str, dict[str, Difference]]:
-        """Give the paired difference, filtered minus unfiltered, by stage and rate.
+        """Return the paired difference, filtered minus unfiltered, by stage and rate.
 
         Empty where one of the two variants is missing. Frames on which the rate is undefined for
         either are left out.
@@ -156,7 +156,7 @@ class Scoreboard:
         }
 
     def summary(self) -> dict[str, Any]:
-        """Give the parts of ``summary.json`` that the evaluation knows, fit for JSON."""
+        """Return the parts of ``summary.json`` that the evaluation knows, fit for JSON."""
         differences = self.differences()
         return {
             "verdict": self._verdict(differences),

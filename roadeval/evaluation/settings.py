@@ -31,7 +31,7 @@ class EvaluationSettings:
         A frame whose ERR exceeds that of ``blind`` by more than this is degraded too: there, not
         looking at the image would have been better.
     noteworthy
-        The least change of ERR by the filter, or excess over ``blind``, that earns a note.
+        The least change of ERR by the filter, or excess over ``blind``, that is noted.
     confidence
         Of the interval around a difference.
     effective_frames

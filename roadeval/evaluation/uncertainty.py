@@ -1,4 +1,4 @@
-"""Differences between the variants: how large, and how sure.
+"""Mean differences between variants, and the intervals around them.
 
 Both variants see the same frames, so their rates are subtracted frame by frame and the differences
 averaged. The interval around that mean is Student's, of the standard error and the degrees of

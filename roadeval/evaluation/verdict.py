@@ -1,4 +1,4 @@
-"""The answer in a sentence to whether the filter helps on this drive."""
+"""The verdict: a sentence that answers whether the filter helps on this drive."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NO_PAIR: Final = f"No verdict on a filter: {FILTERED} and {UNFILTERED} were not 
 
 
 def verdict(difference: Difference, rate: str, stage: str) -> str:
-    """Say what a difference, filtered minus unfiltered, of an error rate means.
+    """Return what a difference, filtered minus unfiltered, of an error rate means.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Rows of ten evaluated frames: "an average based on 10 frames" (section 5)."""
+"""Windows of ten evaluated frames: "an average based on 10 frames" (section 5)."""
 
 from __future__ import annotations
 

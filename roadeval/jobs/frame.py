@@ -97,8 +97,13 @@ def run_frame(
 
     Examples
     --------
-    >>> result = roadeval.run_frame(image, roadeval.load_model("city.model"))  # doctest: +SKIP
-    >>> {layer.spec.name: layer.array.shape for layer in result.layers()}  # doctest: +SKIP
+    >>> import roadeval
+    >>> image = roadeval.Recording("out.rrd").image(frame=12)
+    >>> result = roadeval.run_frame(image, roadeval.load_model("city.model"))
+    >>> [stage.stage for stage in result.stages]
+    ['shadow', 'similarity', 'svm', 'post']
+    >>> {layer.spec.name: layer.array.shape for layer in result.layers()}["compensated"]
+    (48, 64, 3)
     """
     chains = bind((config or RunConfig()).variants(), model)
     if variant not in chains:

@@ -29,8 +29,8 @@ RUN: Final = "run.toml"
 class ResultsWriter:
     """Writes a results folder while frames arrive; to be used as a context.
 
-    Leaving the context without `finish` removes what was begun, the folder too if it was made for
-    it, and leaves earlier results as they were.
+    Leaving the context without `finish` removes what was begun and leaves earlier results as they
+    were.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class ResultsWriter:
         return {name: table.stated for name, table in self._open.items() if table.rows}
 
     def finish(self, summary: Mapping[str, Any], run_toml: str) -> list[Path]:
-        """Give all files their names, the summary last.
+        """Rename all files to their own names, the summary last.
 
         A table without rows is not there, nor is that of an earlier run: it would not belong to
         this summary.
@@ -139,7 +139,7 @@ class _Growing:
         self._write(lines)
 
     def complete(self) -> bool:
-        """Give the file its name, and return True; without rows, leave none of that name."""
+        """Rename the file to its own name and return True; without rows remove it."""
         self._file.close()
         if self.rows:
             self._temporary.replace(self.path)

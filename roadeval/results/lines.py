@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from roadeval.data import Change, Counts, FrameResult, Step, Tally
 from roadeval.evaluation.maps import HeatMap
-from roadeval.evaluation.scoreboard import Sums
+from roadeval.evaluation.scoreboard import DriveSums
 from roadeval.evaluation.windows import Window
 
 Row = tuple[str | int | float, ...]
@@ -45,7 +45,7 @@ def lines(result: FrameResult) -> dict[str, str]:
     return {name: text for name, text in texts.items() if text}
 
 
-def sum_lines(sums: Sums) -> dict[str, str]:
+def sum_lines(sums: DriveSums) -> dict[str, str]:
     """Return the lines of each table that sums up the drive; none where nothing was scored."""
     rows = {
         "windows": window_rows(sums.windows),

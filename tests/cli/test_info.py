@@ -8,6 +8,7 @@ import pytest
 
 from roadeval.cli.app import main
 from roadeval.logs import LogWriter
+from tests.fixtures.make import make
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND
@@ -65,8 +66,8 @@ def test_json_holds_the_same(write, capsys):
     assert "topics.image" in found["problem"]
 
 
-def test_damage_is_told_and_has_its_exit_code(data, capsys):
-    assert main(["info", str(data / "mcap" / "broken" / "trunc_midchunk.mcap")]) == 3
+def test_damage_is_told_and_has_its_exit_code(tmp_path, capsys):
+    assert main(["info", str(make("broken/trunc_midchunk.mcap", tmp_path))]) == 3
     assert capsys.readouterr().err.startswith("roadeval: lost: trunc_midchunk.mcap: ")
 
 

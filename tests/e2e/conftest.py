@@ -5,12 +5,14 @@ import os
 import pickle
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import pytest
 
 from roadeval.logs import LogWriter
-from tests.e2e.commands import DEMO, Replayed, Run, replay, roadeval
+from tests.e2e.commands import CLASSES, DEMO, Replayed, Run, replay, roadeval
+from tests.fixtures.make import make
 from tests.training.making import frame
 
 
@@ -34,8 +36,8 @@ def once(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def demo(once) -> Replayed:
-    """The synthetic drive that ships with the project."""
-    return once("demo", lambda folder: replay(folder, DEMO).run)
+    """The synthetic drive that ships with the project, replayed by the installed program."""
+    return once("demo", lambda folder: replay(folder, DEMO, run=roadeval).run)
 
 
 @pytest.fixture(scope="session")
@@ -46,26 +48,33 @@ def at_home(once):
     return done.run, done.folder
 
 
-@pytest.fixture(scope="session")
-def street(once, data) -> Replayed:
-    """A street at 15 Hz whose truth is class ids: 3 is road, 11 is to be ignored."""
-    drive = data / "drives" / "camvid_0016E5_15hz.mcap"
-    labels = ("--road-label", 3, "--ignore-label", 11)
-    return once("street", lambda folder: replay(folder, drive, *labels).run)
+def of_drive(name: str, *words: Any) -> Callable[[Path], Run]:
+    """Return what replays one of the small drives."""
+    return lambda folder: replay(folder, make(f"drives/{name}.mcap", folder), *words).run
 
 
 @pytest.fixture(scope="session")
-def car_park(once, data) -> Replayed:
-    """Streets and a car park at 1 Hz whose truth is a mask that needs no explanation."""
-    drive = data / "drives" / "camvid_0006R0_1hz.mcap"
-    return once("car_park", lambda folder: replay(folder, drive).run)
+def street(once) -> Replayed:
+    """A street whose truth is class ids: 3 is road, 11 is to be ignored."""
+    return once("street", of_drive("street", *CLASSES))
 
 
 @pytest.fixture(scope="session")
-def unlabelled(once, data) -> Replayed:
-    """A city drive without truth."""
-    drive = data / "drives" / "ford_shadows_unlabelled_raw.mcap"
-    return once("unlabelled", lambda folder: replay(folder, drive).run)
+def car_park(once) -> Replayed:
+    """A drive whose truth is a mask that needs no explanation."""
+    return once("car_park", of_drive("car_park"))
+
+
+@pytest.fixture(scope="session")
+def unlabelled(once) -> Replayed:
+    """A drive without truth."""
+    return once("unlabelled", of_drive("unlabelled"))
+
+
+@pytest.fixture(scope="session")
+def sparse(once) -> Replayed:
+    """A replay that keeps the pictures of every seventh frame."""
+    return once("sparse", of_drive("street", *CLASSES, "--record", "every:7"))
 
 
 @pytest.fixture(scope="session")

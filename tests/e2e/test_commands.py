@@ -2,7 +2,7 @@
 
 import json
 
-from tests.e2e.commands import DEMO, roadeval
+from tests.e2e.commands import DEMO, here, roadeval
 
 
 def test_outputs_land_in_recordings_and_reports_of_the_current_folder(at_home):
@@ -19,13 +19,13 @@ def test_json_prints_the_summary_and_nothing_else(at_home):
 
 
 def test_a_model_is_never_evaluated_on_the_frames_that_trained_it(tmp_path):
-    model, first = tmp_path / "demo.model", ("--end", 2)
+    model, first = tmp_path / "demo.model", ("--end", 1)
     trained = roadeval("train", DEMO, "-o", model, "--train-frames", 4, *first)
     assert trained.returncode == 0, trained.stderr
     assert f"{model}: filtered, unfiltered; trained on 4 frames" in trained.stdout
-    run = roadeval("replay", DEMO, "--model", model, "--record", "none", *first, cwd=tmp_path)
+    run = here("replay", DEMO, "--model", model, "--record", "none", *first, cwd=tmp_path)
     assert run.returncode == 0, run.stderr
-    assert "4 trained on, 16 evaluated" in run.stdout
+    assert "4 trained on, 6 evaluated" in run.stdout
     assert not list(tmp_path.rglob("*.rrd"))
 
 

@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from tests.e2e.commands import DEMO, Replayed, replay, roadeval
+from tests.e2e.commands import DEMO, Replayed, here, replay, roadeval
 from tests.report.making import text
 
 LIMIT = ("--fail-if", "post.filtered.ERR > +0.5pp")
@@ -16,7 +16,7 @@ def worse(tmp_path_factory) -> Replayed:
     """The demo's first frames with a classifier that is known to fail."""
     folder = tmp_path_factory.mktemp("worse")
     (folder / "worse.toml").write_text('[svm]\nkernel = "linear"\n[post]\nfill = false\n')
-    words = ("--config", folder / "worse.toml", "--max-frames", 30, "--record", "none")
+    words = ("--config", folder / "worse.toml", "--max-frames", 20, "--record", "none")
     return replay(folder, DEMO, *words)
 
 
@@ -31,7 +31,7 @@ def test_a_recording_against_itself_differs_by_nothing(demo):
 
 
 def test_a_recording_against_its_own_results_folder_differs_by_nothing_to_the_last_digit(demo):
-    run = roadeval("compare", demo.recording, demo.reports, "--json")
+    run = here("compare", demo.recording, demo.reports, "--json")
     means = [
         told["mean"]
         for change in json.loads(run.stdout)["changes"]
@@ -41,7 +41,7 @@ def test_a_recording_against_its_own_results_folder_differs_by_nothing_to_the_la
 
 
 def test_a_worse_configuration_ends_with_4_and_the_sentence_that_says_why(demo, worse):
-    run = roadeval("compare", demo.recording, worse.reports, *LIMIT)
+    run = here("compare", demo.recording, worse.reports, *LIMIT)
     assert run.returncode == 4
     (why,) = (line for line in run.stderr.splitlines() if "post.filtered.ERR" in line)
     assert "post.filtered.ERR > +0.5pp holds" in why
@@ -50,13 +50,13 @@ def test_a_worse_configuration_ends_with_4_and_the_sentence_that_says_why(demo, 
 
 def test_a_limit_that_is_kept_ends_with_0(demo, worse):
     kept = ("--fail-if", "post.filtered.ERR < -50pp", "--fail-if", "post.filtered.ERR > 99%")
-    assert roadeval("compare", demo.recording, worse.reports, *kept).returncode == 0
+    assert here("compare", demo.recording, worse.reports, *kept).returncode == 0
 
 
 def test_the_files_are_written_by_their_endings(demo, worse, tmp_path):
     names = [tmp_path / f"change.{ending}" for ending in ("pdf", "md", "json")]
     words = [word for name in names for word in ("-o", name)]
-    run = roadeval("compare", demo.recording, worse.reports, *words, *LIMIT, "-q")
+    run = here("compare", demo.recording, worse.reports, *words, *LIMIT, "-q")
     assert run.returncode == 4
     assert run.stdout == ""
     document, markdown, content = (name.read_bytes() for name in names)
@@ -71,7 +71,7 @@ def test_the_files_are_written_by_their_endings(demo, worse, tmp_path):
 
 
 def test_the_variants_of_one_recording_are_compared_with_each_other(demo):
-    run = roadeval("compare", demo.recording, "--json")
+    run = here("compare", demo.recording, "--json")
     assert run.returncode == 0, run.stderr
     content = json.loads(run.stdout)
     assert [each["label"] for each in content["results"]] == ["unfiltered", "filtered"]
@@ -87,7 +87,7 @@ def test_a_damaged_table_is_named_in_one_line(command, kept, worse, tmp_path):
     whole = (folder / "frames.csv").read_bytes()
     (folder / "frames.csv").write_bytes(whole[: int(kept * len(whole))])
     outputs = ("-o", tmp_path / "out.pdf") if command == "report" else ()
-    run = roadeval(command, folder, *outputs)
+    run = here(command, folder, *outputs)
     assert run.returncode == 1
     assert f"{folder / 'frames.csv'}: damaged" in run.stderr
     assert len(run.stderr.splitlines()) == 1
@@ -103,7 +103,7 @@ def test_a_damaged_table_is_named_in_one_line(command, kept, worse, tmp_path):
     ],
 )
 def test_what_cannot_be_done_is_one_line(words, code, said, demo):
-    run = roadeval("compare", demo.recording, demo.reports, *words)
+    run = here("compare", demo.recording, demo.reports, *words)
     assert run.returncode == code
     assert said in run.stderr
     assert len(run.stderr.splitlines()) == 1
@@ -112,7 +112,7 @@ def test_what_cannot_be_done_is_one_line(words, code, said, demo):
 def test_where_err_is_undefined_on_every_frame_it_is_said(ignored, tmp_path):
     names = [tmp_path / f"change.{ending}" for ending in ("pdf", "md", "json")]
     words = [word for name in names for word in ("-o", name)]
-    run = roadeval("compare", ignored.reports, *words)
+    run = here("compare", ignored.reports, *words)
     assert run.returncode == 0, run.stderr
     assert "filtered: ERR is undefined on every frame\n" in run.stdout
     assert "no interval" not in run.stdout

@@ -12,7 +12,7 @@ from roadeval.errors import RoadevalError
 from roadeval.jobs import inspect as inspecting
 from roadeval.jobs.result import Opened
 from roadeval.recording.screen import viewer
-from tests.e2e.commands import DEMO, replay, roadeval
+from tests.e2e.commands import DEMO, here, replay, roadeval
 
 DRIVER = Path("/usr/share/vulkan/icd.d")
 drawable = pytest.mark.skipif(
@@ -41,7 +41,7 @@ def test_the_list_begins_with_the_worst_frame_and_says_why(demo):
 
 
 def test_the_list_fits_the_terminal(demo):
-    run = roadeval("inspect", demo.reports, "--list")
+    run = here("inspect", demo.reports, "--list")
     assert run.returncode == 0, run.stderr
     assert max(map(len, run.stdout.splitlines())) <= 80
 
@@ -76,13 +76,6 @@ def test_without_a_frame_the_worst_is_drawn_and_named(demo, told):
     said = f"frame {worst(demo)}, the worst (--frame N or --worst K takes another)\n"
     assert told(demo.recording) == said
     assert told(demo.recording, "--frame", "12") == "frame 12\n"
-
-
-@pytest.fixture(scope="module")
-def sparse(tmp_path_factory):
-    """A replay that keeps the pictures of every seventh frame."""
-    words = ("--max-frames", 60, "--record", "every:7")
-    return replay(tmp_path_factory.mktemp("sparse"), DEMO, *words)
 
 
 def test_the_frame_that_is_drawn_is_the_worst_of_those_that_have_pictures(sparse, told):
@@ -190,14 +183,14 @@ def test_where_nothing_was_scored_the_first_frame_is_drawn(unlabelled, told):
     ],
 )
 def test_what_cannot_be_done_is_one_line(words, code, said, demo):
-    run = roadeval("inspect", demo.recording, *words)
+    run = here("inspect", demo.recording, *words)
     assert run.returncode == code
     assert said in run.stderr
     assert len(run.stderr.splitlines()) == 1
 
 
 def test_a_results_folder_has_nothing_to_open(demo):
-    run = roadeval("inspect", demo.reports, "--frame", 12)
+    run = here("inspect", demo.reports, "--frame", 12)
     assert run.returncode == 1
     assert "give the recording (.rrd)" in run.stderr
 
@@ -205,6 +198,6 @@ def test_a_results_folder_has_nothing_to_open(demo):
 def test_without_a_screen_the_way_out_is_told(demo, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    run = roadeval("inspect", demo.recording, "--frame", 12)
+    run = here("inspect", demo.recording, "--frame", 12)
     assert run.returncode == 1
     assert "--screenshot FILE.png" in run.stderr

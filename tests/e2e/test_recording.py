@@ -1,5 +1,6 @@
 """What the recording holds is what the tables say."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from roadeval import Recording
 from tests.e2e.commands import DEMO, replay
+from tests.fixtures.make import make
 
 RERUN = Path(sys.executable).with_name("rerun")
 STAGES = ("shadow", "similarity", "svm", "post")
@@ -39,11 +41,11 @@ def truths_of(drive):
             yield np.ma.masked_array(labels == 255, labels == 128)
 
 
-def test_the_recorded_masks_scored_against_the_log_give_the_table(car_park, data):
-    truths = list(truths_of(data / "drives" / "camvid_0006R0_1hz.mcap"))
+def test_the_recorded_masks_scored_against_the_log_give_the_table(car_park, tmp_path):
+    truths = list(truths_of(make("drives/car_park.mcap", tmp_path)))
     recording = Recording(car_park.recording)
     rows = [row for row in car_park.table("frames") if row["variant"] != "blind"]
-    assert len(rows) == 91 * 6
+    assert len(rows) == 20 * 6
     for row in rows:
         frame = int(row["frame"])
         road, truth = recording.layer(row["variant"], row["stage"], frame) == 1, truths[frame]
@@ -84,8 +86,19 @@ def test_two_runs_give_the_same_tables(twice, table):
     assert one == two
 
 
+def plain_summary(reports):
+    """Return a summary without what took how long, and without how many workers there were."""
+    summary = json.loads((reports / "summary.json").read_text())
+    return {key: value for key, value in summary.items() if key not in ("seconds", "run")}
+
+
+def test_two_runs_give_the_same_summary_but_for_the_clock_and_what_was_asked(twice):
+    two, one = (plain_summary(reports) for _, reports in twice)
+    assert one == two
+
+
 def test_two_runs_give_the_same_recording_but_for_the_clock(twice, tmp_path):
-    dropped = [word for path in CLOCKED for word in ("--drop-entity", path)]
+    dropped = [word for path in (*CLOCKED, "/results/summary") for word in ("--drop-entity", path)]
     for number, (recording, _) in enumerate(twice):
         code, said = rerun("filter", *dropped, recording, "-o", tmp_path / f"{number}.rrd")
         assert code == 0, said

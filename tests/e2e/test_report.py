@@ -17,7 +17,7 @@ from roadeval.jobs.report import report as report_of
 from roadeval.jobs.result import Opened
 from roadeval.logs import LogWriter
 from roadeval.report.words import DASH
-from tests.e2e.commands import DEMO, roadeval
+from tests.e2e.commands import DEMO, here, roadeval
 from tests.report.making import text
 
 SECTIONS = (
@@ -128,7 +128,7 @@ def test_the_command_that_makes_the_results_again_is_given(words, demo):
 def test_a_results_folder_gives_the_same_numbers_without_pictures(demo, words, tmp_path):
     folder = tmp_path / "results"
     shutil.copytree(demo.reports, folder)
-    run = roadeval("report", folder)
+    run = here("report", folder)
     assert run.returncode == 0, run.stderr
     content = (folder / "report.pdf").read_bytes()
     assert "Made without pictures" in text(content)
@@ -158,7 +158,7 @@ def killed(drive, done, folder):
 
 def test_a_killed_run_gives_a_report_of_its_readable_part_marked_on_page_1(tmp_path):
     recording = killed(DEMO, 32, tmp_path)
-    run = roadeval("report", recording, "-o", tmp_path / "report.pdf")
+    run = here("report", recording, "-o", tmp_path / "report.pdf")
     assert run.returncode == 0, run.stderr
     assert "a partial recording" in run.stderr
     pages = [page.extract_text() for page in PdfReader(tmp_path / "report.pdf").pages]
@@ -189,7 +189,7 @@ def test_a_killed_run_of_sparse_truth_shows_no_scored_frame_whose_truth_is_missi
 
 
 def test_without_truth_the_report_says_what_it_cannot_say(unlabelled, tmp_path):
-    run = roadeval("report", unlabelled.recording, "-o", tmp_path / "report.pdf")
+    run = here("report", unlabelled.recording, "-o", tmp_path / "report.pdf")
     assert run.returncode == 0, run.stderr
     words = text((tmp_path / "report.pdf").read_bytes())
     assert "Without truth nothing can be said about errors" in words
@@ -198,7 +198,7 @@ def test_without_truth_the_report_says_what_it_cannot_say(unlabelled, tmp_path):
 
 @pytest.mark.parametrize("of", ["recording", "reports"])
 def test_where_err_is_undefined_on_every_frame_the_report_says_so(of, ignored, tmp_path):
-    run = roadeval("report", getattr(ignored, of), "-o", tmp_path / "report.pdf")
+    run = here("report", getattr(ignored, of), "-o", tmp_path / "report.pdf")
     assert run.returncode == 0, run.stderr
     words = text((tmp_path / "report.pdf").read_bytes())
     for said in (
@@ -216,7 +216,7 @@ def test_where_err_is_undefined_on_every_frame_the_report_says_so(of, ignored, t
 def test_what_is_no_result_is_one_line(name, tmp_path):
     (tmp_path / "not.rrd").write_text("hello")
     (tmp_path / "empty").mkdir()
-    run = roadeval("report", tmp_path / name)
+    run = here("report", tmp_path / name)
     assert run.returncode == 1
     assert len(run.stderr.splitlines()) == 1
     assert name in run.stderr
@@ -230,14 +230,14 @@ def test_a_recording_by_another_program_is_one_line(tmp_path):
     stream.log("x", rr.TextDocument("y"))
     stream.flush()
     stream.disconnect()
-    run = roadeval("report", tmp_path / "theirs.rrd")
+    run = here("report", tmp_path / "theirs.rrd")
     assert run.returncode == 1
     assert "somebody_else" in run.stderr
 
 
 def test_a_results_folder_of_another_format_is_one_line(tmp_path):
     (tmp_path / "summary.json").write_text(json.dumps({"format": {"name": "other"}}))
-    run = roadeval("report", tmp_path)
+    run = here("report", tmp_path)
     assert run.returncode == 1
     assert "not a summary of format roadeval-summary" in run.stderr
 

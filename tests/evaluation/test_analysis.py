@@ -124,6 +124,4 @@ def test_a_region_tells_its_share_of_the_pixels_and_of_the_errors():
 def test_settings_of_another_version_are_read_as_far_as_they_are_known():
     evaluation = {"evaluation": {"window": 7, "from_the_future": 1}}
     assert analysis.settings_of({"run": evaluation}) == EvaluationSettings(window=7)
-    earlier = {"settings": {"filtered": evaluation}}
-    assert analysis.settings_of(earlier) == EvaluationSettings(window=7)
     assert analysis.settings_of({}) == EvaluationSettings()

@@ -16,6 +16,7 @@ from roadeval.pipeline.paper import svm
 from roadeval.results.folder import Results
 from roadeval.results.schema import TABLES
 from roadeval.results.summary import summary_text
+from tests.fixtures.make import make
 from tests.jobs.making import FRAMES, NS, settings, write_log
 
 
@@ -242,8 +243,8 @@ def test_results_become_a_log_with_the_images_own_times(drive, tmp_path):
     assert stamps == [(number + 1) * NS for number in range(FRAMES)]
 
 
-def test_what_the_log_lost_is_told(data, tmp_path):
-    outcome = run(data / "mcap" / "broken" / "zero_hole.mcap", tmp_path)
+def test_what_the_log_lost_is_told(tmp_path):
+    outcome = run(make("broken/zero_hole.mcap", tmp_path), tmp_path)
     assert outcome.summary["frames"]["read"] == 38
     assert "a chunk that zstd cannot uncompress" in outcome.losses[0]
     assert outcome.summary["losses"] == list(outcome.losses)

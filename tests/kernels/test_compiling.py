@@ -7,9 +7,8 @@ import sys
 import pytest
 
 import roadeval
-from roadeval import ReplayOptions
 from roadeval.kernels import pick, plain, prepare
-from tests.jobs.test_replay import write_log
+from tests.jobs.making import settings, write_log
 
 PREPARE = "from roadeval.kernels import prepare; prepare(lambda: print('compiling'))"
 
@@ -49,7 +48,7 @@ def test_a_user_mistake_is_reported_before_anything_is_compiled(tmp_path, monkey
     monkeypatch.setattr("roadeval.jobs.train.prepare", pytest.fail)
     drive, model = write_log(tmp_path / "drive.mcap"), tmp_path / "none.model"
     with pytest.raises(roadeval.RoadevalError, match=r"none\.model"):
-        roadeval.replay(drive, reports=tmp_path, options=ReplayOptions(model=model))
+        roadeval.replay(drive, settings(model=model), reports=tmp_path)
     with pytest.raises(roadeval.RoadevalError, match="nosuch"):
         roadeval.train([tmp_path / "nosuch.mcap"], model)
 
@@ -72,6 +71,6 @@ def test_replay_and_train_compile_before_all_else(tmp_path, monkeypatch):
     assert seen() == ["compiling", "training", "replaying", "writing"]
     roadeval.train([drive], tmp_path / "x.model", on_progress=note)
     assert seen() == ["compiling", "training"]
-    learnt = ReplayOptions(model=tmp_path / "x.model", record="none")
-    roadeval.replay(drive, **folder, options=learnt, on_progress=note)
+    learnt = settings(model=tmp_path / "x.model", record="none")
+    roadeval.replay(drive, learnt, **folder, on_progress=note)
     assert seen() == ["compiling", "replaying", "writing"]

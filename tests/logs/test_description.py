@@ -3,7 +3,10 @@
 import json
 from pathlib import Path
 
+import pytest
+
 from roadeval.logs import describe
+from tests.fixtures.shared import both
 from tests.logs.making import SECOND, drive
 
 START = 1_700_000_000 * SECOND
@@ -23,7 +26,11 @@ def test_a_log_is_described_for_machines(tmp_path: Path) -> None:
     assert (found["problem"], found["damage"], found["losses"]) == ("", [], [])
 
 
-def test_all_damage_is_found_and_the_problem_told(data: Path) -> None:
-    broken = data / "mcap" / "broken"
-    assert "checksum is wrong" in describe(broken / "chunk_crc_field_bad.mcap").losses[0]
-    assert "no image topic" in describe(broken / "magic_only.mcap").problem
+@pytest.mark.parametrize("log", both("broken", "chunk_crc_field_bad.mcap"), indirect=True)
+def test_all_damage_is_found(log: Path) -> None:
+    assert "checksum is wrong" in describe(log).losses[0]
+
+
+@pytest.mark.parametrize("log", both("broken", "magic_only.mcap"), indirect=True)
+def test_the_problem_is_told(log: Path) -> None:
+    assert "no image topic" in describe(log).problem

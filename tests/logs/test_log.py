@@ -20,6 +20,8 @@ from roadeval.logs import (
 from roadeval.logs.container import chunks, compression
 from roadeval.logs.container.records import Message
 from roadeval.logs.topics.pairing import UNREADABLE
+from tests.fixtures.make import make
+from tests.fixtures.shared import shared
 from tests.logs.making import SECOND, compressed, drive, grey, jpeg, png, raw, ros2_log
 
 START = 1_700_000_000_123_456_789
@@ -237,21 +239,46 @@ def test_another_systems_masks_and_true_shadow_come_along(tmp_path: Path) -> Non
     assert np.array_equal(frame.shadow_truth, 1 - mask // 255)
 
 
-@pytest.mark.parametrize(
-    ("drive_name", "labels", "road"),
-    [
-        ("camvid_0016E5_15hz", LabelSettings((3,), (11,)), True),
-        ("camvid_0006R0_1hz", LabelSettings(), True),
-        ("ford_shadows_unlabelled_raw", LabelSettings(), False),
-    ],
-)
-def test_real_drives(data: Path, drive_name: str, labels: LabelSettings, road: bool) -> None:
-    with open_log(data / "drives" / f"{drive_name}.mcap") as log:
+def check_drive(path: Path, labels: LabelSettings, frames: int, *, labelled: bool) -> None:
+    """Every frame is labelled, or none, and the truth has all its values."""
+    with open_log(path) as log:
         stream = log.frames(log.select(labels=labels))
         frame = next(stream).decode()
         rest = list(stream)
-    assert len(rest) == (100 if road else 38)
-    assert all(f.labelled == road for f in rest)
-    if road:
+    assert len(rest) == frames - 1
+    assert all(each.labelled == labelled for each in rest)
+    if labelled:
         assert frame.truth is not None
         assert set(np.unique(frame.truth)) == {0, 1, 255}
+
+
+STREET = LabelSettings((3,), (11,))
+
+
+@pytest.mark.parametrize(
+    ("name", "labels", "frames", "labelled"),
+    [
+        ("street", STREET, 30, True),
+        ("car_park", LabelSettings(), 30, True),
+        ("unlabelled", LabelSettings(), 15, False),
+    ],
+)
+def test_small_drives(
+    tmp_path: Path, name: str, labels: LabelSettings, frames: int, labelled: bool
+) -> None:
+    check_drive(make(f"drives/{name}.mcap", tmp_path), labels, frames, labelled=labelled)
+
+
+@pytest.mark.parametrize("folder", shared("drives"))
+@pytest.mark.parametrize(
+    ("name", "labels", "frames", "labelled"),
+    [
+        ("camvid_0016E5_15hz", STREET, 101, True),
+        ("camvid_0006R0_1hz", LabelSettings(), 101, True),
+        ("ford_shadows_unlabelled_raw", LabelSettings(), 39, False),
+    ],
+)
+def test_real_drives(
+    folder: Path, name: str, labels: LabelSettings, frames: int, labelled: bool
+) -> None:
+    check_drive(folder / f"{name}.mcap", labels, frames, labelled=labelled)

@@ -25,6 +25,7 @@ from tests.evaluation.making import a_frame, a_variant, pixels
 
 TRUTHS = [pixels("##..", "##.?"), pixels("....", "...."), pixels("###.", "....")]
 MASK = pixels("#.#.", "##..")
+RUN_TOML = 'preset = "paper"\n'
 
 
 def a_board() -> Scoreboard:
@@ -54,7 +55,7 @@ def write(folder: Path, role: Role = Role.EVALUATED) -> list[Path]:
         for result in scored(board, role):
             writer.append(lines(result))
         writer.append(sum_lines(board.sums()))
-        return writer.finish(the_rest(board))
+        return writer.finish(the_rest(board), RUN_TOML)
 
 
 def names(folder: Path) -> set[str]:
@@ -111,7 +112,7 @@ def test_a_variant_named_like_a_number_keeps_its_name(tmp_path: Path) -> None:
         result = board.score(a_frame(TRUTHS[0]), Role.EVALUATED, (variant,))
         board.add(result)
         writer.append(lines(result))
-        writer.finish(the_rest(board))
+        writer.finish(the_rest(board), RUN_TOML)
     assert Results(tmp_path).frames["variant"].tolist() == ["007"]
 
 
@@ -147,9 +148,9 @@ def test_a_table_that_nothing_was_counted_for_is_not_written_and_an_earlier_one_
         board.add(result)
         writer.append(lines(result))
         writer.append(sum_lines(board.sums()))
-        writer.finish(the_rest(board))
+        writer.finish(the_rest(board), RUN_TOML)
     assert names(tmp_path) == {
-        *("frames.csv", "regions.csv", "windows.csv", "heat.csv", "summary.json"),
+        *("frames.csv", "regions.csv", "windows.csv", "heat.csv", "run.toml", "summary.json"),
     }
     assert Results(tmp_path).table("oracles").empty
 
@@ -186,8 +187,8 @@ def test_nothing_bears_its_name_before_all_is_complete(tmp_path: Path) -> None:
             writer.append(lines(result))
         assert all(name.startswith(".") for name in names(tmp_path))
         writer.append(sum_lines(board.sums()))
-        writer.finish(the_rest(board))
-    assert names(tmp_path) == {*(f"{table}.csv" for table in TABLES), "summary.json"}
+        writer.finish(the_rest(board), RUN_TOML)
+    assert names(tmp_path) == {*(f"{table}.csv" for table in TABLES), "run.toml", "summary.json"}
 
 
 def test_an_interrupted_run_leaves_the_earlier_results(tmp_path: Path) -> None:
@@ -278,7 +279,7 @@ def test_masks_that_are_missing_on_some_frames_agree_with_the_summary(tmp_path: 
             board.add(result)
             writer.append(lines(result))
         writer.append(sum_lines(board.sums()))
-        writer.finish(the_rest(board))
+        writer.finish(the_rest(board), RUN_TOML)
     tables = {name: Results(tmp_path).table(name) for name in TABLES}
     assert len(tables["frames"]) == 3 * 2 + 1 + 1
     assert not {("net", "late"), ("late", "net")} & set(
@@ -290,8 +291,8 @@ def test_a_run_that_scored_nothing_writes_no_tables_and_leaves_no_older_ones(
     tmp_path: Path,
 ) -> None:
     write(tmp_path)
-    assert [path.name for path in write(tmp_path, Role.TRAINING)] == ["summary.json"]
-    assert names(tmp_path) == {"summary.json"}
+    assert [path.name for path in write(tmp_path, Role.TRAINING)] == ["run.toml", "summary.json"]
+    assert names(tmp_path) == {"run.toml", "summary.json"}
     assert Results(tmp_path).frames.empty
     assert "ERR" in Results(tmp_path).frames
 

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from roadeval.cli.app import main
-from roadeval.config import pipelines_of, preset, variants_of
+from roadeval.config import configure
 from roadeval.errors import RoadevalError
 from roadeval.training import TrainingSettings, fit, save_model
 from roadeval.training.learning import from_file
 from tests.e2e.commands import DEMO
 from tests.training.making import frame
 
-EXTRA = {name: preset(name) for name in ("printed", "gated", "robust")}
-PIPELINES = pipelines_of(variants_of(preset("paper"), EXTRA))
+EXTRA = {name: {"preset": name} for name in ("printed", "gated", "robust")}
+PIPELINES = configure({"variants": EXTRA}).pipelines()
 TWO = {name: PIPELINES[name] for name in ("filtered", "unfiltered")}
 
 
@@ -168,7 +168,7 @@ def test_a_machine_without_the_features_of_a_window_ends_with_one_line_and_code_
     tmp_path, capsys, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    pipelines = pipelines_of(variants_of(preset("robust"), {}))
+    pipelines = configure({"preset": "robust"}).pipelines()
     sound = fit([frame(n) for n in range(3)], pipelines, TrainingSettings())
     machine = sound.parameters["unfiltered"]["context"]
     narrow = replace(machine, planes=machine.planes[:, :-2])

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from roadeval.config import Config
 from roadeval.data import IGNORE
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import View
@@ -80,8 +79,7 @@ def test_without_truth_the_patch_teaches():
 
 def test_a_collapsed_classifier_is_reported():
     # A threshold that no decision value reaches: nothing is ever called road.
-    config = Config()
-    settings = dict(config.stages)
+    settings = dict(pipelines()["unfiltered"].settings)
     settings["svm"] = type(settings["svm"])(threshold=1000.0)
     pipeline = Pipeline(("similarity", "svm", "post"), settings)
     warnings = fit(FRAMES, {"x": pipeline}, TrainingSettings()).warnings

@@ -19,5 +19,5 @@
 | 21 | closing | `post.closing` |
 | 22 | boundary | `post.boundary` |
 | 23 | holes | `post.fill_holes` |
-| 24-29 | rates | `roadeval.evaluation` |
+| 24-29 | rates | in the room roadeval.evaluation |
 """

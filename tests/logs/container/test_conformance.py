@@ -1,4 +1,4 @@
-"""The MCAP project's own conformance suite: every record, message and channel as expected."""
+"""Every combination of what MCAP leaves open: each record, message and channel as expected."""
 
 import json
 from collections.abc import Iterator
@@ -21,6 +21,8 @@ from roadeval.logs.container.records import (
     parse_chunk,
     walk,
 )
+from tests.fixtures import conformance
+from tests.fixtures.shared import shared
 
 FOLDERS = (
     "NoData",
@@ -60,24 +62,49 @@ def records(source: ByteReader, chunks: ChunkReader) -> Iterator[tuple[str, dict
             yield type(record).__name__, fields(record)
 
 
-@pytest.mark.parametrize("folder", FOLDERS)
-def test_every_file_reads_as_expected(data: Path, folder: str) -> None:
-    paths = sorted((data / "mcap" / "conformance" / folder).glob("*.mcap"))
-    assert paths
-    for path in paths:
-        expected = json.loads(path.with_suffix(".json").read_text())["records"]
+Suite = list[tuple[Path, list[tuple[str, dict[str, Any]]]]]
+"""Logs, and the records expected of each, by kind and fields."""
+
+
+def here(content: str, folder: Path) -> Suite:
+    """Write every variant of a content, and read its records by the MCAP project's reader."""
+    suite = []
+    for name, data in conformance.variants(content):
+        path = folder / f"{name}.mcap"
+        path.write_bytes(data)
+        found = [(type(record).__name__, fields(record)) for record in conformance.records(data)]
+        suite.append((path, [record for record in found if record[0] != "MessageIndex"]))
+    return suite
+
+
+def published(folder: Path) -> Suite:
+    """Return the MCAP project's suite, and what it says itself."""
+    suite = []
+    for path in sorted(folder.glob("*.mcap")):
+        listed = json.loads(path.with_suffix(".json").read_text())["records"]
+        suite.append((path, [(record["type"], dict(record["fields"])) for record in listed]))
+    return suite
+
+
+@pytest.fixture(params=[*conformance.CONTENTS, *shared("mcap", "conformance")], ids=str)
+def suite(request: pytest.FixtureRequest, tmp_path: Path) -> Suite:
+    if isinstance(request.param, str):
+        return here(request.param, tmp_path)
+    return [case for folder in FOLDERS for case in published(request.param / folder)]
+
+
+def test_every_file_reads_as_expected(suite: Suite) -> None:
+    assert suite
+    for path, expected in suite:
         source = FileReader(path)
         inner = PartReader(source, len(MAGIC), source.size - 2 * len(MAGIC))
         found = list(records(inner, ChunkReader(source)))
         source.close()
-        assert found == [(r["type"], dict(r["fields"])) for r in expected], path.name
+        assert found == expected, path.name
 
 
-@pytest.mark.parametrize("folder", FOLDERS)
-def test_every_message_is_found_and_nothing_is_called_damaged(data: Path, folder: str) -> None:
-    for path in sorted((data / "mcap" / "conformance" / folder).glob("*.mcap")):
-        expected = json.loads(path.with_suffix(".json").read_text())["records"]
-        messages = [dict(r["fields"]) for r in expected if r["type"] == "Message"]
+def test_every_message_is_found_and_nothing_is_called_damaged(suite: Suite) -> None:
+    for path, expected in suite:
         container = Container(path, lambda *_: True, lambda *_: True)
         found = [
             fields(container.message(chunk, offset))
@@ -88,5 +115,5 @@ def test_every_message_is_found_and_nothing_is_called_damaged(data: Path, folder
         topics = {channel.topic for channel in container.channels.values()}
         assert damage_of(container) == (), path.name
         container.close()
-        assert found == messages, path.name
-        assert topics == {dict(r["fields"])["topic"] for r in expected if r["type"] == "Channel"}
+        assert found == [record for kind, record in expected if kind == "Message"]
+        assert topics == {record["topic"] for kind, record in expected if kind == "Channel"}

@@ -3,11 +3,16 @@
 import re
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 
 from roadeval.logs import FrameError, Log, LogError, open_log
+from tests.fixtures.broken import BROKEN as BROKEN_HERE
+from tests.fixtures.elsewhere import SPLIT, WITH_IMAGES, WITHOUT_IMAGES, split_bag
+from tests.fixtures.make import LOGS, make
+from tests.fixtures.shared import SHARED, both, shared
 from tests.measuring import PEAK
 
 CAM = "/cam/image/compressed"
@@ -26,35 +31,67 @@ BROKEN = {
     "zerotime": (40, 40, WHOLE),
     "dataend_crc_real": (40, 40, WHOLE),
     "dataend_crc_bad": (40, 40, "checksum of all data is wrong .*no message is lost"),
-    "huge_len_chunk": (40, 40, r"head of a chunk is damaged.*byte 66147.*no message is lost"),
+    "huge_len_chunk": (40, 40, r"head of a chunk is damaged.*byte {at}.*no message is lost"),
     "trunc_in_summary": (40, 40, "does not end as it should .*no message is lost"),
     "trunc_last1": (40, 40, "does not end as it should .*no message is lost"),
 }
 LOSSY = {
-    "chunk_crc_field_bad": (38, 40, r"checksum is wrong \(byte 66147, 0.600 to 0.700 s\); lost: 2"),
-    "chunk_data_flip_lz4": (38, 40, r"checksum is wrong \(byte 77235, 0.600 to 0.700 s\); lost: 2"),
-    "huge_len_msg_unchunked": (39, 39, r"beyond the end .*byte 440492, 0.400 to 0.500 s.*39 of 40"),
-    "live": (36, 36, r"never finished.*byte 375816, after 3.500 s.*36 images kept"),
-    "trunc_midchunk": (36, 36, r"ends inside a chunk \(byte 395258, after 3.500 s\)"),
-    "trunc_nofooter": (40, 40, r"never finished.*byte 439479, after 3.900 s"),
-    "trunc_unchunked": (28, 28, r"beyond the end of the file \(byte 2462562, after 2.700 s\)"),
-    "zero_hole": (38, 38, r"cannot uncompress \(byte 66147, 0.600 to 0.700 s\).*38 of 40"),
+    "chunk_crc_field_bad": (38, 40, r"checksum is wrong \(byte {at}, 0.600 to 0.700 s\); lost: 2"),
+    "chunk_data_flip_lz4": (38, 40, r"checksum is wrong \(byte {at}, 0.600 to 0.700 s\); lost: 2"),
+    "huge_len_msg_unchunked": (39, 39, r"beyond the end .*byte {at}, 0.400 to 0.500 s.*39 of 40"),
+    "live": (36, 36, r"never finished.*byte {at}, after 3.500 s.*36 images kept"),
+    "trunc_midchunk": (36, 36, r"ends inside a chunk \(byte {at}, after 3.500 s\)"),
+    "trunc_nofooter": (40, 40, r"never finished.*byte {at}, after 3.900 s"),
+    "trunc_unchunked": (28, 28, r"beyond the end of the file \(byte {at}, after 2.700 s\)"),
+    "zero_hole": (38, 38, r"cannot uncompress \(byte {at}, 0.600 to 0.700 s\).*38 of 40"),
 }
 NO_FRAMES = {
     "magic_only": "never finished",
-    "fox_killed_lz4_onechunk": r"ends inside a chunk \(byte 68, after 5.700 s\).*58 images kept",
+    "fox_killed_lz4_onechunk": r"ends inside a chunk \(byte {at}, after 5.700 s\).*58 images kept",
 }
 NO_LOG = {
     "broken/bagV2.mcap": "a ROS 1 bag: mcap convert bagV2.mcap bagV2_converted.mcap",
     "broken/notmcap.mcap": r"something else \(it begins with 00 01 00 01",
     "broken/zero.mcap": "the file is empty",
+    "real/whole.mcap.zstd": "compressed as a whole by zstd: zstd -d",
     "real/tiryoh_whole_file_zstd.mcap.zstd": "compressed as a whole by zstd: zstd -d",
-    "real/missing.mcap": "No such file",
 }
-REAL_WITH_IMAGES = {
+SHARED_AT = {
+    "chunk_crc_field_bad": 66147,
+    "chunk_data_flip_lz4": 77235,
+    "dataend_crc_bad": 439479,
+    "fox_killed_lz4_onechunk": 68,
+    "huge_len_chunk": 66147,
+    "huge_len_msg_unchunked": 440492,
+    "live": 375816,
+    "trunc_in_summary": 439479,
+    "trunc_last1": 439479,
+    "trunc_midchunk": 395258,
+    "trunc_nofooter": 439479,
+    "trunc_unchunked": 2462562,
+    "zero_hole": 66147,
+}
+"""Where the shared ones are damaged."""
+SHARED_WITH_IMAGES = {
     "lichtblick_custom_camera.json_CompressedImage": 10,
     "mcap_explorer_demo.protobuf_CompressedImage": 30,
 }
+
+
+def broken(names: Iterable[str]) -> pytest.MarkDecorator:
+    """Run a test over damaged logs: ours, and the shared ones of the same names."""
+    cases = both("broken", *(f"{name}.mcap" for name in names))
+    return pytest.mark.parametrize("log", cases, indirect=True)
+
+
+def real(*names: str) -> list[Path]:
+    return [path for name in names for path in shared("mcap", "real", name)]
+
+
+def place(path: Path) -> int:
+    """Return the byte at which a log is damaged."""
+    ours = not (SHARED and path.is_relative_to(SHARED))
+    return BROKEN_HERE[path.stem][1]().at if ours else SHARED_AT.get(path.stem, 0)
 
 
 def decoded(log: Log) -> tuple[int, int]:
@@ -69,76 +106,104 @@ def decoded(log: Log) -> tuple[int, int]:
     return good, stream.accounting.in_log
 
 
-def test_the_tables_name_every_file(data: Path) -> None:
-    names = {path.stem for path in (data / "mcap" / "broken").glob("*.mcap")}
+@pytest.mark.parametrize("folder", [None, *shared("mcap", "broken")])
+def test_the_tables_name_every_file(folder: Path | None) -> None:
+    names = {path.stem for path in folder.glob("*.mcap")} if folder else set(BROKEN_HERE)
     no_log = {Path(name).stem for name in NO_LOG if name.startswith("broken")}
     assert names == {*BROKEN, *LOSSY, *NO_FRAMES, *no_log}
 
 
-@pytest.mark.parametrize("name", BROKEN)
-def test_a_log_that_lacks_nothing_loses_nothing(data: Path, name: str) -> None:
-    good, in_log, said = BROKEN[name]
-    with open_log(data / "mcap" / "broken" / f"{name}.mcap") as log:
-        log.verify()
-        assert decoded(log) == (good, in_log)
-        assert log.losses == ()
-        sentences = " | ".join(map(str, log.damage))
+@broken(BROKEN)
+def test_a_log_that_lacks_nothing_loses_nothing(log: Path) -> None:
+    good, in_log, said = BROKEN[log.stem]
+    with open_log(log) as opened:
+        opened.verify()
+        assert decoded(opened) == (good, in_log)
+        assert opened.losses == ()
+        sentences = " | ".join(map(str, opened.damage))
     assert bool(sentences) == bool(said)
-    assert matches(said, sentences)
+    assert matches(said, sentences, log)
 
 
-@pytest.mark.parametrize("name", LOSSY)
-def test_a_damaged_log_gives_what_is_readable_and_says_the_rest(data: Path, name: str) -> None:
-    good, in_log, said = LOSSY[name]
-    with open_log(data / "mcap" / "broken" / f"{name}.mcap") as log:
-        assert decoded(log) == (good, in_log)
-        assert matches(said, " | ".join(log.losses))
+@broken(LOSSY)
+def test_a_damaged_log_gives_what_is_readable_and_says_the_rest(log: Path) -> None:
+    good, in_log, said = LOSSY[log.stem]
+    with open_log(log) as opened:
+        assert decoded(opened) == (good, in_log)
+        assert matches(said, " | ".join(opened.losses), log)
 
 
-@pytest.mark.parametrize("name", NO_FRAMES)
-def test_a_log_without_a_readable_frame_still_says_what_it_lost(data: Path, name: str) -> None:
-    with open_log(data / "mcap" / "broken" / f"{name}.mcap") as log:
-        assert matches(NO_FRAMES[name], " | ".join(log.losses))
+@broken(NO_FRAMES)
+def test_a_log_without_a_readable_frame_still_says_what_it_lost(log: Path) -> None:
+    with open_log(log) as opened:
+        assert matches(NO_FRAMES[log.stem], " | ".join(opened.losses), log)
         with pytest.raises(LogError):
-            log.select()
+            opened.select()
 
 
-@pytest.mark.parametrize("name", NO_LOG)
-def test_what_is_no_log_is_called_by_its_name(data: Path, name: str) -> None:
-    with pytest.raises(LogError, match=NO_LOG[name]):
-        open_log(data / "mcap" / name)
+@pytest.mark.parametrize("log", [*both("", *NO_LOG)], indirect=True)
+def test_what_is_no_log_is_called_by_its_name(log: Path) -> None:
+    with pytest.raises(LogError, match=NO_LOG[f"{log.parent.name}/{log.name}"]):
+        open_log(log)
 
 
-@pytest.mark.parametrize("name", REAL_WITH_IMAGES)
-def test_other_peoples_logs_with_images(data: Path, name: str) -> None:
-    with open_log(data / "mcap" / "real" / f"{name}.mcap") as log:
-        assert decoded(log) == (REAL_WITH_IMAGES[name],) * 2
-        assert log.damage == ()
+def test_a_missing_file_is_called_by_its_name(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="No such file"):
+        open_log(tmp_path / "missing.mcap")
 
 
-def test_other_peoples_logs_without_images(data: Path) -> None:
-    paths = sorted((data / "mcap" / "real").rglob("*.mcap"))
-    rest = [path for path in paths if path.stem not in REAL_WITH_IMAGES]
-    assert len(rest) == 27
-    for path in rest:
+def other_peoples(tmp_path: Path) -> dict[Path, int]:
+    """Return logs with images, and their frames."""
+    ours = {
+        make(f"real/{name}.mcap", tmp_path): count for name, (_, _, count) in WITH_IMAGES.items()
+    }
+    theirs = {path: n for name, n in SHARED_WITH_IMAGES.items() for path in real(f"{name}.mcap")}
+    return ours | theirs
+
+
+def test_a_camera_among_other_topics(tmp_path: Path) -> None:
+    for path, count in other_peoples(tmp_path).items():
+        with open_log(path) as log:
+            assert decoded(log) == (count, count), path.name
+            assert log.damage == ()
+
+
+def without_images(tmp_path: Path) -> list[Path]:
+    """Return our logs without images, and other people's."""
+    ours = [make(f"real/{name}.mcap", tmp_path) for name in WITHOUT_IMAGES]
+    theirs = [path for folder in real("") for path in sorted(folder.rglob("*.mcap"))]
+    return ours + [path for path in theirs if path.stem not in SHARED_WITH_IMAGES]
+
+
+def test_logs_without_images_say_what_they_have(tmp_path: Path) -> None:
+    for path in without_images(tmp_path):
         with open_log(path) as log:
             log.verify()
-            assert bool(log.losses) == (path.stem == "tiryoh_truncated")
+            assert bool(log.losses) == (path.stem in {"cut_off", "tiryoh_truncated"}), path.name
             with pytest.raises(LogError, match="no image topic; the log has: "):
                 log.select()
 
 
-def test_a_folder_of_split_files_is_one_log(data: Path) -> None:
-    with open_log(data / "mcap" / "real" / "rosbag2") as log:
-        chatter = next(topic for topic in log.topics if topic.name == "/chatter")
-    assert chatter.count == 1324 + 1324 + 529
+def folders(tmp_path: Path) -> dict[Path, int]:
+    """Return folders of split files, and their messages."""
+    for name in split_bag():
+        make(f"real/rosbag2/{name}", tmp_path)
+    ours = {tmp_path / "real" / "rosbag2": sum(SPLIT)}
+    return ours | dict.fromkeys(real("rosbag2"), 1324 + 1324 + 529)
 
 
-def test_data_of_a_wrong_checksum_is_kept_on_demand(data: Path) -> None:
-    path = data / "mcap" / "broken" / "chunk_crc_field_bad.mcap"
-    with open_log(path, keep_corrupt=True) as log:
-        assert decoded(log) == (40, 40)
-        assert "checksum is wrong, used all the same" in log.losses[0]
+def test_a_folder_of_split_files_is_one_log(tmp_path: Path) -> None:
+    for folder, messages in folders(tmp_path).items():
+        with open_log(folder) as log:
+            chatter = next(topic for topic in log.topics if topic.name == "/chatter")
+        assert chatter.count == messages
+
+
+@broken(["chunk_crc_field_bad"])
+def test_data_of_a_wrong_checksum_is_kept_on_demand(log: Path) -> None:
+    with open_log(log, keep_corrupt=True) as opened:
+        assert decoded(opened) == (40, 40)
+        assert "checksum is wrong, used all the same" in opened.losses[0]
 
 
 MEASURE = f"""
@@ -162,8 +227,12 @@ print((peak() - baseline) / 1024)
 """
 
 
-def test_no_length_field_makes_memory_grow(data: Path) -> None:
-    paths = [*(data / "mcap" / "broken").iterdir(), *(data / "mcap" / "real").rglob("*.mcap*")]
+def test_no_length_field_makes_memory_grow(tmp_path: Path) -> None:
+    names = [name for name in LOGS if name.startswith(("broken/", "real/"))]
+    paths = [make(name, tmp_path) for name in names]
+    for folder in ("broken", "real"):
+        for shared_folder in shared("mcap", folder):
+            paths += list(shared_folder.rglob("*.mcap*"))
     run = subprocess.run(
         [sys.executable, "-c", MEASURE, *map(str, paths)],
         capture_output=True,
@@ -174,5 +243,5 @@ def test_no_length_field_makes_memory_grow(data: Path) -> None:
     assert float(run.stdout) < 150
 
 
-def matches(pattern: str, text: str) -> bool:
-    return re.search(pattern, text) is not None
+def matches(pattern: str, text: str, path: Path) -> bool:
+    return re.search(pattern.replace("{at}", str(place(path))), text) is not None

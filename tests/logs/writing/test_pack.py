@@ -9,6 +9,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from roadeval.logs import LabelSettings, LogError, open_log, pack
+from tests.fixtures.shared import shared
 from tests.logs.making import grey, jpeg, png
 
 HALF_SECOND = 500_000_000
@@ -92,27 +93,68 @@ def test_a_file_that_is_no_video_is_refused(tmp_path: Path) -> None:
         pack(tmp_path / "a.mp4", tmp_path / "a.mcap")
 
 
-def test_images_and_colour_masks_of_the_road(data: Path, tmp_path: Path) -> None:
-    source = data / "comma10k_mini"
-    packed = pack(source / "imgs", tmp_path / "comma.mcap", masks=source / "masks")
-    labels = LabelSettings(road_colors=((64, 32, 32), (255, 0, 0)), ignore_colors=((204, 0, 255),))
+ROAD, MARKING, OWN_CAR, VERGE = (64, 32, 32), (255, 0, 0), (204, 0, 255), (128, 128, 96)
+
+
+@pytest.fixture(params=["made", *shared("comma10k_mini")], ids=str)
+def painted(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """Folders of images and of masks whose colours say what is what."""
+    if request.param != "made":
+        return request.param  # type: ignore[no-any-return]
+    mask = np.full((6, 8, 3), VERGE, np.uint8)
+    mask[2:4], mask[3, 4], mask[4:] = ROAD, MARKING, OWN_CAR
+    names = [f"{number:04}" for number in range(11)]
+    folder(tmp_path / "imgs", {f"{name}.png": png(grey(100)) for name in names})
+    folder(tmp_path / "masks", {f"{name}.png": png(mask[..., ::-1]) for name in names})
+    return tmp_path
+
+
+def test_images_and_colour_masks_of_the_road(painted: Path, tmp_path: Path) -> None:
+    packed = pack(painted / "imgs", tmp_path / "comma.mcap", masks=painted / "masks")
+    labels = LabelSettings(road_colors=(ROAD, MARKING), ignore_colors=(OWN_CAR,))
     with open_log(packed.path) as log:
         with pytest.raises(LogError, match=r"/truth/road.*labels\.road_colors"):
             log.select()
         frames = [frame.decode() for frame in log.frames(log.select(labels=labels))]
-    first = cv2.imread(str(min((source / "masks").glob("*.png"))))[..., ::-1]
-    road = (first == (64, 32, 32)).all(2) | (first == (255, 0, 0)).all(2)
+    first = cv2.imread(str(min((painted / "masks").glob("*.png"))))[..., ::-1]
+    road = (first == ROAD).all(2) | (first == MARKING).all(2)
     assert len(frames) == 11
     assert frames[0].truth is not None
     assert np.array_equal(frames[0].truth == 1, road)
 
 
+def film(path: Path, rate: int, count: int) -> Path:
+    """Write a video file."""
+    import av
+
+    with av.open(str(path), "w") as container:
+        try:
+            stream = container.add_stream("libx264", rate=rate)
+        except av.FFmpegError:
+            pytest.skip("PyAV was built without libx264")
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for number in range(count):
+            image = np.full((48, 64, 3), 8 * number, np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, "rgb24")))
+        container.mux(stream.encode(None))
+    return path
+
+
+@pytest.fixture(params=["made", *shared("solidWhiteRight.mp4")], ids=str)
+def video(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, int]:
+    """A video of 25 frames a second, and how many it has."""
+    if request.param == "made":
+        return film(tmp_path / "film.mp4", 25, 20), 20
+    return request.param, 221
+
+
 def test_a_video_is_packed_frame_by_frame_and_read_by_foxgloves_decoder(
-    data: Path, tmp_path: Path
+    video: tuple[Path, int], tmp_path: Path
 ) -> None:
-    packed = pack(data / "solidWhiteRight.mp4", tmp_path / "white.mcap")
-    assert packed.frames == 221
+    path, count = video
+    packed = pack(path, tmp_path / "film.mcap")
+    assert packed.frames == count
     with packed.path.open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         times = [m.timestamp.ToNanoseconds() for *_, m in reader.iter_decoded_messages()]
-    assert times == [40_000_000 * i for i in range(221)]
+    assert times == [40_000_000 * i for i in range(count)]

@@ -1,0 +1,54 @@
+"""Build the API pages from the docstrings: ``python docs/api.py [FOLDER]``, build/api by default.
+
+Every warning is an error: a name in ``__all__`` that does not exist, an annotation that cannot be
+resolved, a module that cannot be imported.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from types import ModuleType
+from typing import Final
+
+import pdoc
+
+import roadeval
+
+FOR_CHECKERS: Final = (
+    r"[\s\S]*(array\[int\]|pd\.Series\[float\]|DataclassInstance|PydanticDataclass)"
+)
+"""Annotations that type checkers understand and Python 3.11 cannot evaluate."""
+
+
+def prepare(package: ModuleType) -> None:
+    """Make public names and sub-modules visible to pdoc.
+
+    It sees neither names that a package imports on first use nor modules that are missing in
+    ``__all__``.
+    """
+    names = getattr(package, "__all__", None)
+    for name in names or ():
+        setattr(package, name, getattr(package, name))
+    for module in iter_modules(package.__path__):
+        if names is not None and not module.name.startswith("_") and module.name not in names:
+            names.append(module.name)
+        if module.ispkg:
+            prepare(import_module(f"{package.__name__}.{module.name}"))
+
+
+def main(folder: str = "build/api") -> None:
+    """Write the pages into a folder."""
+    prepare(roadeval)
+    warnings.simplefilter("error")
+    warnings.filterwarnings("ignore", FOR_CHECKERS, UserWarning)
+    footer = f"roadeval {roadeval.__version__}"
+    pdoc.render.configure(docformat="numpy", show_source=False, footer_text=footer)
+    pdoc.pdoc("roadeval", output_directory=Path(folder))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

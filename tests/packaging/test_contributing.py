@@ -1,0 +1,211 @@
+"""CONTRIBUTING.md's walk-throughs: each file on that page, put in its place, is enough."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+from mcap.writer import Writer
+from pypdf import PdfReader
+
+import roadeval
+
+ROOT = Path(__file__).resolve().parents[2]
+FENCED = re.compile(r"^`(?P<path>[^`\n]+)`\n\n```\w+\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
+FILES = {
+    found["path"]: found["text"]
+    for found in FENCED.finditer((ROOT / "CONTRIBUTING.md").read_text())
+}
+PERIOD_NS = 100_000_000
+FRAMES = 22
+
+
+@dataclass(frozen=True)
+class Workshop:
+    """A copy of the package with the page's files in it, and the results of a replay by it."""
+
+    folder: Path
+
+    def roadeval(self, *words: str) -> subprocess.CompletedProcess[str]:
+        """Run a command of the copy."""
+        command = [sys.executable, "-P", "-m", "roadeval", *words]
+        environment = os.environ | {"PYTHONPATH": str(self.folder)}
+        return subprocess.run(
+            command, cwd=self.folder, env=environment, capture_output=True, text=True, check=False
+        )
+
+    def done(self, *words: str) -> str:
+        """Run a command that must succeed, and return what it printed."""
+        run = self.roadeval(*words)
+        assert run.returncode == 0, run.stderr
+        return run.stdout
+
+    def table(self, name: str) -> pd.DataFrame:
+        return pd.read_csv(self.folder / "reports" / f"{name}.csv")
+
+
+def frame(number: int) -> tuple[np.ndarray, np.ndarray]:
+    """A grey road between darker verges below a bright sky, and its truth."""
+    noise = np.random.default_rng(number).integers(-12, 13, (48, 64, 3))
+    image = np.full((48, 64, 3), 40) + noise
+    truth = np.zeros((48, 64), np.uint8)
+    image[:16] = 210
+    image[16:, 20:44] += 80
+    truth[16:, 20:44] = 255
+    return image.clip(0, 255).astype(np.uint8), truth
+
+
+def write_drive(path: Path) -> None:
+    """A drive whose messages are in the encoding that the page adds."""
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channels = [writer.register_channel(t, "stamped_file", 0) for t in ("/camera", "/truth")]
+        for number in range(FRAMES):
+            stamp = 1_000_000_000 + number * PERIOD_NS
+            for channel, pixels in zip(channels, frame(number), strict=True):
+                data = stamp.to_bytes(8, "little") + cv2.imencode(".png", pixels)[1].tobytes()
+                writer.add_message(channel, stamp, data, stamp)
+        writer.finish()
+
+
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory) -> Workshop:
+    folder = tmp_path_factory.mktemp("workshop")
+    shutil.copytree(Path(roadeval.__file__).parent, folder / "roadeval")
+    for path, text in FILES.items():
+        place = folder / path
+        assert not place.exists(), f"{path} is there already"
+        assert place.parent.is_dir(), f"{path} has no folder to lie in"
+        place.write_text(text)
+    write_drive(folder / "drive.mcap")
+    made = Workshop(folder)
+    words = ("--variant", "bright=bright.toml", "--save", "out.rrd", "--reports", "reports")
+    made.done("replay", "drive.mcap", *words)
+    return made
+
+
+@pytest.fixture(scope="module")
+def report(workshop) -> str:
+    """The words of the drive's PDF, in one line."""
+    workshop.done("report", "out.rrd", "-o", "report.pdf")
+    pages = PdfReader(workshop.folder / "report.pdf").pages
+    return " ".join(" ".join(page.extract_text() for page in pages).split())
+
+
+@pytest.fixture(scope="module")
+def recording(workshop) -> roadeval.Recording:
+    return roadeval.Recording(workshop.folder / "out.rrd")
+
+
+def test_the_page_adds_one_of_each():
+    rooms = {str(Path(path).parent) for path in FILES}
+    assert rooms == {
+        ".",
+        "roadeval/pipeline/beyond",
+        "roadeval/evaluation/metrics",
+        "roadeval/evaluation/regions",
+        "roadeval/logs/messages/encodings",
+        "roadeval/report/figures",
+        "roadeval/jobs",
+        "roadeval/cli/commands",
+    }
+
+
+def test_the_stage_has_rows_in_the_table(workshop):
+    frames = workshop.table("frames").query("variant == 'bright'")
+    assert list(frames["stage"].unique()) == ["brightness", "post"]
+    assert frames["ERR"].max() < 0.05
+
+
+def test_the_stage_has_its_mask_in_the_recording(recording):
+    mask = recording.layer("bright", "brightness", FRAMES - 1)
+    np.testing.assert_array_equal(mask, frame(FRAMES - 1)[1] == 255)
+
+
+def test_the_stage_is_in_the_report(report):
+    assert "brightness" in report
+
+
+def test_the_stage_has_documented_settings(workshop):
+    settings = workshop.done("config", "--variant", "bright=bright.toml")
+    assert "tolerance = 50" in settings
+
+
+def test_the_metric_is_a_column_of_frames(workshop):
+    frames = workshop.table("frames")
+    np.testing.assert_allclose(frames["BACC"], (frames["TPR"] + frames["TNR"]) / 2)
+
+
+def test_the_metric_is_a_column_of_windows(workshop):
+    windows = workshop.table("windows")
+    np.testing.assert_allclose(windows["BACC"], (windows["TPR"] + windows["TNR"]) / 2)
+    pooled = (windows["pooled_TPR"] + windows["pooled_TNR"]) / 2
+    np.testing.assert_allclose(windows["pooled_BACC"], pooled)
+
+
+def test_the_metric_is_in_the_summary(workshop):
+    summary = json.loads((workshop.folder / "reports" / "summary.json").read_text())
+    totals = summary["totals"]["bright"]["post"]
+    frames = workshop.table("frames").query("variant == 'bright' and stage == 'post'")
+    assert totals["BACC"] == pytest.approx(frames["BACC"].mean())
+
+
+def test_the_metric_is_in_the_recording(recording, workshop):
+    series = recording.scalars("/metrics/bright/post/BACC")
+    frames = workshop.table("frames").query("variant == 'bright' and stage == 'post'")
+    np.testing.assert_allclose(series, frames["BACC"])
+    assert "BACC" in recording.frames
+
+
+def test_the_metric_is_compared_by_its_direction(workshop):
+    compared = json.loads(workshop.done("compare", "out.rrd", "--json"))
+    final = [change for change in compared["changes"] if change["final"]]
+    assert final
+    assert all("BACC" in change["difference"] for change in final)
+    worse = workshop.roadeval("compare", "out.rrd", "--fail-if", "post.bright.BACC > 0%")
+    assert worse.returncode == 4, worse.stderr
+
+
+def test_the_region_is_counted(workshop):
+    regions = workshop.table("regions").query("region == 'ahead' and stage == 'post'")
+    assert set(regions["variant"]) == {"filtered", "unfiltered", "bright", "blind"}
+    assert set(regions[["TP", "TN", "FP", "FN"]].sum(axis=1)) == {48 * 22}
+
+
+def test_the_region_is_in_the_report_by_its_title(report):
+    assert "ahead of the vehicle" in report
+
+
+def test_the_encoding_is_described(workshop):
+    found = json.loads(workshop.done("info", "drive.mcap", "--json"))
+    assert {topic["name"]: topic["count"] for topic in found["topics"]} == {
+        "/camera": FRAMES,
+        "/truth": FRAMES,
+    }
+
+
+def test_the_encoding_is_read(recording):
+    image, truth = frame(FRAMES - 1)
+    assert recording.image(FRAMES - 1).shape == image.shape
+    np.testing.assert_array_equal(recording.truth(FRAMES - 1), truth == 255)
+
+
+@pytest.mark.parametrize("ending", ["png", "pdf"])
+def test_the_figure_is_written(workshop, ending):
+    assert (workshop.folder / "reports" / f"accuracy.{ending}").stat().st_size > 1000
+
+
+def test_the_command_runs(workshop):
+    number = int(workshop.done("worst", "out.rrd"))
+    final = workshop.table("frames").query("variant == 'filtered' and stage == 'post'")
+    assert final.set_index("frame")["ERR"][number] == final["ERR"].max()
+    assert "worst" in workshop.done("--help")

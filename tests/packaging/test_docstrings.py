@@ -1,0 +1,45 @@
+"""Every example in a docstring runs, and shows what it says."""
+
+import doctest
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import roadeval
+from roadeval.synth import DriveSettings, write_drive
+
+HOME = Path(roadeval.__file__).parent
+SOURCES = {path: path.read_text() for path in sorted(HOME.rglob("*.py"))}
+OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+def name_of(path: Path) -> str:
+    parts = path.relative_to(HOME.parent).with_suffix("").parts
+    return ".".join(part for part in parts if part != "__init__")
+
+
+MODULES = [name_of(path) for path, text in SOURCES.items() if ">>> " in text]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """A folder with the files that examples speak of: a drive, its recording and a model."""
+    folder = tmp_path_factory.mktemp("examples")
+    write_drive(folder / "drive.mcap", DriveSettings(frames=14, width=64, height=48))
+    reports = folder / "reports"
+    roadeval.replay(folder / "drive.mcap", save=folder / "out.rrd", reports=reports)
+    roadeval.train([folder / "drive.mcap"], folder / "city.model")
+    return folder
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_the_examples_of_a_module_run(name, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    found = doctest.testmod(import_module(name), optionflags=OPTIONS)
+    assert found.attempted
+    assert not found.failed
+
+
+def test_no_example_is_skipped():
+    assert not [name_of(path) for path, text in SOURCES.items() if "doctest: +SKIP" in text]

@@ -1,0 +1,60 @@
+"""What the documents name is there: paths, anchors of the version, and the licence."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import roadeval
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = Path(roadeval.__file__).parent
+DOCUMENTS = [
+    "README.md",
+    "CONTRIBUTING.md",
+    *(f"docs/{path.name}" for path in ROOT.glob("docs/*.md")),
+]
+LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)[^)]*\)")
+QUOTED = re.compile(r"`((?:[\w.-]+/)+[\w.-]*)`")
+"""A path in backticks: it has a slash."""
+MADE = re.compile(r"^`(\S+)`$", re.MULTILINE)
+"""The head of a file that CONTRIBUTING.md adds."""
+ROOMS = {path.name for path in PACKAGE.iterdir() if path.is_dir()}
+ELSEWHERE = ("reports/", "recordings/", "build/", "masks/", "images/", "../shared/")
+"""Where runs write, and what users bring."""
+
+
+def exists(path: str, document: Path) -> bool:
+    """Whether a path is there: beside the document, in the checkout, or in the package.
+
+    Tests may run where the package is installed and the checkout has none.
+    """
+    path = path.removeprefix("../roadeval/").removeprefix("roadeval/")
+    return any((place / path).exists() for place in (document.parent, ROOT, PACKAGE))
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_every_path_exists(name):
+    document = ROOT / name
+    text = document.read_text()
+    paths = {*LINK.findall(text), *QUOTED.findall(text)} - {*MADE.findall(text)}
+    missing = [
+        path
+        for path in sorted(paths)
+        if not path.startswith(ELSEWHERE) and not exists(path, document)
+    ]
+    assert paths
+    assert not missing
+
+
+def test_every_room_is_in_the_architecture():
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    missing = [room for room in sorted(ROOMS - {"__pycache__"}) if f"`{room}/`" not in text]
+    assert not missing
+
+
+def test_the_version_is_the_same_everywhere():
+    changes = (ROOT / "CHANGELOG.md").read_text()
+    citation = (ROOT / "CITATION.cff").read_text()
+    assert f"\n## [{roadeval.__version__}] - " in changes
+    assert f"\nversion: {roadeval.__version__}\n" in citation

@@ -1,0 +1,79 @@
+"""Nothing at import needs POSIX, and what uses it does without where it is taken away."""
+
+import subprocess
+import sys
+import threading
+
+import roadeval
+from roadeval.cli.app import main
+from roadeval.synth import DriveSettings, write_drive
+
+IMPORTS = """
+import builtins, os, signal, sys
+from importlib import import_module
+from pkgutil import walk_packages
+
+import roadeval
+
+def import_all():
+    for module in walk_packages(roadeval.__path__, "roadeval."):
+        if module.name != "roadeval.__main__":
+            import_module(module.name)
+
+# Other packages are made for the system that they are installed on: they come first, as they are.
+import_all()
+for name in [name for name in sys.modules if name.split(".")[0] == "roadeval"]:
+    del sys.modules[name]
+
+POSIX = {"fcntl", "grp", "posix", "pty", "pwd", "readline", "resource", "syslog", "termios", "tty"}
+MISSING = {
+    os: "fork forkpty getuid geteuid getgid getsid getpgid killpg setsid chown mkfifo nice wait "
+        "waitid wait3 wait4 posix_spawn sched_getaffinity sysconf uname getloadavg WNOHANG statvfs",
+    signal: "SIGALRM SIGCHLD SIGHUP SIGKILL SIGPIPE SIGQUIT SIGSTOP SIGTSTP SIGUSR1 SIGUSR2 "
+        "alarm pause setitimer sigwait pthread_sigmask pthread_kill siginterrupt",
+}
+for module, names in MISSING.items():
+    for name in names.split():
+        delattr(module, name)
+ordinary = builtins.__import__
+
+def without_posix(name, scope=None, *rest):
+    importer = (scope or {}).get("__name__", "")
+    if name in POSIX and importer.split(".")[0] == "roadeval":
+        raise ModuleNotFoundError(f"{importer} imports {name}")
+    return ordinary(name, scope, *rest)
+
+builtins.__import__ = without_posix
+import roadeval
+import_all()
+print(sum(name.startswith("roadeval.") for name in sys.modules))
+"""
+
+
+def test_no_module_needs_posix_to_be_imported():
+    run = subprocess.run(
+        [sys.executable, "-c", IMPORTS], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    assert int(run.stdout) > 100
+
+
+def test_a_command_runs_in_a_thread_that_may_not_handle_signals(capsys):
+    codes = []
+    thread = threading.Thread(target=lambda: codes.append(main(["--version"])))
+    thread.start()
+    thread.join()
+    assert codes == [0]
+    assert capsys.readouterr().out.startswith("roadeval ")
+
+
+def test_a_run_finds_its_workers_where_the_number_of_processors_is_unknown(monkeypatch, tmp_path):
+    monkeypatch.setattr("os.cpu_count", lambda: None)
+    write_drive(tmp_path / "drive.mcap", DriveSettings(frames=12, width=64, height=48))
+    outcome = roadeval.replay(
+        tmp_path / "drive.mcap",
+        roadeval.configure({"output": {"record": "none"}}),
+        save=tmp_path / "out.rrd",
+        reports=tmp_path / "reports",
+    )
+    assert outcome.summary["frames"]["evaluated"] == 2

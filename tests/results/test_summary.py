@@ -1,0 +1,38 @@
+"""Summaries read back, those of version 1 too."""
+
+import json
+
+import pytest
+
+from roadeval.results.reading import ResultsError
+from roadeval.results.summary import FORMAT, parse_summary
+
+
+def test_a_summary_of_version_1_takes_todays_shape():
+    own = {"preset": "paper", "svm": {"c": 1.0}, "training": {"frames": 10}, "evaluation": {}}
+    old = {
+        "format": {**FORMAT, "version": 1},
+        "totals": {},
+        "selection": {"image_topic": "/camera", "road_labels": [3], "scale": 0.5},
+        "settings": {"filtered": own, "unfiltered": own},
+    }
+    summary = parse_summary(json.dumps(old), "old.rrd")
+    assert summary["format"] == FORMAT
+    assert "selection" not in summary
+    assert summary["settings"] == {name: {"svm": {"c": 1.0}} for name in old["settings"]}
+    assert summary["run"] == {
+        "preset": "paper",
+        "topics": {"image": "/camera"},
+        "labels": {"road": [3]},
+        "frames": {"scale": 0.5},
+        "output": {},
+        "training": {"frames": 10},
+        "evaluation": {},
+    }
+
+
+@pytest.mark.parametrize("version", [0, 3, None])
+def test_another_version_is_refused_where_it_lies(version):
+    text = json.dumps({"format": {**FORMAT, "version": version}})
+    with pytest.raises(ResultsError, match=r"^new\.rrd: not a summary of format"):
+        parse_summary(text, "new.rrd")
