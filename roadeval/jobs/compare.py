@@ -134,8 +134,10 @@ def writer(path: Path) -> Callable[[Compared, Paper], bytes]:
         If nothing does.
     """
     known: dict[str, Callable[[Compared, Paper], bytes]] = {
-        ".pdf": lambda compared, paper: pdf(document(compared.content, compared.windows), paper),
-        ".md": lambda compared, _: markdown(compared.content).encode(),
+        ".pdf": lambda compared, paper: pdf(
+            document(compared.comparison, compared.judgements, compared.windows), paper
+        ),
+        ".md": lambda compared, _: markdown(compared.comparison, compared.judgements).encode(),
         ".json": lambda compared, _: as_json(compared).encode(),
     }
     if path.suffix.lower() not in known:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import Any, Final, TypeGuard
+from typing import Final, TypeGuard
 
 DASH: Final = "\N{EN DASH}"
 """Between two numbers; and where a number is undefined."""
@@ -39,9 +39,12 @@ def points(difference: float | None, digits: int = 2) -> str:
     return text[1:] if float(text) == 0 else text.replace("-", MINUS)
 
 
-def interval(difference: Mapping[str, Any], digits: int = 2) -> str:
-    """Return the interval of a difference, given as in ``summary.json``."""
-    low, high = difference["low"], difference["high"]
+def interval(low: float | None, high: float | None, digits: int = 2) -> str:
+    """Return an interval of a difference of two fractions in percentage points.
+
+    >>> interval(0.01, 0.02)
+    '+1.00 to +2.00'
+    """
     if not defined(low) or not defined(high):
         return "none given"
     return f"{points(low, digits)} to {points(high, digits)}"

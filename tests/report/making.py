@@ -7,7 +7,7 @@ import pandas as pd
 from pypdf import PdfReader
 
 from roadeval.report.blocks import Cell, Document
-from roadeval.report.findings import Findings, PairedComparison
+from roadeval.report.findings import Commands, Findings, PairedComparison
 
 
 def a_document(*blocks, title="street"):
@@ -67,8 +67,7 @@ def some_findings(**changes):
     plain = {
         "source": "drive.rrd",
         "complete": True,
-        "again": "do it again",
-        "inspect": "open frame {}".format,
+        "commands": Commands("repeat {}".format, "open frame {}".format),
         "pictured": 1200,
         "summary": {
             "drive": {"name": "street", "width": 40, "height": 20},
@@ -76,6 +75,7 @@ def some_findings(**changes):
             "frames": frames,
             "totals": totals,
             "settings": {},
+            "run": {},
             "versions": {},
         },
         "properties": {},

@@ -23,8 +23,8 @@ def test_a_difference_has_its_sign_unless_it_is_nothing(difference, told):
 
 
 def test_an_interval_is_given_or_not():
-    assert interval({"low": -0.01, "high": 0.02}) == f"{MINUS}1.00 to +2.00"
-    assert interval({"low": None, "high": None}) == "none given"
+    assert interval(-0.01, 0.02) == f"{MINUS}1.00 to +2.00"
+    assert interval(None, None) == "none given"
 
 
 def test_a_stamp_is_a_date_where_it_can_be_one():

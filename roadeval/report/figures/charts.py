@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from roadeval.evaluation.compared import MaskComparison
     from roadeval.report.findings import ErrorHeatmap, Totals
 
 WIDTH: Final = 7.4
@@ -185,11 +186,8 @@ def coverage(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def forest(changes: Sequence[Mapping[str, Any]]) -> Figure:
-    """Draw each result's change of ERR, FPR and FNR against the base, with its interval.
-
-    ``changes`` are rows of a comparison, see `roadeval.evaluation.comparison`.
-    """
+def forest(changes: Sequence[MaskComparison]) -> Figure:
+    """Draw each result's change of ERR, FPR and FNR against the base, with its interval."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(WIDTH, 0.8 + 0.26 * len(changes)), layout="constrained")
@@ -197,10 +195,10 @@ def forest(changes: Sequence[Mapping[str, Any]]) -> Figure:
     grid = figure.subplots(1, 3, sharey=True)
     for ax, rate in zip(grid, RATES, strict=True):
         for place, each in zip(places, changes, strict=True):
-            change = each["difference"][rate]
-            ax.plot(_percent(change["mean"]), place, "o", color=INK, markersize=5)
-            if change["low"] is not None:
-                ends = [100 * change["low"], 100 * change["high"]]
+            change = each.difference[rate]
+            ax.plot(_percent(change.mean), place, "o", color=INK, markersize=5)
+            if change.low is not None and change.high is not None:
+                ends = [100 * change.low, 100 * change.high]
                 ax.plot(ends, [place, place], color=INK, linewidth=1.6)
         ax.axvline(0, color=FAINT, linewidth=0.8)
         ax.margins(x=0.15)
@@ -214,22 +212,19 @@ def forest(changes: Sequence[Mapping[str, Any]]) -> Figure:
     return figure
 
 
-def levels(rows: Sequence[Mapping[str, Any]]) -> Figure:
-    """Draw the rates of several results' final masks, a line of marks a result.
-
-    ``rows`` are those of a comparison, see `roadeval.evaluation.comparison`.
-    """
+def levels(rows: Sequence[MaskComparison]) -> Figure:
+    """Draw the rates of several results' final masks, a line of marks a result."""
     from matplotlib.figure import Figure
 
-    results = list(dict.fromkeys(row["result"] for row in rows))
-    variants = list(dict.fromkeys(row["variant"] for row in rows))
+    results = list(dict.fromkeys(row.result for row in rows))
+    variants = list(dict.fromkeys(row.variant for row in rows))
     figure = Figure(figsize=(WIDTH, 1.0 + 0.32 * len(results)), layout="constrained")
     grid = figure.subplots(1, 3, sharey=True)
     for ax, rate in zip(grid, RATES, strict=True):
         for variant, look in looks(variants).items():
-            own = [row for row in rows if row["variant"] == variant]
-            values = [_percent(row["new"][rate]) for row in own]
-            _marks(ax, values, [results.index(row["result"]) for row in own], look)
+            own = [row for row in rows if row.variant == variant]
+            values = [_percent(row.new[rate]) for row in own]
+            _marks(ax, values, [results.index(row.result) for row in own], look)
         ax.set_title(f"{rate}, %", loc="left")
         ax.set_xlim(left=0)
         ax.grid(axis="x")
@@ -239,9 +234,9 @@ def levels(rows: Sequence[Mapping[str, Any]]) -> Figure:
     return figure
 
 
-def _name(row: Mapping[str, Any]) -> str:
-    same = row["result"] == row["variant"]
-    return str(row["result"]) if same else f"{row['result']}: {row['variant']}"
+def _name(row: MaskComparison) -> str:
+    same = row.result == row.variant
+    return row.result if same else f"{row.result}: {row.variant}"
 
 
 def _marks(ax: Axes, x: Any, y: Any, look: Look) -> None:

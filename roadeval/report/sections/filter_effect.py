@@ -61,7 +61,7 @@ def _differences(findings: Findings, pair: PairedComparison) -> Table:
                 rate,
                 *(percent(findings.total(name)[rate]) for name in names),
                 Cell(points(change["mean"]), bold=True),
-                interval(change),
+                interval(change["low"], change["high"]),
                 number(change["frames"]),
                 DASH if (worth := change["effective_frames"]) is None else f"{worth:.0f}",
             ]
@@ -148,8 +148,8 @@ def _against_baseline(findings: Findings, blind: Sequence[PairedComparison]) -> 
             [
                 variant_cell(pair.treated, [*findings.finals]),
                 percent(findings.total(pair.treated)["ERR"]),
-                Cell(points(pair.differences["ERR"]["mean"]), bold=True),
-                interval(pair.differences["ERR"]),
+                Cell(points((change := pair.differences["ERR"])["mean"]), bold=True),
+                interval(change["low"], change["high"]),
                 number(int((pair.frames["ERR"] < 0).sum())),
                 number(int((pair.frames["ERR"] > 0).sum())),
             ]

@@ -4,7 +4,7 @@ from roadeval.report.blocks import Command, KeepTogether, Text, TwoColumns
 from roadeval.report.findings import NotableFrame
 from roadeval.report.sections.frames import section
 from roadeval.report.words import MINUS
-from tests.report.making import plain_rows, rates, some_findings, the
+from tests.report.making import column, plain_rows, rates, some_findings, the
 
 
 def a_frame(number, **changes):
@@ -37,6 +37,7 @@ def test_a_bad_frame_is_shown_with_its_rates_the_stage_at_fault_and_its_notes():
         ["filtered", "40.00", "30.00", "20.00"],
         ["unfiltered", "50.00", "60.00", "70.00"],
     ]
+    assert [cell.bold for cell in column(the(TwoColumns, blocks).right[0], "ERR")] == [True, False]
     assert the(Command, blocks).text == "open frame 7"
 
 

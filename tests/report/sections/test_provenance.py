@@ -29,7 +29,7 @@ def test_the_log_and_the_command_that_makes_the_results_again_are_given():
     blocks = list(section(findings))
     texts = [block.text for block in blocks if isinstance(block, Text)]
     assert texts[:2] == ["Log: street.mcap", "SHA-256: abc"]
-    assert the(Command, blocks).text == "do it again"
+    assert the(Command, blocks).text == "repeat street.mcap"
 
 
 def test_seconds_are_told_in_milliseconds_beside_the_versions():

@@ -72,6 +72,6 @@ def test_many_variants_have_a_table_a_number():
 
 def test_the_width_of_the_edge_is_told_where_it_is_known():
     findings = some_findings(regions=table_of("boundary", "interior"))
-    findings.summary["settings"]["filtered"] = {"evaluation": {"boundary_width": 7}}
+    findings.summary["run"]["evaluation"] = {"boundary_width": 7}
     (note,) = (block.text for block in section(findings) if isinstance(block, Text))
     assert "within 7 pixels of the border" in note

@@ -1,0 +1,93 @@
+"""Charts of the PDF: each number where it belongs, in its own colour."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.colors import to_hex
+
+from roadeval.data import colours
+from roadeval.evaluation.compared import MaskComparison
+from roadeval.evaluation.uncertainty import Difference
+from roadeval.report.figures import charts
+from roadeval.report.findings import ErrorHeatmap
+
+FILTERED, UNFILTERED = (colours.hex_of(c).lower() for c in (colours.FILTERED, colours.UNFILTERED))
+
+
+def bars(figure):
+    """Height and colour of each bar."""
+    return [
+        (round(bar.get_height(), 6), to_hex(bar.get_facecolor())) for bar in figure.axes[0].patches
+    ]
+
+
+def test_a_frame_that_got_worse_has_the_colour_of_the_other_variant():
+    frames = pd.DataFrame({"ERR": [0.1, -0.2]}, index=[7, 9])
+    mean = {"mean": -0.05, "low": None}
+    figure = charts.difference(frames, "filtered", "unfiltered", mean)
+    assert bars(figure) == [(10.0, UNFILTERED), (-20.0, FILTERED)]
+    upper, lower = sorted(figure.axes[0].texts, key=lambda text: -text.get_position()[1])
+    assert (upper.get_text(), lower.get_text()) == ("filtered worse", "filtered better")
+
+
+def test_many_frames_are_drawn_as_means_of_neighbours():
+    changes = np.tile([0.1, np.nan, 0.3, np.nan], charts.BARS)
+    frames = pd.DataFrame({"ERR": changes})
+    mean = {"mean": 0.2, "low": 0.1, "high": 0.3}
+    figure = charts.difference(frames, "filtered", "unfiltered", mean)
+    # The last patch is the interval.
+    assert bars(figure)[:-1] == [(20.0, UNFILTERED)] * charts.BARS
+
+
+def test_a_region_has_its_error_rate_left_and_its_share_of_the_errors_right():
+    row = {"variant": "filtered", "region": "lit", "pixels": 0.5, "ERR": 0.1, "errors": 0.3}
+    figure = charts.regions(pd.DataFrame([row]), ["filtered"], {"lit": "in light"})
+    left, right = figure.axes
+    assert left.lines[0].get_xdata() == pytest.approx([10])
+    assert right.lines[0].get_xdata() == pytest.approx([30])
+    assert right.patches[0].get_width() == pytest.approx(50)
+
+
+def test_each_rate_of_the_stages_has_its_own_axes_and_the_baseline_is_a_level():
+    rates = {"ERR": 0.1, "FPR": 0.2, "FNR": None}
+    totals = {"filtered": {"svm": rates, "post": rates}, "blind": {"post": rates}}
+    figure = charts.stages(totals)
+    for ax, value in zip(figure.axes, (10, 20, np.nan), strict=True):
+        line, _, level = ax.lines
+        np.testing.assert_allclose(line.get_ydata(), [value, value])
+        np.testing.assert_allclose(level.get_ydata(), [value, value])
+
+
+def test_false_positives_are_left_and_false_negatives_right_in_their_colours():
+    heat = ErrorHeatmap("filtered", np.array([[0.1, np.nan]]), np.array([[0.2, 0.4]]))
+    left, right, *_ = charts.heatmap([heat]).axes
+    for ax, share, colour in ((left, heat.fp, colours.FP), (right, heat.fn, colours.FN)):
+        (image,) = ax.images
+        np.testing.assert_allclose(np.ma.filled(image.get_array(), np.nan), 100 * share)
+        assert image.get_cmap()(0.5)[:3] == pytest.approx(np.array(colour) / 255, abs=0.01)
+    assert left.get_title(loc="left").startswith("false positives")
+
+
+def test_the_covered_share_is_in_percent():
+    figure = charts.coverage(pd.DataFrame({"filtered": [0.25, 0.5]}, index=[3, 8]))
+    (line,) = figure.axes[0].lines
+    assert line.get_ydata().tolist() == [25, 50]
+    assert line.get_xdata().tolist() == [3, 8]
+
+
+def test_a_comparison_shows_changes_with_their_intervals_and_levels_without():
+    change = Difference(0.01, -0.02, 0.04, 0.95, None, 12, None, None, None)
+    unsure = replace(change, low=None, high=None)
+    new = {"ERR": 0.1, "FPR": 0.2, "FNR": 0.3}
+    changes = {"ERR": change, "FPR": unsure, "FNR": change}
+    row = MaskComparison("new", "filtered", "post", True, 12, {}, new, changes)
+    first, second, _ = charts.forest([row]).axes
+    mean, interval, _ = first.lines
+    assert mean.get_xdata() == pytest.approx([1])
+    assert interval.get_xdata() == pytest.approx([-2, 4])
+    assert len(second.lines) == 2
+    assert [ax.lines[0].get_xdata()[0] for ax in charts.levels([row]).axes] == pytest.approx(
+        [10, 20, 30]
+    )

@@ -1,0 +1,51 @@
+"""The report of a drive: which sections it has, and what stands above them."""
+
+import pandas as pd
+
+from roadeval.report.blocks import Heading
+from roadeval.report.drive import document
+from tests.report.making import some_findings
+
+
+def sections(findings):
+    blocks = document(findings).blocks
+    return [block.text for block in blocks if isinstance(block, Heading) and block.level == 1]
+
+
+def test_without_truth_there_are_masks_in_place_of_rates():
+    findings = some_findings(finals={}, overlap={})
+    findings.summary["totals"] = {}
+    assert sections(findings) == [
+        *("Summary", "Masks", "Settings, versions, and how to reproduce this")
+    ]
+
+
+def test_with_truth_the_sections_go_from_the_verdict_to_the_settings():
+    row = {"variant": "filtered", "region": "lit", "pixels": 1.0, "ERR": 0.1, "errors": 1.0}
+    findings = some_findings(
+        finals={"filtered": "post"},
+        regions=pd.DataFrame([row]),
+        error_parts={"filtered": {"svm": 0.2, "post": -0.1}},
+    )
+    findings.summary["totals"] = {"filtered": findings.totals["filtered"]}
+    assert sections(findings) == [
+        "Summary",
+        "Over the drive: the paper's tables and figures",
+        "With the filter against without",
+        "Where the errors are",
+        "Which stage broke it",
+        "The worst frames",
+        "Settings, versions, and how to reproduce this",
+    ]
+
+
+def test_the_drives_facts_stand_below_its_name():
+    findings = some_findings(finals={}, overlap={})
+    findings.summary["totals"] = {}
+    findings.summary["drive"]["rate_hz"] = 14.9999
+    findings.summary["versions"]["roadeval"] = "1.2"
+    findings.summary["run"]["preset"] = "paper"
+    page = document(findings)
+    assert page.title == "street"
+    assert page.subtitle == "1210 frames, 40 × 20, 15 Hz, preset paper, roadeval 1.2"  # noqa: RUF001
+    assert page.footer == "street, drive.rrd"
