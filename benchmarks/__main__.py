@@ -24,8 +24,9 @@ from roadeval import logs
 from roadeval.config import configure
 from roadeval.data import Frame, Role
 from roadeval.jobs import frame as runner
+from roadeval.jobs.processing import process
 from roadeval.jobs.progress import ignore
-from roadeval.jobs.run import Run
+from roadeval.jobs.run import prepare
 from roadeval.pipeline.stage import View
 from roadeval.recording import RecordRule, recorder_for
 from roadeval.results.lines import lines
@@ -121,14 +122,14 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
 
     config = configure({"run": {"jobs": 1}})
     with logs.open_log(drive) as log, one_thread_each():
-        run = Run(log, config, ignore)
+        run = prepare(log, config, ignore)
         recorder = recorder_for(folder / "stages.rrd", run.layout(), RecordRule.parse("all"))
         with recorder:
             for position, logged in enumerate(log.frames(run.selection)):
                 frame, seconds = timed(logged.decode)
                 lap("decode", seconds)
                 seen = View.of(frame.image)
-                variants = tuple(runner.run_variant(n, c, seen) for n, c in run._chains.items())
+                variants = tuple(runner.run_variant(n, c, seen) for n, c in run.chains.items())
                 for variant in variants:
                     for stage in variant.stages:
                         lap(f"{variant.variant} {stage.stage}", stage.seconds)
@@ -147,11 +148,13 @@ def _plain(
 ) -> Rows:
     config = configure({"run": {"jobs": 1}})
     with logs.open_log(drive) as log:
-        run = Run(log, config, ignore)
+        run = prepare(log, config, ignore)
         frames = [each.decode() for each in log.frames(run.selection)]
         step = max(1, len(frames) // options.plain_frames)
         chosen = range(len(frames))[step // 2 :: step][: options.plain_frames]
-        results = [r for i, (_, _, r) in enumerate(run.frames(Whole())) if i in chosen]
+        results = [
+            done.encoded for i, done in enumerate(process(run, Whole(), ignore)) if i in chosen
+        ]
     plain = PlainWay(frames, config)
     for name, parameters in run.model.parameters.items():
         plain.require_same_machine(name, parameters["svm"])

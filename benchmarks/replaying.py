@@ -17,8 +17,10 @@ from roadeval import logs
 from roadeval.config import RunConfig
 from roadeval.data import FrameResult
 from roadeval.data.packed import Packed
+from roadeval.jobs import summary
+from roadeval.jobs.processing import process
 from roadeval.jobs.progress import ignore
-from roadeval.jobs.run import Run
+from roadeval.jobs.run import prepare
 from roadeval.recording import RecordRule, recorder_for
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.lines import lines, sum_lines
@@ -58,11 +60,12 @@ class Whole:
 def hold(drive: Path, config: RunConfig) -> Held:
     """Run the pipeline once, before any clock runs, and keep what the floor needs."""
     with logs.open_log(drive) as log:
-        run = Run(log, config, ignore)
+        run = prepare(log, config, ignore)
         results, sizes = [], []
         recorder = recorder_for(drive.with_suffix(".held.rrd"), run.layout(), ALL)
-        for position, (_, _, result) in enumerate(run.frames(Whole())):
-            if position % max(1, -(-run.total * _bytes(result) // HELD_BYTES)) == 0:
+        for position, done in enumerate(process(run, Whole(), ignore)):
+            result = done.encoded
+            if position % max(1, -(-len(run.frames) * _bytes(result) // HELD_BYTES)) == 0:
                 results.append(result)
                 encoded = recorder.encode(result, position, lines(result))
                 sizes.append(_layer_bytes(encoded.payloads))
@@ -109,17 +112,17 @@ def floor(held: Held, folder: Path, jobs: int) -> Cost:
 def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
     """Do what `replay` does, without its training, its summary and its figures."""
     with logs.open_log(drive) as log:
-        run = Run(log, config, ignore)
+        run = prepare(log, config, ignore)
         recorder = recorder_for(folder / "loop.rrd", run.layout(), ALL)
         meter = Meter()
         with recorder, ResultsWriter(folder / "reports") as results:
-            for _, own, encoded in run.frames(recorder):
-                recorder.write(encoded)
-                results.append(own)
+            for done in process(run, recorder, ignore):
+                recorder.write(done.encoded)
+                results.append(done.lines)
             recorder.finish({})
             cost = meter.read()
             results.append(sum_lines(run.board.sums()))
-            results.finish(run.summary())
+            results.finish(summary.of(run), "")
         return cost
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,9 +11,11 @@ from roadeval import logs
 from roadeval.config import OutputSettings, RunConfig
 from roadeval.config.toml import run_toml
 from roadeval.jobs import summary
+from roadeval.jobs.examples import ExampleFrames
 from roadeval.jobs.outputs import AnyPath, Outputs, keep_apart
+from roadeval.jobs.processing import process
 from roadeval.jobs.progress import OnProgress, Progress, ignore
-from roadeval.jobs.run import Run
+from roadeval.jobs.run import Run, prepare
 from roadeval.recording import NullRecorder, RecordRule, recorder_for
 from roadeval.report.figures.figure import ExampleFrame, FigureData
 from roadeval.report.figures.files import write_figures
@@ -86,34 +87,29 @@ def _run(
     log: logs.Log, config: RunConfig, to: Outputs, on_progress: OnProgress
 ) -> tuple[Outcome, list[ExampleFrame]]:
     """Run over the log into a recording and tables; return the frames for the figure of masks."""
-    with (
-        ResultsWriter(to.reports) as results,
-        _sidecar(to.mcap) as sidecar,
-        ExitStack() as opened,
-    ):
-        run = Run(log, config, on_progress)
-        recorder = recorder_for(to.recording, run.layout(), RecordRule.parse(config.output.record))
-        opened.enter_context(recorder)
-        for result, lines, encoded in run.frames(recorder):
-            recorder.write(encoded)
-            results.append(lines)
-            sidecar.write(result)
-        on_progress(Progress(run.done, run.total, "writing"))
-        recorder.flush()
-        trim()
-        sums = sum_lines(run.board.sums())
-        results.append(sums)
-        facts = summary.of(run) | {"tables": results.tables}
-        recorder.finish(_texts(run, facts, sums))
-        files = results.finish(facts, run_toml(config, log.name, VERSION))
+    sidecar = logs.SidecarWriter(to.mcap) if to.mcap else logs.NoSidecar()
+    with ResultsWriter(to.reports) as results, sidecar:
+        run = prepare(log, config, on_progress)
+        examples = ExampleFrames(len(run.frames))
+        rule = RecordRule.parse(config.output.record)
+        with recorder_for(to.recording, run.layout(), rule) as recorder:
+            for done in process(run, recorder, on_progress):
+                recorder.write(done.encoded)
+                results.append(done.lines)
+                sidecar.write(done.result)
+                examples.offer(done.position, done.result)
+            on_progress(Progress(len(run.frames), len(run.frames), "writing"))
+            recorder.flush()
+            trim()
+            sums = sum_lines(run.board.sums())
+            results.append(sums)
+            facts = summary.of(run) | {"tables": results.tables}
+            recorder.finish(_texts(run, facts, sums))
+            files = results.finish(facts, run_toml(config, log.name, VERSION))
     saved = None if isinstance(recorder, NullRecorder) else recorder.path
     files += [sidecar.path] if sidecar.path else []
     warnings, losses = summary.warnings(run), summary.losses(run)
-    return Outcome(saved, to.reports, facts, warnings, losses, tuple(files)), run.examples.kept
-
-
-def _sidecar(path: Path | None) -> logs.SidecarWriter | logs.NoSidecar:
-    return logs.NoSidecar() if path is None else logs.SidecarWriter(path)
+    return Outcome(saved, to.reports, facts, warnings, losses, tuple(files)), examples.kept
 
 
 def _texts(run: Run, facts: Mapping[str, Any], sums: Mapping[str, str]) -> dict[str, str]:

@@ -62,7 +62,7 @@ def warnings(run: Run) -> tuple[str, ...]:
 
 def losses(run: Run) -> tuple[str, ...]:
     """List the parts of the log that were lost."""
-    frames = sorted(run.read.accounting.undecodable.items())
+    frames = sorted(run.frames.accounting.undecodable.items())
     return (*run.log.losses, *(f"frame {number}: {reason}" for number, reason in frames))
 
 
@@ -113,7 +113,7 @@ def _drive(run: Run) -> dict[str, Any]:
 
 def _accounting(run: Run) -> dict[str, Any]:
     """Account for every frame of the image topic: evaluated, or skipped and why."""
-    seen, roles = run.read.accounting, Counter(run.board.roles())
+    seen, roles = run.frames.accounting, Counter(run.board.roles())
     skipped = {
         "outside the range": seen.in_log - seen.in_range,
         "not read (stride or limit)": seen.in_range - seen.read,

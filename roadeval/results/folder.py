@@ -46,6 +46,7 @@ class ResultsWriter:
     def __init__(self, folder: Path) -> None:
         self._folder: Final = folder
         self._open: Final[dict[str, _Growing]] = {}
+        self._made: Final = not folder.exists()
         with self._explained():
             folder.mkdir(parents=True, exist_ok=True)
             for name, table in TABLES.items():
@@ -105,6 +106,9 @@ class ResultsWriter:
         for table in self._open.values():
             table.discard()
         self._open.clear()
+        if self._made:
+            with suppress(OSError):  # it stays where something lies in it by now
+                self._folder.rmdir()
 
     @contextmanager
     def _explained(self) -> Iterator[None]:

@@ -9,8 +9,9 @@ import pytest
 
 import roadeval
 from roadeval import RoadevalError
+from roadeval.jobs.processing import process
 from roadeval.jobs.progress import ignore
-from roadeval.jobs.run import Run
+from roadeval.jobs.run import prepare
 from roadeval.logs import TopicSettings, open_log
 from roadeval.pipeline.paper import svm
 from roadeval.results.folder import ResultsFolder
@@ -221,12 +222,13 @@ def test_a_mask_in_the_log_is_scored_as_a_variant(drive, tmp_path):
     assert roadeval.Recording(outcome.recording).layer("net", "post", 12).max() == 1
 
 
-def test_the_folder_of_the_log_is_made_and_gone_again_if_the_run_is_refused(drive, tmp_path):
+def test_folders_are_made_and_a_run_that_is_refused_leaves_nothing(drive, tmp_path):
+    (tmp_path / "new").mkdir()
     names = {"save": "o.rrd", "reports": "reports", "mcap": "new/m.mcap"}
     outputs = {option: tmp_path / name for option, name in names.items()}
     with pytest.raises(RoadevalError, match="training"):
         roadeval.replay(drive, settings(max_frames=3), **outputs)
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.rglob("*")] == ["new"]
     roadeval.replay(drive, settings(max_frames=14), **outputs)
     assert (tmp_path / "new" / "m.mcap").exists()
 
@@ -482,7 +484,8 @@ def test_results_that_wait_have_lost_their_layers_but_not_their_masks(drive):
 
     options = settings(max_frames=14)
     with open_log(drive) as log:
-        *_, (lean, _, whole) = Run(log, options, ignore).frames(Seen())
+        *_, done = process(prepare(log, options, ignore), Seen(), ignore)
+    lean, whole = done.result, done.encoded
     assert any(list(variant.layers()) for variant in whole.variants)
     assert not any(list(variant.layers()) for variant in lean.variants)
     assert lean.tallies == whole.tallies

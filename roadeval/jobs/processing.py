@@ -1,0 +1,83 @@
+"""The frames of a run, decoded, computed, scored and encoded in worker threads."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol
+
+from roadeval import logs
+from roadeval.data import FrameResult, Role
+from roadeval.jobs import frame as one_frame
+from roadeval.jobs.progress import OnProgress, Progress
+from roadeval.jobs.run import Run
+from roadeval.pipeline.stage import View
+from roadeval.results.lines import lines
+from roadeval.runtime.memory import TRIM_EVERY, trim
+from roadeval.runtime.threads import ordered
+
+
+class Encoder(Protocol):
+    """Whatever turns a frame into what it will record, in any thread."""
+
+    def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> Any:
+        """Encode the frame at ``position`` among those read, from 0, with its table lines."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ProcessedFrame:
+    """A scored frame without its layers, its lines of the tables, and its encoded form.
+
+    ``position`` counts the frames that were read, from 1, those included that cannot be decoded.
+    """
+
+    position: int
+    result: FrameResult
+    lines: Mapping[str, str]
+    encoded: Any
+
+
+def process(run: Run, encoder: Encoder, on_progress: OnProgress) -> Iterator[ProcessedFrame]:
+    """Yield every decodable frame in order, and add it to the run's score.
+
+    Decoding, computing, scoring and encoding happen in the worker threads.
+    """
+    total, workers = len(run.frames), run.config.run.jobs or os.cpu_count() or 1
+    work = partial(_process, run, encoder)
+    for position, done in enumerate(ordered(work, enumerate(run.frames, 1), workers), 1):
+        on_progress(Progress(position, total, "replaying"))
+        if position % TRIM_EVERY == 0:
+            trim()
+        if done is None:
+            run.board.lose()
+        else:
+            run.board.add(done.result)
+            yield done
+
+
+def _process(
+    run: Run, encoder: Encoder, item: tuple[int, logs.LoggedFrame]
+) -> ProcessedFrame | None:
+    position, logged = item
+    try:
+        frame = logged.decode()
+    except logs.FrameError:
+        return None  # it stands in the log's accounting, with the reason
+    role = run.schedule.role(frame)
+    known = (frame.truth, frame.shadow_truth) if role is Role.EVALUATED else (None, None)
+    shared: dict[Any, Any] = {}
+    view = View.of(frame.image)
+    variants = [
+        one_frame.run_variant(
+            name, chain, view, truth=known[0], shadow_truth=known[1], known=shared
+        )
+        for name, chain in run.chains.items()
+    ]
+    variants += [one_frame.external_variant(name, mask) for name, mask in frame.external.items()]
+    result = run.board.score(frame, role, tuple(variants))
+    own = lines(result)
+    encoded = encoder.encode(result, position - 1, own)
+    # Results wait for their turn, and would wait with some 15 bytes a pixel.
+    return ProcessedFrame(position, result.without_layers(), own, encoded)
