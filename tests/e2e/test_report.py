@@ -242,7 +242,7 @@ def test_a_results_folder_of_another_format_is_one_line(tmp_path):
 
 
 def test_the_same_result_gives_the_same_file_and_nothing_is_left_beside_nor_fetched(
-    report, demo, tmp_path, monkeypatch
+    demo, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(socket.socket, "connect", lambda *_: pytest.fail("a connection"))
     monkeypatch.chdir(tmp_path)
