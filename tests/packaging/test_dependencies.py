@@ -1,0 +1,44 @@
+"""The package declares what it imports."""
+
+import ast
+import re
+import sys
+import tomllib
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import roadeval
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+DECLARED = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["video"]]
+
+
+def plain(name: str) -> str:
+    """A distribution's name as the package index compares it."""
+    return re.sub(r"[-_.]+", "-", re.match(r"[\w.-]+", name)[0]).lower()
+
+
+def imported(path: Path) -> set[str]:
+    """The packages that a module imports, wherever in it."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            names.add(node.module)
+    return {name.partition(".")[0] for name in names}
+
+
+def test_every_import_is_of_a_declared_dependency():
+    distributions = packages_distributions()
+    modules = set().union(*map(imported, Path(roadeval.__file__).parent.rglob("*.py")))
+    others = modules - sys.stdlib_module_names - {"roadeval"}
+    declared = {plain(each) for each in DECLARED}
+    assert {"numpy", "rerun"} <= others
+    undeclared = {
+        module
+        for module in others
+        if not declared & {plain(each) for each in distributions.get(module, ())}
+    }
+    assert not undeclared
