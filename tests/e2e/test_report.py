@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from pypdf import PdfReader
 
+from roadeval.data.words import DASH
 from roadeval.jobs.result import Result
 from roadeval.logs import LogWriter
-from roadeval.report.words import DASH
 from tests.e2e.commands import DEMO, here, roadeval
 from tests.report.making import text
 
