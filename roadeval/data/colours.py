@@ -56,6 +56,14 @@ def with_opacity(colour: Colour, opacity: int) -> ColourWithOpacity:
     return (*colour, opacity)
 
 
+_ON_PAPER: Final = {YELLOW: BLACK, GREY: (138, 138, 138)}
+
+
+def on_paper(colour: Colour) -> Colour:
+    """Return the colour, or where it is faint on white another for the same thing."""
+    return _ON_PAPER.get(colour, colour)
+
+
 def hex_of(colour: Colour) -> str:
     """Return the colour as Matplotlib, Typst and HTML write it: ``#RRGGBB``."""
     return "#{:02X}{:02X}{:02X}".format(*colour)

@@ -83,7 +83,7 @@ _KNOWN: Final = {
     ),
     BASELINE: Look(
         "blind: never looks at the image",
-        colours.hex_of(colours.BLIND),
+        colours.hex_of(colours.on_paper(colours.BLIND)),
         "x",
         dash=(0, (1, 1.4)),
         width=1.3,
@@ -106,7 +106,7 @@ def looks(variants: Sequence[str]) -> dict[str, Look]:
         name: replace(
             _SHAPES[place % len(_SHAPES)],
             label=name,
-            colour=colours.hex_of(colours.EXTRA[place % len(colours.EXTRA)]),
+            colour=colours.hex_of(colours.on_paper(colours.EXTRA[place % len(colours.EXTRA)])),
         )
         for place, name in enumerate(others)
     }
