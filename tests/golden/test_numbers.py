@@ -141,7 +141,7 @@ def accounts(read: range, trained: int, gap: int) -> dict[str, int]:
         "labelled": len(set(read) - set(drive.UNLABELLED)),
         "evaluated": len(usable) - trained - len(left_out),
         "outside the range": read[0],
-        "not read (--every, --max-frames)": drive.FRAMES - 1 - read[-1],
+        "not read (stride or limit)": drive.FRAMES - 1 - read[-1],
         "undecodable": len(read) - len(decoded),
         "trained on": trained,
         "gap after training": len(left_out),
@@ -187,7 +187,11 @@ def test_every_frame_is_accounted_for_alike_in_summary_terminal_report_and_guide
 
 def test_what_json_prints_is_the_file_s_text_and_the_recording_s(told):
     assert json.loads(told.out("replay_json")) == told.summary("model")
-    assert Recording(told.folder / "paper.rrd").summary == told.summary()
+    recorded, file = Recording(told.folder / "paper.rrd").summary, told.summary()
+    # A recording is the same wherever it is written to, so it does not say where that is.
+    for summary in (recorded, file):
+        summary["run"].pop("output")
+    assert recorded == file
 
 
 # --- The report -----------------------------------------------------------------------------------
@@ -384,6 +388,13 @@ def test_the_report_s_oracles(told, lines):
         cells = [percent(as_is[variant]), percent(mean.ERR), points(mean.ERR - as_is[variant])]
         cells += [percent(mean.FPR), percent(mean.FNR), str(len(own))]
         assert " ".join([variant, "perfect", oracle, *cells]) in lines["paper"]
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_the_report_s_milliseconds_are_the_summary_s_seconds(run, told, lines):
+    for variant, stages in told.summary(run)["seconds"].items():
+        for stage, seconds in stages.items():
+            assert f"{variant} {stage} {1000 * seconds:.2f}" in lines[run]
 
 
 # --- The worst frames -----------------------------------------------------------------------------

@@ -22,7 +22,23 @@ def pages(path: Path) -> list[str]:
 
 
 def paged(path: Path) -> str:
-    return "".join(f"=== page {n}\n{text}\n" for n, text in enumerate(pages(path), 1))
+    """A document's titles, its outline, and its text page by page."""
+    reader = pypdf.PdfReader(path)
+    kept = ("/Title", "/Author", "/Keywords")
+    lines = [f"{name[1:]}: {reader.metadata.get(name)}" for name in kept]
+    lines += ["=== outline", *_outline(reader, reader.outline)]
+    for number, text in enumerate(pages(path), 1):
+        lines += [f"=== page {number}", text]
+    return "\n".join(lines)
+
+
+def _outline(reader: pypdf.PdfReader, entries: list[Any], indent: str = "") -> Iterator[str]:
+    for entry in entries:
+        if isinstance(entry, list):
+            yield from _outline(reader, entry, f"{indent}    ")
+        else:
+            page = reader.get_destination_page_number(entry)
+            yield f"{indent}{entry.title}, page {(page or 0) + 1}"
 
 
 def bold(path: Path, page: int) -> list[str]:
