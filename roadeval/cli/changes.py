@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from roadeval.cli.outcome import defined, percent, points
+from roadeval.cli.outcome import percent, points
+from roadeval.data.words import defined
 
 if TYPE_CHECKING:
     from rich.console import Console

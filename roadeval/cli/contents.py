@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from roadeval.cli import console
 from roadeval.cli.options import with_flags
+from roadeval.data.words import timestamp
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -38,15 +38,7 @@ def show(found: Mapping[str, Any], out: Console) -> None:
 
 def _extent(found: Mapping[str, Any]) -> str:
     start, end = found["start_ns"], found["end_ns"]
-    return f"{(end - start) / NS:.1f} s from {moment(start)}"
-
-
-def moment(ns: int) -> str:
-    """Write a log time for a person: the date where it is one, else seconds."""
-    if ns < 365 * 24 * 3600 * NS:
-        return f"{ns / NS:.3f} s"
-    at = datetime.fromtimestamp(ns // NS, UTC)
-    return f"{at:%Y-%m-%d %H:%M:%S}.{ns % NS // 1_000_000:03d} UTC"
+    return f"{(end - start) / NS:.1f} s from {timestamp(start)}"
 
 
 def _gap(gap: tuple[int, int], start: int) -> str:

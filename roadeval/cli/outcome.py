@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeGuard
+from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.cli import console
 from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
+from roadeval.data.words import defined
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -109,18 +109,13 @@ def differences(final: Mapping[str, Mapping[str, Any]]) -> Table:
 
 
 def percent(fraction: float | None) -> str:
-    """Write a rate for a person; an undefined one as a dash."""
+    """Return a rate for the terminal, in ASCII alone; an undefined one as a dash."""
     return f"{100 * fraction:.2f} %" if defined(fraction) else "-"
 
 
 def points(fraction: float | None) -> str:
-    """Write a difference of two rates in percentage points, with its sign."""
+    """Return a difference of two rates in percentage points, with its sign, in ASCII alone."""
     return f"{100 * fraction:+.2f} pp" if defined(fraction) else "-"
-
-
-def defined(fraction: float | None) -> TypeGuard[float]:
-    """Tell whether a rate or an end of an interval has a value."""
-    return fraction is not None and not math.isnan(fraction)
 
 
 def _show_files(outcome: Outcome, out: Console) -> None:

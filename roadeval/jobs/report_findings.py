@@ -49,7 +49,7 @@ def collect(result: Result, commands: Commands | None = None) -> Findings:
         windows=windows,
         window_size=window_size,
         paired=paired,
-        regions=analysis.by_region(result.regions),
+        regions=analysis.by_region(result.regions) if len(frames) else result.regions,
         overlap={
             variant: {stage: analysis.overlap(total) for stage, total in stages.items()}
             for variant, stages in summary["totals"].items()
@@ -87,11 +87,10 @@ def _windows(result: Result) -> tuple[pd.DataFrame, int]:
     """Return the drive's windows and their size; longer ones where the drive is long."""
     size = analysis.settings_of(result.summary).window
     count = -(-result.frames["frame"].nunique() // size)
-    if (count <= WINDOWS and len(result.windows) == 0 < count) or count > WINDOWS:
-        size *= max(-(-count // WINDOWS), 1)
-        windows = analysis.windows(result.frames, size)
-        return table_of("windows", window_rows(windows)), size
-    return result.windows, size
+    if not count or (count <= WINDOWS and len(result.windows)):
+        return result.windows, size
+    size *= -(-count // WINDOWS)
+    return table_of("windows", window_rows(analysis.windows(result.frames, size))), size
 
 
 def _paired(

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
+from roadeval.data.words import defined, interval, listing, number, percent, points, timestamp
 from roadeval.evaluation.compared import Comparison, Judgement, MaskComparison, MovedFrame
 from roadeval.report.blocks import Block, BulletList, Cell, Document, Figure, Heading, Table, Text
 from roadeval.report.figures.charts import forest, levels
@@ -14,7 +15,6 @@ from roadeval.report.figures.figure import FigureData
 from roadeval.report.figures.files import svg, svg_of
 from roadeval.report.markdown import escaped
 from roadeval.report.markdown import table as markdown_table
-from roadeval.report.words import defined, interval, listing, number, percent, points, timestamp
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -89,7 +89,7 @@ def test_a_damaged_table_is_named_in_one_line(command, kept, worse, tmp_path):
     outputs = ("-o", tmp_path / "out.pdf") if command == "report" else ()
     run = here(command, folder, *outputs)
     assert run.returncode == 1
-    assert f"{folder / 'frames.csv'}: damaged" in run.stderr
+    assert f"{folder / 'frames.csv'}: does not agree with its summary" in run.stderr
     assert len(run.stderr.splitlines()) == 1
 
 

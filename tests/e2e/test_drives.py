@@ -12,7 +12,7 @@ FIGURES = [
     for suffix in ("pdf", "png")
 ]
 TABLES = [
-    *("frames.csv", "windows.csv", "regions.csv", "summary.json"),
+    *("frames.csv", "windows.csv", "regions.csv", "summary.json", "run.toml"),
     *("changes.csv", "heat.csv", "oracles.csv"),
 ]
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from pypdf import PdfReader
 
+from roadeval.data.words import DASH
 from roadeval.jobs.result import Result
 from roadeval.logs import LogWriter
-from roadeval.report.words import DASH
 from tests.e2e.commands import DEMO, here, roadeval
 from tests.report.making import text
 
@@ -242,7 +242,7 @@ def test_a_results_folder_of_another_format_is_one_line(tmp_path):
 
 
 def test_the_same_result_gives_the_same_file_and_nothing_is_left_beside_nor_fetched(
-    report, demo, tmp_path, monkeypatch
+    demo, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(socket.socket, "connect", lambda *_: pytest.fail("a connection"))
     monkeypatch.chdir(tmp_path)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
+from roadeval.data.words import MINUS
 from roadeval.evaluation.compared import (
     ComparedResult,
     Comparison,
@@ -17,7 +18,6 @@ from roadeval.evaluation.uncertainty import Difference
 from roadeval.report.blocks import BulletList, Table
 from roadeval.report.comparison import document, headline, markdown
 from roadeval.report.pdf.typeset import pdf
-from roadeval.report.words import MINUS
 from tests.report.making import text
 
 

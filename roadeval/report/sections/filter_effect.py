@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from roadeval.data import BASELINE
+from roadeval.data.words import DASH, defined, interval, listing, number, percent, points
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.figures.charts import difference
 from roadeval.report.figures.files import svg
 from roadeval.report.findings import Findings, PairedComparison
 from roadeval.report.sections.common import sampled_frames, variant_cell
-from roadeval.report.words import DASH, defined, interval, listing, number, percent, points
 
 
 def section(findings: Findings) -> Iterator[Block]:

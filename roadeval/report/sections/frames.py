@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from roadeval.data.words import percent, points, timestamp
 from roadeval.evaluation.analysis import FILTER
 from roadeval.report.blocks import (
     Block,
@@ -20,7 +21,6 @@ from roadeval.report.blocks import (
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import jpeg
 from roadeval.report.sections.common import variant_cell
-from roadeval.report.words import percent, points, timestamp
 
 LARGE: Final = 420
 SMALL: Final = 200

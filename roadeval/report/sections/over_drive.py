@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from roadeval.data import FILTERED, UNFILTERED
+from roadeval.data.words import DASH, percent
 from roadeval.report.blocks import Block, Cell, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.figures.figure import figures
 from roadeval.report.figures.files import svg_of
 from roadeval.report.findings import Findings
 from roadeval.report.sections.common import PAPER_RATES, SIDE_BY_SIDE, example_pictures
-from roadeval.report.words import DASH, percent
 
 PAPER_WINDOW: Final = 10
 """Frames in a row of the paper's figures (section 5)."""

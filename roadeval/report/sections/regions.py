@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Final
 
+from roadeval.data.words import percent
 from roadeval.evaluation.regions import partitions, titles
 from roadeval.report.blocks import Block, Figure, Heading, Table, Text
 from roadeval.report.figures.charts import heatmap
@@ -13,7 +14,6 @@ from roadeval.report.figures.charts import regions as chart
 from roadeval.report.figures.files import svg
 from roadeval.report.findings import Findings
 from roadeval.report.sections.common import SIDE_BY_SIDE, sampled_frames
-from roadeval.report.words import percent
 
 SHARES: Final = {"ERR": "ERR within, %", "errors": "share of its wrong pixels, %"}
 """Columns of `Findings.regions` that are tabulated for each variant, with their titles."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
+from roadeval.data.words import DASH, number, percent, points
 from roadeval.evaluation.analysis import FILTER
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.figures.charts import stages as chart
 from roadeval.report.figures.files import svg
 from roadeval.report.findings import Findings
 from roadeval.report.sections.common import sampled_frames, variant_cell
-from roadeval.report.words import DASH, number, percent, points
 
 
 def section(findings: Findings) -> Iterator[Block]:

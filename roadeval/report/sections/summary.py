@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
+from roadeval.data.words import defined, listing, number, percent
 from roadeval.evaluation.metrics import METRICS, OVERLAP
 from roadeval.report.blocks import (
     Block,
@@ -23,7 +24,6 @@ from roadeval.report.blocks import (
 from roadeval.report.findings import Findings
 from roadeval.report.images import jpeg
 from roadeval.report.sections.common import RATES, variant_cell
-from roadeval.report.words import defined, listing, number, percent
 
 CROWDED: Final = 7
 """Variants and warnings together that leave room for all thumbnails."""

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
+from roadeval.data.words import DASH, MINUS
 from roadeval.report.blocks import Heading, Table, Text
 from roadeval.report.sections.filter_effect import frames_changed, pixels_changed, section
-from roadeval.report.words import DASH, MINUS
 from tests.report.making import a_difference, a_pair, plain_rows, some_findings
 
 

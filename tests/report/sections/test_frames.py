@@ -1,9 +1,9 @@
 """The frames to look at: what is said about each, and how to open it."""
 
+from roadeval.data.words import MINUS
 from roadeval.report.blocks import Command, KeepTogether, Text, TwoColumns
 from roadeval.report.findings import NotableFrame
 from roadeval.report.sections.frames import section
-from roadeval.report.words import MINUS
 from tests.report.making import column, plain_rows, rates, some_findings, the
 
 

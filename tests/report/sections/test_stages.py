@@ -2,9 +2,9 @@
 
 import pandas as pd
 
+from roadeval.data.words import DASH, MINUS
 from roadeval.report.blocks import Table, Text
 from roadeval.report.sections.stages import section, stages_table
-from roadeval.report.words import DASH, MINUS
 from tests.report.making import column, plain_rows, some_findings
 
 PARTS = {

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from roadeval.report.words import DASH, MINUS, interval, listing, number, percent, points, timestamp
+from roadeval.data.words import DASH, MINUS, interval, listing, number, percent, points, timestamp
 
 
 @pytest.mark.parametrize(
