@@ -46,7 +46,7 @@ class ResultsWriter:
     def __init__(self, folder: Path) -> None:
         self._folder: Final = folder
         self._open: Final[dict[str, _Growing]] = {}
-        self._made: Final = not folder.exists()
+        self._made: Final = [each for each in (folder, *folder.parents) if not each.exists()]
         with self._explained():
             folder.mkdir(parents=True, exist_ok=True)
             for name, table in TABLES.items():
@@ -106,9 +106,9 @@ class ResultsWriter:
         for table in self._open.values():
             table.discard()
         self._open.clear()
-        if self._made:
-            with suppress(OSError):  # it stays where something lies in it by now
-                self._folder.rmdir()
+        for folder in self._made:
+            with suppress(OSError):  # one in which something lies by now stays
+                folder.rmdir()
 
     @contextmanager
     def _explained(self) -> Iterator[None]:

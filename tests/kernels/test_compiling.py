@@ -44,7 +44,7 @@ def test_loops_that_must_not_be_compiled_are_not(monkeypatch):
 
 
 def test_a_user_mistake_is_reported_before_anything_is_compiled(tmp_path, monkeypatch):
-    monkeypatch.setattr("roadeval.jobs.run.prepare", pytest.fail)
+    monkeypatch.setattr("roadeval.jobs.run.load_kernels", pytest.fail)
     monkeypatch.setattr("roadeval.jobs.train.prepare", pytest.fail)
     drive, model = write_log(tmp_path / "drive.mcap"), tmp_path / "none.model"
     with pytest.raises(roadeval.RoadevalError, match=r"none\.model"):
@@ -54,7 +54,7 @@ def test_a_user_mistake_is_reported_before_anything_is_compiled(tmp_path, monkey
 
 
 def test_replay_and_train_compile_before_all_else(tmp_path, monkeypatch):
-    monkeypatch.setattr("roadeval.jobs.run.prepare", lambda on_compile: on_compile())
+    monkeypatch.setattr("roadeval.jobs.run.load_kernels", lambda on_compile: on_compile())
     monkeypatch.setattr("roadeval.jobs.train.prepare", lambda on_compile: on_compile())
     drive, stages = write_log(tmp_path / "drive.mcap"), []
 
