@@ -1,4 +1,4 @@
-"""The command line: which commands there are, and the one place where errors become words."""
+"""The command line: its commands, and the place where errors become messages."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def explain(error: Exception | SystemExit) -> int:
-    """Say in one line what ended the command and return the exit code for it.
+    """Write in one line what ended the command, and return the exit code for it.
 
     With ``ROADEVAL_DEBUG=1`` in the environment the traceback stands above the line.
     """

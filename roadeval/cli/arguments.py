@@ -14,6 +14,7 @@ from roadeval.errors import RoadevalError
 
 if TYPE_CHECKING:
     from roadeval.config import RunConfig
+    from roadeval.report.pdf.typeset import Paper
 
 Drive = Annotated[
     Path, typer.Argument(metavar="DRIVE", show_default=False, help="A camera log (MCAP).")
@@ -28,6 +29,19 @@ Json = Annotated[bool, typer.Option("--json", help="Print the result on stdout a
 Quiet = Annotated[
     bool, typer.Option("-q", "--quiet", help="No progress and no table; warnings stay.")
 ]
+
+PaperSize = Annotated[
+    str, typer.Option("--paper", metavar="a4|letter", show_default=False, help="Default: a4.")
+]
+
+
+def paper_of(size: str) -> Paper:
+    """Return the size of paper; one that is not known is wrong usage."""
+    from roadeval.report.pdf.typeset import Paper
+
+    if size not in [*Paper]:
+        raise typer.BadParameter(f"{size!r} is none of {', '.join(Paper)}")
+    return Paper(size)
 
 
 @contextmanager

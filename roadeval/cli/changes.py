@@ -82,7 +82,7 @@ def _levels(changes: Sequence[Change]) -> Table:
 
 
 def _unsure(told: Mapping[str, Any]) -> str:
-    """Say why there is no interval."""
+    """Return why there is no interval."""
     if not defined(told["mean"]):
         return "ERR is undefined on every frame"
     return f"no interval, {told['reason']}"

@@ -1,4 +1,4 @@
-"""What a log holds, as plain data and as a screen of text."""
+"""The description of a log as a screen of text."""
 
 from __future__ import annotations
 

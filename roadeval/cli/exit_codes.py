@@ -1,4 +1,4 @@
-"""What the shell learns from us, in one number."""
+"""Process exit codes."""
 
 from enum import IntEnum
 

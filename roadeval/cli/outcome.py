@@ -1,4 +1,4 @@
-"""What a replay came to, on one screen of 80 columns: percent here, fractions in the files."""
+"""The outcome of a replay on one screen of 80 columns, in percent."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def show(outcome: Outcome, out: Console) -> None:
 
 
 def accounting(summary: Mapping[str, Any]) -> str:
-    """Say what became of the frames, in a line."""
+    """Return the account of the frames in a line."""
     frames = summary["frames"]
     counted = f"{frames['evaluated'] or 'none'} evaluated"
     if summary["windows"]:
@@ -119,7 +119,7 @@ def points(fraction: float | None) -> str:
 
 
 def _show_files(outcome: Outcome, out: Console) -> None:
-    """Say where the outputs lie; a path is never broken, so that it can be copied."""
+    """Print where the outputs lie; a path is never broken, so that it can be copied."""
     if outcome.recording:
         out.print(f"recording  {outcome.recording} ({size(outcome.recording)})", soft_wrap=True)
     if outcome.reports:

@@ -1,4 +1,4 @@
-"""What a comparison finds: results side by side, mask by mask, and limits that were judged."""
+"""The content of a comparison: results side by side, mask by mask, and judged limits."""
 
 from __future__ import annotations
 

@@ -167,7 +167,7 @@ class _Pair:
                     name: mean_difference(
                         (after[name] - before[name]).to_numpy(float), self._settings
                     )
-                    for name in (COMPARED if final else COMPARED[:1])
+                    for name in (COMPARED if final else ("ERR",))
                 },
             )
 

@@ -1,4 +1,4 @@
-"""What a metric is: a pure function of pixel counts, with what people and tables need to know."""
+"""Metrics: pure functions of pixel counts, with name, title, formula, unit and direction."""
 
 from __future__ import annotations
 

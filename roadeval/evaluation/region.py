@@ -1,4 +1,4 @@
-"""What a region is: a set of pixels that is counted apart, found anew in every labelled frame."""
+"""Regions: sets of pixels counted separately, found in every labelled frame."""
 
 from __future__ import annotations
 

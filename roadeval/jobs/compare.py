@@ -37,7 +37,7 @@ ROWS: Final = 60
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
-    """What came of a comparison.
+    """A comparison with its judged conditions.
 
     Parameters
     ----------

@@ -89,7 +89,7 @@ def worst_frames(
 
 
 def worst(result: Result, variant: str | None = None) -> WorstFrame | None:
-    """Give the worst frame that can be looked at, of a variant or else of the first one.
+    """Return the worst frame that has pictures, of a variant or else of the first one.
 
     A recording may hold the pictures of few frames: the others do not count. None if no frame with
     pictures was scored.
@@ -105,7 +105,7 @@ def worst(result: Result, variant: str | None = None) -> WorstFrame | None:
 
 
 def without_pictures(result: Result, frame: int) -> str:
-    """Say what is seen of a frame that was scored and whose pictures were not kept.
+    """Return a sentence on a frame that was scored and whose pictures were not kept.
 
     Empty for every other frame.
     """

@@ -20,7 +20,7 @@ from roadeval.runtime.threads import ordered
 
 
 class Encoder(Protocol):
-    """Whatever turns a frame into what it will record, in any thread."""
+    """The part of a recorder that encodes a frame; called from any thread."""
 
     def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> Any:
         """Encode the frame at ``position`` among those read, from 0, with its table lines."""

@@ -1,4 +1,4 @@
-"""A result, whichever way it comes: a recording, whole or partial, or a folder of results."""
+"""The result of a replay: a recording, whole or partial, or a results folder."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Result:
-    """What ``roadeval replay`` left, from an ``.rrd`` or a results folder.
+    """The result of a replay, from an ``.rrd`` or a results folder.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Result:
         )
 
     def layer(self, variant: str, name: str, frame: int) -> npt.NDArray[Any] | None:
-        """Give a layer of a variant; None where the run did not keep it."""
+        """Return a layer of a variant; None where the run did not keep it."""
         assert self.recording is not None
         try:
             return self.recording.layer(variant, name, frame)
@@ -98,11 +98,11 @@ class Result:
 
     @property
     def properties(self) -> Mapping[str, str | int | float]:
-        """What the recording says of its origin; nothing of a folder."""
+        """The recording's own properties, about its origin; none of a folder."""
         return self.recording.layout.properties if self.recording else {}
 
     def notes(self, frame: int, variant: str) -> tuple[str, ...]:
-        """Give the recording's sentences about a frame, but those about other variants."""
+        """Return the recording's notes on a frame, without those on other variants."""
         if self.recording is None:
             return ()
         others = {each.name for each in self.recording.variants} - {variant}

@@ -1,4 +1,4 @@
-"""A run over a log, prepared: what is read of it, what runs on each frame, and what scores it."""
+"""A run over a log, prepared: topics, model, chains and scoreboard."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from roadeval.version import VERSION
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """What a run needs for its frames, and the score that they add up to.
+    """A prepared run: its frames, the chains that run on them, and the score so far.
 
     Parameters
     ----------

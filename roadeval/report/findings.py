@@ -1,4 +1,4 @@
-"""What a report says about one drive: tables, frames and facts that a job has collected."""
+"""The content of a report on one drive: tables, frames and facts that a job has collected."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ class Camera:
         return np.asarray((points - self.position) @ self.axes[2])
 
     def catches(self, corners: Matrix) -> Flags:
-        """Tell which of ``(n, 4, 3)`` rectangles may be seen: ``(n,)`` bool, a quick guess.
+        """Return which of ``(n, 4, 3)`` rectangles may be seen: ``(n,)`` bool, a quick guess.
 
         Left out is what lies behind, to either side, or is too low in the image.
         """

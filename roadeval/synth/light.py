@@ -85,7 +85,7 @@ def daylight(beam: float) -> Light:
 
 
 def is_shadow(visible: Field, light: Light) -> Mask:
-    """Tell true shadow from the share of the sun's disc that each pixel's surface sees.
+    """Return true shadow from the share of the sun's disc that each pixel's surface sees.
 
     Parameters
     ----------

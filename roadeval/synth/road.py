@@ -67,7 +67,7 @@ class Road:
         return -HALF_WIDTH * widening, (HALF_WIDTH + bay) * widening
 
     def is_road(self, offset: Field, z: Field) -> Flags:
-        """Tell which points of the ground are road: bool, shaped like ``offset``."""
+        """Return which points of the ground are road: bool, shaped like ``offset``."""
         left, right = self.edges(z)
         return np.asarray((offset >= left) & (offset <= right))
 

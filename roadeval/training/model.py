@@ -1,4 +1,4 @@
-"""What was learnt, for every variant, and the file that keeps it: arrays and JSON, no code."""
+"""Learnt parameters of every variant, and their file: arrays and JSON, no code."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ def _content(path: Path) -> tuple[Any, dict[str, npt.NDArray[Any]]]:
 
 @validated(frozen=True)
 class _Header:
-    """What stands in a model file beside the arrays: see `Model`."""
+    """The JSON part of a model file, see `Model`."""
 
     settings: dict[str, dict[str, dict[str, Any]]]
     source: Literal["truth", "patch"]

@@ -1,4 +1,4 @@
-"""What each frame of a run is used for."""
+"""The role of each frame of a run: training, gap, evaluated, unlabelled."""
 
 from __future__ import annotations
 

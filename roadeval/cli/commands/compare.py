@@ -8,7 +8,6 @@ from typing import Annotated, Final
 import typer
 
 from roadeval.cli import arguments, console, messages
-from roadeval.cli.commands.report import PaperName
 from roadeval.cli.exit_codes import ExitCode
 
 
@@ -65,9 +64,7 @@ def compare(
             help="Write it as .pdf, .md or .json, by the ending. Repeatable.",
         ),
     ] = None,
-    paper: Annotated[
-        PaperName, typer.Option("--paper", metavar="a4|letter", help="Default: a4.")
-    ] = PaperName.A4,
+    paper: arguments.PaperSize = "a4",
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
@@ -80,11 +77,11 @@ def compare(
     """
     from roadeval.cli import changes
     from roadeval.jobs import compare as comparing
-    from roadeval.report.pdf.typeset import Paper
 
+    size = arguments.paper_of(paper)
     compared = comparing.compare(results, variants=variant, fail_if=fail_if or ())
     for path in output or ():
-        comparing.write(compared, path, paper=Paper(paper))
+        comparing.write(compared, path, paper=size)
     if json:
         console.emit(comparing.as_json(compared).rstrip())
     elif not quiet:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -14,13 +13,6 @@ from roadeval.cli.exit_codes import ExitCode
 
 if TYPE_CHECKING:
     from roadeval.report.findings import Commands
-
-
-class PaperName(StrEnum):
-    """Sizes of paper."""
-
-    A4 = "a4"
-    LETTER = "letter"
 
 
 def report(
@@ -35,9 +27,7 @@ def report(
             help="Default: report.pdf in reports/<drive>/, or in the results folder given.",
         ),
     ] = None,
-    paper: Annotated[
-        PaperName, typer.Option("--paper", metavar="a4|letter", help="Default: a4.")
-    ] = PaperName.A4,
+    paper: arguments.PaperSize = "a4",
     quiet: arguments.Quiet = False,
 ) -> int:
     """Write the report of a drive as a PDF.
@@ -47,10 +37,10 @@ def report(
     """
     from roadeval.jobs.report import report as write
     from roadeval.jobs.result import Result
-    from roadeval.report.pdf.typeset import Paper
 
+    size = arguments.paper_of(paper)
     read = Result(result)
-    path = write(read, output, paper=Paper(paper), commands=_commands(result))
+    path = write(read, output, paper=size, commands=_commands(result))
     if not quiet:
         console.emit(str(path))
     if not read.complete:

@@ -1,4 +1,4 @@
-"""What a message encoding provides: from a message's bytes to its fields."""
+"""Message encodings: from a message's bytes to its fields."""
 
 from __future__ import annotations
 

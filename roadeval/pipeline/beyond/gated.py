@@ -22,13 +22,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb, Truth
+from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb, Truth, colours
 from roadeval.data.packed import Packed
 from roadeval.pipeline.beyond import road_light
 from roadeval.pipeline.beyond.road_light import RoadLight
 from roadeval.pipeline.beyond.shadow_gates import (
     ACCEPTED,
-    NONE,
     VERDICTS,
     Components,
     GatedSettings,
@@ -47,7 +46,7 @@ Map = npt.NDArray[np.float32]
 
 
 def _mask(name: str, title: str, inside: str) -> LayerSpec:
-    classes = (LabelClass(0, "none", NONE), LabelClass(1, inside, SHADOW_COLOUR))
+    classes = (LabelClass(0, "none", colours.CLEAR), LabelClass(1, inside, SHADOW_COLOUR))
     return LayerSpec(name, LayerKind.MASK, title, classes)
 
 

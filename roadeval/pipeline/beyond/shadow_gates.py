@@ -15,7 +15,7 @@ import numpy.typing as npt
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.data import LabelClass, Mask, Rgb
+from roadeval.data import LabelClass, Mask, Rgb, colours
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.beyond import road_light
 from roadeval.pipeline.beyond.road_light import RoadLight
@@ -27,17 +27,16 @@ Labels = npt.NDArray[np.int32]
 Share = Annotated[float, Field(ge=0, le=1)]
 Pixels = Annotated[int, Field(ge=0, le=64)]
 
-NONE: Final = (0, 0, 0, 0)
 VERDICTS: Final = (
-    LabelClass(0, "none", NONE),
+    LabelClass(0, "none", colours.CLEAR),
     LabelClass(1, "accepted", SHADOW_COLOUR),
-    LabelClass(2, "too small", (153, 153, 153, 200)),
-    LabelClass(3, "too far away", (230, 159, 0, 200)),
+    LabelClass(2, "too small", colours.with_opacity(colours.GREY, 200)),
+    LabelClass(3, "too far away", colours.with_opacity(colours.ORANGE, 200)),
     LabelClass(4, "no lit road around it", RING_COLOUR),
-    LabelClass(5, "too dark for shade", (0, 0, 0, 200)),
+    LabelClass(5, "too dark for shade", colours.with_opacity(colours.BLACK, 200)),
     LabelClass(6, "too bright for shade", (255, 255, 255, 200)),
-    LabelClass(7, "rougher than road", (213, 94, 0, 200)),
-    LabelClass(8, "too little in the frame", (204, 121, 167, 200)),
+    LabelClass(7, "rougher than road", colours.with_opacity(colours.VERMILLION, 200)),
+    LabelClass(8, "too little in the frame", colours.with_opacity(colours.PURPLE, 200)),
 )
 ACCEPTED, SMALL, FAR, ALONE, DARK, BRIGHT, ROUGH, LITTLE = range(1, len(VERDICTS))
 

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, field_validator
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, mask_spec
+from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, colours, mask_spec
 from roadeval.data.arrays import Reach
 from roadeval.data.packed import Packed, everywhere
 from roadeval.kernels import KERNELS
@@ -25,7 +25,10 @@ BOUNDARY: Final = LayerSpec(
     "boundary",
     LayerKind.MASK,
     "Road boundary (Eq. 22)",
-    (LabelClass(0, "none", (0, 0, 0, 0)), LabelClass(1, "boundary", (240, 228, 66, 255))),
+    (
+        LabelClass(0, "none", colours.CLEAR),
+        LabelClass(1, "boundary", colours.with_opacity(colours.BOUNDARY, 255)),
+    ),
 )
 
 Odd = Annotated[int, Field(ge=1, le=999)]

@@ -12,7 +12,16 @@ from typing import Final
 
 import numpy as np
 
-from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Packed, Truth, everywhere
+from roadeval.data import (
+    LabelClass,
+    Layer,
+    LayerKind,
+    LayerSpec,
+    Packed,
+    Truth,
+    colours,
+    everywhere,
+)
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.paper.compensation import Compensation, lift
 from roadeval.pipeline.paper.shadow_mask import (
@@ -24,22 +33,22 @@ from roadeval.pipeline.paper.shadow_mask import (
 from roadeval.pipeline.paper.shadow_settings import ShadowSettings
 from roadeval.pipeline.stage import Output, Stage, View
 
-SHADOW_COLOUR: Final = (86, 180, 233, 160)
-RING_COLOUR: Final = (240, 228, 66, 220)
+SHADOW_COLOUR: Final = colours.with_opacity(colours.SHADOW, 160)
+RING_COLOUR: Final = colours.with_opacity(colours.RING, 220)
 
 NDI: Final = LayerSpec("ndi", LayerKind.SCALAR, "NDI (Eq. 6)", value_range=(-1.0, 1.0))
 SHADOW: Final = LayerSpec(
     "shadow",
     LayerKind.MASK,
     "Shadow mask (Eq. 8)",
-    (LabelClass(0, "lit", (0, 0, 0, 0)), LabelClass(1, "shadow", SHADOW_COLOUR)),
+    (LabelClass(0, "lit", colours.CLEAR), LabelClass(1, "shadow", SHADOW_COLOUR)),
 )
 RINGS: Final = LayerSpec(
     "rings",
     LayerKind.MASK,
     "Components and buffer rings (Eq. 9-10)",
     (
-        LabelClass(0, "none", (0, 0, 0, 0)),
+        LabelClass(0, "none", colours.CLEAR),
         LabelClass(1, "shadow", SHADOW_COLOUR),
         LabelClass(2, "ring", RING_COLOUR),
     ),

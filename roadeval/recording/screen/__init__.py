@@ -1,1 +1,1 @@
-"""What the viewer shows: its arrangement, texts and colours; and the viewer itself."""
+"""The viewer: its arrangement, texts and colours, and how it is opened."""

@@ -1,4 +1,4 @@
-"""What a figure is: a name, a caption, and a pure function that draws a run's results."""
+"""Figures: a name, a caption, and a pure function that draws a run's results."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What can be saved of a damaged file, such as one whose recorder was killed."""
+"""Recovery of the readable part of a damaged file, such as one whose recorder was killed."""
