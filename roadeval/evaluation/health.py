@@ -1,10 +1,10 @@
-"""A variant's health on a frame (ok, degraded, failed), and notes for a person."""
+"""A variant's health on a frame: ok, degraded or failed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
-from roadeval.data import BASELINE, FILTERED, UNFILTERED, Health
+from roadeval.data import Health
 from roadeval.evaluation.settings import EvaluationSettings
 
 Rates = Mapping[str, float]
@@ -22,54 +22,3 @@ def judge(rates: Rates, blind: Rates | None, settings: EvaluationSettings) -> He
     if worse or rates["ERR"] >= settings.degraded_err:
         return Health.DEGRADED
     return Health.OK
-
-
-def notes(
-    finals: Mapping[str, Rates], blind: Rates | None, settings: EvaluationSettings
-) -> tuple[str, ...]:
-    """Return what a person should know of a frame, in sentences.
-
-    Parameters
-    ----------
-    finals
-        The rates of each variant's final mask.
-    blind
-        Those of the baseline, or None.
-    settings
-        The thresholds.
-    """
-    return (
-        *_filter_note(finals, settings),
-        *(note for name, rates in finals.items() for note in _failures(name, rates, settings)),
-        *_blind_notes(finals, blind, settings),
-    )
-
-
-def _filter_note(finals: Mapping[str, Rates], settings: EvaluationSettings) -> Iterator[str]:
-    if FILTERED not in finals or UNFILTERED not in finals:
-        return
-    change = finals[FILTERED]["ERR"] - finals[UNFILTERED]["ERR"]
-    if abs(change) >= settings.noteworthy:
-        verb = "raised" if change > 0 else "lowered"
-        yield f"The filter {verb} ERR by {100 * abs(change):.1f} pp on this frame."
-
-
-def _failures(name: str, rates: Rates, settings: EvaluationSettings) -> Iterator[str]:
-    if rates["FNR"] >= settings.failed_fnr:
-        yield f"{name} finds {100 * rates['TPR']:.1f} % of the road."
-    elif rates["ERR"] >= settings.failed_err:
-        yield f"{name} gets {100 * rates['ERR']:.1f} % of the pixels wrong."
-
-
-def _blind_notes(
-    finals: Mapping[str, Rates], blind: Rates | None, settings: EvaluationSettings
-) -> Iterator[str]:
-    if blind is None:
-        return
-    for name, rates in finals.items():
-        excess = rates["ERR"] - blind["ERR"]
-        if excess >= settings.noteworthy:
-            yield (
-                f"{name} is {100 * excess:.1f} pp worse than {BASELINE}, which never looks at the "
-                f"image (ERR {100 * blind['ERR']:.1f} %)."
-            )

@@ -71,7 +71,6 @@ def score_frame(
         errors={v.variant: counts.error_map(v.final(), frame.truth) for v in variants},
         tallies=tallies,
         health={name: health.judge(own, blind, settings) for name, own in finals.items()},
-        notes=health.notes(finals, blind, settings),
         truth_bits=truth,
         changes=maps.changes(list(masks), bits, truth),
         contours=contours.boundary_f(final_bits, truth, settings.boundary_width),

@@ -15,7 +15,6 @@ import numpy.typing as npt
 from roadeval.data import (
     BASELINE,
     FILTERED,
-    FINAL_STAGE,
     UNFILTERED,
     Change,
     Frame,
@@ -33,7 +32,6 @@ from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import score_frame
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference, mean_difference
-from roadeval.evaluation.verdict import NO_PAIR, NOTHING_SCORED, verdict
 
 COMPARED: Final = tuple(
     name for name, metric in METRICS.items() if name == "ACC" or metric.mirrors is None
@@ -157,15 +155,13 @@ class Scoreboard:
 
     def summary(self) -> dict[str, Any]:
         """Return the parts of ``summary.json`` that the evaluation knows, fit for JSON."""
-        differences = self.differences()
         return {
-            "verdict": self._verdict(differences),
             "totals": self.totals(),
             "beyond": self._beyond.totals(),
             "oracles": self.oracles(),
             "difference": {
                 stage: {rate: asdict(difference) for rate, difference in by_rate.items()}
-                for stage, by_rate in differences.items()
+                for stage, by_rate in self.differences().items()
             },
             "windows": -(-len(self._frames) // self._settings.window),
             "health": {name: dict(counted) for name, counted in self._health.items()},
@@ -187,13 +183,6 @@ class Scoreboard:
                     treated.positions, control.positions, return_indices=True
                 )
                 yield stage, treated.rates[mine] - control.rates[theirs]
-
-    def _verdict(self, differences: Mapping[str, Mapping[str, Difference]]) -> str:
-        if not self._frames:
-            return NOTHING_SCORED
-        if FINAL_STAGE not in differences:
-            return NO_PAIR
-        return verdict(differences[FINAL_STAGE]["ERR"], "ERR", FINAL_STAGE)
 
     def _mean_seconds(self) -> dict[str, dict[str, float]]:
         mean: dict[str, dict[str, float]] = {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Protocol
 
@@ -14,6 +14,7 @@ from roadeval.jobs import frame as one_frame
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.jobs.run import Run
 from roadeval.pipeline.stage import View
+from roadeval.results import notes
 from roadeval.results.lines import lines
 from roadeval.runtime.memory import TRIM_EVERY, trim
 from roadeval.runtime.threads import ordered
@@ -77,6 +78,7 @@ def _process(
     ]
     variants += [one_frame.external_variant(name, mask) for name, mask in frame.external.items()]
     result = run.board.score(frame, role, tuple(variants))
+    result = replace(result, notes=notes.of_tallies(result.tallies, run.config.evaluation))
     own = lines(result)
     encoded = encoder.encode(result, position - 1, own)
     # Results wait for their turn, and would wait with some 15 bytes a pixel.

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.evaluation import analysis
 from roadeval.evaluation.scoreboard import COMPARED
-from roadeval.evaluation.verdict import NO_PAIR, NOTHING_SCORED, verdict
 from roadeval.recording import Recording, RecordingError
 from roadeval.results.folder import ResultsFolder
+from roadeval.results.verdict import NOTHING_SCORED, verdict_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -144,13 +144,17 @@ class Result:
 
 
 def _facts(frames: pd.DataFrame) -> dict[str, Any]:
+    """Compute what a summary states of the frames that were scored."""
     settings, totals = analysis.settings_of({}), analysis.totals(frames)
-    if not {FILTERED, UNFILTERED} <= totals.keys():
-        return {"verdict": NO_PAIR, "totals": totals}
-    paired = analysis.pairs(frames, FILTERED, UNFILTERED)
-    found = analysis.differences(paired, settings, COMPARED)
+    differences = {}
+    if {FILTERED, UNFILTERED} <= totals.keys():
+        paired = analysis.pairs(frames, FILTERED, UNFILTERED)
+        differences[FINAL_STAGE] = analysis.differences(paired, settings, COMPARED)
     return {
-        "verdict": verdict(found["ERR"], "ERR", FINAL_STAGE),
+        "verdict": verdict_of(totals, differences),
         "totals": totals,
-        "difference": {FINAL_STAGE: {name: asdict(each) for name, each in found.items()}},
+        "difference": {
+            stage: {name: asdict(each) for name, each in found.items()}
+            for stage, found in differences.items()
+        },
     }

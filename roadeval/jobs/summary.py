@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from roadeval.data import Role
 from roadeval.jobs.run import Run
+from roadeval.results.verdict import verdict_of
 from roadeval.version import VERSION
 
 PACKAGES: Final = (
@@ -20,7 +21,9 @@ PACKAGES: Final = (
 
 def of(run: Run) -> dict[str, Any]:
     """Return the content of ``summary.json``, but for its format, of a run at its end."""
-    return run.board.summary() | {
+    found = run.board.summary()
+    return found | {
+        "verdict": verdict_of(found["totals"], run.board.differences()),
         "drive": _drive(run),
         "frames": _accounting(run),
         "training": _training(run),

@@ -1,10 +1,10 @@
-"""When a frame is fine, and what is said of one that is not."""
+"""When a frame is fine, degraded or failed."""
 
 import pytest
 
 from roadeval.data import Counts, Health
 from roadeval.evaluation import metrics
-from roadeval.evaluation.health import Rates, judge, notes
+from roadeval.evaluation.health import Rates, judge
 from roadeval.evaluation.settings import EvaluationSettings
 
 SETTINGS = EvaluationSettings(
@@ -39,33 +39,3 @@ def test_a_frame_without_road_fails_by_its_errors_only() -> None:
 @pytest.mark.parametrize(("blind", "health"), [(7, Health.OK), (5, Health.DEGRADED)])
 def test_losing_to_blind_by_more_than_the_margin_degrades(blind: int, health: Health) -> None:
     assert judge(with_error(8), with_error(blind), SETTINGS) is health
-
-
-def test_a_fine_frame_needs_no_note() -> None:
-    finals = {"filtered": with_error(8), "unfiltered": with_error(9)}
-    assert notes(finals, with_error(7), SETTINGS) == ()
-
-
-@pytest.mark.parametrize(
-    ("filtered", "unfiltered", "note"),
-    [
-        (20, 8, "The filter raised ERR by 12.0 pp on this frame."),
-        (8, 20, "The filter lowered ERR by 12.0 pp on this frame."),
-    ],
-)
-def test_a_large_effect_of_the_filter_is_noted(filtered: int, unfiltered: int, note: str) -> None:
-    finals = {"filtered": with_error(filtered), "unfiltered": with_error(unfiltered)}
-    assert notes(finals, None, SETTINGS) == (note,)
-
-
-def test_a_failure_is_noted_with_its_reason() -> None:
-    missed = metrics.of(Counts(tp=1, tn=80, fp=0, fn=19))
-    assert notes({"net": missed}, None, SETTINGS) == ("net finds 5.0 % of the road.",)
-    wrong = notes({"net": with_error(30)}, None, SETTINGS)
-    assert wrong == ("net gets 30.0 % of the pixels wrong.",)
-
-
-def test_losing_to_blind_is_noted() -> None:
-    assert notes({"net": with_error(14)}, with_error(7), SETTINGS) == (
-        "net is 7.0 pp worse than blind, which never looks at the image (ERR 7.0 %).",
-    )

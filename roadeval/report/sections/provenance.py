@@ -30,8 +30,11 @@ def section(findings: Findings) -> Iterator[Block]:
         yield Text("; ".join(f"{name}: {value}" for name, value in known.items()), "note")
     yield from _versions_and_seconds(summary)
     if summary.get("settings"):
-        shared = {name: summary["run"].get(name, {}) for name in ("training", "evaluation")}
-        rows = settings_rows({name: each | shared for name, each in summary["settings"].items()})
+        run = summary["run"]
+        shared = {name: run[name] for name in ("training", "evaluation") if name in run}
+        first = {"preset": run["preset"]} if "preset" in run else {}
+        settings = summary["settings"].items()
+        rows = settings_rows({name: first | each | shared for name, each in settings})
         half = -(-len(rows) // 2)
         left, right = (_words(["setting", "value"], part) for part in (rows[:half], rows[half:]))
         yield KeepTogether([Heading("Settings", 2), TwoColumns([left], [right])])

@@ -3,7 +3,7 @@
 import pytest
 
 from roadeval.evaluation.uncertainty import Difference
-from roadeval.evaluation.verdict import verdict
+from roadeval.results.verdict import NO_PAIR, NOTHING_SCORED, verdict, verdict_of
 
 
 def difference(mean: float, low: float | None, high: float | None) -> Difference:
@@ -55,3 +55,10 @@ def test_where_no_frame_has_a_difference_there_is_no_verdict() -> None:
     nothing = Difference(float("nan"), None, None, 0.95, None, 0, None, None, "there are 0 frames")
     sentence = "Nothing to compare: ERR of post is undefined on every frame."
     assert verdict(nothing, "ERR", "post") == sentence
+
+
+def test_without_a_score_or_a_pair_the_verdict_says_so() -> None:
+    found = {"post": {"ERR": difference(0.092, 0.071, 0.11)}}
+    assert verdict_of({}, {}) == NOTHING_SCORED
+    assert verdict_of({"unfiltered": {}}, {}) == NO_PAIR
+    assert verdict_of({"filtered": {}, "unfiltered": {}}, found).startswith("On this drive the")

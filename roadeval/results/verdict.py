@@ -2,13 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Mapping
+from typing import Any, Final
 
-from roadeval.data import FILTERED, UNFILTERED
+from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.evaluation.uncertainty import Difference
 
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
 NO_PAIR: Final = f"No verdict on a filter: {FILTERED} and {UNFILTERED} were not both run."
+
+
+def verdict_of(
+    totals: Mapping[str, Any], differences: Mapping[str, Mapping[str, Difference]]
+) -> str:
+    """Return the verdict on a drive.
+
+    Parameters
+    ----------
+    totals
+        By variant; empty where nothing was scored.
+    differences
+        Filtered minus unfiltered, by stage and rate.
+    """
+    if not totals:
+        return NOTHING_SCORED
+    if FINAL_STAGE not in differences:
+        return NO_PAIR
+    return verdict(differences[FINAL_STAGE]["ERR"], "ERR", FINAL_STAGE)
 
 
 def verdict(difference: Difference, rate: str, stage: str) -> str:
