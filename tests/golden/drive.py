@@ -27,6 +27,9 @@ UNLABELLED = (12, 17, 30)
 NO_ROAD = 33
 """The frame whose truth has no road."""
 
+TIE = 14
+"""The frame on which the network misses one pixel, as the baseline does: neither is better."""
+
 Plane = npt.NDArray[np.int64]
 
 _y: Plane = np.arange(HEIGHT)[:, None] + np.zeros((1, WIDTH), int)
@@ -74,6 +77,8 @@ def truth(number: int) -> npt.NDArray[np.uint8]:
 
 def guess(number: int) -> npt.NDArray[np.bool_]:
     """What a network would say: the road of two frames ago, with a hole."""
+    if number == TIE:
+        return road(number) & ~((_y == 24) & (_x == 34))
     hole = (_y % 16 < 3) & (_x > 40)
     return road(number - 2) & ~hole
 
