@@ -67,8 +67,6 @@ def configuration(given: Given) -> RunConfig:
     """
     from roadeval.config import Variant, configure, read_tables
 
-    if "training.model" in given and {"training.frames", "training.gap"} & given.keys():
-        raise typer.BadParameter("--train-frames and --train-gap do not go with --model")
     named = [*given.get("variants", ()), *given.get("topics.masks", ())]
     with usage():
         _check_names([name for name, _ in named])
@@ -78,7 +76,12 @@ def configuration(given: Given) -> RunConfig:
         Variant.of(name, read_tables(path), path) for name, path in given.get("variants", ())
     ]
     with usage():
-        return config.override(_tables(given)).with_variants(variants)
+        whole = config.override(_tables(given)).with_variants(variants)
+    if whole.training.model and {"training.frames", "training.gap"} & given.keys():
+        raise typer.BadParameter(
+            f"--train-frames and --train-gap do not go with a model ({whole.training.model})"
+        )
+    return whole
 
 
 def _preset(given: Given) -> dict[str, str]:

@@ -101,8 +101,8 @@ OPTIONS: Final = (
         "config",
         ("--config",),
         "FILE.toml",
-        "Settings on top of the preset: all that 'roadeval config' prints, and the run.toml of an "
-        "earlier run.",
+        "Settings on top of the preset: all that 'roadeval config' prints, the run.toml of an "
+        "earlier run, or its recording.",
         Path,
     ),
     Option(
@@ -208,23 +208,21 @@ OPTIONS: Final = (
 """In the order of the help."""
 
 FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS}
-_SETTINGS: Final = re.compile(
-    rf"(?<![\w./])({'|'.join(re.escape(name) for name in FLAGS if '.' in name)})(?![\w/]|\.\w)"
-)
+_MARKED: Final = re.compile(r"`(\w+\.\w+)`")
 
 Given = Mapping[str, Any]
 """Values of options by the names of their settings; one that was not typed is not there."""
 
 
 def with_flags(text: str) -> str:
-    """Replace the names of settings in a message by the flags that give them values.
+    """Replace the settings in a message, between backticks, by the flags that give them values.
 
     Examples
     --------
-    >>> with_flags("nothing is left to evaluate; lower training.frames")
+    >>> with_flags("nothing is left to evaluate; lower `training.frames`")
     'nothing is left to evaluate; lower --train-frames'
     """
-    return _SETTINGS.sub(lambda found: FLAGS[found[1]], text)
+    return _MARKED.sub(lambda found: FLAGS.get(found[1], found[0]), text)
 
 
 def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:

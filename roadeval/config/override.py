@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from pydantic import ValidationError
@@ -23,7 +23,7 @@ def override(settings: Any, tables: Mapping[str, Any], table: str, where: str = 
     table
         The name of the settings' table.
     where
-        The file, for messages; without one they name settings as ``table.key``.
+        The file, for messages; without one they name settings between backticks.
 
     Raises
     ------
@@ -32,15 +32,31 @@ def override(settings: Any, tables: Mapping[str, Any], table: str, where: str = 
     """
     values = tables.get(table, {})
     if not isinstance(values, Mapping):
-        raise ConfigError(f"{where}: [{table}] must be a table" if where else f"{table}: a table")
+        begin = f"{where}: " if where else ""
+        raise ConfigError(f"{begin}[{table}] must be a table")
     if not values:
         return settings
     try:
         return type(settings)(**_merged(dataclasses.asdict(settings), values))
     except ValidationError as error:
-        key, message = _first(error, settings)
-        name = f"{where}: [{table}] {key}" if where else f"{table}.{key}" if key else ""
-        raise ConfigError(f"{name}{': ' if key else ''}{message}") from error
+        keys, message = _first(error, settings)
+        raise ConfigError(named(table, keys, where) + message) from error
+
+
+def named(table: str, keys: Sequence[str | int], where: str) -> str:
+    """Begin a message with the setting that it is about, in a file or on its own.
+
+    >>> named("labels", ("road", 0), "")
+    '`labels.road`, item 1: '
+    >>> named("post", ("patch", "top"), "wide.toml")
+    'wide.toml: [post] patch.top: '
+    """
+    key = ".".join(part for part in keys if isinstance(part, str))
+    items = [part + 1 for part in keys if isinstance(part, int)]
+    item = f", item {items[0]}" if items else ""
+    if where:
+        return f"{where}: [{table}] {key}{item}{': ' if key else ''}"
+    return f"`{table}.{key}`{item}: " if key else ""
 
 
 def either(names: Iterable[str]) -> str:
@@ -59,16 +75,18 @@ def _merged(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any
     return merged
 
 
-def _first(error: ValidationError, settings: Any) -> tuple[str, str]:
-    """Return the first bad key and what is wrong with it; no key where several do not fit."""
+def _first(error: ValidationError, settings: Any) -> tuple[tuple[str | int, ...], str]:
+    """Return the first bad key by its parts, and what is wrong; no key where several do not fit."""
     problem = error.errors(include_url=False)[0]
-    key = ".".join(str(part) for part in problem["loc"])
+    keys = problem["loc"]
     if problem["type"] == "unexpected_keyword_argument":
+        for part in keys[:-1]:
+            settings = getattr(settings, str(part))
         names = [entry.name for entry in dataclasses.fields(settings)]
-        return key, f"there is no such setting; choose {either(names)}"
+        return keys, f"there is no such setting; choose {either(names)}"
     message = problem["msg"].removeprefix("Value error, ")
-    if not key:
-        return key, message
+    if not keys:
+        return keys, message
     given = problem["input"]
     shown = "" if isinstance(given, Mapping) else f" (given: {given!r})"
-    return key, f"{message[0].lower()}{message[1:]}{shown}"
+    return keys, f"{message[0].lower()}{message[1:]}{shown}"

@@ -91,10 +91,14 @@ class RunConfig:
             RecordRule.parse(self.output.record)
         except RoadevalError as error:
             raise ConfigError(str(error)) from error
+        for key, ending in (("save", ".rrd"), ("mcap", ".mcap")):
+            path = getattr(self.output, key)
+            if path is not None and not path.endswith(ending):
+                raise ConfigError(f"`output.{key}` {path}: name a file that ends in {ending}")
         if self.output.mcap is not None and self.frames.scale != 1:
             raise ConfigError(
-                "output.mcap and frames.scale do not go together: reduced masks would not lie over "
-                "the log's images"
+                "`output.mcap` and `frames.scale` do not go together: reduced masks would not lie "
+                "over the log's images"
             )
 
     def variants(self) -> tuple[Variant, ...]:
@@ -131,9 +135,12 @@ class RunConfig:
                 **{name: override(getattr(self, name), tables, name, where) for name in SECTIONS},
             )
         except ConfigError as error:
-            if where and not str(error).startswith(where):
-                raise ConfigError(f"{where}: {error}") from error
-            raise
+            if not where:
+                raise
+            # In a file a setting is no flag.
+            message = str(error).replace("`", "")
+            begins = message.startswith(where)
+            raise ConfigError(message if begins else f"{where}: {message}") from error
 
     def with_variants(self, variants: Iterable[Variant]) -> RunConfig:
         """Return the configuration with further variants; one of a name that is there replaces it.

@@ -46,4 +46,4 @@ class ExecutionSettings:
         Worker threads; one per CPU core by default.
     """
 
-    jobs: Annotated[int, Field(ge=1)] | None = None
+    jobs: Annotated[int, Field(ge=1, le=1000)] | None = None

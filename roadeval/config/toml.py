@@ -9,6 +9,7 @@ from typing import Any
 
 from roadeval.config.errors import ConfigError
 from roadeval.config.run import RunConfig, configure
+from roadeval.recording import Recording
 
 
 def load_config(path: str | Path, preset: str | None = None) -> RunConfig:
@@ -31,15 +32,27 @@ def load_config(path: str | Path, preset: str | None = None) -> RunConfig:
 
 
 def read_tables(path: str | Path) -> dict[str, Any]:
-    """Read the tables of a TOML file; a `ConfigError` if there are none to read."""
+    """Read the tables of a TOML file, or of the ``run.toml`` that a recording holds.
+
+    A `ConfigError` if there are none to read.
+    """
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        return tomllib.loads(_text(Path(path)))
     except FileNotFoundError as error:
         raise ConfigError(f"{path}: there is no such configuration file") from error
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: not valid TOML: {error}") from error
+
+
+def _text(path: Path) -> str:
+    if path.suffix != ".rrd":
+        return path.read_text(encoding="utf-8")
+    text = Recording(path).result("run")
+    if text is None:
+        raise ConfigError(f"{path}: the recording of an earlier version, or of a run that was cut")
+    return text
 
 
 def run_toml(config: RunConfig, drive: str, version: str) -> str:

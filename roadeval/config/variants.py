@@ -94,8 +94,12 @@ def check_tables(tables: Mapping[str, Any], known: Collection[str], where: str) 
     """Refuse, as a `ConfigError`, a table or key at the top that is not known."""
     for key in tables:
         if key not in known:
-            names = [name for name in known if name != "chain"]
-            raise ConfigError(f"{_prefix(where)}[{key}] is no table here; choose {either(names)}")
+            names = either(name for name in known if name != "chain")
+            if isinstance(tables[key], Mapping):
+                raise ConfigError(f"{_prefix(where)}[{key}] is no table here; choose {names}")
+            raise ConfigError(
+                f"{_prefix(where)}{key} stands in no table; put it below one of {names}"
+            )
 
 
 def pipeline_of(base: Pipeline | None, tables: Mapping[str, Any], where: str) -> Pipeline:
@@ -121,7 +125,7 @@ def _chain(names: Any, where: str) -> tuple[str, ...]:
     if not isinstance(names, list | tuple) or not names:
         raise ConfigError(f"{begin} must be a list of stages; choose {either(STAGES)}")
     for name in names:
-        if name not in STAGES:
+        if not isinstance(name, str) or name not in STAGES:
             raise ConfigError(f"{begin}: there is no stage {name!r}; choose {either(STAGES)}")
     if len(set(names)) < len(names):
         raise ConfigError(f"{begin}: a stage can occur only once")

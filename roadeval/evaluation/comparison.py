@@ -219,7 +219,7 @@ class _Pair:
 def _differing(base: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     """Return the settings that two results know and differ in, with both values."""
     return [
-        f"{name} {_text(base[name])} and {_text(new[name])}"
+        f"`{name}` {_text(base[name])} and {_text(new[name])}"
         for name in base
         if name in new and base[name] != new[name]
     ]

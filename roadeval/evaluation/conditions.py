@@ -178,7 +178,7 @@ def _obstacle(
     names = f"{base.label} and {new.label}"
     if base.scale is not None and new.scale is not None and base.scale != new.scale:
         return (
-            f"{names} were replayed with frames.scale {base.scale:g} and {new.scale:g}; replay "
+            f"{names} were replayed with `frames.scale` {base.scale:g} and {new.scale:g}; replay "
             "both at one scale, or limit in %"
         )
     shorter = min(base.frames, new.frames)

@@ -39,7 +39,7 @@ class EvaluationSettings:
         too short more often than its confidence admits (`roadeval.evaluation.uncertainty`).
     """
 
-    window: Annotated[int, Field(ge=1)] = 10
+    window: Annotated[int, Field(ge=1, le=1_000_000_000)] = 10
     boundary_width: Annotated[int, Field(ge=1, le=100)] = 5
     bands: Annotated[int, Field(ge=1, le=50)] = 5
     failed_err: Annotated[float, Field(gt=0, le=1)] = 0.25
@@ -48,4 +48,4 @@ class EvaluationSettings:
     degraded_margin: Annotated[float, Field(ge=0, le=1)] = 0.02
     noteworthy: Annotated[float, Field(ge=0, le=1)] = 0.05
     confidence: Annotated[float, Field(gt=0.5, lt=1)] = 0.95
-    effective_frames: Annotated[int, Field(ge=2)] = 10
+    effective_frames: Annotated[int, Field(ge=2, le=1_000_000_000)] = 10

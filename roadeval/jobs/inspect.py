@@ -1,4 +1,4 @@
-"""The frames worth opening, and the viewer result at one."""
+"""The frames worth opening, and the viewer opened at one."""
 
 from __future__ import annotations
 

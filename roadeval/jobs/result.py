@@ -12,7 +12,7 @@ from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.evaluation import analysis
 from roadeval.evaluation.scoreboard import COMPARED
 from roadeval.recording import Recording, RecordingError
-from roadeval.results.folder import ResultsFolder
+from roadeval.results.folder import RUN, ResultsFolder
 from roadeval.results.verdict import NOTHING_SCORED, verdict_of
 
 if TYPE_CHECKING:
@@ -48,6 +48,14 @@ class Result:
     def name(self) -> str:
         """The drive's name."""
         return self.recording.layout.drive if self.recording else self.summary["drive"]["name"]
+
+    @property
+    def configuration(self) -> Path | None:
+        """The file that holds the run's configuration; None where a run left none."""
+        if self.recording is not None:
+            return self.path if self.recording.result("run") else None
+        path = self.path / RUN
+        return path if path.exists() else None
 
     @cached_property
     def summary(self) -> dict[str, Any]:

@@ -49,7 +49,8 @@ def train(
             for frame in learning.spread(there, settings.frames, labelled=by_truth):
                 if not held.add(frame):
                     raise TrainingError(
-                        f"{held.full()}; lower training.frames, or reduce them with frames.scale"
+                        f"{held.full()}; lower `training.frames`, or reduce them with "
+                        "`frames.scale`"
                     )
                 frames[log.path].append(frame)
                 on_progress(Progress(len(held.frames), total, "training"))

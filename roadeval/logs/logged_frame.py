@@ -103,7 +103,7 @@ class LoggedFrame:
             size = f"{truth.shape[1]}x{truth.shape[0]}"
             raise FrameError(
                 f"{topic} is {size}, its image {width}x{height}: "
-                "scale the labels with topics.resize_truth"
+                "scale the labels with `topics.resize_truth`"
             )
         return nearest(truth, (width, height))
 

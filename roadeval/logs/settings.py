@@ -4,13 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
+from datetime import datetime
 from typing import Annotated, Self
 
-from pydantic import AfterValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.logs.errors import LogError
 from roadeval.logs.times import parse_time
+
+
+def _as_text(moment: object) -> object:
+    """Take a number, or a date that TOML knows, for its text."""
+    if isinstance(moment, datetime):
+        return moment.isoformat()
+    return str(moment) if isinstance(moment, int | float) else moment
 
 
 def _check_time(text: str) -> str:
@@ -21,7 +29,7 @@ def _check_time(text: str) -> str:
     return text
 
 
-Time = Annotated[str, AfterValidator(_check_time)]
+Time = Annotated[str, BeforeValidator(_as_text), AfterValidator(_check_time)]
 """A moment as `roadeval.logs.parse_time` reads it."""
 Label = Annotated[int, Field(ge=0, le=65535)]
 Level = Annotated[int, Field(ge=0, le=255)]
@@ -88,10 +96,10 @@ class LabelSettings:
         if (self.road or self.ignore) and (self.road_colors or self.ignore_colors):
             raise ValueError("the truth's labels are given as values or as colours, not as both")
         if self.ignore and not self.road:
-            raise ValueError("labels.ignore needs labels.road: name the values that mean road")
+            raise ValueError("`labels.ignore` needs `labels.road`: name the values that mean road")
         if self.ignore_colors and not self.road_colors:
             raise ValueError(
-                "labels.ignore_colors needs labels.road_colors: name the colours that mean road"
+                "`labels.ignore_colors` needs `labels.road_colors`: name the colours that mean road"
             )
         for both in {*self.road} & {*self.ignore} or {*self.road_colors} & {*self.ignore_colors}:
             raise ValueError(f"label {both} cannot mean road and ignore at once")
@@ -121,7 +129,7 @@ class FrameSettings:
 
     start: Time | None = None
     end: Time | None = None
-    every: Annotated[int, Field(ge=1)] = 1
-    max_frames: Annotated[int, Field(ge=1)] | None = None
+    every: Annotated[int, Field(ge=1, le=1_000_000_000)] = 1
+    max_frames: Annotated[int, Field(ge=1, le=1_000_000_000)] | None = None
     scale: Annotated[float, Field(gt=0, le=1)] = 1.0
     keep_corrupt: bool = False

@@ -10,11 +10,11 @@ from typing import Any, Final
 from roadeval.data import LayerSpec, Output, Packed, Rgb, Truth
 from roadeval.pipeline import beyond, paper
 from roadeval.pipeline.stage import Stage, View, perfect_mask
-from roadeval.runtime.discovery import found_in
+from roadeval.runtime.discovery import by_name, found_in
 
-STAGES: Final[Mapping[str, Stage[Any, Any]]] = {
-    stage.name: stage for stage in (*found_in(beyond, "STAGE"), *found_in(paper, "STAGE"))
-}
+STAGES: Final[Mapping[str, Stage[Any, Any]]] = by_name(
+    (*found_in(beyond, "STAGE"), *found_in(paper, "STAGE"))
+)
 """Every stage that a configuration's ``chain`` may name, found by its folder."""
 
 

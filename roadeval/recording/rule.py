@@ -54,7 +54,7 @@ class RecordRule:
         match = _RULE.fullmatch(text)
         if match is None:
             raise RecordingError(
-                f"output.record {text}: choose all, masks, worst:K, every:N or none (as worst:20)"
+                f"`output.record` {text}: choose all, masks, worst:K, every:N or none (as worst:20)"
             )
         plain, counted, number = match.groups()
         return cls(RuleKind(plain or counted), int(number or 0))

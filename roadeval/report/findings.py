@@ -90,11 +90,11 @@ class NotableFrame:
 class Commands:
     """Commands for a terminal, as they are typed.
 
-    ``again`` makes the results again from the log, whose path it is given; ``inspect`` opens the
-    viewer at a frame, whose number it is given.
+    ``again`` makes the results again from the log, whose path it is given, where the result holds
+    its configuration; ``inspect`` opens the viewer at a frame, whose number it is given.
     """
 
-    again: Callable[[str], str]
+    again: Callable[[str], str] | None
     inspect: Callable[[int], str]
 
 

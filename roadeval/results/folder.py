@@ -93,14 +93,19 @@ class ResultsWriter:
             The files written.
         """
         path, text = self._folder / SUMMARY, summary_text({"tables": self.tables} | dict(summary))
-        with self._explained():
-            # From here to the end an earlier run's summary would stand beside this one's tables.
+        config = self._folder / RUN
+        with (
+            self._explained(),
+            files.replacing(path) as whole,
+            files.replacing(config) as configured,
+        ):
+            configured.write_bytes(run_toml.encode())
+            whole.write_bytes(text.encode())
+            # From here an earlier run's summary would stand beside this one's tables.
             path.unlink(missing_ok=True)
             written = [table.path for table in self._open.values() if table.complete()]
             self._open.clear()
-            files.put(self._folder / RUN, run_toml.encode())
-            files.put(path, text.encode())
-        return [*written, self._folder / RUN, path]
+        return [*written, config, path]
 
     def _discard(self) -> None:
         for table in self._open.values():
@@ -118,7 +123,7 @@ class ResultsWriter:
             self._discard()
             raise ResultsError(
                 f"{error.filename or self._folder}: cannot write results ({error.strerror}); "
-                "choose another folder with output.reports"
+                "choose another folder with `output.reports`"
             ) from error
 
 

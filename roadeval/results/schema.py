@@ -79,7 +79,8 @@ COUNTS: Final = (
     LABELLED,
 )
 RATES: Final = tuple(
-    Column(name, Kind.RATE, f"{metric.title}, {metric.formula}") for name, metric in METRICS.items()
+    Column(name, Kind.RATE, f"{metric.title}, {metric.formula} ({metric.unit})")
+    for name, metric in METRICS.items()
 )
 MEANS: Final = tuple(
     Column(rate.name, Kind.RATE, f"mean of the frames' {rate.name}") for rate in RATES

@@ -75,7 +75,10 @@ def read_summary(path: Path) -> dict[str, Any]:
         ) from error
     except ValueError as error:
         raise ResultsError(f"{path}: not a summary ({error}); make it anew") from error
-    return parse_summary(text, path)
+    summary = parse_summary(text, path)
+    if missing := {"drive", "frames", "totals"} - summary.keys():
+        raise ResultsError(f"{path}: not a summary (it has no {', '.join(sorted(missing))})")
+    return summary
 
 
 def parse_summary(text: str, where: object) -> dict[str, Any]:
@@ -92,7 +95,7 @@ def parse_summary(text: str, where: object) -> dict[str, Any]:
         raise ResultsError(f"{where}: not a summary ({error}); make it anew") from error
     form = summary.get("format") if isinstance(summary, dict) else None
     if form == {**FORMAT, "version": 1}:
-        return _of_version_1(summary)
+        summary, form = _of_version_1(summary), FORMAT
     if form != FORMAT:
         raise ResultsError(
             f"{where}: not a summary of format {FORMAT['name']} {FORMAT['version']}; "
@@ -107,7 +110,7 @@ def _of_version_1(summary: Mapping[str, Any]) -> dict[str, Any]:
     There every variant carried the run's training and evaluation among its settings, and what was
     asked of the log stood under ``selection``; summaries made before that have no such part.
     """
-    asked = summary.get("selection", {})
+    asked = summary.get("selection") or {}
     run: dict[str, Any] = {
         table: {key: asked[old] for key, old in keys.items() if old in asked}
         for table, keys in _SELECTION.items()

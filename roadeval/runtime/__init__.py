@@ -1,1 +1,1 @@
-"""The machine: threads, processes, files and memory. Knows nothing of the domain."""
+"""The machine: threads, files and memory. Knows nothing of the domain."""

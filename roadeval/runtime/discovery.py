@@ -2,10 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from importlib import import_module
 from pkgutil import iter_modules
 from types import ModuleType
 from typing import Any
+
+
+def by_name(things: Iterable[Any]) -> dict[str, Any]:
+    """Return things by their ``name``, in their order.
+
+    Raises
+    ------
+    ValueError
+        If two have the same.
+    """
+    named: dict[str, Any] = {}
+    for thing in things:
+        if named.setdefault(thing.name, thing) is not thing:
+            raise ValueError(f"two files define {thing.name!r}: {thing} and {named[thing.name]}")
+    return named
 
 
 def found_in(package: ModuleType, name: str) -> tuple[Any, ...]:

@@ -57,7 +57,8 @@ def fit(
         numbers = f"{frames[0].number} to {frames[-1].number}"
         raise TrainingError(
             f"frames {numbers} do not show both road and non-road, so nothing can be learnt from "
-            "them; choose other frames with frames.start or training.frames, or give training.model"
+            "them; choose other frames with `frames.start` or `training.frames`, or give "
+            "`training.model`"
         )
     images = tuple(frame.image for frame in frames)
     training_set = TrainingSet(
@@ -86,8 +87,8 @@ def _truths(frames: Sequence[Frame], settings: TrainingSettings) -> tuple[str, l
         return "truth", labelled
     if settings.source == "truth":
         raise TrainingError(
-            "there is no truth to train on: name its topic with topics.truth, give training.model, "
-            'or allow training.source = "patch"'
+            "there is no truth to train on: name its topic with `topics.truth`, give "
+            '`training.model`, or allow training.source = "patch"'
         )
     return "patch", [patch_truth(frame.image, settings) for frame in frames]
 

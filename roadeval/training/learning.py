@@ -117,7 +117,7 @@ def _hold(
     for readable, frame in _decoded(candidates):
         if not held.add(frame):
             if not held.frames:
-                raise TrainingError(f"{held.full()}; reduce the frames with frames.scale")
+                raise TrainingError(f"{held.full()}; reduce the frames with `frames.scale`")
             return held, chain([readable], candidates)
         on_frame(len(held.frames))
         if len(held.frames) == count:
@@ -141,7 +141,7 @@ def _require_one_left(trained: int, following: int, gap: int) -> None:
         raise TrainingError(
             f"the range has {trained + following} labelled frames, and training would take "
             f"{trained} of them and {gap} more as a gap: none is left to evaluate; "
-            "lower training.frames or training.gap, or give training.model"
+            "lower `training.frames` or `training.gap`, or give `training.model`"
         )
 
 

@@ -48,10 +48,10 @@ class TrainingSettings:
     model: str | None = None
     source: Literal["auto", "truth", "patch"] = "auto"
     frames: Annotated[int, Field(ge=1, le=1000)] = 10
-    gap: Annotated[int, Field(ge=0)] = 0
-    pixels_per_class: Annotated[int, Field(ge=1)] = 200
+    gap: Annotated[int, Field(ge=0, le=1_000_000_000)] = 0
+    pixels_per_class: Annotated[int, Field(ge=1, le=1_000_000_000)] = 200
     max_pixels: Annotated[int, Field(ge=2, le=100_000)] = 8000
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Annotated[int, Field(ge=0, le=1_000_000_000)] = 0
     patch: ReferencePatch = ReferencePatch()
     horizon: Annotated[float, Field(ge=0, le=1)] = 0.4
     far: Annotated[float, Field(gt=0, lt=1)] = 0.9999

@@ -63,7 +63,7 @@ def test_json_holds_the_same(write, capsys):
     found = json.loads(capsys.readouterr().out)
     assert [topic["name"] for topic in found["topics"]] == ["/left", "/right"]
     assert found["start_ns"] == START
-    assert "topics.image" in found["problem"]
+    assert "`topics.image`" in found["problem"]
 
 
 def test_damage_is_told_and_has_its_exit_code(tmp_path, capsys):

@@ -109,7 +109,39 @@ def test_a_preset_that_is_not_the_file_s_is_refused(asked, tmp_path, capsys):
 
 def test_a_model_and_training_frames_do_not_go_together(capsys):
     assert main(["replay", "d.mcap", "--model", "m", "--train-gap", "3"]) == 2
-    assert "--train-frames and --train-gap do not go with --model" in capsys.readouterr().err
+    assert "--train-frames and --train-gap do not go with a model (m)" in capsys.readouterr().err
+
+
+def test_nor_with_a_model_that_a_file_names(tmp_path, capsys):
+    (tmp_path / "c.toml").write_text('[training]\nmodel = "city.model"\n')
+    words = ["replay", "d.mcap", "--config", str(tmp_path / "c.toml"), "--train-frames", "3"]
+    assert main(words) == 2
+    assert "do not go with a model (city.model)" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--road-label 3 --road-label 70000", "--road-label, item 2: input should be less than"),
+        ("--every 0", "--every: input should be greater than or equal to 1 (given: 0)"),
+        ("--ignore-label 3", "--ignore-label needs --road-label"),
+    ],
+)
+def test_a_value_that_cannot_be_is_named_by_its_flag(words, said, capsys):
+    assert main(["replay", "d.mcap", *words.split()]) == 2
+    assert f"roadeval: error: {said}" in capsys.readouterr().err
+
+
+def test_in_a_file_a_setting_is_no_flag(tmp_path, capsys):
+    (tmp_path / "c.toml").write_text("[labels]\nignore = [3]\n")
+    assert main(["replay", "d.mcap", "--config", str(tmp_path / "c.toml")]) == 1
+    assert "[labels] labels.ignore needs labels.road" in capsys.readouterr().err
+
+
+def test_a_file_that_is_called_like_a_setting_keeps_its_name(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["info", "output.mcap"]) == 1
+    assert "output.mcap" in capsys.readouterr().err
 
 
 def test_every_option_s_words_are_a_setting_s_value(asked):
@@ -126,11 +158,11 @@ def test_every_option_s_words_are_a_setting_s_value(asked):
 @pytest.mark.parametrize(
     ("text", "shown"),
     [
-        ("lower training.frames or frames.scale", "lower --train-frames or --scale"),
-        ("name it with topics.truth.", "name it with --truth-topic."),
+        ("lower `training.frames` or `frames.scale`", "lower --train-frames or --scale"),
+        ("name it with `topics.truth`.", "name it with --truth-topic."),
         ("a.toml: [frames] every: bad", "a.toml: [frames] every: bad"),
-        ("/data/frames.start/x and frames.starting", "/data/frames.start/x and frames.starting"),
-        ("my.frames.every stays", "my.frames.every stays"),
+        ("output.mcap: No such file", "output.mcap: No such file"),
+        ("`training.source` has no flag", "`training.source` has no flag"),
     ],
 )
 def test_names_of_settings_become_flags(text, shown):

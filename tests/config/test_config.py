@@ -76,7 +76,16 @@ def test_overriding_twice_keeps_what_the_first_said():
         ("[frames]\nscale = 1.5", r"\[frames\] scale: .*\(given: 1.5\)"),
         ("[frames]\nstart = 'noon'", "'noon' is no time"),
         ("[labels]\nroad = [3]\nignore = [3]", "label 3 cannot mean road and ignore at once"),
-        ("[labels]\nroad_colors = [[1, 2]]", r"\[labels\] road_colors.0.2: field required"),
+        ("[labels]\nroad_colors = [[1, 2]]", r"\[labels\] road_colors, item 1: field required"),
+        ("[labels]\nroad = [3, -1]", r"\[labels\] road, item 2: .*\(given: -1\)"),
+        ("[training.patch]\nx = 1", r"\[training\] patch.x: .*choose bottom, bottom_width, top"),
+        ("[frames]\nstart = 2013-05-01T12:00:00", "'2013-05-01T12:00:00' is no time"),
+        ("[training]\ngap = 100000000000000000000", r"\[training\] gap: input should be less"),
+        ("chain = [['post']]", r"no stage \['post'\]"),
+        ("chain = [{a = 1}]", "no stage"),
+        ("frames = 3", r"\[frames\] must be a table"),
+        ("ring_width = 3", "ring_width stands in no table; put it below one of .*shadow"),
+        ("[output]\nsave = 'g.toml'", r"output.save g.toml: name a file that ends in .rrd"),
         ("[output]\nrecord = 'some'", "choose all, masks, worst:K, every:N or none"),
         ("[run]\njobs = 0", r"\[run\] jobs: "),
         ("[output]\nmcap = 'm.mcap'\n[frames]\nscale = 0.5", "output.mcap and frames.scale do not"),
@@ -105,8 +114,16 @@ def test_a_bad_key_or_value_is_named(tmp_path, text, message):
 
 
 def test_without_a_file_a_setting_is_named_by_table_and_key():
-    with pytest.raises(ConfigError, match=r"^frames\.every: input should be greater"):
+    with pytest.raises(ConfigError, match=r"^`frames\.every`: input should be greater"):
         configure({"frames": {"every": 0}})
+
+
+@pytest.mark.parametrize(
+    ("text", "start"),
+    [("2", "2"), ("2.5", "2.5"), ("2013-05-01T12:00:00Z", "2013-05-01T12:00:00+00:00")],
+)
+def test_a_time_may_be_a_number_or_a_date(tmp_path, text, start):
+    assert load_config(write(tmp_path, f"[frames]\nstart = {text}")).frames.start == start
 
 
 def test_a_missing_file_is_one_line(tmp_path):

@@ -96,7 +96,10 @@ def test_every_setting_is_documented_with_its_range():
         if (" = " in line or line.endswith(" =")) and not before.startswith("#")
     ]
     assert undocumented == ['preset = "gated"']
-    assert "# Worker threads; one per CPU core by default. At least 1.\n# jobs =\n" in text
+    assert (
+        "# Worker threads; one per CPU core by default. At least 1, at most 1000.\n# jobs =\n"
+        in text
+    )
     assert "One of auto, truth, patch.\nsource" in text.replace("\n# ", " ")
     assert "Above 0, at most 1.\nscale = 1.0\n" in text
     assert "``" not in text

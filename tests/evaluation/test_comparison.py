@@ -84,8 +84,8 @@ def test_settings_that_differ_are_named_with_both_values():
     base, new = a_side("base", [10, 20], asked=asked), a_side("new", [10, 20], asked=other)
     relabelled = replace(new, frames=new.frames.assign(N=new.frames["N"] - 1))
     assert list(compare([base, relabelled], SETTINGS).warnings) == [
-        "base and new were replayed with different settings (frames.scale 1 and 0.5, "
-        "labels.road not given and [3]): part of the change may be theirs",
+        "base and new were replayed with different settings (`frames.scale` 1 and 0.5, "
+        "`labels.road` not given and [3]): part of the change may be theirs",
         "the truth differs on 2 frames between base and new: part of the change may be the truth's",
     ]
 
@@ -102,7 +102,7 @@ def test_a_change_between_scales_is_not_judged_but_a_level_is():
     base = a_side("base", [10] * 12, asked={"frames.scale": 1.0})
     found = compare([base, a_side("new", [12] * 12, asked={"frames.scale": 0.5})], SETTINGS)
     with pytest.raises(
-        ConditionError, match=r"not judged, because .* with frames\.scale 1 and 0\.5"
+        ConditionError, match=r"not judged, because .* with `frames\.scale` 1 and 0\.5"
     ):
         judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
     assert judge(found, [Condition.parse("post.filtered.ERR > 11%")], SETTINGS)[0].holds

@@ -333,12 +333,13 @@ def test_an_error_on_the_way_leaves_no_results_and_a_partial_recording(
     assert partial.layer("unfiltered", "svm", 5).shape == (24, 32)
 
 
-@pytest.mark.parametrize("output", ["save", "mcap"])
-def test_an_output_never_replaces_the_drive(tmp_path, output):
+def test_an_output_never_replaces_the_drive(tmp_path):
     log = write_log(tmp_path / "small.mcap")
     before = log.read_bytes()
     with pytest.raises(RoadevalError, match="is an input or another output"):
-        roadeval.replay(log, **{"save": tmp_path / "o.rrd", "reports": tmp_path, output: log})
+        roadeval.replay(log, save=tmp_path / "o.rrd", reports=tmp_path, mcap=log)
+    with pytest.raises(RoadevalError, match=r"name a file that ends in \.rrd"):
+        roadeval.replay(log, save=log, reports=tmp_path)
     with pytest.raises(RoadevalError, match="is an input or another output"):
         roadeval.train([log], log)
     assert log.read_bytes() == before
@@ -359,6 +360,16 @@ def test_a_table_is_the_same_in_the_folder_and_in_the_recording_bit_by_bit(once,
     written = results.table(table)
     assert len(written)
     pd.testing.assert_frame_equal(recording.table(table), written, check_exact=True)
+
+
+def test_a_recording_s_own_configuration_makes_the_run_again(once, drive, tmp_path):
+    folder, outcome = once
+    again = roadeval.load_config(outcome.recording)
+    assert again.as_dict()["output"]["save"] is None
+    roadeval.replay(drive, again, save=tmp_path / "o.rrd", reports=tmp_path)
+    for table in TABLES:
+        theirs = (folder / "reports" / f"{table}.csv").read_bytes()
+        assert (tmp_path / f"{table}.csv").read_bytes() == theirs
 
 
 def test_the_summary_holds_the_run_s_configuration(drive, tmp_path):
@@ -457,7 +468,7 @@ def test_a_scale_reduces_images_truth_and_recording_alike(drive, tmp_path, once)
 
 @pytest.mark.parametrize("scale", [0, -1, 1.01, float("nan")])
 def test_a_scale_that_is_no_share_is_refused(scale):
-    with pytest.raises(RoadevalError, match=r"frames\.scale: input should be"):
+    with pytest.raises(RoadevalError, match=r"`frames\.scale`: input should be"):
         settings(scale=scale)
 
 
@@ -473,7 +484,7 @@ def test_reduced_frames_and_a_model_of_another_size_are_told(drive, tmp_path):
 
 
 def test_reduced_masks_do_not_go_beside_the_log(drive, tmp_path):
-    with pytest.raises(RoadevalError, match=r"output\.mcap and frames\.scale do not go"):
+    with pytest.raises(RoadevalError, match=r"`output\.mcap` and `frames\.scale` do not go"):
         roadeval.replay(drive, settings(scale=0.5), mcap=tmp_path / "o.mcap")
 
 

@@ -204,7 +204,7 @@ def test_truth_of_another_size_is_refused_and_the_remedy_named(tmp_path: Path) -
     path = ros2_log(tmp_path / "small.mcap", messages)
     with open_log(path) as log:
         with pytest.raises(
-            LogError, match=r"/labels is 4x3, but /cam is 8x6: .*topics.resize_truth"
+            LogError, match=r"/labels is 4x3, but /cam is 8x6: .*`topics.resize_truth`"
         ):
             log.select()
         frame = next(log.frames(log.select(TopicSettings(resize_truth=True)))).decode()

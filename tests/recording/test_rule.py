@@ -23,7 +23,7 @@ def test_another_text_is_refused_with_the_settings_name(text):
     with pytest.raises(RecordingError) as caught:
         RecordRule.parse(text)
     assert str(caught.value) == (
-        f"output.record {text}: choose all, masks, worst:K, every:N or none (as worst:20)"
+        f"`output.record` {text}: choose all, masks, worst:K, every:N or none (as worst:20)"
     )
 
 

@@ -299,7 +299,9 @@ def test_a_run_that_scored_nothing_writes_no_tables_and_leaves_no_older_ones(
 
 def test_a_folder_that_cannot_be_written_is_one_line_with_a_remedy(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(ResultsError, match=r"cannot write results.*with output\.reports") as caught:
+    with pytest.raises(
+        ResultsError, match=r"cannot write results.*with `output\.reports`"
+    ) as caught:
         ResultsWriter(tmp_path / "file")
     assert "\n" not in str(caught.value)
 
@@ -309,7 +311,10 @@ def test_a_folder_without_results_says_how_to_make_some(tmp_path: Path) -> None:
         ResultsFolder(tmp_path)
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"format": {"name": "roadeval-summary"}}'])
+SHORT = '{"format": {"name": "roadeval-summary", "version": 2}}'
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"format": {"name": "roadeval-summary"}}', SHORT])
 def test_a_file_that_is_no_summary_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "summary.json").write_text(text)
     with pytest.raises(ResultsError, match="not a summary"):

@@ -99,13 +99,13 @@ def test_training_frames_are_bounded_in_memory(monkeypatch):
     assert roles(frames, schedule) == "tttgee"
     assert "trained on 3 of 5 frames: training holds its frames decoded" in model.warnings[0]
     monkeypatch.setattr(held, "GREATEST_MEMORY", 9000)
-    with pytest.raises(TrainingError, match=r"more than 0 of them would take .*frames.scale"):
+    with pytest.raises(TrainingError, match=r"more than 0 of them would take .*`frames.scale`"):
         learn(log(6), frames=3)
 
 
 @pytest.mark.parametrize(("frames", "gap"), [(4, 0), (2, 2), (9, 0)])
 def test_leaving_no_frame_to_evaluate_is_an_error(frames, gap):
-    with pytest.raises(TrainingError, match=r"none is left to evaluate; lower training\.frames"):
+    with pytest.raises(TrainingError, match=r"none is left to evaluate; lower `training\.frames`"):
         learn(log(4), frames=frames, gap=gap)
 
 

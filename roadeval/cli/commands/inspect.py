@@ -81,7 +81,10 @@ def inspect(
 
 def _list(found: list[WorstFrame], *, as_json: bool) -> None:
     if as_json:
-        console.emit(dumps([asdict(each) for each in found], indent=2, ensure_ascii=False))
+        from roadeval.results.summary import plain
+
+        listed = plain([asdict(each) for each in found])
+        console.emit(dumps(listed, indent=2, ensure_ascii=False, allow_nan=False))
     else:
         console.results().print(_table(found))
 

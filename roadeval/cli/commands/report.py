@@ -12,6 +12,7 @@ from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
 
 if TYPE_CHECKING:
+    from roadeval.jobs.result import Result
     from roadeval.report.findings import Commands
 
 
@@ -24,7 +25,7 @@ def report(
             "-o",
             "--output",
             metavar="FILE.pdf",
-            help="Default: report.pdf in reports/<drive>/, or in the results folder given.",
+            help="Default: reports/<recording>.pdf, or report.pdf in the results folder given.",
         ),
     ] = None,
     paper: arguments.PaperSize = "a4",
@@ -40,7 +41,7 @@ def report(
 
     size = arguments.paper_of(paper)
     read = Result(result)
-    path = write(read, output, paper=size, commands=_commands(result))
+    path = write(read, output, paper=size, commands=_commands(read))
     if not quiet:
         console.emit(str(path))
     if not read.complete:
@@ -48,12 +49,15 @@ def report(
     return ExitCode.DONE
 
 
-def _commands(result: Path) -> Commands:
+def _commands(result: Result) -> Commands:
     from roadeval.report.findings import Commands
 
+    path, config = str(result.path), result.configuration
     return Commands(
-        lambda log: shlex.join(["roadeval", "replay", log, "--config", "run.toml"]),
-        lambda frame: shlex.join(["roadeval", "inspect", str(result), "--frame", str(frame)]),
+        again=None
+        if config is None
+        else lambda log: shlex.join(["roadeval", "replay", log, "--config", str(config)]),
+        inspect=lambda frame: shlex.join(["roadeval", "inspect", path, "--frame", str(frame)]),
     )
 
 

@@ -15,14 +15,13 @@ import numpy.typing as npt
 
 from roadeval.data import Counts
 from roadeval.evaluation.metric import Metric
-from roadeval.runtime.discovery import found_in
+from roadeval.runtime.discovery import by_name, found_in
 
-ALL: Final[Mapping[str, Metric]] = {
-    metric.name: metric
-    for metric in sorted(
+ALL: Final[Mapping[str, Metric]] = by_name(
+    sorted(
         found_in(sys.modules[__name__], "METRIC"), key=lambda metric: (metric.order, metric.name)
     )
-}
+)
 METRICS: Final = {name: metric for name, metric in ALL.items() if metric.tabled}
 """The columns of the tables, in their order."""
 OVERLAP: Final = {name: metric for name, metric in ALL.items() if not metric.tabled}

@@ -59,7 +59,7 @@ def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicI
         If the one asked for is not there or no image, or if none or several are candidates.
     """
     if asked is not None:
-        return named(topics, asked, "topics.image"), "asked for"
+        return named(topics, asked, "`topics.image`"), "asked for"
     images = [topic for topic in topics if topic.is_image and topic.count]
     candidates = [topic for topic in images if not _looks_like_label(topic)]
     cameras = [topic for topic in candidates if not _looks_like_depth(topic)] or candidates
@@ -68,7 +68,9 @@ def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicI
         return cameras[0], "the only camera image" if others else "the only image topic"
     if not cameras:
         raise LogError(_no_image(topics, images))
-    raise LogError(f"{len(cameras)} image topics: {_names(cameras)}; choose one with topics.image")
+    raise LogError(
+        f"{len(cameras)} image topics: {_names(cameras)}; choose one with `topics.image`"
+    )
 
 
 def choose_truth(
@@ -85,7 +87,7 @@ def choose_truth(
         If the one asked for is not there or no image, or if several are candidates.
     """
     if asked is not None:
-        return _asked_for(topics, asked, "topics.truth")
+        return _asked_for(topics, asked, "`topics.truth`")
     labels = _label_topics(topics, image)
     roads = [topic for topic in labels if not words(topic.name) & SHADOW_WORDS]
     kinds = [
@@ -99,9 +101,11 @@ def choose_truth(
         by = "colours" if plain[0].channels == 3 else "single channel"
         return Choice(plain[0], f"the label image, by its name and its {by}")
     if plain:
-        raise LogError(f"{len(plain)} label topics: {_names(plain)}; choose one with topics.truth")
+        raise LogError(
+            f"{len(plain)} label topics: {_names(plain)}; choose one with `topics.truth`"
+        )
     if roads:
-        why = f"no topic is plainly road truth; topics.truth takes one of: {_names(roads)}"
+        why = f"no topic is plainly road truth; `topics.truth` takes one of: {_names(roads)}"
         return Choice(None, why)
     return Choice(None, "no label topic")
 
@@ -115,7 +119,7 @@ def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, asked: str | No
         If the one asked for is not there or no image, or if several are candidates.
     """
     if asked is not None:
-        return _asked_for(topics, asked, "topics.shadow")
+        return _asked_for(topics, asked, "`topics.shadow`")
     labels = _label_topics(topics, image)
     shadows = [t for t in labels if words(t.name) & SHADOW_WORDS and t.channels == 1]
     shadows = _most_alike(shadows, image)
@@ -123,7 +127,7 @@ def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, asked: str | No
         return Choice(shadows[0], "the shadow mask, by its name and its single channel")
     if shadows:
         raise LogError(
-            f"{len(shadows)} shadow topics: {_names(shadows)}; choose one with topics.shadow"
+            f"{len(shadows)} shadow topics: {_names(shadows)}; choose one with `topics.shadow`"
         )
     return Choice(None, "no shadow topic")
 
@@ -196,7 +200,7 @@ def _most_alike(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo
 
 def _no_image(topics: Sequence[TopicInfo], images: Sequence[TopicInfo]) -> str:
     if images:
-        return f"only label images: {_names(images)}; choose the camera's with topics.image"
+        return f"only label images: {_names(images)}; choose the camera's with `topics.image`"
     found = ", ".join(f"{topic.name} ({topic.schema or 'no schema'})" for topic in topics[:8])
     more = ", ..." if len(topics) > 8 else ""
     return f"no image topic; the log has: {found or 'no topics at all'}{more}"

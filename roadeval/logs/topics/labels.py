@@ -127,7 +127,7 @@ def seen_in(picture: Picture, labels: LabelSettings, topic: str) -> set[int]:
         colors = map(_color_name, np.unique(pack_colors(pixels)).tolist())
         raise LogError(
             f"{topic} holds the colours {_listed(colors)}: name those that mean road with "
-            "labels.road_colors"
+            "`labels.road_colors`"
         )
     return set(np.flatnonzero(np.bincount(pixels.ravel())).tolist())
 
@@ -152,17 +152,17 @@ def understand(labels: LabelSettings, seen: Iterable[int], topic: str) -> LabelM
     values = sorted(set(seen))
     if labels.road_colors:
         road, ignore = map(_packed, labels.road_colors), map(_packed, labels.ignore_colors)
-        given = {"labels.road_colors": tuple(road), "labels.ignore_colors": tuple(ignore)}
+        given = {"`labels.road_colors`": tuple(road), "`labels.ignore_colors`": tuple(ignore)}
         return _as_given(given, values, topic, by_color=True)
     if labels.road:
-        given = {"labels.road": labels.road, "labels.ignore": labels.ignore}
+        given = {"`labels.road`": labels.road, "`labels.ignore`": labels.ignore}
         return _as_given(given, values, topic, by_color=False)
     for meaning in _MASKS:
         if set(values) <= set(meaning):
             return _as_mask(meaning, values)
     raise LogError(
         f"{topic} holds the values {_listed(map(str, values))}: name those that mean road with "
-        "labels.road, and those to leave out with labels.ignore"
+        "`labels.road`, and those to leave out with `labels.ignore`"
     )
 
 

@@ -124,7 +124,7 @@ def settle(
     truth = choose_truth(topics, image, asked.truth, colors=bool(labels.road_colors))
     shadow = choose_shadow(topics, image, asked.shadow)
     masks = {
-        name: Choice(named(topics, topic, f"topics.masks {name}"), "asked for")
+        name: Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")
         for name, topic in asked.masks.items()
     }
     look = partial(_label_topic, readers, image, resize=asked.resize_truth)
@@ -159,7 +159,7 @@ def _label_topic(
         sizes = ["x".join(map(str, size)) for size in (topic.size, image.size)]
         raise LogError(
             f"{topic.name} is {sizes[0]}, but {image.name} is {sizes[1]}: "
-            "scale the labels with topics.resize_truth"
+            "scale the labels with `topics.resize_truth`"
         )
     seen: set[int] = set()
     for picture in _samples(readers[topic.name]):

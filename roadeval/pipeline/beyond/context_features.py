@@ -73,9 +73,9 @@ def at_samples(sample: TrainingSet, width: int, windows: tuple[int, ...]) -> Val
     for index, image in enumerate(sample.images):
         here = sample.frame == index
         small = features(reduced(image, width), windows)
-        height, width = small.shape[1:]
-        row = sample.row[here] * height // image.shape[0]
-        column = sample.column[here] * width // image.shape[1]
+        rows_small, columns_small = small.shape[1:]  # of this image: `width` bounds them all
+        row = sample.row[here] * rows_small // image.shape[0]
+        column = sample.column[here] * columns_small // image.shape[1]
         rows.append((np.flatnonzero(here), small[:, row, column].T))
     order = np.concatenate([where for where, _ in rows])
     result: Values = np.concatenate([values for _, values in rows])[np.argsort(order)]

@@ -62,7 +62,7 @@ def write_figures(folder: Path, data: FigureData) -> list[Path]:
     except OSError as error:
         raise FiguresError(
             f"{error.filename or folder}: cannot write figures ({error.strerror}); "
-            "choose another folder with output.reports"
+            "choose another folder with `output.reports`"
         ) from error
 
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 from roadeval.report.blocks import Block, Command, Heading, KeepTogether, Table, Text, TwoColumns
 from roadeval.report.findings import Findings
+
+TABLES: Final = ("topics", "labels", "frames", "training", "evaluation")
+"""Of the run's configuration, beside its stages: what can change a number."""
 
 
 def section(findings: Findings) -> Iterator[Block]:
@@ -16,13 +19,9 @@ def section(findings: Findings) -> Iterator[Block]:
     if log := summary.get("log"):
         yield Text(f"Log: {log['path']}")
         yield Text(f"SHA-256: {log['sha256']}")
-    if log and findings.commands:
+    if log and findings.commands and findings.commands.again:
         yield Command(findings.commands.again(log["path"]))
-        yield Text(
-            "run.toml lies in the results folder and holds the whole configuration of the run; "
-            "the same log, configuration and versions give the same numbers.",
-            "note",
-        )
+        yield Text("The same log, configuration and versions give the same numbers.", "note")
     for topic in summary["drive"].get("topics", ()):
         yield Text(str(topic), "note")
     if findings.properties:
@@ -31,7 +30,7 @@ def section(findings: Findings) -> Iterator[Block]:
     yield from _versions_and_seconds(summary)
     if summary.get("settings"):
         run = summary["run"]
-        shared = {name: run[name] for name in ("training", "evaluation") if name in run}
+        shared = {name: run[name] for name in TABLES if name in run}
         first = {"preset": run["preset"]} if "preset" in run else {}
         settings = summary["settings"].items()
         rows = settings_rows({name: first | each | shared for name, each in settings})
@@ -79,6 +78,10 @@ def settings_rows(settings: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
     return rows
 
 
+def _as_in_toml(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
 def flattened(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
     """Yield settings by their dotted names.
 
@@ -89,6 +92,6 @@ def flattened(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[s
         if isinstance(value, Mapping):
             yield from flattened(value, f"{prefix}{name}.")
         elif isinstance(value, list | tuple):
-            yield f"{prefix}{name}", ", ".join(map(str, value))
+            yield f"{prefix}{name}", ", ".join(map(str, value)) or "none"
         else:
-            yield f"{prefix}{name}", "none" if value is None else str(value)
+            yield f"{prefix}{name}", "none" if value is None else _as_in_toml(value)

@@ -48,13 +48,15 @@ def test_depth_is_picked_only_where_there_is_nothing_else() -> None:
 
 
 def test_two_cameras_are_listed_with_the_setting() -> None:
-    with pytest.raises(LogError, match=r"/left/image, /right/image; .*topics.image"):
+    with pytest.raises(LogError, match=r"/left/image, /right/image; .*`topics.image`"):
         choose_image([camera("/left/image"), camera("/right/image")], None)
 
 
 def test_an_unknown_topic_lists_the_valid_ones() -> None:
     topics = [camera("/left"), camera("/right"), other("/imu")]
-    with pytest.raises(LogError, match=r"topics.image /lef: is not in the log; .*: /left, /right"):
+    with pytest.raises(
+        LogError, match=r"`topics.image` /lef: is not in the log; .*: /left, /right"
+    ):
         choose_image(topics, "/lef")
     with pytest.raises(LogError, match=r"/imu: carries no images"):
         choose_image(topics, "/imu")
@@ -90,7 +92,7 @@ def test_the_labels_of_the_chosen_camera_are_taken() -> None:
 
 
 def test_two_label_topics_are_listed_with_the_setting() -> None:
-    with pytest.raises(LogError, match=r"/a/labels, /b/labels; .*topics.truth"):
+    with pytest.raises(LogError, match=r"/a/labels, /b/labels; .*`topics.truth`"):
         truth_of(label("/a/labels"), label("/b/labels"))
 
 

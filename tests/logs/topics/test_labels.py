@@ -36,7 +36,7 @@ def test_a_mask_is_understood_by_itself(values: list[int], expected: list[int]) 
 
 
 def test_class_ids_are_asked_for_with_the_values_seen() -> None:
-    with pytest.raises(LogError, match=r"/labels holds the values 0 3 11: .*labels.road"):
+    with pytest.raises(LogError, match=r"/labels holds the values 0 3 11: .*`labels.road`"):
         truth([0, 3, 11])
 
 
@@ -53,8 +53,8 @@ def test_a_sixteen_bit_value_is_understood() -> None:
 @pytest.mark.parametrize(
     ("labels", "setting"),
     [
-        (LabelSettings(road=(7,)), "labels.road 7"),
-        (LabelSettings(road=(3,), ignore=(9,)), "labels.ignore 9"),
+        (LabelSettings(road=(7,)), "`labels.road` 7"),
+        (LabelSettings(road=(3,), ignore=(9,)), "`labels.ignore` 9"),
     ],
 )
 def test_a_given_value_that_never_occurs_is_refused(labels: LabelSettings, setting: str) -> None:
@@ -68,9 +68,11 @@ def test_a_value_cannot_mean_both() -> None:
 
 
 def test_ignore_needs_road() -> None:
-    with pytest.raises(ValidationError, match=r"labels\.ignore needs labels\.road"):
+    with pytest.raises(ValidationError, match=r"`labels\.ignore` needs `labels\.road`"):
         LabelSettings(ignore=(3,))
-    with pytest.raises(ValidationError, match=r"labels\.ignore_colors needs labels\.road_colors"):
+    with pytest.raises(
+        ValidationError, match=r"`labels\.ignore_colors` needs `labels\.road_colors`"
+    ):
         LabelSettings(ignore_colors=(ROAD,))
 
 
@@ -113,14 +115,14 @@ def test_colours_can_mean_road_and_ignore() -> None:
 
 def test_colours_are_asked_for_with_those_seen() -> None:
     with pytest.raises(
-        LogError, match=r"/labels holds the colours 0,0,255 64,32,32: .*labels.road_colors"
+        LogError, match=r"/labels holds the colours 0,0,255 64,32,32: .*`labels.road_colors`"
     ):
         seen_in(colors([ROAD, SKY]), LabelSettings(), "/labels")
 
 
 def test_a_colour_that_never_occurs_is_refused() -> None:
     labels = LabelSettings(road_colors=(LANE,))
-    with pytest.raises(LogError, match=r"labels\.road_colors 255,0,0 does not occur in /labels"):
+    with pytest.raises(LogError, match=r"`labels\.road_colors` 255,0,0 does not occur in /labels"):
         understand(labels, seen_in(colors([ROAD, SKY]), labels, "/labels"), "/labels")
 
 

@@ -113,7 +113,7 @@ def test_images_and_colour_masks_of_the_road(painted: Path, tmp_path: Path) -> N
     packed = pack(painted / "imgs", tmp_path / "comma.mcap", masks=painted / "masks")
     labels = LabelSettings(road_colors=(ROAD, MARKING), ignore_colors=(OWN_CAR,))
     with open_log(packed.path) as log:
-        with pytest.raises(LogError, match=r"/truth/road.*labels\.road_colors"):
+        with pytest.raises(LogError, match=r"/truth/road.*`labels\.road_colors`"):
             log.select()
         frames = [frame.decode() for frame in log.frames(log.select(labels=labels))]
     first = cv2.imread(str(min((painted / "masks").glob("*.png"))))[..., ::-1]

@@ -128,6 +128,15 @@ def test_sampled_features_are_the_images_at_the_sampled_pixels_in_their_order():
 # --- What it can tell apart -----------------------------------------------------------------------
 
 
+def test_images_of_different_sizes_are_each_reduced_to_the_same_width():
+    images, truth = (grey(24, 32), grey(240, 320)), np.ones((1, 1), np.uint8)
+    place = np.zeros(1, np.intp)
+    both = TrainingSet(images, np.array([0, 1]), *(np.zeros(2, np.intp),) * 2, np.ones(2, bool))
+    alone = TrainingSet(images[1:], place, place, place, truth[0] == 1)
+    values = at_samples(both, 160, PLAIN.windows)
+    np.testing.assert_array_equal(values[1:], at_samples(alone, 160, PLAIN.windows))
+
+
 def test_place_tells_a_grey_road_from_a_grey_wall():
     truth = np.zeros((24, 32), np.uint8)
     truth[12:] = 1
