@@ -270,3 +270,19 @@ def test_no_recording_is_made_by_the_recorder_that_does_nothing(drive):
         recorder.write(recorder.encode(drive[0], 0, {}))
         recorder.flush()
         recorder.finish(RESULTS)
+
+
+def test_what_fails_at_the_close_alone_is_raised_and_what_failed_first_is_kept(
+    tmp_path, monkeypatch
+):
+    def fail(recorder):
+        raise RecordingError("cannot be written any further")
+
+    monkeypatch.setattr(Recorder, "flush", fail)
+    with (
+        pytest.raises(RecordingError, match="cannot be written"),
+        Recorder(tmp_path / "a.rrd", layout()),
+    ):
+        pass
+    with pytest.raises(KeyError, match="first"), Recorder(tmp_path / "b.rrd", layout()):
+        raise KeyError("first")

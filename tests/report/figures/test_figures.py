@@ -225,6 +225,15 @@ def test_ignored_pixels_are_greyed() -> None:
     assert "ignored" in texts(figure)
 
 
+@pytest.mark.parametrize(("value", "said"), [(255, True), (1, False)])
+def test_the_legend_speaks_of_ignored_pixels_where_there_are_some(value: int, said: bool) -> None:
+    example = an_example()
+    truth = np.ones_like(example.image[..., 0])
+    truth[0, 0] = value
+    figure = masks_of([ExampleFrame(7, example.image, truth, example.masks)])
+    assert ("grey: ignored" in texts(figure)) is said
+
+
 def test_large_images_are_shrunk() -> None:
     big = ExampleFrame(
         1, np.zeros((600, 1200, 3), np.uint8), None, {"net": np.zeros((600, 1200), np.uint8)}
