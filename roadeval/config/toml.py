@@ -9,7 +9,6 @@ from typing import Any
 
 from roadeval.config.errors import ConfigError
 from roadeval.config.run import RunConfig, configure
-from roadeval.recording import Recording
 
 
 def load_config(path: str | Path, preset: str | None = None) -> RunConfig:
@@ -49,6 +48,8 @@ def read_tables(path: str | Path) -> dict[str, Any]:
 def _text(path: Path) -> str:
     if path.suffix != ".rrd":
         return path.read_text(encoding="utf-8")
+    from roadeval.recording import Recording
+
     text = Recording(path).result("run")
     if text is None:
         raise ConfigError(f"{path}: the recording of an earlier version, or of a run that was cut")
