@@ -39,6 +39,13 @@ def test_with_truth_the_sections_go_from_the_verdict_to_the_settings():
     ]
 
 
+def test_of_a_run_that_was_cut_the_evaluated_frames_are_counted():
+    findings = some_findings(finals={}, overlap={})
+    findings.summary["totals"] = {}
+    findings.summary["frames"] = {"evaluated": 17, "trained_on": 10, "with_pictures": 20}
+    assert document(findings).subtitle.startswith("17 frames")
+
+
 def test_the_drives_facts_stand_below_its_name():
     findings = some_findings(finals={}, overlap={})
     findings.summary["totals"] = {}

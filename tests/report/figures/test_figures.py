@@ -158,6 +158,13 @@ def test_series_differ_by_colour_and_by_shape() -> None:
         assert one.dash != other.dash
 
 
+def test_further_variants_differ_by_mark_and_dash() -> None:
+    further = [*looks([*"abcde"]).values()]
+    assert [look.hollow for look in further] == [False, True, False, True, False]
+    assert len({look.marker for look in further}) == len({look.dash for look in further}) == 5
+    assert {look.dash[0] for look in further} == {0}
+
+
 def test_the_colours_are_those_of_the_design() -> None:
     found = looks(BY_DEFAULT)
     assert (found["filtered"].colour, found["unfiltered"].colour) == ("#0072B2", "#E69F00")
