@@ -28,7 +28,7 @@ app = typer.Typer(
 
 
 def _place(command: Callable[..., int]) -> int:
-    """Where a command stands in the help."""
+    """Return the place of a command in the help."""
     name = command.__name__
     return FIRST.index(name) if name in FIRST else len(FIRST)
 

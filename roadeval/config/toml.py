@@ -52,7 +52,9 @@ def _text(path: Path) -> str:
 
     text = Recording(path).result("run")
     if text is None:
-        raise ConfigError(f"{path}: the recording of an earlier version, or of a run that was cut")
+        raise ConfigError(
+            f"{path}: holds no configuration: an earlier version made it, or the run was cut"
+        )
     return text
 
 
@@ -62,9 +64,13 @@ def run_toml(config: RunConfig, drive: str, version: str) -> str:
 
     document = tomlkit.document()
     document.add(
-        tomlkit.comment(f"The configuration of a replay of {drive} by roadeval {version}:")
+        tomlkit.comment(f"The configuration of a replay of {drive} by roadeval {version}.")
     )
-    document.add(tomlkit.comment("given to roadeval replay as its configuration, it runs again."))
+    document.add(
+        tomlkit.comment(
+            "To repeat the run, give this file to roadeval replay as its configuration."
+        )
+    )
     for key, value in without_none(config.as_dict()).items():
         document.add(key, value)
     return tomlkit.dumps(document)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 from roadeval.data import BASELINE, UNFILTERED
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import analysis
-from roadeval.evaluation.compared import (
+from roadeval.evaluation.comparison_result import (
     ComparedResult,
     Comparison,
     MaskComparison,

@@ -30,7 +30,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.compared import ComparedResult, Comparison, Judgement, MaskComparison
+from roadeval.evaluation.comparison_result import (
+    ComparedResult,
+    Comparison,
+    Judgement,
+    MaskComparison,
+)
 from roadeval.evaluation.metrics import METRICS, OVERLAP
 from roadeval.evaluation.settings import EvaluationSettings
 

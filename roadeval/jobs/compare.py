@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import analysis, comparison
-from roadeval.evaluation.compared import Comparison, Judgement, as_dict
 from roadeval.evaluation.comparison import Side
+from roadeval.evaluation.comparison_result import Comparison, Judgement, as_dict
 from roadeval.evaluation.conditions import Condition, judge
 from roadeval.jobs.result import Result
 from roadeval.report.comparison import document, markdown

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from roadeval.data.words import defined, interval, listing, number, percent, points, timestamp
-from roadeval.evaluation.compared import Comparison, Judgement, MaskComparison, MovedFrame
+from roadeval.evaluation.comparison_result import Comparison, Judgement, MaskComparison, MovedFrame
 from roadeval.report.blocks import Block, BulletList, Cell, Document, Figure, Heading, Table, Text
 from roadeval.report.figures.charts import forest, levels
 from roadeval.report.figures.fig3a_error_rate import FIGURE

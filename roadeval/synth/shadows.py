@@ -1,4 +1,4 @@
-"""Where the direct sun does not reach: what stands beside the road, projected along its rays.
+"""Cast shadows: what stands beside the road, projected along its rays.
 
 Occluders are cut into layers by height. A layer's silhouette, projected along the sun onto the
 ground, is blurred by the sun's disc as it appears from there: the penumbra grows with the way

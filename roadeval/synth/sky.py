@@ -1,4 +1,4 @@
-"""What closes the view: sky, fair-weather clouds, far hills and a line of far trees."""
+"""The background: sky, fair-weather clouds, far hills and a line of far trees."""
 
 from __future__ import annotations
 

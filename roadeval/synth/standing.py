@@ -1,4 +1,4 @@
-"""What stands on one foot beside the road: seen as one panel, in the sun's way as it is.
+"""Things that stand on one foot beside the road: seen as one panel, in the sun's way as it is.
 
 Trees and posts alike: leaves and rods block the sun, a picture shows them.
 """

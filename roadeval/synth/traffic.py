@@ -1,4 +1,4 @@
-"""Who else is on the road: a car ahead, some that come towards us, one parked in the lay-by."""
+"""Other vehicles: a car ahead, some that come towards the camera, one parked in the lay-by."""
 
 from __future__ import annotations
 

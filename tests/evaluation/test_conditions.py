@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from roadeval.evaluation.compared import MaskComparison
+from roadeval.evaluation.comparison_result import MaskComparison
 from roadeval.evaluation.conditions import Condition, ConditionError
 
 MASK = MaskComparison(

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from roadeval.data.words import MINUS
-from roadeval.evaluation.compared import (
+from roadeval.evaluation.comparison_result import (
     ComparedResult,
     Comparison,
     Judgement,

@@ -75,7 +75,7 @@ def compare(
     judged, as where two results have fewer than ten frames in common, or fewer than half of those
     of the shorter one.
     """
-    from roadeval.cli import changes
+    from roadeval.cli.screens import compare as screen
     from roadeval.jobs import compare as comparing
 
     size = arguments.paper_of(paper)
@@ -85,7 +85,7 @@ def compare(
     if json:
         console.emit(comparing.as_json(compared).rstrip())
     elif not quiet:
-        changes.show(compared.content, console.results())
+        screen.show(compared.content, console.results())
     for warning in compared.content["warnings"]:
         messages.warning(warning)
     for sentence in compared.held:

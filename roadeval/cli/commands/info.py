@@ -17,14 +17,14 @@ def info(drive: arguments.Drive, *, given: Given, json: arguments.Json = False) 
     would pick what it picks, or what it would ask for.
     """
     config = arguments.configuration(given)
-    from roadeval.cli import contents
+    from roadeval.cli.screens import info as screen
     from roadeval.jobs.info import info as describe
 
     found = describe(drive, config)
     if json:
         console.emit(dumps(found.as_dict(), indent=2, ensure_ascii=False))
     else:
-        contents.show(found.as_dict(), console.results())
+        screen.show(found.as_dict(), console.results())
     for damage in found.damage:
         if damage not in found.losses:
             messages.warning(damage)

@@ -94,7 +94,7 @@ def _table(found: list[WorstFrame]) -> Table:
     from rich import box
     from rich.table import Table
 
-    from roadeval.cli.outcome import percent
+    from roadeval.cli.screens.replay import percent
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for name in ("", "frame", "ERR", "FPR", "FNR"):

@@ -25,7 +25,7 @@ def replay(
     stage is scored against it, with the shadow filter and without.
     """
     config = arguments.configuration(given)
-    from roadeval.cli import outcome
+    from roadeval.cli.screens import replay as screen
     from roadeval.jobs.replay import replay as run
     from roadeval.results.summary import summary_text
 
@@ -34,7 +34,7 @@ def replay(
     if json:
         console.emit(summary_text(found.summary).rstrip())
     elif not quiet:
-        outcome.show(found, console.results())
+        screen.show(found, console.results())
     for warning in found.warnings:
         messages.warning(warning)
     return messages.losses(found.losses)

@@ -1,4 +1,4 @@
-"""``roadeval report``: everything a result has to tell, as one PDF."""
+"""``roadeval report``: the report of a drive as a PDF."""
 
 from __future__ import annotations
 

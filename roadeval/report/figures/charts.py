@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from roadeval.evaluation.compared import MaskComparison
+    from roadeval.evaluation.comparison_result import MaskComparison
     from roadeval.report.findings import ErrorHeatmap, Totals
 
 WIDTH: Final = 7.4

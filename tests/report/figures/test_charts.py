@@ -8,7 +8,7 @@ import pytest
 from matplotlib.colors import to_hex
 
 from roadeval.data import colours
-from roadeval.evaluation.compared import MaskComparison
+from roadeval.evaluation.comparison_result import MaskComparison
 from roadeval.evaluation.uncertainty import Difference
 from roadeval.report.figures import charts
 from roadeval.report.findings import ErrorHeatmap

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from roadeval.cli import outcome
+from roadeval.cli.screens import replay as outcome
 from roadeval.jobs.replay import Outcome
 
 RATES = ("ACC", "ERR", "TPR", "FNR", "TNR", "FPR")

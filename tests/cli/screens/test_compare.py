@@ -4,7 +4,7 @@ import io
 
 from rich.console import Console
 
-from roadeval.cli import changes
+from roadeval.cli.screens import compare as changes
 
 
 def row(result, variant):

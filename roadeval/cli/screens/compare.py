@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from roadeval.cli.outcome import percent, points
+from roadeval.cli.screens.replay import percent, points
 from roadeval.data.words import defined
 
 if TYPE_CHECKING:

@@ -1,0 +1,1 @@
+"""The terminal's screens of 80 columns, one file a command."""
