@@ -42,6 +42,13 @@ def test_totals_of_the_table_are_those_of_the_run():
     assert analysis.totals(frames) == board.totals()
 
 
+def test_totals_keep_the_table_s_order():
+    table = a_table({("wide", "svm"): [1], ("wide", "post"): [1], ("blind", "post"): [1]})
+    totals = analysis.totals(table)
+    assert [*totals] == ["wide", "blind"]
+    assert [*totals["wide"]] == ["svm", "post"]
+
+
 def test_windows_of_the_table_are_those_of_the_run():
     board, frames = scored()
     found = [asdict(window) for window in analysis.windows(frames, 5)]

@@ -48,6 +48,13 @@ def test_a_cars_shadow_lies_away_from_the_sun() -> None:
     assert cabin[:, 0].min() < body[:, 0].min() < -WIDTH / 2
 
 
+def test_a_car_stands_on_a_rectangle_ahead_of_its_foot() -> None:
+    corners = car(oncoming=False).footprint()
+    half, near, far = WIDTH / 2, 20.0, 20.0 + LENGTH
+    expected = [(-half, 0, near), (half, 0, near), (half, 0, far), (-half, 0, far)]
+    np.testing.assert_allclose(corners, expected, atol=1e-9)
+
+
 def test_the_cabins_shadow_is_turned_with_the_car() -> None:
     ahead, oncoming = (car(turned).shadow(SUN)[1][:, 2] for turned in (False, True))
     middle = 20.0 + LENGTH / 2
