@@ -121,7 +121,7 @@ def test_the_log_is_named_by_its_hash(words, demo):
 
 def test_the_command_that_makes_the_results_again_is_given(words, demo):
     path = demo.summary["log"]["path"]
-    assert f"roadeval replay {path} --config run.toml" in words
+    assert f"roadeval replay {path} --config drive.rrd" in words
 
 
 def test_a_results_folder_gives_the_same_numbers_without_pictures(demo, words, tmp_path):
