@@ -63,7 +63,7 @@ class Frame:
 
 
 class Role(StrEnum):
-    """What a frame is used for. Only `EVALUATED` frames are ever counted."""
+    """The use of a frame in a run. Only `EVALUATED` frames are ever counted."""
 
     EVALUATED = "evaluated"
     TRAINING = "training"

@@ -40,7 +40,7 @@ class LabelClass:
 
 @dataclass(frozen=True, slots=True)
 class LayerSpec:
-    """What a layer is, known before the first frame.
+    """The description of a layer, known before the first frame.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ def fixed(titles: Mapping[str, str]) -> Titles:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LabelledFrame:
-    """What a region is found in: a frame, its packed truth, and what the variants made of it."""
+    """The input of a region: a frame, its packed truth, and what the variants made of it."""
 
     frame: Frame
     truth: TruthBits

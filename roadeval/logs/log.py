@@ -97,7 +97,7 @@ class Log:
 
     @property
     def losses(self) -> tuple[str, ...]:
-        """What is lost of the log, a sentence for each loss; empty if nothing is.
+        """The losses of the log, a sentence each; empty if nothing is lost.
 
         Damage inside chunks is found when they are read, or by `verify`.
         """

@@ -183,7 +183,7 @@ class Findings:
 
     @property
     def figure_data(self) -> FigureData:
-        """What the figures of the results folder are drawn from."""
+        """The data that the figures of the results folder are drawn from."""
         return FigureData(self.drive, self.windows, self.examples)
 
     @property

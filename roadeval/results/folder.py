@@ -71,7 +71,7 @@ class ResultsWriter:
 
     @property
     def tables(self) -> dict[str, dict[str, Any]]:
-        """What the summary states of each table with rows so far: ``rows`` and ``sha256``."""
+        """Rows and SHA-256 of each table that has rows so far, as the summary states them."""
         return {name: table.stated for name, table in self._open.items() if table.rows}
 
     def finish(self, summary: Mapping[str, Any], run_toml: str) -> list[Path]:

@@ -14,7 +14,7 @@ from roadeval.evaluation.metrics import METRICS
 
 
 class Kind(StrEnum):
-    """What a column holds.
+    """The kind of value in a column.
 
     `NAME`: text, whatever it looks like. `COUNT`: a whole number. `TIME`: nanoseconds. `RATE`: a
     fraction; the cell is empty where it is undefined.

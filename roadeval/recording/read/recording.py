@@ -94,7 +94,7 @@ class Recording:
 
     @cached_property
     def roles(self) -> dict[int, str]:
-        """What each frame was used for, see `roadeval.data.Role`.
+        """The role of each frame, see `roadeval.data.Role`.
 
         A killed run may not have written what it knew of its last frames: those have the role of
         the frame before.
