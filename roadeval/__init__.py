@@ -21,9 +21,15 @@ from roadeval.version import VERSION
 if TYPE_CHECKING:
     from roadeval.config import RunConfig, configure, load_config
     from roadeval.errors import RoadevalError
+    from roadeval.jobs.compare import compare
+    from roadeval.jobs.config import config_toml
+    from roadeval.jobs.demo import demo
     from roadeval.jobs.frame import run_frame
+    from roadeval.jobs.info import info
+    from roadeval.jobs.pack import pack
     from roadeval.jobs.progress import Progress
     from roadeval.jobs.replay import Outcome, replay
+    from roadeval.jobs.report import write_report
     from roadeval.jobs.train import train
     from roadeval.recording import Recording
     from roadeval.training import Model, load_model, save_model
@@ -37,24 +43,32 @@ __all__ = [
     "Recording",
     "RoadevalError",
     "RunConfig",
+    "compare",
+    "config_toml",
     "configure",
+    "demo",
+    "info",
     "load_config",
     "load_model",
+    "pack",
     "replay",
     "run_frame",
     "save_model",
     "train",
+    "write_report",
 ]
 
 _HOMES: Final = {
+    **{name: f"jobs.{name}" for name in ("compare", "demo", "info", "pack", "replay", "train")},
     **dict.fromkeys(("RunConfig", "configure", "load_config"), "config"),
-    **dict.fromkeys(("Outcome", "replay"), "jobs.replay"),
-    "Progress": "jobs.progress",
     **dict.fromkeys(("Model", "load_model", "save_model"), "training"),
-    "train": "jobs.train",
+    "Outcome": "jobs.replay",
+    "Progress": "jobs.progress",
     "Recording": "recording",
     "RoadevalError": "errors",
+    "config_toml": "jobs.config",
     "run_frame": "jobs.frame",
+    "write_report": "jobs.report",
 }
 
 

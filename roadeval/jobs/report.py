@@ -10,10 +10,8 @@ from roadeval.report.drive import document
 from roadeval.report.findings import Commands
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 
-__all__ = ["collect", "report"]
 
-
-def report(
+def write_report(
     result: str | Path | Result,
     output: str | Path | None = None,
     *,

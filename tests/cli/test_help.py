@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from importlib.util import find_spec
 
 import pytest
 
@@ -26,6 +27,11 @@ def test_every_command_has_help(command, capsys):
     shown = capsys.readouterr()
     assert f"Usage: roadeval {command}" in shown.out
     assert shown.err == ""
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_a_file_among_the_jobs(command):
+    assert find_spec(f"roadeval.jobs.{command}")
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -20,9 +20,9 @@ def config(*, given: Given) -> int:
     --config.
     """
     settings = arguments.configuration(given)
-    from roadeval.config.document import documented
+    from roadeval.jobs.config import config_toml
 
-    console.emit(documented(settings).rstrip())
+    console.emit(config_toml(settings).rstrip())
     return ExitCode.DONE
 
 

@@ -25,17 +25,13 @@ def demo(
     100 frames, 640x480, 10 Hz; truth of the road and of shadow. The same seed gives the same
     drive.
     """
-    from roadeval.jobs.progress import Progress
-    from roadeval.synth import DriveSettings, write_drive
+    from roadeval.jobs.demo import demo as render
+    from roadeval.synth import DriveSettings
 
     with progress.watched(quiet) as watch:
-        write_drive(
-            output,
-            DriveSettings(seed=seed),
-            lambda done, total: watch(Progress(done, total, "rendering")),
-        )
+        log = render(output, DriveSettings(seed=seed), on_progress=watch)
     if not quiet:
-        console.emit(str(output))
+        console.emit(str(log))
     return ExitCode.DONE
 
 

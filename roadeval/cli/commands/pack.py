@@ -40,24 +40,15 @@ def pack(
 
     Foxglove and Rerun open it too: JPEGs as they are, masks as PNG, Foxglove's protobuf schemas.
     """
-    from roadeval.logs import describe
-    from roadeval.logs import pack as run
+    from roadeval.jobs.pack import pack as run
 
-    packed = run(images, output, masks=truth, rate_hz=rate)
-    _warn_of(packed.without_mask, "images without a mask")
-    _warn_of(packed.without_image, "masks without an image")
-    if truth and (problem := describe(packed.path).problem):
-        messages.warning(f"packed, but replay needs to be told more: {problem}")
+    packed = run(images, output, truth=truth, rate_hz=rate)
+    for warning in packed.warnings:
+        messages.warning(warning)
     if not quiet:
-        masks = f", {packed.labelled} with a mask" if truth else ""
-        console.emit(f"{packed.path}: {packed.frames} images{masks}; {packed.stamps}")
+        masks = f", {packed.masks} with a mask" if truth else ""
+        console.emit(f"{packed.path}: {packed.images} images{masks}; {packed.stamps}")
     return ExitCode.DONE
-
-
-def _warn_of(names: tuple[str, ...], what: str) -> None:
-    if names:
-        some = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
-        messages.warning(f"{what}: {some} ({len(names)} in all)")
 
 
 COMMAND: Final = pack

@@ -36,12 +36,12 @@ def report(
     Does the filter help, where are the errors, which stage broke it, and the frames to look at;
     from the recording alone, or from a results folder, then without pictures.
     """
-    from roadeval.jobs.report import report as write
+    from roadeval.jobs.report import write_report
     from roadeval.jobs.result import Result
 
     size = arguments.paper_of(paper)
     read = Result(result)
-    path = write(read, output, paper=size, commands=_commands(read))
+    path = write_report(read, output, paper=size, commands=_commands(read))
     if not quiet:
         console.emit(str(path))
     if not read.complete:

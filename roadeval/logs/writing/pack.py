@@ -58,7 +58,6 @@ def pack(
     *,
     masks: str | Path | None = None,
     rate_hz: float | None = None,
-    start_ns: int = 0,
 ) -> PackResult:
     """Write a folder of images, or a video, as a log that Foxglove and Rerun open too.
 
@@ -77,8 +76,6 @@ def pack(
     rate_hz
         Images a second. By default a video's own; of images, the times in their names if every
         name is a time (seconds, or milli-, micro- or nanoseconds since 1970), else 10.
-    start_ns
-        Stamp of the first image, unless the names hold times.
 
     Raises
     ------
@@ -91,20 +88,20 @@ def pack(
     if images.suffix.lower() in VIDEO_SUFFIXES and images.is_file():
         if masks is not None:
             raise LogError(f"{images}: masks go with a folder of images, not with a video")
-        return _pack_video(images, output, rate_hz, start_ns)
+        return _pack_video(images, output, rate_hz)
     if not images.is_dir():
         raise LogError(f"{images}: neither a folder of images nor a video")
-    return _pack_folder(images, output, Path(masks) if masks else None, rate_hz, start_ns)
+    return _pack_folder(images, output, Path(masks) if masks else None, rate_hz)
 
 
 def _pack_folder(
-    images: Path, output: Path, masks: Path | None, rate_hz: float | None, start_ns: int
+    images: Path, output: Path, masks: Path | None, rate_hz: float | None
 ) -> PackResult:
     files = _listed(images)
     by_image = _pair(files, _listed(masks)) if masks else {}
     if masks and not by_image:
         raise LogError(f"{masks}: no mask has the name of an image in {images}")
-    stamps, words = _stamps(files, rate_hz, start_ns)
+    stamps, words = _stamps(files, rate_hz)
     with LogWriter(output) as log:
         for file, stamp in stamps.items():
             log.image(CAMERA, stamp, *_image(file))
@@ -117,24 +114,24 @@ def _pack_folder(
     return PackResult(output, len(files), len(by_image), tuple(unlabelled), tuple(lonely), words)
 
 
-def _stamps(files: list[Path], rate_hz: float | None, start_ns: int) -> tuple[dict[Path, int], str]:
+def _stamps(files: list[Path], rate_hz: float | None) -> tuple[dict[Path, int], str]:
     """Return each file's stamp, in the order of the stamps, and their source in words."""
     times = {file: time for file in files if (time := _time_in(file.stem)) is not None}
     if rate_hz is None and len(times) == len(files) == len(set(times.values())):
         ordered = sorted(times.items(), key=lambda item: item[1])
         return dict(ordered), "the times in the files' names"
     rate = rate_hz or DEFAULT_RATE_HZ
-    regular = {file: start_ns + round(i * NS / rate) for i, file in enumerate(files)}
+    regular = {file: round(i * NS / rate) for i, file in enumerate(files)}
     return regular, f"{rate:g} images a second"
 
 
-def _pack_video(video: Path, output: Path, rate_hz: float | None, start_ns: int) -> PackResult:
+def _pack_video(video: Path, output: Path, rate_hz: float | None) -> PackResult:
     count = 0
     with LogWriter(output) as log:
         for count, (time_ns, jpeg) in enumerate(frames_of(video), start=1):
             if rate_hz is not None:
                 time_ns = round((count - 1) * NS / rate_hz)  # noqa: PLW2901
-            log.image(CAMERA, start_ns + time_ns, jpeg, "jpeg")
+            log.image(CAMERA, time_ns, jpeg, "jpeg")
         if not count:
             raise LogError(f"{video}: a video without frames")
     words = "the video's own times" if rate_hz is None else f"{rate_hz:g} images a second"

@@ -1,0 +1,26 @@
+"""The whole effective configuration, to read and to edit."""
+
+from __future__ import annotations
+
+from roadeval.config import RunConfig
+from roadeval.config.document import documented
+
+
+def config_toml(config: RunConfig | None = None) -> str:
+    """Return a configuration as TOML: every setting with its meaning, range and value.
+
+    Parameters
+    ----------
+    config
+        The configuration; the defaults of ``roadeval replay`` otherwise. What can be set stands in
+        the text whether it was or not, so that the file, edited, can be given to
+        `roadeval.load_config`.
+
+    Examples
+    --------
+    >>> import roadeval
+    >>> text = roadeval.config_toml(roadeval.configure({"preset": "gated"}))
+    >>> text.startswith('preset = "gated"')
+    True
+    """
+    return documented(config or RunConfig())
