@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from roadeval import logs
-from roadeval.config import OutputSettings, RunConfig
+from roadeval.config import RunConfig
 from roadeval.config.toml import run_toml
 from roadeval.jobs import summary
 from roadeval.jobs.examples import ExampleFrames
+from roadeval.jobs.identity import deciding
 from roadeval.jobs.outputs import AnyPath, Outputs, keep_apart
 from roadeval.jobs.processing import process
 from roadeval.jobs.progress import OnProgress, Progress, ignore
@@ -115,9 +116,9 @@ def _run(
 def _texts(run: Run, facts: Mapping[str, Any], sums: Mapping[str, str]) -> dict[str, str]:
     """Return the results as the recording keeps them: the files' own text.
 
-    Where they were written is left out, so that the same input gives the same recording.
+    What decides no number is left out, so that the same input gives the same recording.
     """
-    config = replace(run.config, output=OutputSettings(record=run.config.output.record))
+    config = deciding(run.config)
     return {
         "summary": summary_text({**facts, "run": config.as_dict()}),
         "run": run_toml(config, run.log.name, VERSION),

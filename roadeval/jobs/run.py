@@ -15,6 +15,7 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.jobs import frame
+from roadeval.jobs.identity import identity
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.kernels import prepare as load_kernels
 from roadeval.pipeline.chain import Chain
@@ -86,6 +87,8 @@ class Run:
     def _properties(self) -> dict[str, str | int | float]:
         return {
             "version": VERSION,
+            # The recording's identity comes from its layout, this digest included.
+            "input": identity(self.log, self.config),
             "drive": self.log.name,
             "preset": self.config.preset,
             "image_topic": self.selection.image.name,

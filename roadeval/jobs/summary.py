@@ -32,7 +32,7 @@ def of(run: Run) -> dict[str, Any]:
         "run": run.config.as_dict(),
         "settings": {each.name: each.pipeline.as_dict() for each in run.variants},
         "versions": versions(),
-        "log": {"path": str(run.log.path), "sha256": run.log.sha256()},
+        "log": {"path": str(run.log.path), "sha256": run.log.sha256},
     }
 
 

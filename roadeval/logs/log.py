@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -124,8 +125,11 @@ class Log:
         for container in self._containers:
             container.verify()
 
+    @cached_property
     def sha256(self) -> str:
         """SHA-256 of the file, or of the SHA-256 sums of a folder's files, in hexadecimal.
+
+        The first time the whole log is read for it.
 
         Raises
         ------

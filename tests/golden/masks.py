@@ -28,6 +28,7 @@ _NAMES: Final = "|".join(PACKAGES)
 RULES: Final[Mapping[str, tuple[str, str | Callable[[re.Match[str]], str]]]] = {
     # The log's own checksum: its writer's version stands in the file.
     "the SHA-256 of a log": (r"\b[0-9a-f]{64}\b", "<sha256>"),
+    "the digest of a run's input, which holds that": (r"(?<=input: )[0-9a-f]{32}\b", "<digest>"),
     "a package's version": (rf"\b({_NAMES}|version:) \d[\w.+]*", r"\1 <version>"),
     # Compression differs between versions of Rerun and of the codecs.
     "the size of a recording": (r"\.rrd \(\d+\.\d [kM]B\)", ".rrd (<size>)"),

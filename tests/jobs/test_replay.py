@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from rerun.chunk import RrdReader
 
 import roadeval
 from roadeval import RoadevalError
@@ -39,6 +40,12 @@ def run(drive: Path, folder: Path, **options):
     return roadeval.replay(
         drive, settings(**options), save=folder / "out.rrd", reports=folder / "reports"
     )
+
+
+def identity_of(recording: Path) -> str:
+    """By which Rerun's viewer and catalogue tell recordings apart."""
+    (entry,) = RrdReader(recording).recordings()
+    return entry.recording_id
 
 
 def frames_of(folder: Path) -> pd.DataFrame:
@@ -123,11 +130,17 @@ def test_figures_are_written(once):
         assert {f"{figure}.png", f"{figure}.pdf"} <= names
 
 
-def test_the_number_of_workers_changes_no_number(drive, once, tmp_path):
-    run(drive, tmp_path, jobs=1)
+def test_the_number_of_workers_changes_no_number_and_no_identity(drive, once, tmp_path):
+    outcome = run(drive, tmp_path, jobs=1)
     for table in TABLES:
         other = (tmp_path / "reports" / f"{table}.csv").read_bytes()
         assert other == (once[0] / "reports" / f"{table}.csv").read_bytes()
+    assert identity_of(outcome.recording) == identity_of(once[1].recording)
+
+
+def test_the_same_drive_under_another_configuration_has_another_identity(drive, once, tmp_path):
+    outcome = run(drive, tmp_path, max_frames=12)
+    assert identity_of(outcome.recording) != identity_of(once[1].recording)
 
 
 def test_frames_after_training_can_be_left_out(drive, tmp_path):

@@ -25,7 +25,9 @@ def section(findings: Findings) -> Iterator[Block]:
     for topic in summary["drive"].get("topics", ()):
         yield Text(str(topic), "note")
     if findings.properties:
-        known = {name: value for name, value in findings.properties.items() if value != ""}
+        # The digest of the input says less than the log's checksum and the settings around it.
+        told = ((name, value) for name, value in findings.properties.items() if name != "input")
+        known = {name: value for name, value in told if value != ""}
         yield Text("; ".join(f"{name}: {value}" for name, value in known.items()), "note")
     yield from _versions_and_seconds(summary)
     if summary.get("settings"):
