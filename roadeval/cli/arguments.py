@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from roadeval.cli.options import Given, with_flags
+from roadeval.cli.options import FLAGS, Given, with_flags
 from roadeval.errors import RoadevalError
 
 if TYPE_CHECKING:
-    from roadeval.config import RunConfig
+    from roadeval.config import RunConfig, Variant
     from roadeval.report.pdf.typeset import Paper
 
 Drive = Annotated[
@@ -65,16 +65,14 @@ def configuration(given: Given) -> RunConfig:
     RoadevalError
         For a file that cannot be used.
     """
-    from roadeval.config import Variant, configure, read_tables
+    from roadeval.config import configure
 
     named = [*given.get("variants", ()), *given.get("topics.masks", ())]
     with usage():
         _check_names([name for name, _ in named])
         base = configure(_preset(given)) if "config" not in given else None
     config = _from_file(given) if base is None else base
-    variants = [
-        Variant.of(name, read_tables(path), path) for name, path in given.get("variants", ())
-    ]
+    variants = [_variant(*each) for each in given.get("variants", ())]
     with usage():
         whole = config.override(_tables(given)).with_variants(variants)
     if whole.training.model and {"training.frames", "training.gap"} & given.keys():
@@ -97,6 +95,16 @@ def _from_file(given: Given) -> RunConfig:
     if preset is not None and tables.get("preset", preset) != preset:
         raise ConfigError(f"{path}: starts from preset {tables['preset']}, not from {preset}")
     return configure({**_preset(given), **tables}, where=str(path))
+
+
+def _variant(name: str, path: str | None) -> Variant:
+    """Read a variant from its file; without one it is the preset of its name."""
+    from roadeval.config import Variant, read_tables
+
+    if path is not None:
+        return Variant.of(name, read_tables(path), path)
+    with usage():
+        return Variant.of(name, {"preset": name}, f"{FLAGS['variants']} {name} names no file")
 
 
 def _check_names(names: Sequence[str]) -> None:

@@ -34,6 +34,11 @@ def named(text: str) -> tuple[str, str]:
     return name, value
 
 
+def variant(text: str) -> tuple[str, str | None]:
+    """Read ``NAME=FILE.toml``, or the name of a preset alone."""
+    return named(text) if "=" in text else (text, None)
+
+
 @dataclass(frozen=True, slots=True)
 class Option:
     """An option of the command line that gives a setting its value.
@@ -93,9 +98,10 @@ OPTIONS: Final = (
     Option(
         "preset",
         ("--preset",),
-        "paper|printed|gated|robust",
-        "The equations as meant, or with the misprints taken literally; with a filter that "
-        "does no harm; or for use on a road. Default: paper.",
+        "paper|printed|printed_order|hsi|gated|robust",
+        "The equations as meant (the default); the misprints taken literally; the paper with its "
+        "own order of post-processing, or with shadow compensated in HSI; a more careful shadow "
+        "filter; or for use on a road.",
     ),
     Option(
         "config",
@@ -108,10 +114,11 @@ OPTIONS: Final = (
     Option(
         "variants",
         ("--variant",),
-        "NAME=FILE.toml",
-        "One more variant beside filtered and unfiltered. Repeatable.",
+        "NAME=FILE.toml|PRESET",
+        "One more variant beside filtered and unfiltered: of a file, or a preset by its name. "
+        "Repeatable.",
         list[str],
-        named,
+        variant,
     ),
     Option(
         "training.model",

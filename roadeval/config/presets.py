@@ -20,10 +20,17 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "svm": {"kernel": "linear"},
         "post": {"operations": ("close", "open")},
     },
+    "printed_order": {"chain": PAPER_CHAIN, "post": {"operations": ("close", "open")}},
+    "hsi": {"chain": PAPER_CHAIN, "shadow": {"colour_space": "hsi"}},
     "gated": {"chain": ("gated", "similarity", "svm", "post")},
     "robust": {
         "chain": ("exposure", "similarity", "context", "post"),
         "training": {"pixels_per_class": 800, "max_pixels": 20_000},
     },
 }
-"""By name, each in the shape of a TOML file (see `roadeval.config.toml`)."""
+"""By name, each in the shape of a TOML file (see `roadeval.config.toml`).
+
+``printed_order`` and ``hsi`` are ``paper`` with one thing as the text has it: the order of
+post-processing (section 4.4), and the colour space of the compensation (section 4.2, step 5). They
+show beside it, as variants, what that thing does.
+"""

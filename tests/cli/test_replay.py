@@ -107,6 +107,12 @@ def test_a_preset_that_is_not_the_file_s_is_refused(asked, tmp_path, capsys):
     assert "starts from preset gated, not from robust" in capsys.readouterr().err
 
 
+def test_a_variant_without_a_file_is_the_preset_of_its_name(asked):
+    assert main(["replay", "d.mcap", "--variant", "hsi", "--variant", "printed_order"]) == 0
+    presets = {name: {"preset": name} for name in ("hsi", "printed_order")}
+    assert asked["config"] == configure({"variants": presets})
+
+
 def test_a_model_and_training_frames_do_not_go_together(capsys):
     assert main(["replay", "d.mcap", "--model", "m", "--train-gap", "3"]) == 2
     assert "--train-frames and --train-gap do not go with a model (m)" in capsys.readouterr().err

@@ -13,7 +13,9 @@ WRONG = {
     "an unknown preset": ["a.mcap", "--preset", "modern"],
     "an unknown selection": ["a.mcap", "--record", "some"],
     "a selection of none": ["a.mcap", "--record", "worst:0"],
-    "a variant without a file": ["a.mcap", "--variant", "mine"],
+    "a variant that is no preset and has no file": ["a.mcap", "--variant", "mine"],
+    "a variant of an empty file name": ["a.mcap", "--variant", "mine="],
+    "a preset as a variant twice": ["a.mcap", "--variant", "hsi", "--variant", "hsi"],
     "a variant twice": ["a.mcap", "--variant", "mine=a.toml", "--variant", "mine=b.toml"],
     "a variant of a default's name": ["a.mcap", "--variant", "filtered=a.toml"],
     "a variant of a reserved name": ["a.mcap", "--variant", "camera=a.toml"],
@@ -53,6 +55,11 @@ def test_a_mistyped_command_is_guessed(capsys):
         (
             ["replay", "a.mcap", "--ignore-label", "3"],
             "--ignore-label needs --road-label: name the values that mean road",
+        ),
+        (
+            ["replay", "a.mcap", "--variant", "mine"],
+            "--variant mine names no file: preset: there is no 'mine'; choose gated, hsi, paper, "
+            "printed, printed_order, robust",
         ),
     ],
 )

@@ -29,6 +29,19 @@ def test_printed_takes_the_misprints_literally():
     assert printed["svm"].kernel == "linear"
 
 
+@pytest.mark.parametrize(
+    ("preset", "stage", "key", "value"),
+    [
+        ("printed_order", "post", "operations", ("close", "open")),
+        ("hsi", "shadow", "colour_space", "hsi"),
+    ],
+)
+def test_a_preset_that_shows_one_thing_differs_from_paper_by_that_alone(preset, stage, key, value):
+    own, paper = configure({"preset": preset}).pipeline, configure().pipeline
+    assert own == configure({stage: {key: value}}).pipeline
+    assert own != paper
+
+
 def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path):
     config = load_config(write(tmp_path, "[shadow]\nring_width = 3\n[training]\nframes = 20"))
     assert config.pipeline.settings["shadow"].ring_width == 3
