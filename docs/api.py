@@ -19,6 +19,7 @@ import pdoc
 from pdoc import docstrings
 
 import roadeval
+from roadeval.results import schema
 
 UNRESOLVED: Final = (
     r".*(array\[int\]|Series\[float\]|DataclassInstance|PydanticDataclass|ForwardRef)"
@@ -51,6 +52,7 @@ def in_markdown(convert: Callable[[str], str]) -> Callable[[str], str]:
 def main(folder: str = "build/api") -> None:
     """Write the pages into a folder."""
     prepare(roadeval)
+    schema.__doc__ = f"{schema.__doc__}\n{schema.documentation()}"
     docstrings.numpy = in_markdown(docstrings.numpy)
     warnings.simplefilter("error")
     warnings.filterwarnings("ignore", UNRESOLVED, UserWarning)

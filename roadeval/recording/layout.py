@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Final
 
 from roadeval.data import (
@@ -51,6 +51,8 @@ PROPERTIES: Final = "/__properties/roadeval"
 ROLE: Final = "/state/frame"
 COUNTS: Final = ("TP", "TN", "FP", "FN", "N")
 """The order of the five numbers under ``/counts``."""
+MOST_WAITING: Final = 128
+"""Frames whose images and text may wait to be written, at most: a killed run loses them."""
 
 
 class RecordingError(RoadevalError):
@@ -75,8 +77,8 @@ class Layout:
         Whether tallies of the baseline come, too.
     has_truth, has_shadow_truth
         Whether any frame has a truth of the road, of shadow.
-    first_frame, last_frame
-        The evaluated frames, if known: the viewer marks them on its time bar.
+    first_frame
+        The first frame that can be evaluated, if known.
     rate_hz
         Frames a second, if known: the speed at which the viewer plays them.
     tables
@@ -94,7 +96,6 @@ class Layout:
     has_truth: bool = True
     has_shadow_truth: bool = False
     first_frame: int | None = None
-    last_frame: int | None = None
     rate_hz: float | None = None
     tables: Mapping[str, str] = field(default_factory=dict)
     properties: Mapping[str, str | int | float] = field(default_factory=dict)
@@ -132,8 +133,9 @@ class Layout:
 
     @classmethod
     def from_json(cls, text: str) -> Layout:
-        """Return the layout that `to_json` wrote."""
-        raw = json.loads(text)
+        """Return the layout that `to_json` wrote; what only other versions know is passed over."""
+        known = {each.name for each in fields(cls)}
+        raw = {name: value for name, value in json.loads(text).items() if name in known}
         raw["variants"] = tuple(_variant(v) for v in raw["variants"])
         raw["rates"] = tuple(raw["rates"])
         return cls(**raw)

@@ -17,7 +17,6 @@ from roadeval.recording.codecs import codecs_of
 from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.read.payloads import PayloadCache
 from roadeval.recording.read.rrd_file import RrdFile
-from roadeval.recording.write.batching import IMAGES_AND_TEXT
 from roadeval.results.reading import read_table
 from roadeval.results.summary import parse_summary
 
@@ -90,7 +89,7 @@ class Recording:
     @property
     def unsure(self) -> tuple[int, ...]:
         """The last frames of a partial recording, of which a killed run may lack some layers."""
-        return () if self.complete else self.frame_numbers[-IMAGES_AND_TEXT.most :]
+        return () if self.complete else self.frame_numbers[-at.MOST_WAITING :]
 
     @cached_property
     def roles(self) -> dict[int, str]:

@@ -87,12 +87,9 @@ def _time_panel(layout: Layout) -> rrb.TimePanel:
     The first frames may be training frames, whose error maps are empty, and a blueprint cannot
     name a frame to open at.
     """
-    first, last = layout.first_frame, layout.last_frame
-    known = first is not None and last is not None
     return rrb.TimePanel(
         state="collapsed",
         timeline=at.FRAME,
         play_state="following",
         fps=layout.rate_hz,
-        time_selection=rrb.components.AbsoluteTimeRange(first, last) if known else None,
     )

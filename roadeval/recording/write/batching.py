@@ -19,7 +19,7 @@ import numpy as np
 import rerun as rr
 from rerun.chunk import Chunk
 
-from roadeval.recording.layout import FRAME, STAMP
+from roadeval.recording.layout import FRAME, MOST_WAITING, STAMP
 
 Columns = Callable[[list[Any]], Any]
 """Makes the viewer's component columns of one value a row."""
@@ -56,7 +56,7 @@ class WaitLimits:
         return min(max(frames // SHARE, self.least), self.most)
 
 
-IMAGES_AND_TEXT: Final = WaitLimits(8, 128)
+IMAGES_AND_TEXT: Final = WaitLimits(8, MOST_WAITING)
 """Of what is read frame by frame: images, notes, states, table lines."""
 NUMBERS: Final = WaitLimits(64, 1024)
 """Of the graphs' numbers: many entities of a few bytes a frame."""
