@@ -5,7 +5,7 @@ otherwise, or `Packed`. Times are integer nanoseconds since the Unix epoch, or w
 log uses.
 """
 
-from roadeval.data.counts import Change, Counts, Step, Tally
+from roadeval.data.counts import Change, Counts, Tally, Transition
 from roadeval.data.frame import IGNORE, NON_ROAD, ROAD, Frame, Mask, Rgb, Role, Truth
 from roadeval.data.layer import (
     ERRORS,
@@ -56,8 +56,8 @@ __all__ = [
     "Rgb",
     "Role",
     "StageResult",
-    "Step",
     "Tally",
+    "Transition",
     "Truth",
     "TruthBits",
     "VariantLayout",

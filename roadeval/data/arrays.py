@@ -16,7 +16,7 @@ Plane = npt.NDArray[np.uint8]
 """``(H, W)``: a channel, codes of any kind, or a mask, nonzero inside."""
 Planes = tuple[Plane, Plane, Plane]
 """Red, green and blue."""
-Table = npt.NDArray[np.uint8]
+CodeTable = npt.NDArray[np.uint8]
 """``(n, m)``: a code for each pair of numbers."""
 Levels = npt.NDArray[np.uint8]
 """``(n,)``: what becomes of each grey level."""

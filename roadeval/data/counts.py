@@ -59,5 +59,5 @@ class Change:
         )
 
 
-Step = tuple[str, str, str, str]
+Transition = tuple[str, str, str, str]
 """From one mask to another: variant and stage before, variant and stage after."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from roadeval.data.counts import Change, Step, Tally
+from roadeval.data.counts import Change, Tally, Transition
 from roadeval.data.frame import Frame, Mask, Rgb, Role
 from roadeval.data.layer import Layer, LayerSpec
 from roadeval.data.packed import Packed, TruthBits
@@ -116,7 +116,7 @@ class FrameResult:
     health: Mapping[str, Health] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     truth_bits: TruthBits | None = None
-    changes: Mapping[Step, Change] = field(default_factory=dict)
+    changes: Mapping[Transition, Change] = field(default_factory=dict)
     contours: Mapping[str, float] = field(default_factory=dict)
     oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)
 

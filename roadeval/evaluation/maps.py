@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import Change, Layer, Step, TruthBits
+from roadeval.data import Change, Layer, Transition, TruthBits
 from roadeval.data.arrays import FN, FP, IGNORED, Bits
 from roadeval.data.packed import everywhere, ones
 from roadeval.evaluation.bits import flat
@@ -77,7 +77,7 @@ class HeatMap:
         self._bytes[:] = 0
 
 
-def changes(names: Sequence[Name], masks: Bits, truth: TruthBits) -> dict[Step, Change]:
+def changes(names: Sequence[Name], masks: Bits, truth: TruthBits) -> dict[Transition, Change]:
     """Count what each stage changed in the mask before it, and each final mask in the others.
 
     Parameters
@@ -114,10 +114,10 @@ class Maps:
     """The heat map of every variant's final mask, and every change between masks, of a drive."""
 
     heat: dict[str, HeatMap] = field(default_factory=dict)
-    changes: dict[Step, Change] = field(default_factory=dict)
+    changes: dict[Transition, Change] = field(default_factory=dict)
     frames: int = 0
 
-    def add(self, errors: Mapping[str, Layer], found: Mapping[Step, Change]) -> None:
+    def add(self, errors: Mapping[str, Layer], found: Mapping[Transition, Change]) -> None:
         """Add a frame: the final masks' errors by variant, and what `changes` counted."""
         self.frames += 1
         for variant, layer in errors.items():

@@ -20,7 +20,7 @@ from roadeval.data import (
     Frame,
     FrameResult,
     Role,
-    Step,
+    Transition,
     VariantResult,
 )
 from roadeval.evaluation import windows
@@ -44,7 +44,7 @@ class DriveSums:
     """What the drive's tables of sums hold: its windows, changes of masks, and heat maps."""
 
     windows: Sequence[windows.Window]
-    changes: Mapping[Step, Change]
+    changes: Mapping[Transition, Change]
     heat: Mapping[str, HeatMap]
 
 

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from roadeval.data.arrays import Matrix, Plane, Planes, Sums, Table, Values, Vector, Words
+from roadeval.data.arrays import CodeTable, Matrix, Plane, Planes, Sums, Values, Vector, Words
 from roadeval.kernels.compiler import compiled, inlined
 
 
 @compiled
-def look_up_sum_min(planes: Planes, table: Table) -> tuple[Plane, Sums]:
+def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
     """See `plain.look_up_sum_min`."""
     reds, greens, blues = planes
     height, width = reds.shape

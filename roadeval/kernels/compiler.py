@@ -24,7 +24,7 @@ TYPES: Final = {
     "Image": _array(types.uint8, 3),
     "Plane": _array(types.uint8, 2),
     "Planes": types.UniTuple(_array(types.uint8, 2), 3),
-    "Table": _array(types.uint8, 2),
+    "CodeTable": _array(types.uint8, 2),
     "Labels": _array(types.int32, 2),
     "Runs": _array(types.int32, 2),
     "Bits": _array(types.uint64, 2),

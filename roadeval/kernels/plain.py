@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from roadeval.data.arrays import (
     Bits,
+    CodeTable,
     Image,
     Labels,
     Matrix,
@@ -16,7 +17,6 @@ from roadeval.data.arrays import (
     Reach,
     Runs,
     Sums,
-    Table,
     Values,
     Vector,
     Words,
@@ -26,7 +26,7 @@ from roadeval.data.packed import pack, unpack
 # --- Colours --------------------------------------------------------------------------------------
 
 
-def look_up_sum_min(planes: Planes, table: Table) -> tuple[Plane, Sums]:
+def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
     """Look every pixel up by the sum and the minimum of its channels.
 
     Parameters

@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Final, Self
 
 from roadeval.results.reading import ResultsError, read_table
-from roadeval.results.schema import TABLES, Table
+from roadeval.results.schema import TABLES, TableSchema
 from roadeval.results.summary import SUMMARY, read_summary, summary_text
 from roadeval.runtime import files
 
@@ -130,7 +130,7 @@ class ResultsWriter:
 class _Growing:
     """A table that grows under a temporary name."""
 
-    def __init__(self, folder: Path, table: Table) -> None:
+    def __init__(self, folder: Path, table: TableSchema) -> None:
         self.path: Final = folder / f"{table.name}.csv"
         self.rows = 0
         self._temporary: Final = folder / f".{table.name}.csv.partial"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 
-from roadeval.data import Change, Counts, FrameResult, Step, Tally
+from roadeval.data import Change, Counts, FrameResult, Tally, Transition
 from roadeval.evaluation.maps import HeatMap
 from roadeval.evaluation.scoreboard import DriveSums
 from roadeval.evaluation.windows import Window
@@ -66,7 +66,7 @@ def window_rows(windows: Iterable[Window]) -> Iterator[Row]:
         )
 
 
-def change_rows(changes: Mapping[Step, Change]) -> Iterator[Row]:
+def change_rows(changes: Mapping[Transition, Change]) -> Iterator[Row]:
     """Yield the rows of ``changes.csv``."""
     for step, change in changes.items():
         yield (*step, change.repaired, change.spoiled, change.labelled)

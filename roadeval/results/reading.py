@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.errors import RoadevalError
 from roadeval.results.lines import Row
-from roadeval.results.schema import TABLES, Kind, Table
+from roadeval.results.schema import TABLES, Kind, TableSchema
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -106,13 +106,13 @@ def _check(where: Path | str, content: bytes, stated: Mapping[str, Any] | None) 
     )
 
 
-def _types(table: Table) -> pa.Schema:
+def _types(table: TableSchema) -> pa.Schema:
     import pyarrow as pa
 
     return pa.schema([(column.name, TYPES[column.kind]) for column in table.columns])
 
 
-def _parsed(content: bytes, table: Table) -> pa.Table:
+def _parsed(content: bytes, table: TableSchema) -> pa.Table:
     """Parse CSV; a ValueError says what is wrong with it."""
     import pyarrow as pa
     from pyarrow import csv

@@ -36,7 +36,7 @@ class Column:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class TableSchema:
     """A table, in the file ``<name>.csv``.
 
     Parameters
@@ -89,10 +89,10 @@ POOLED: Final = tuple(
     Column(f"pooled_{rate.name}", Kind.RATE, f"{rate.name} of the summed counts") for rate in RATES
 )
 
-TABLES: Final[Mapping[str, Table]] = {
+TABLES: Final[Mapping[str, TableSchema]] = {
     table.name: table
     for table in (
-        Table(
+        TableSchema(
             "frames",
             "A row per evaluated frame, variant and stage.",
             (
@@ -103,7 +103,7 @@ TABLES: Final[Mapping[str, Table]] = {
             ),
             streamed=True,
         ),
-        Table(
+        TableSchema(
             "regions",
             "A row per evaluated frame, variant, stage and region.",
             (
@@ -113,7 +113,7 @@ TABLES: Final[Mapping[str, Table]] = {
             ),
             streamed=True,
         ),
-        Table(
+        TableSchema(
             "oracles",
             "A row per evaluated frame, variant, stage replaced by the truth, and stage after it.",
             (
@@ -123,7 +123,7 @@ TABLES: Final[Mapping[str, Table]] = {
             ),
             streamed=True,
         ),
-        Table(
+        TableSchema(
             "windows",
             "A row per window of consecutive evaluated frames, variant and stage.",
             (
@@ -135,7 +135,7 @@ TABLES: Final[Mapping[str, Table]] = {
                 *(*MEANS, *POOLED),
             ),
         ),
-        Table(
+        TableSchema(
             "changes",
             "A row per mask and the one before it: stage to stage, and final mask to final mask.",
             (
@@ -148,7 +148,7 @@ TABLES: Final[Mapping[str, Table]] = {
                 LABELLED,
             ),
         ),
-        Table(
+        TableSchema(
             "heat",
             "A row per variant and square cell of the image, of the final mask's errors.",
             (
@@ -166,7 +166,7 @@ TABLES: Final[Mapping[str, Table]] = {
 """The tables by name, in the order in which they are written."""
 
 
-def streamed() -> dict[str, Table]:
+def streamed() -> dict[str, TableSchema]:
     """Return the tables whose rows come with each frame."""
     return {name: table for name, table in TABLES.items() if table.streamed}
 

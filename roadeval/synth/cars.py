@@ -52,8 +52,8 @@ END_GLASS: Final = ((0.22, 0.98), (0.36, 1.34), (WIDTH - 0.36, 1.34), (WIDTH - 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
-    """What a make of car looks like.
+class CarPaint:
+    """The painted sides of a car.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Look:
     oncoming: bool
 
 
-def paint(body: Colour, oncoming: bool, sun: Sun) -> Look:
+def paint(body: Colour, oncoming: bool, sun: Sun) -> CarPaint:
     """Paint a car: from behind and its left, or, ``oncoming``, from ahead and its left."""
     near = sun.facing(np.array([0.0, 0.0, -1.0]))
     beside = sun.facing(np.array([1.0 if oncoming else -1.0, 0.0, 0.0]))
@@ -82,7 +82,7 @@ def paint(body: Colour, oncoming: bool, sun: Sun) -> Look:
     belt = len(end) - round(BELT * PIXELS_PER_METRE)
     side = side[:, ::-1] if oncoming else side
     deck = np.full((64, 64, 4), (*body, 1.0), np.float32)
-    return Look(
+    return CarPaint(
         window=_lit(end[:belt], near, 0.95),
         deck=_lit(deck, above, 1.0),
         face=_lit(end[belt:], near, 0.6),
@@ -108,7 +108,7 @@ class Car:
         Share of the sun's disc that what stands about leaves to it.
     """
 
-    look: Look
+    look: CarPaint
     foot: Matrix
     heading: float
     sunlit: float

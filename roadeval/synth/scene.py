@@ -10,10 +10,10 @@ import numpy as np
 from roadeval.synth.camera import Matrix
 from roadeval.synth.ground import Ground
 from roadeval.synth.journey import Journey
-from roadeval.synth.layout import BEHIND, Layout
 from roadeval.synth.light import Sun
 from roadeval.synth.panel import Panel
 from roadeval.synth.road import Bend, Road
+from roadeval.synth.roadside import BEHIND, Roadside
 from roadeval.synth.shadows import Silhouettes, SunMap
 from roadeval.synth.sky import Sky
 from roadeval.synth.texture import GroundTexture
@@ -61,9 +61,9 @@ def build(journey: Journey, rng: np.random.Generator) -> Scene:
     sun = Sun(np.radians(rng.uniform(36, 46)), side * np.radians(rng.uniform(62, 105)))
     end = journey.distance(journey.duration)
     road = _road(end, rng)
-    layout = Layout(journey, road, sun, rng)
-    houses = list(layout.houses())
-    things = list(layout.clear_of(houses))
+    roadside = Roadside(journey, road, sun, rng)
+    houses = list(roadside.houses())
+    things = list(roadside.clear_of(houses))
     silhouettes = Silhouettes(road, sun, -BEHIND, end + SHADED_AHEAD)
     for house in houses:
         house.occlude(silhouettes)

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from roadeval.synth.cars import LENGTH, WIDTH, Car, Colour, Look, paint
+from roadeval.synth.cars import LENGTH, WIDTH, Car, CarPaint, Colour, paint
 from roadeval.synth.journey import LANE, SPEED, Journey
 from roadeval.synth.light import Sun
 from roadeval.synth.noise import Field
@@ -26,7 +26,7 @@ ONCOMING: Final = 3
 class Mover:
     """A car that keeps its offset from the centre line; ``z`` metres at time 0."""
 
-    look: Look
+    look: CarPaint
     offset: float
     z: float
     speed: float

@@ -29,9 +29,9 @@ from roadeval.pipeline.beyond.road_light import RoadLight
 from roadeval.pipeline.beyond.shadow_gates import (
     ACCEPTED,
     VERDICTS,
-    Components,
+    GatedImage,
     GatedSettings,
-    Scene,
+    MeasuredComponents,
     components,
     eroded,
     judge,
@@ -67,7 +67,7 @@ COMPENSATED: Final = LayerSpec("compensated", LayerKind.RGB, "Compensated image"
 # --- Compensation ---------------------------------------------------------------------------------
 
 
-def gain_map(found: Components, verdicts: Verdicts, settings: GatedSettings) -> Map:
+def gain_map(found: MeasuredComponents, verdicts: Verdicts, settings: GatedSettings) -> Map:
     """Return the gain of each channel at each pixel, ``(h, w, 3)`` float32; 1 is no change.
 
     In an accepted component it is ring over core, no less than 1 and no more than one over the
@@ -133,7 +133,7 @@ def oracle(settings: GatedSettings, road: RoadLight) -> Callable[[View, Truth], 
 
 
 def _maps(
-    scene: Scene, found: Components, verdicts: Verdicts, settings: GatedSettings
+    scene: GatedImage, found: MeasuredComponents, verdicts: Verdicts, settings: GatedSettings
 ) -> dict[str, Mask]:
     """Return masks, label images and regions at the size of the working image, by name."""
     kinds = verdicts[found.labels]

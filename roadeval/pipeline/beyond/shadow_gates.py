@@ -124,7 +124,7 @@ CORE: Final = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scene:
+class GatedImage:
     """A working image as the gates see it.
 
     Parameters
@@ -143,7 +143,7 @@ class Scene:
     lit: Mask
 
 
-def look(image: Rgb, road: RoadLight, settings: GatedSettings) -> Scene:
+def look(image: Rgb, road: RoadLight, settings: GatedSettings) -> GatedImage:
     """Find the candidates and the lit road of an ``(h, w, 3)`` uint8 RGB image."""
     total = road_light.brightness(image)
     like = road_light.likeness(image, road)
@@ -159,14 +159,14 @@ def look(image: Rgb, road: RoadLight, settings: GatedSettings) -> Scene:
     square = np.ones((3, 3), np.uint8)
     dark = cv2.morphologyEx(cv2.morphologyEx(dark, cv2.MORPH_OPEN, square), cv2.MORPH_CLOSE, square)
     lit &= (total >= limit) & (total < 3 * settings.max_level)
-    return Scene(image, total, dark, lit.view(np.uint8))
+    return GatedImage(image, total, dark, lit.view(np.uint8))
 
 
 # --- Components and rings -------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Components:
+class MeasuredComponents:
     """The measurements of each component; entry 0 is the background.
 
     Parameters
@@ -193,7 +193,7 @@ class Components:
     texture: Floats
 
 
-def components(scene: Scene, settings: GatedSettings) -> Components:
+def components(scene: GatedImage, settings: GatedSettings) -> MeasuredComponents:
     """Label the candidates (Eq. 9) and measure each component against its ring (Eq. 10)."""
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(scene.candidates)
     core = np.where(eroded(scene.candidates, CORE), labels, 0)
@@ -205,7 +205,7 @@ def components(scene: Scene, settings: GatedSettings) -> Components:
     bottom = boxes[:, cv2.CC_STAT_TOP] + boxes[:, cv2.CC_STAT_HEIGHT] - 1
     texture = _texture(scene.total, core, count)
     sizes = (boxes[:, cv2.CC_STAT_AREA].astype(np.int64), inside[:, 0], around[:, 0])
-    return Components(labels, rings, *sizes, bottom / len(labels), ratio, texture)
+    return MeasuredComponents(labels, rings, *sizes, bottom / len(labels), ratio, texture)
 
 
 def eroded(mask: Mask, pixels: int) -> npt.NDArray[np.bool_]:
@@ -216,7 +216,7 @@ def eroded(mask: Mask, pixels: int) -> npt.NDArray[np.bool_]:
     return inner > 0
 
 
-def _rings(scene: Scene, labels: Labels, settings: GatedSettings) -> Labels:
+def _rings(scene: GatedImage, labels: Labels, settings: GatedSettings) -> Labels:
     """Assign each pixel of lit road at a ring's distance to the component nearest to it."""
     distance, nearest = cv2.distanceTransformWithLabels(
         1 - scene.candidates, cv2.DIST_C, 5, labelType=cv2.DIST_LABEL_CCOMP
@@ -246,7 +246,7 @@ def _texture(total: npt.NDArray[np.uint16], core: Labels, count: int) -> Floats:
     return np.sqrt(np.bincount(core[here], rough[here], count) / np.maximum(n, 1))
 
 
-def judge(found: Components, settings: GatedSettings) -> npt.NDArray[np.uint8]:
+def judge(found: MeasuredComponents, settings: GatedSettings) -> npt.NDArray[np.uint8]:
     """Return the verdict on each component: ``(count,)`` uint8, a value of `VERDICTS`.
 
     The first gate that it does not pass is the reason; the background is 0.

@@ -75,7 +75,7 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Layout:
+class Roadside:
     """Draws where things stand along a journey."""
 
     journey: Journey
