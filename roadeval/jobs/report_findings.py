@@ -96,7 +96,7 @@ def _windows(result: Result) -> tuple[pd.DataFrame, int]:
 def _paired(
     frames: pd.DataFrame, summary: dict[str, Any], changes: pd.DataFrame
 ) -> Iterator[PairedComparison]:
-    """Compare with the filter against without, then every variant with the baseline."""
+    """Compare filtered against unfiltered, then every variant with the baseline."""
     settings, finals = analysis.settings_of(summary), analysis.final_stages(frames)
     pairs = [(FILTERED, UNFILTERED), *((v, BASELINE) for v in variants_but_baseline(frames))]
     for treated, control in pairs:

@@ -106,15 +106,25 @@ class FramePicker:
             yield LayerImage(f"{variant.name}: errors", image, ERRORS, errors)
 
     def _layers(self, recording: Recording, frame: int) -> Iterator[list[LayerImage]]:
-        """Yield each variant's layers: the stages' masks, and all that is not a mask."""
+        """Yield each variant's layers: the stages' masks, and all that is not a mask.
+
+        The first of a row bears the variant's name, too.
+        """
         image = recording.image(frame)
         for variant in recording.variants[:LAYERS]:
-            layers = [
-                (spec, self._result.layer(variant.name, spec.name, frame))
+            specs = [
+                spec
                 for spec in variant.layers
                 if spec.kind is not LayerKind.MASK or spec.name in variant.stages
             ]
-            yield [LayerImage(s.name, image, s, array) for s, array in layers if array is not None]
+            arrays = {spec: self._result.layer(variant.name, spec.name, frame) for spec in specs}
+            known = [(spec, array) for spec, array in arrays.items() if array is not None]
+            yield [
+                LayerImage(
+                    spec.name if place else f"{variant.name}: {spec.name}", image, spec, array
+                )
+                for place, (spec, array) in enumerate(known)
+            ]
 
     def _outcome(self, recording: Recording, frame: int) -> LayerImage:
         variant = recording.variants[0]

@@ -123,7 +123,7 @@ class Findings:
     window_size
         Evaluated frames in a window.
     paired
-        With the filter against without first, if both were run; then against the baseline.
+        Filtered against unfiltered first, if both were run; then against the baseline.
     regions
         See `roadeval.evaluation.analysis.by_region`.
     overlap

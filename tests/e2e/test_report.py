@@ -22,7 +22,7 @@ from tests.report.making import text
 SECTIONS = (
     "Summary",
     "Over the drive: the paper's tables and figures",
-    "With the filter against without",
+    "Filtered against unfiltered",
     "Where the errors are",
     "Which stage broke it",
     "The worst frames",

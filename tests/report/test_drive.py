@@ -31,7 +31,7 @@ def test_with_truth_the_sections_go_from_the_verdict_to_the_settings():
     assert sections(findings) == [
         "Summary",
         "Over the drive: the paper's tables and figures",
-        "With the filter against without",
+        "Filtered against unfiltered",
         "Where the errors are",
         "Which stage broke it",
         "The worst frames",

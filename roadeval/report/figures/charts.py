@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 WIDTH: Final = 7.4
 """Inches across a chart; a page's text is 6.7 wide, so letters come out a little smaller."""
+MAPS_SHARE: Final = 0.68
+"""Share of the page's width that `heatmap` is drawn for, so that its letters keep their size."""
 RATES: Final = ("ERR", "FPR", "FNR")
 BARS: Final = 400
 """More frames than this are drawn as means of neighbours."""
@@ -146,12 +148,13 @@ def heatmap(maps: Sequence[ErrorHeatmap]) -> Figure:
     from matplotlib.figure import Figure
 
     height, width = maps[0].fp.shape
-    row = (WIDTH - 0.9) / 2 * height / width
-    figure = Figure(figsize=(WIDTH, (row + 0.1) * len(maps) + 0.5), layout="constrained")
+    across = MAPS_SHARE * WIDTH
+    row = (across - 0.9) / 2 * height / width
+    figure = Figure(figsize=(across, (row + 0.1) * len(maps) + 0.5), layout="constrained")
     grid = figure.subplots(len(maps), 2, squeeze=False)
     columns = (
-        ("false positives: non-road called road", colours.FP, [each.fp for each in maps]),
-        ("false negatives: road missed", colours.FN, [each.fn for each in maps]),
+        ("FP: non-road called road", colours.FP, [each.fp for each in maps]),
+        ("FN: road missed", colours.FN, [each.fn for each in maps]),
     )
     for axes, (title, colour, shares) in zip(grid.T, columns, strict=True):
         top = max(*(np.nan_to_num(share).max() for share in shares), 0.01)
@@ -163,8 +166,8 @@ def heatmap(maps: Sequence[ErrorHeatmap]) -> Figure:
             ax.set_yticks([])
             ax.spines[:].set_visible(True)
         axes[0].set_title(title, loc="left")
-        bar = figure.colorbar(drawn, ax=axes, location="bottom", aspect=40, pad=0.02)
-        bar.set_label("% of the frames that label the pixel", size=8)
+        bar = figure.colorbar(drawn, ax=axes, location="bottom", aspect=30, pad=0.02)
+        bar.set_label("% of the frames")
         bar.outline.set_visible(False)
     for ax, each in zip(grid[:, 0], maps, strict=True):
         ax.set_ylabel(each.variant)

@@ -1,4 +1,4 @@
-"""With the filter against without, frame by frame, and every variant against the baseline."""
+"""Filtered against unfiltered, frame by frame, and every variant against the baseline."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def section(findings: Findings) -> Iterator[Block]:
     """Yield what the filter changed, how much masks flicker, and who beats the baseline."""
     filters = [each for each in findings.paired if each.control != BASELINE]
     blind = [each for each in findings.paired if each.control == BASELINE]
-    yield Heading("With the filter against without")
+    yield Heading("Filtered against unfiltered")
     for each in filters:
         yield from _paired(findings, each)
     if not filters:

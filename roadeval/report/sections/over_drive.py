@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from roadeval.data import FILTERED, UNFILTERED
 from roadeval.data.words import DASH, percent
 from roadeval.report.blocks import Block, Cell, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.figures.figure import figures
@@ -67,7 +66,7 @@ def _table(findings: Findings, rates: Sequence[str]) -> Table:
     whole = [percent(findings.total(name)[rate]) for rate in rates for name in names]
     rows.append([Cell(text, bold=True) for text in ("all", *whole)])
     return Table(
-        ["frames", *(_short(name) for _ in rates for name in names)],
+        ["frames", *(name for _ in rates for name in names)],
         rows,
         breaks=[len(rows) - 1],
         groups=[("", 1), *((f"{rate}, %", len(names)) for rate in rates)],
@@ -77,7 +76,3 @@ def _table(findings: Findings, rates: Sequence[str]) -> Table:
 
 def _span(first: int, last: int) -> str:
     return str(first) if first == last else f"{first}{DASH}{last}"
-
-
-def _short(name: str) -> str:
-    return {FILTERED: "with", UNFILTERED: "without"}.get(name, name)

@@ -9,7 +9,7 @@ from typing import Final
 from roadeval.data.words import percent
 from roadeval.evaluation.regions import partitions, titles
 from roadeval.report.blocks import Block, Figure, Heading, Table, Text
-from roadeval.report.figures.charts import heatmap
+from roadeval.report.figures.charts import MAPS_SHARE, heatmap
 from roadeval.report.figures.charts import regions as chart
 from roadeval.report.figures.files import svg
 from roadeval.report.findings import Findings
@@ -39,8 +39,8 @@ def section(findings: Findings) -> Iterator[Block]:
         yield Figure(
             svg(partial(heatmap, findings.heatmaps[place : place + MAPS])),
             f"Where the final masks go wrong, over {sampled_frames(findings)}. "
-            "Grey: never labelled.",
-            width=0.68,
+            "Percent of the frames that label the pixel; grey: none does.",
+            width=MAPS_SHARE,
         )
 
 

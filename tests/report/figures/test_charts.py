@@ -67,7 +67,7 @@ def test_false_positives_are_left_and_false_negatives_right_in_their_colours():
         (image,) = ax.images
         np.testing.assert_allclose(np.ma.filled(image.get_array(), np.nan), 100 * share)
         assert image.get_cmap()(0.5)[:3] == pytest.approx(np.array(colour) / 255, abs=0.01)
-    assert left.get_title(loc="left").startswith("false positives")
+    assert left.get_title(loc="left").startswith("FP")
 
 
 def test_the_covered_share_is_in_percent():

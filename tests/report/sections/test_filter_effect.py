@@ -1,4 +1,4 @@
-"""With the filter against without: the sentences, and the tables' columns."""
+"""Filtered against unfiltered: the sentences, and the tables' columns."""
 
 import math
 

@@ -20,7 +20,7 @@ def windows():
 
 def test_each_window_has_the_final_masks_rates_and_the_last_line_is_the_whole():
     table, *_ = (b for b in section(some_findings(windows=windows())) if isinstance(b, Table))
-    assert table.columns == ["frames", *(("with", "without", "blind") * 4)]
+    assert table.columns == ["frames", *(("filtered", "unfiltered", "blind") * 4)]
     assert [title for title, _ in table.groups] == ["", "ERR, %", "FPR, %", "FNR, %", "ACC, %"]
     assert plain_rows(table) == [
         [
