@@ -18,13 +18,18 @@ def defined(number: float | None) -> TypeGuard[float]:
     return number is not None and not math.isnan(number)
 
 
+def in_percent(fraction: float | None) -> float:
+    """Return a fraction as a number of percent, NaN where it is undefined."""
+    return 100 * fraction if defined(fraction) else math.nan
+
+
 def percent(fraction: float | None, digits: int = 2) -> str:
     """Return a fraction in percent, without the sign.
 
     >>> percent(0.2416)
     '24.16'
     """
-    return f"{100 * fraction:.{digits}f}" if defined(fraction) else DASH
+    return f"{in_percent(fraction):.{digits}f}" if defined(fraction) else DASH
 
 
 def points(difference: float | None, digits: int = 2) -> str:
@@ -35,7 +40,7 @@ def points(difference: float | None, digits: int = 2) -> str:
     """
     if not defined(difference):
         return DASH
-    text = f"{100 * difference:+.{digits}f}"
+    text = f"{in_percent(difference):+.{digits}f}"
     return text[1:] if float(text) == 0 else text.replace("-", MINUS)
 
 

@@ -120,13 +120,13 @@ def by_region(regions: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``variant``, ``region``, the counts, ``ERR``, ``FPR``, ``FNR``, and ``pixels`` and
+        ``variant``, ``region``, the counts, the rates of short tables, and ``pixels`` and
         ``errors``: the region's share of all labelled pixels, and of all wrong ones.
     """
     sums = finals(regions).groupby(["variant", "region"], sort=False)[[*OUTCOMES]].sum()
     counts = [Counts(*row) for row in sums.to_numpy().tolist()]
-    for name in ("ERR", "FPR", "FNR"):
-        sums[name] = [metrics.METRICS[name].function(each) for each in counts]
+    for name, metric in metrics.SHORT.items():
+        sums[name] = [metric.function(each) for each in counts]
     table = sums.reset_index()
     wrong, labelled = table["FP"] + table["FN"], table[[*OUTCOMES]].sum(axis=1)
     halves = table["region"].isin(next(iter(partitions(table["region"].unique().tolist())), []))
@@ -145,7 +145,7 @@ def oracles(table: pd.DataFrame, frames: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``variant``, ``oracle``, ``ERR``, ``FPR``, ``FNR``, the ``frames`` it is known on, and
+        ``variant``, ``oracle``, the rates of short tables, the ``frames`` they are known on, and
         ``as_is``: the ERR on the same frames as it really is. Empty if nothing was counted.
     """
     import pandas as pd
@@ -156,7 +156,7 @@ def oracles(table: pd.DataFrame, frames: pd.DataFrame) -> pd.DataFrame:
     own = finals(frames)[["frame", "variant", "ERR"]].rename(columns={"ERR": "as_is"})
     both = table[table["stage"] == last].merge(own, on=["frame", "variant"])
     grouped = both.groupby(["variant", "oracle"], sort=False)
-    sums = grouped[["ERR", "FPR", "FNR", "as_is"]].mean()
+    sums = grouped[[*metrics.SHORT, "as_is"]].mean()
     sums["frames"] = grouped.size()
     return sums.reset_index()
 

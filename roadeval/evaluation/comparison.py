@@ -21,15 +21,13 @@ from roadeval.evaluation.comparison_result import (
     MaskComparison,
     MovedFrame,
 )
-from roadeval.evaluation.metrics import METRICS
+from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import mean_difference
 
 if TYPE_CHECKING:
     import pandas as pd
 
-COMPARED: Final = tuple(name for name, metric in METRICS.items() if metric.mirrors is None)
-"""The metrics that are subtracted: those that mirror no other."""
 MOVED: Final = 5
 """Frames named of those that changed most, in each direction."""
 

@@ -5,8 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import IntEnum
 
 from roadeval.data import Counts
+
+
+class Shown(IntEnum):
+    """Where people see a metric; each place includes those before it."""
+
+    IN_FILES = 0
+    """A column of the tables and a series of the recording, and no more."""
+    IN_FULL = 1
+    """Where all rates of a mask stand: key tables, rows over the drive, paired differences."""
+    EVERYWHERE = 2
+    """Short tables and lists, graphs and charts, too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,11 +40,16 @@ class Metric:
         The direction of improvement.
     order
         Its place among the columns; the paper's metrics bear their equations' numbers.
+    rank
+        Its place where people read it, the lowest first; of equal ones by ``order``.
+    meaning
+        What it counts, in plain words; empty where the title says it.
     unit
         Of the value in tables.
     mirrors
-        The metric that tells the same, as ``FNR`` for ``TPR = 1 - FNR``: a comparison shows one of
-        the two.
+        The metric that tells the same, as ``FNR`` for ``TPR = 1 - FNR``, and is shown in its stead.
+    shown
+        Where people see it: everywhere by default, one that mirrors another in files alone.
     tabled
         Whether it is a column of the tables. One that is not is computed of sums alone.
     """
@@ -43,9 +60,24 @@ class Metric:
     function: Callable[[Counts], float]
     higher_is_better: bool
     order: int
+    rank: int = 10
+    meaning: str = ""
     unit: str = "fraction"
     mirrors: str | None = None
+    shown: Shown | None = None
     tabled: bool = True
+
+    @property
+    def in_words(self) -> str:
+        """What it counts, or else its title."""
+        return self.meaning or self.title
+
+    @property
+    def place(self) -> Shown:
+        """Where people see it."""
+        if self.shown is not None:
+            return self.shown
+        return Shown.EVERYWHERE if self.mirrors is None else Shown.IN_FILES
 
 
 def ratio(part: int, whole: int) -> float:

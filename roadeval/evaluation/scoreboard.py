@@ -28,15 +28,10 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.edges_and_flicker import EdgesAndFlicker
 from roadeval.evaluation.frame_counts import FrameCounts, GrowingCounts, sum_up
 from roadeval.evaluation.maps import HeatMap, Maps, Name
-from roadeval.evaluation.metrics import METRICS
+from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.score import score_frame
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference, mean_difference
-
-COMPARED: Final = tuple(
-    name for name, metric in METRICS.items() if name == "ACC" or metric.mirrors is None
-)
-"""The metrics whose paired differences are given: all but mirrors, and ACC."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,6 +10,7 @@ from typing import Final
 from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import analysis
+from roadeval.evaluation.metrics import SHORT
 from roadeval.jobs.result import Result
 
 LISTED: Final = 10
@@ -27,7 +28,7 @@ class WorstFrame:
     frame, stamp_ns
         Which.
     rates
-        ERR, FPR and FNR of the final mask.
+        Of the final mask, as short tables show them.
     parts
         How ERR came about, see `roadeval.evaluation.analysis.causes`.
     notes
@@ -80,7 +81,7 @@ def worst_frames(
             rank,
             row["frame"],
             row["stamp_ns"],
-            {rate: row[rate] for rate in ("ERR", "FPR", "FNR")},
+            {rate: row[rate] for rate in SHORT},
             causes.loc[row["frame"]].to_dict(),
             result.notes(row["frame"], chosen),
         )

@@ -11,7 +11,7 @@ import numpy as np
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, TruthBits
 from roadeval.data.packed import Packed
 from roadeval.evaluation import analysis, counts, maps
-from roadeval.evaluation.scoreboard import COMPARED
+from roadeval.evaluation.metrics import COMPARED
 from roadeval.jobs.report_frames import FramePicker, evenly, str_keys, variants_but_baseline
 from roadeval.jobs.result import Result
 from roadeval.report.findings import Commands, ErrorHeatmap, Findings, PairedComparison

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data import BASELINE, ERRORS, FILTERED, TRUTH, UNFILTERED, LayerKind
 from roadeval.evaluation import analysis
+from roadeval.evaluation.metrics import SHORT
 from roadeval.jobs.result import Result
 from roadeval.recording import Recording
 from roadeval.report.figures.figure import ExampleFrame
@@ -79,7 +80,7 @@ class FramePicker:
 
     def _notable(self, frame: int, stamp_ns: int, change: float | None = None) -> NotableFrame:
         own = analysis.finals(self._frames[self._frames["frame"] == frame]).set_index("variant")
-        rates = str_keys(own[["ERR", "FPR", "FNR"]].to_dict("index"))
+        rates = str_keys(own[[*SHORT]].to_dict("index"))
         first, recording = self._variants[0], self._recording
         seen = recording is not None and frame in self._result.pictured
         return NotableFrame(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.evaluation import analysis
-from roadeval.evaluation.scoreboard import COMPARED
+from roadeval.evaluation.metrics import COMPARED
 from roadeval.recording import Recording, RecordingError
 from roadeval.results.folder import RUN, ResultsFolder
 from roadeval.results.verdict import NOTHING_SCORED, verdict_of

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from roadeval.data.words import defined, interval, listing, number, percent, points, timestamp
 from roadeval.evaluation.comparison_result import Comparison, Judgement, MaskComparison, MovedFrame
+from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
 from roadeval.report.blocks import Block, BulletList, Cell, Document, Figure, Heading, Table, Text
 from roadeval.report.figures.charts import forest, levels
 from roadeval.report.figures.fig3a_error_rate import FIGURE
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Rows = Sequence[MaskComparison] | Sequence[MovedFrame]
-RATES: Final = ("ERR", "FPR", "FNR")
+OTHERS: Final = tuple(name for name in SHORT if name != "ERR")
+"""The rates of short tables without ERR, which has columns of its own."""
 
 
 def headline(comparison: Comparison) -> str:
@@ -130,7 +132,7 @@ def _rates_table(comparison: Comparison) -> Table:
 def _changes_table(rows: Sequence[MaskComparison]) -> Table:
     names = _naming_columns(rows)
     return Table(
-        [*names, "stage", "base", "new", "difference", "interval", "FPR", "FNR"],
+        [*names, "stage", "base", "new", "difference", "interval", *OTHERS],
         [
             [
                 *_named(row, names),
@@ -139,19 +141,19 @@ def _changes_table(rows: Sequence[MaskComparison]) -> Table:
                 percent(row.new["ERR"]),
                 Cell(points(row.difference["ERR"].mean), bold=row.final),
                 interval(row.difference["ERR"].low, row.difference["ERR"].high),
-                *(points(row.new[rate] - row.base[rate]) for rate in ("FPR", "FNR")),
+                *(points(row.new[rate] - row.base[rate]) for rate in OTHERS),
             ]
             for row in rows
         ],
         text_columns=range(len(names) + 1),
         breaks=_breaks(rows),
-        groups=[("", len(names) + 1), ("ERR", 4), ("difference", 2)],
+        groups=[("", len(names) + 1), ("ERR", 4), ("difference", len(OTHERS))],
         small=True,
     )
 
 
 def _levels_table(rows: Sequence[MaskComparison]) -> Table:
-    rates = (*RATES, "IoU")
+    rates = (*SHORT, *SHORT_OVERLAP)
     return Table(
         ["result", "variant", "stage", "frames", *rates],
         [

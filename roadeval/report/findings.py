@@ -60,7 +60,7 @@ class NotableFrame:
     frame, stamp_ns
         Which.
     rates
-        Of each variant's final mask: ERR, FPR, FNR.
+        Of each variant's final mask, as short tables show them.
     parts
         The parts of the ERR of ``variant``, by stage, see `Findings.error_parts`.
     variant

@@ -9,8 +9,18 @@ from hypothesis import strategies as st
 from sklearn import metrics as theirs
 
 from roadeval.data import Counts
-from roadeval.evaluation.metric import Metric
-from roadeval.evaluation.metrics import ALL, METRICS, OVERLAP, of, table
+from roadeval.evaluation.metric import Metric, Shown
+from roadeval.evaluation.metrics import (
+    ALL,
+    COMPARED,
+    FULL,
+    METRICS,
+    OVERLAP,
+    SHORT,
+    SHORT_OVERLAP,
+    of,
+    table,
+)
 
 pixels = st.integers(0, 40)
 
@@ -29,6 +39,26 @@ def test_the_papers_six_by_hand() -> None:
 def test_the_columns_keep_the_papers_order() -> None:
     assert list(METRICS) == ["ACC", "ERR", "TPR", "FNR", "TNR", "FPR"]
     assert list(OVERLAP) == ["IoU", "F1", "precision"]
+
+
+def test_people_read_errors_first_and_no_metric_beside_its_mirror_but_accuracy() -> None:
+    assert list(FULL) == ["ERR", "FPR", "FNR", "ACC"]
+    assert list(SHORT) == ["ERR", "FPR", "FNR"]
+    assert list(SHORT_OVERLAP) == ["IoU"]
+    assert COMPARED == ("ACC", "ERR", "FNR", "FPR")
+
+
+@pytest.mark.parametrize(
+    ("attributes", "place"),
+    [
+        ({}, Shown.EVERYWHERE),
+        ({"mirrors": "ERR"}, Shown.IN_FILES),
+        ({"mirrors": "ERR", "shown": Shown.IN_FULL}, Shown.IN_FULL),
+    ],
+)
+def test_a_metric_is_shown_everywhere_but_where_another_tells_the_same(attributes, place) -> None:
+    metric = Metric("X", "x", "TP", lambda counts: counts.tp, True, 50, **attributes)
+    assert metric.place == place
 
 
 @pytest.mark.parametrize("metric", ALL.values(), ids=ALL)

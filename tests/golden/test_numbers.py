@@ -7,6 +7,7 @@ computes here: tables come by pandas, masks as pictures, and each formula stands
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Final
@@ -106,8 +107,8 @@ def masks(told):
 def test_the_terminal_s_table(run, told):
     shown = [line.split() for line in told.out(OUTS[run]).splitlines()]
     for (variant, stage), total in totals(told.table("frames", run)).items():
-        names = ("ERR", "pooled_ERR", "ACC", "FPR", "FNR")
-        cells = [cell for name in names for cell in (percent(total[name]), "%")]
+        names = ("ERR", "pooled_ERR", "FPR", "FNR", "ACC")
+        cells = [percent(total[name]) for name in names]
         row = [stage, str(int(total["frames"])), *cells]
         assert row in shown or [variant, *row] in shown
 
@@ -121,7 +122,8 @@ def test_the_terminal_names_the_lowest_error_and_what_the_filter_changed(run, to
     assert f"Lowest ERR: {lowest}{aside}, {percent(means['ERR'].min())} %\n" in out
     for rate in ("ERR", "FPR", "FNR"):
         change = (finals(told, run)[rate].filtered - finals(told, run)[rate].unfiltered).mean()
-        assert f"\n  {rate}  {100 * change:+.2f} pp  95 % interval " in out.replace("pp   ", "pp  ")
+        shown = f"{100 * change:+.2f}".replace("+0.00", "0.00")
+        assert re.search(rf"\n  {rate} +{re.escape(shown)}  95 % interval ", out)
     verb = "raises" if means["ERR"].filtered > means["ERR"].unfiltered else "lowers"
     change = abs(means["ERR"].filtered - means["ERR"].unfiltered)
     assert f"the filter {verb} ERR of post by {100 * change:.1f} pp" in out
@@ -416,7 +418,7 @@ def test_the_list_of_the_worst_frames(told):
     for rank, frame in enumerate(worst, 1):
         own = table.loc[frame]
         rates = [own[rate].filtered for rate in ("ERR", "FPR", "FNR")]
-        cells = ["-" if np.isnan(rate) else f"{percent(rate)} %" for rate in rates]
+        cells = ["-" if np.isnan(rate) else percent(rate) for rate in rates]
         first, *rest = (100 * causes.loc[frame, part] for part in PAIRS)
         why = f"svm {first:.1f}, filter {rest[0]:+.1f}, post {rest[1]:+.1f} pp."
         assert f"{rank} {frame} {' '.join(cells)} {why}" in text
@@ -441,7 +443,7 @@ def test_the_guide_s_table_of_rates(told):
     guide = texts.documents(told.folder / "printed.rrd")["/results/overview"].splitlines()
     for (variant, stage), total in totals(told.table("frames", "printed")).items():
         rates = (total[name] for name in ("ERR", "FPR", "FNR", "pooled_ERR"))
-        cells = [f"{percent(rate)} %" for rate in rates]
+        cells = [percent(rate) for rate in rates]
         assert f"| {' | '.join([variant, stage, *cells])} |" in guide
 
 
@@ -463,15 +465,27 @@ def test_the_viewer_s_curves_are_the_table_s_numbers(run, told):
 # --- The comparison -------------------------------------------------------------------------------
 
 
+def changes_shown(out: str) -> dict[tuple[str, str, str], list[str]]:
+    """Base, new and change on the terminal by variant, stage and rate; a name stands once."""
+    found, variant, stage = {}, "", ""
+    for line in out.splitlines():
+        if match := re.match(r"(\w*) +(\w*) +(ERR|FPR|FNR) +(\S+) +(\S+) +(\S+) ", line):
+            variant, stage = match[1] or variant, match[2] or stage
+            found[variant, stage, match[3]] = [match[4], match[5], match[6]]
+    return found
+
+
 def test_the_comparison_s_table_is_of_the_frames_that_both_evaluated(told):
     base, new = (with_rates(told.table("frames", run)) for run in RUNS)
     both = base.merge(new, on=["stamp_ns", "variant", "stage"], suffixes=("_base", "_new"))
-    shown = [" ".join(line.split()) for line in told.out("compare").splitlines()]
+    shown = changes_shown(told.out("compare"))
     for (variant, stage), rows in both.groupby(["variant", "stage"]):
-        before, after = rows.ERR_base.mean(), rows.ERR_new.mean()
-        row = f"{variant} {stage} {percent(before)} % {percent(after)} % "
-        row += f"{100 * (after - before) + 0.0:+.2f} pp"
-        assert any(line.startswith(row) for line in shown)
+        for rate in ("ERR", "FPR", "FNR") if stage == "post" else ("ERR",):
+            before, after = rows[f"{rate}_base"].mean(), rows[f"{rate}_new"].mean()
+            change = (rows[f"{rate}_new"] - rows[f"{rate}_base"]).mean()
+            cells = [percent(before), percent(after), points(change).replace(MINUS, "-")]
+            assert shown.pop((variant, stage, rate)) == cells
+    assert not shown
     left_out = new["frame"].nunique() - both["frame_new"].nunique()
     assert f"warning: {left_out} frames that printed evaluated" in told.texts["compare"]["err"]
 

@@ -13,8 +13,6 @@ from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from roadeval.jobs.inspect import WorstFrame
 
 
@@ -80,37 +78,15 @@ def inspect(
 
 
 def _list(found: list[WorstFrame], *, as_json: bool) -> None:
+    from roadeval.cli.screens import inspect as screen
+
     if as_json:
         from roadeval.results.summary import plain
 
         listed = plain([asdict(each) for each in found])
         console.emit(dumps(listed, indent=2, ensure_ascii=False, allow_nan=False))
     else:
-        console.results().print(_table(found))
-
-
-def _table(found: list[WorstFrame]) -> Table:
-    """Tabulate the frames: rates, where ERR comes from, and the recording's notes."""
-    from rich import box
-    from rich.table import Table
-
-    from roadeval.cli.screens.replay import percent
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    for name in ("", "frame", "ERR", "FPR", "FNR"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("why", overflow="fold")
-    for each in found:
-        rates = (percent(each.rates[rate]) for rate in ("ERR", "FPR", "FNR"))
-        table.add_row(str(each.rank), str(each.frame), *rates, _why(each), end_section=True)
-    return table
-
-
-def _why(suspect: WorstFrame) -> str:
-    first, *rest = suspect.parts.items()
-    terms = [f"{first[0]} {100 * first[1]:.1f}"]
-    terms += [f"{name} {100 * value:+.1f}" for name, value in rest]
-    return " ".join([f"{', '.join(terms)} pp.", *suspect.notes])
+        screen.show(found, console.results())
 
 
 COMMAND: Final = inspect

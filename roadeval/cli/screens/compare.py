@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.cli.screens.replay import percent, points
+from roadeval.cli.screens import tables
+from roadeval.cli.screens.tables import Row, interval, percent, points
 from roadeval.data.words import defined
+from roadeval.evaluation.metrics import SHORT
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
 
+CHANGE: Final = ("base %", "new %", "change pp", "interval pp")
+LEVEL: Final = ("frames", *(f"{name} %" for name in SHORT))
+"""The titles of numbers where results are subtracted, and where they stand side by side."""
 Change = Mapping[str, Any]
 """A row of a comparison's ``changes``."""
 
@@ -23,10 +27,10 @@ def show(content: Mapping[str, Any], out: Console) -> None:
     for title, rows in _groups(content["changes"]):
         if content["same_drive"]:
             out.print(f"{title} against {base}" if title else f"against {base}", soft_wrap=True)
-            out.print(_differences(rows))
+            tables.show(("variant", "stage", "rate"), CHANGE, list(_changes(rows)), out)
         else:
             out.print(title, soft_wrap=True)
-            out.print(_levels(rows))
+            tables.show(("variant", "stage"), LEVEL, list(_levels(rows)), out)
         for change in rows:
             told = change["difference"].get("ERR")
             if change["final"] and told and told["low"] is None:
@@ -45,40 +49,43 @@ def _groups(changes: Sequence[Change]) -> list[tuple[str, list[Change]]]:
     return [(label, [c for c in changes if c["result"] == label]) for label in labels]
 
 
-def _grid(*numbers: str) -> Table:
-    from rich import box
-    from rich.table import Table
+def _changes(changes: Sequence[Change]) -> Iterator[Row]:
+    """Yield a row for each rate of short tables of which a mask's change is known."""
+    for change, above in zip(changes, (None, *changes), strict=False):
+        told = change["difference"]
+        known = [rate for rate in SHORT if rate in told]
+        for rate in known:
+            first = rate == known[0]
+            yield Row(
+                [
+                    change["variant"] if first and _begins(change, above) else "",
+                    change["stage"] if first else "",
+                    rate,
+                    percent(change["base"][rate]),
+                    percent(change["new"][rate]),
+                    points(told[rate]["mean"]),
+                    interval(told[rate]["low"], told[rate]["high"]),
+                ],
+                bold=change["final"] and first,
+                ends=change["final"] and rate == known[-1],
+            )
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    table.add_column("variant", overflow="fold")
-    table.add_column("stage")
-    for name in numbers:
-        table.add_column(name, justify="right", no_wrap=True)
-    return table
 
-
-def _differences(changes: Sequence[Change]) -> Table:
-    table = _grid("base ERR", "new", "difference", "interval, pp")
-    for change in changes:
-        told = change["difference"]["ERR"]
-        table.add_row(
-            change["variant"],
-            change["stage"],
-            percent(change["base"]["ERR"]),
-            percent(change["new"]["ERR"]),
-            points(told["mean"]),
-            _interval(told),
-            style="bold" if change["final"] else None,
+def _levels(changes: Sequence[Change]) -> Iterator[Row]:
+    for change, above in zip(changes, (None, *changes), strict=False):
+        yield Row(
+            [
+                change["variant"] if _begins(change, above) else "",
+                change["stage"],
+                str(change["frames"]),
+                *(percent(change["new"][rate]) for rate in SHORT),
+            ],
+            ends=change["final"],
         )
-    return table
 
 
-def _levels(changes: Sequence[Change]) -> Table:
-    table = _grid("frames", "ERR", "FPR", "FNR")
-    for change in changes:
-        rates = (percent(change["new"][rate]) for rate in ("ERR", "FPR", "FNR"))
-        table.add_row(change["variant"], change["stage"], str(change["frames"]), *rates)
-    return table
+def _begins(change: Change, above: Change | None) -> bool:
+    return above is None or above["variant"] != change["variant"]
 
 
 def _unsure(told: Mapping[str, Any]) -> str:
@@ -86,9 +93,3 @@ def _unsure(told: Mapping[str, Any]) -> str:
     if not defined(told["mean"]):
         return "ERR is undefined on every frame"
     return f"no interval, {told['reason']}"
-
-
-def _interval(told: Mapping[str, Any]) -> str:
-    if not defined(told["low"]):
-        return "-"
-    return f"{100 * told['low']:+.2f} {100 * told['high']:+.2f}"

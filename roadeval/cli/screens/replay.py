@@ -8,8 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.cli import console
+from roadeval.cli.screens import tables
+from roadeval.cli.screens.tables import Row, interval, percent, points
 from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.data.words import defined
+from roadeval.evaluation.metrics import FULL, SHORT
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,8 +20,8 @@ if TYPE_CHECKING:
 
     from roadeval.jobs.replay import Outcome
 
-RATES: Final = ("ERR", "pooled_ERR", "ACC", "FPR", "FNR")
-COMPARED: Final = ("ERR", "FPR", "FNR")
+RATES: Final = {"ERR": "ERR %", "pooled_ERR": "pooled ERR %"} | {n: f"{n} %" for n in FULL}
+"""The rates of every stage, with the titles of their columns."""
 
 Totals = Mapping[str, Mapping[str, Mapping[str, Any]]]
 """Counts and rates by variant and stage, as ``totals`` in ``summary.json``."""
@@ -49,11 +52,11 @@ def accounting(summary: Mapping[str, Any]) -> str:
 
 
 def _show_scores(summary: Mapping[str, Any], out: Console) -> None:
-    out.print(scores(summary["totals"]))
+    tables.show(("variant", "stage"), ("frames", *RATES.values()), scores(summary["totals"]), out)
     out.print()
     out.print(best(summary["totals"]))
     if final := summary["difference"].get(FINAL_STAGE):
-        out.print(f"{FILTERED} minus {UNFILTERED}, {FINAL_STAGE}:")
+        out.print(f"{FILTERED} minus {UNFILTERED}, {FINAL_STAGE}, in percentage points:")
         out.print(differences(final))
     out.print(summary["verdict"])
 
@@ -64,28 +67,23 @@ def _why_nothing(frames: Mapping[str, Any]) -> str:
     return "no frame that was read has road truth"
 
 
-def scores(totals: Totals) -> Table:
-    """Tabulate the rates by variant and stage; the lowest ERR of a final mask is bold."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False, show_edge=False)
-    table.add_column("variant", overflow="fold")
-    table.add_column("stage", overflow="fold")
-    for name in ("frames", "ERR", "pooled ERR", "ACC", "FPR", "FNR"):
-        table.add_column(name, justify="right")
+def scores(totals: Totals) -> list[Row]:
+    """Return a row of rates for each variant and stage; the best final mask's is bold."""
     winner = _lowest(totals)
-    for variant, stages in totals.items():
-        for place, (stage, total) in enumerate(stages.items()):
-            table.add_row(
+    return [
+        Row(
+            [
                 "" if place else variant,
                 stage,
                 str(total["frames"]),
-                *(percent(total[name]) for name in RATES),
-                style="bold" if (variant, stage) == (winner, FINAL_STAGE) else None,
-                end_section=place == len(stages) - 1,
-            )
-    return table
+                *(percent(total.get(name)) for name in RATES),
+            ],
+            bold=(variant, stage) == (winner, FINAL_STAGE),
+            ends=place == len(stages) - 1,
+        )
+        for variant, stages in totals.items()
+        for place, (stage, total) in enumerate(stages.items())
+    ]
 
 
 def best(totals: Totals) -> str:
@@ -94,28 +92,18 @@ def best(totals: Totals) -> str:
     if winner is None:
         return "ERR is defined on no frame."
     aside = ", which never looks at the image" if winner == BASELINE else ""
-    return f"Lowest ERR: {winner}{aside}, {percent(totals[winner][FINAL_STAGE]['ERR'])}"
+    return f"Lowest ERR: {winner}{aside}, {percent(totals[winner][FINAL_STAGE]['ERR'])} %"
 
 
 def differences(final: Mapping[str, Mapping[str, Any]]) -> Table:
     """Tabulate what the filter changed in the final mask: percentage points, and how sure."""
-    from rich.table import Table
+    from rich.table import Column, Table
 
-    table = Table.grid(padding=(0, 2, 0, 0))
-    for rate in COMPARED:
+    table = Table.grid("rate", Column(justify="right"), "interval", padding=(0, 2, 0, 0))
+    for rate in SHORT:
         if rate in final:
             table.add_row(f"  {rate}", points(final[rate]["mean"]), _certainty(final[rate]))
     return table
-
-
-def percent(fraction: float | None) -> str:
-    """Return a rate for the terminal, in ASCII alone; an undefined one as a dash."""
-    return f"{100 * fraction:.2f} %" if defined(fraction) else "-"
-
-
-def points(fraction: float | None) -> str:
-    """Return a difference of two rates in percentage points, with its sign, in ASCII alone."""
-    return f"{100 * fraction:+.2f} pp" if defined(fraction) else "-"
 
 
 def _show_files(outcome: Outcome, out: Console) -> None:
@@ -137,8 +125,8 @@ def size(file: Path) -> str:
 def _certainty(difference: Mapping[str, Any]) -> str:
     if not defined(difference["low"]):
         return f"no interval: {difference['reason']}"
-    low, high = (points(difference[end]) for end in ("low", "high"))
-    return f"{100 * difference['confidence']:.0f} % interval {low} to {high}"
+    confidence = percent(difference["confidence"], 0)
+    return f"{confidence} % interval {interval(difference['low'], difference['high'])}"
 
 
 def _lowest(totals: Totals) -> str | None:

@@ -1,7 +1,7 @@
 """The metrics, one file each: the paper's six (Eq. 24-29) and those a reader of today expects.
 
-To add one, add a file with a ``METRIC``: it becomes a column of the tables and a series of the
-recording.
+To add one, add a file with a ``METRIC``: it becomes a column of the tables, a series of the
+recording, and a rate of every screen, graph and report, as its attributes say.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Counts
-from roadeval.evaluation.metric import Metric
+from roadeval.evaluation.metric import Metric, Shown
 from roadeval.runtime.discovery import by_name, found_in
 
 ALL: Final[Mapping[str, Metric]] = by_name(
@@ -26,6 +26,22 @@ METRICS: Final = {name: metric for name, metric in ALL.items() if metric.tabled}
 """The columns of the tables, in their order."""
 OVERLAP: Final = {name: metric for name, metric in ALL.items() if not metric.tabled}
 """Metrics beyond the paper's, which are computed of sums alone."""
+
+
+def _read(metrics: Mapping[str, Metric], least: Shown) -> dict[str, Metric]:
+    """Return the metrics that people see there, in the order in which they read them."""
+    ranked = sorted(metrics.values(), key=lambda metric: metric.rank)
+    return {metric.name: metric for metric in ranked if metric.place >= least}
+
+
+SHORT: Final = _read(METRICS, Shown.EVERYWHERE)
+"""The rates of short tables, of lists, graphs and charts."""
+FULL: Final = _read(METRICS, Shown.IN_FULL)
+"""The rates of a mask where there is room for all."""
+SHORT_OVERLAP: Final = _read(OVERLAP, Shown.EVERYWHERE)
+"""Of the metrics that stand in no table, those that go with `SHORT`."""
+COMPARED: Final = tuple(name for name in METRICS if name in FULL)
+"""The metrics whose paired differences are given, in the order of the columns."""
 
 
 def of(counts: Counts) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """Accuracy (Eq. 24)."""
 
 from roadeval.data import Counts
-from roadeval.evaluation.metric import Metric, ratio
+from roadeval.evaluation.metric import Metric, Shown, ratio
 
 
 def accuracy(counts: Counts) -> float:
@@ -16,5 +16,7 @@ METRIC = Metric(
     function=accuracy,
     higher_is_better=True,
     order=24,
+    rank=4,
     mirrors="ERR",
+    shown=Shown.IN_FULL,
 )

@@ -16,4 +16,6 @@ METRIC = Metric(
     function=error_rate,
     higher_is_better=False,
     order=25,
+    rank=1,
+    meaning="pixels that are wrong",
 )

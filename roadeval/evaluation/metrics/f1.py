@@ -1,7 +1,7 @@
 """F1 score."""
 
 from roadeval.data import Counts
-from roadeval.evaluation.metric import Metric, ratio
+from roadeval.evaluation.metric import Metric, Shown, ratio
 
 
 def f1(counts: Counts) -> float:
@@ -23,5 +23,6 @@ METRIC = Metric(
     function=f1,
     higher_is_better=True,
     order=102,
+    shown=Shown.IN_FULL,
     tabled=False,
 )

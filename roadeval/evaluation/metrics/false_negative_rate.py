@@ -16,4 +16,6 @@ METRIC = Metric(
     function=false_negative_rate,
     higher_is_better=False,
     order=27,
+    rank=3,
+    meaning="road not found",
 )

@@ -16,4 +16,6 @@ METRIC = Metric(
     function=false_positive_rate,
     higher_is_better=False,
     order=29,
+    rank=2,
+    meaning="non-road called road",
 )

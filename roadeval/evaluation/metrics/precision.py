@@ -1,7 +1,7 @@
 """Precision."""
 
 from roadeval.data import Counts
-from roadeval.evaluation.metric import Metric, ratio
+from roadeval.evaluation.metric import Metric, Shown, ratio
 
 
 def precision(counts: Counts) -> float:
@@ -21,5 +21,6 @@ METRIC = Metric(
     function=precision,
     higher_is_better=True,
     order=103,
+    shown=Shown.IN_FULL,
     tabled=False,
 )

@@ -5,11 +5,12 @@ from __future__ import annotations
 import rerun.blueprint as rrb
 
 from roadeval.data import VariantLayout
+from roadeval.evaluation.metrics import SHORT
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout
 from roadeval.recording.screen import views
 from roadeval.recording.screen.overview import overview
-from roadeval.recording.screen.views import PLOTTED, View
+from roadeval.recording.screen.views import View
 
 
 def arrange(layout: Layout) -> rrb.Blueprint:
@@ -52,10 +53,10 @@ def _rates(layout: Layout) -> View:
             ],
         )
         for stage in dict.fromkeys(stage for _, stage in layout.scored())
-        for rate in PLOTTED
+        for rate in SHORT
         if rate in layout.rates
     ]
-    return rrb.Grid(*plots, grid_columns=len(PLOTTED), name="Rates by stage")
+    return rrb.Grid(*plots, grid_columns=len(SHORT), name="Rates by stage")
 
 
 def _counts(layout: Layout) -> View:

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from roadeval.data import VariantLayout
+from roadeval.data.words import percent
+from roadeval.evaluation.metrics import SHORT
 from roadeval.recording.layout import Layout
 
 _ERRORS: Final = """\
@@ -22,6 +24,7 @@ image.
 _NO_TRUTH: Final = """\
 The log has no truth for the road: there is nothing to score, only what was computed.
 """
+_RATES: Final = "In percent: means of the frames' rates; *pooled*: of all pixels."
 _HANDLING: Final = """\
 **Space** plays. The tabs above hold every layer, every number and the results.
 """
@@ -60,17 +63,14 @@ def _table(totals: Mapping[str, Any]) -> Iterator[str]:
         for variant, stages in totals.items()
         for stage, total in stages.items()
     ]
+    titles = {name: name for name in SHORT} | {"pooled_ERR": "pooled ERR"}
     if rows:
-        yield from ("", "## Rates", "", "Means of the frames' rates; *pooled*: of all pixels.", "")
-        yield "| variant | stage | ERR | FPR | FNR | pooled ERR |"
-        yield "|---|---|---|---|---|---|"
+        yield from ("", "## Rates", "", _RATES, "")
+        yield f"| {' | '.join(['variant', 'stage', *titles.values()])} |"
+        yield f"|---|---|{'---|' * len(titles)}"
     for variant, stage, total in rows:
-        cells = (_percent(total.get(name)) for name in ("ERR", "FPR", "FNR", "pooled_ERR"))
-        yield f"| {variant} | {stage} | {' | '.join(cells)} |"
-
-
-def _percent(fraction: float | None) -> str:
-    return "-" if fraction is None else f"{100 * fraction:.2f} %"
+        cells = (percent(total.get(name)) for name in titles)
+        yield f"| {' | '.join([variant, stage, *cells])} |"
 
 
 def _accounts(frames: Mapping[str, Any]) -> Iterator[str]:

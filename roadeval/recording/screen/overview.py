@@ -12,6 +12,7 @@ from typing import Final
 import rerun.blueprint as rrb
 
 from roadeval.data import BASELINE, FINAL_STAGE, LayerSpec, VariantLayout
+from roadeval.evaluation.metrics import SHORT
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout
 from roadeval.recording.screen import views
@@ -103,7 +104,7 @@ def _row(variant: str, cells: Sequence[Cell], columns: int, aside: View | None) 
 
 def _bottom(layout: Layout, aside: View | None) -> View:
     plots = (
-        [_rate(layout, rate) for rate in views.PLOTTED if rate in layout.rates]
+        [_rate(layout, rate) for rate in SHORT if rate in layout.rates]
         if layout.has_truth
         else [views.stage_times(variant) for variant in layout.variants[:_ROWS]]
     )
@@ -115,4 +116,4 @@ def _rate(layout: Layout, rate: str) -> View:
     finals = [(variant.name, variant.stages[-1]) for variant in layout.variants]
     finals += [(BASELINE, FINAL_STAGE)] * layout.baseline
     paths = [at.scalar_path("metrics", *final, rate) for final in finals]
-    return views.plot(f"{rate}: {views.PLOTTED[rate]}", paths)
+    return views.plot(f"{rate}: {SHORT[rate].in_words}", paths)

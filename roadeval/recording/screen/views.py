@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Any
 
 import rerun.blueprint as rrb
 
@@ -13,13 +13,6 @@ from roadeval.recording.layout import Layout
 
 View = Any
 """A view or a container of views."""
-
-PLOTTED: Final[Mapping[str, str]] = {
-    "ERR": "pixels that are wrong",
-    "FPR": "non-road called road",
-    "FNR": "road that was missed",
-}
-"""The rates that are plotted, in words: errors, of which the other rates are the complements."""
 
 
 def picture(title: str, paths: Sequence[str]) -> View:

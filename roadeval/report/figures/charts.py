@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from roadeval.data import BASELINE, colours
+from roadeval.data.words import in_percent
+from roadeval.evaluation.metrics import SHORT
 from roadeval.report.figures.style import FAINT, INK, PALE, Look, looks
 
 if TYPE_CHECKING:
@@ -22,7 +24,8 @@ WIDTH: Final = 7.4
 """Inches across a chart; a page's text is 6.7 wide, so letters come out a little smaller."""
 MAPS_SHARE: Final = 0.68
 """Share of the page's width that `heatmap` is drawn for, so that its letters keep their size."""
-RATES: Final = ("ERR", "FPR", "FNR")
+PER_ROW: Final = 3
+"""Rates that are drawn beside each other."""
 BARS: Final = 400
 """More frames than this are drawn as means of neighbours."""
 LEAST: Final = 0.1
@@ -118,20 +121,18 @@ def regions(table: pd.DataFrame, variants: Sequence[str], titles: Mapping[str, s
 
 
 def stages(totals: Totals) -> Figure:
-    """Draw ERR, FPR and FNR of each stage's mask, a line a variant."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(WIDTH, 2.5), layout="constrained")
+    """Draw the rates of each stage's mask, a line a variant."""
+    figure, grid = _rate_axes(2.5)
     names = list(dict.fromkeys(s for v, own in totals.items() for s in own if v != BASELINE))
-    for ax, rate in zip(figure.subplots(1, 3), RATES, strict=True):
+    for rate, ax in grid.items():
         for variant, look in looks(list(totals)).items():
             own = totals[variant]
             if variant == BASELINE:
-                value = _percent(next(iter(own.values()))[rate])
+                value = in_percent(next(iter(own.values())).get(rate))
                 ax.axhline(value, **look.line)
                 continue
             places = np.array([names.index(stage) for stage in own])
-            values = np.array([_percent(total[rate]) for total in own.values()])
+            values = np.array([in_percent(total.get(rate)) for total in own.values()])
             ax.plot(places, values, **look.line)
             _marks(ax, places, values, look)
         ax.set_xticks(range(len(names)), names)
@@ -190,16 +191,13 @@ def coverage(table: pd.DataFrame) -> Figure:
 
 
 def forest(changes: Sequence[MaskComparison]) -> Figure:
-    """Draw each result's change of ERR, FPR and FNR against the base, with its interval."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(WIDTH, 0.8 + 0.26 * len(changes)), layout="constrained")
+    """Draw each result's changes of rates against the base, with their intervals."""
+    figure, grid = _rate_axes(0.8 + 0.26 * len(changes), sharey=True)
     places = np.arange(len(changes))
-    grid = figure.subplots(1, 3, sharey=True)
-    for ax, rate in zip(grid, RATES, strict=True):
+    for rate, ax in grid.items():
         for place, each in zip(places, changes, strict=True):
             change = each.difference[rate]
-            ax.plot(_percent(change.mean), place, "o", color=INK, markersize=5)
+            ax.plot(in_percent(change.mean), place, "o", color=INK, markersize=5)
             if change.low is not None and change.high is not None:
                 ends = [100 * change.low, 100 * change.high]
                 ax.plot(ends, [place, place], color=INK, linewidth=1.6)
@@ -210,31 +208,42 @@ def forest(changes: Sequence[MaskComparison]) -> Figure:
         ax.set_title(f"{rate}, pp", loc="left")
         ax.grid(axis="x")
         ax.grid(visible=False, axis="y")
-    grid[0].set_yticks(places, [_name(each) for each in changes])
-    grid[0].set_ylim(len(changes) - 0.5, -0.5)
+    first = next(iter(grid.values()))
+    first.set_yticks(places, [_name(each) for each in changes])
+    first.set_ylim(len(changes) - 0.5, -0.5)
     return figure
 
 
 def levels(rows: Sequence[MaskComparison]) -> Figure:
     """Draw the rates of several results' final masks, a line of marks a result."""
-    from matplotlib.figure import Figure
-
     results = list(dict.fromkeys(row.result for row in rows))
     variants = list(dict.fromkeys(row.variant for row in rows))
-    figure = Figure(figsize=(WIDTH, 1.0 + 0.32 * len(results)), layout="constrained")
-    grid = figure.subplots(1, 3, sharey=True)
-    for ax, rate in zip(grid, RATES, strict=True):
+    figure, grid = _rate_axes(1.0 + 0.32 * len(results), sharey=True)
+    for rate, ax in grid.items():
         for variant, look in looks(variants).items():
             own = [row for row in rows if row.variant == variant]
-            values = [_percent(row.new[rate]) for row in own]
+            values = [in_percent(row.new[rate]) for row in own]
             _marks(ax, values, [results.index(row.result) for row in own], look)
         ax.set_title(f"{rate}, %", loc="left")
         ax.set_xlim(left=0)
         ax.grid(axis="x")
-    grid[0].set_yticks(range(len(results)), results)
-    grid[0].set_ylim(len(results) - 0.5, -0.5)
+    first = next(iter(grid.values()))
+    first.set_yticks(range(len(results)), results)
+    first.set_ylim(len(results) - 0.5, -0.5)
     _legend(figure, variants)
     return figure
+
+
+def _rate_axes(height: float, *, sharey: bool = False) -> tuple[Figure, dict[str, Axes]]:
+    """Return a figure with axes for each rate, in rows of ``height`` inches."""
+    from matplotlib.figure import Figure
+
+    rows, columns = -(-len(SHORT) // PER_ROW), min(len(SHORT), PER_ROW)
+    figure = Figure(figsize=(WIDTH, height * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, sharey=sharey, squeeze=False).ravel()
+    for spare in grid[len(SHORT) :]:
+        spare.remove()
+    return figure, dict(zip(SHORT, grid, strict=False))
 
 
 def _name(row: MaskComparison) -> str:
@@ -264,11 +273,6 @@ def _legend(figure: Figure, variants: Sequence[str]) -> None:
         mark = {} if name == BASELINE else look.mark
         handles.append(Line2D([], [], **look.line, **mark, markersize=5, label=name))
     figure.legend(handles=handles, loc="outside upper left", ncols=6, handlelength=3.2)
-
-
-def _percent(fraction: float | None) -> float:
-    """Return a fraction in percent, an undefined one as NaN."""
-    return np.nan if fraction is None else 100 * fraction
 
 
 def _frame_ticks(ax: Axes, frames: Any) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from roadeval.report.figures.figure import FigureData, FigureSpec
 from roadeval.report.figures.rates_over_drive import rates_over_drive
@@ -10,12 +10,12 @@ from roadeval.report.figures.rates_over_drive import rates_over_drive
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+AXES: Final = {"ERR": "Error rate (ERR)"}
+
 
 def error_rate(data: FigureData) -> Figure | None:
     """Draw ERR of each variant's final mask over the drive."""
-    return rates_over_drive(
-        f"Error rate on {data.drive}", data.windows, {"ERR": "Error rate (ERR)"}, height=3.9
-    )
+    return rates_over_drive(f"Error rate on {data.drive}", data.windows, AXES, height=3.9)
 
 
 FIGURE = FigureSpec(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from roadeval.data.words import listing
 from roadeval.evaluation.analysis import finals
+from roadeval.evaluation.metrics import METRICS
 from roadeval.report.figures.style import Look, heading, looks
 
 if TYPE_CHECKING:
@@ -47,7 +49,7 @@ def rates_over_drive(
     rows = final.drop_duplicates("window").sort_values("window")
     group = -(-len(rows) // CROWDED)
     figure = Figure(figsize=(8, height))
-    heading(figure, title, _subtitle(final, rows, group))
+    heading(figure, title, _subtitle(final, rows, group, rates))
     axes = figure.subplots(len(rates), 1, sharex=True, squeeze=False)[:, 0]
     for ax, (rate, name) in zip(axes, rates.items(), strict=True):
         _draw(ax, final, rate, group)
@@ -60,12 +62,21 @@ def rates_over_drive(
     return figure
 
 
-def _subtitle(final: pd.DataFrame, rows: pd.DataFrame, group: int) -> str:
+def _subtitle(final: pd.DataFrame, rows: pd.DataFrame, group: int, rates: Collection[str]) -> str:
     stages, size = ", ".join(dict.fromkeys(final["stage"])), rows["frames"].max()
     each = f"each point is the mean of {size} frames" if size > 1 else "each point is one frame"
     if group > 1:
         each = f"each point averages {group} rows of {size} frames, the band spans them"
-    return f"Final mask ({stages}); {each}; lower is better"
+    return f"Final mask ({stages}); {each}; {_direction(rates)}"
+
+
+def _direction(rates: Collection[str]) -> str:
+    rising = [rate for rate in rates if METRICS[rate].higher_is_better]
+    if not rising:
+        return "lower is better"
+    if len(rising) == len(rates):
+        return "higher is better"
+    return f"higher is better for {listing(rising)}, lower for the others"
 
 
 def _draw(ax: Axes, final: pd.DataFrame, rate: str, group: int) -> None:

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from roadeval.data import TRUTH, mask_spec
-from roadeval.evaluation.metrics import METRICS
+from roadeval.data.words import percent
+from roadeval.evaluation.metrics import SHORT
 from roadeval.report.blocks import Cell, ImageFile
 from roadeval.report.figures.figure import ExampleFrame
 from roadeval.report.figures.style import looks
 from roadeval.report.findings import Findings
 from roadeval.report.images import LayerImage, jpeg
 
-PAPER_RATES: Final = ("ERR", "FPR", "FNR", "ACC")
-"""The rates of the paper that a report shows; TNR and TPR mirror FPR and FNR."""
-RATES: Final = (
-    *PAPER_RATES,
-    *(n for n, metric in METRICS.items() if metric.mirrors is None and n not in PAPER_RATES),
-)
-"""Those and every further metric of the tables."""
 SIDE_BY_SIDE: Final = 3
 """More variants than this do not fit beside each other under several rates."""
 ROAD: Final = mask_spec("road", "road")
@@ -28,6 +22,11 @@ ROAD: Final = mask_spec("road", "road")
 def variant_cell(name: str, names: Sequence[str]) -> Cell:
     """Return a variant's name with the dot of its colour among ``names``."""
     return Cell(name, dot=looks(names)[name].colour)
+
+
+def rate_cells(rates: Mapping[str, float], *, bold: bool) -> list[Cell]:
+    """Return a mask's cells in a short table of rates; its ERR may be bold."""
+    return [Cell(percent(rates.get(name)), bold=bold and name == "ERR") for name in SHORT]
 
 
 def sampled_frames(findings: Findings) -> str:

@@ -7,9 +7,9 @@ from typing import Final
 
 from roadeval.data.words import percent, points, timestamp
 from roadeval.evaluation.analysis import FILTER
+from roadeval.evaluation.metrics import SHORT
 from roadeval.report.blocks import (
     Block,
-    Cell,
     Command,
     Heading,
     ImageGrid,
@@ -20,7 +20,7 @@ from roadeval.report.blocks import (
 )
 from roadeval.report.findings import Findings, NotableFrame
 from roadeval.report.images import jpeg
-from roadeval.report.sections.common import variant_cell
+from roadeval.report.sections.common import rate_cells, variant_cell
 
 LARGE: Final = 420
 SMALL: Final = 200
@@ -56,13 +56,11 @@ def _frames(
 
 def _frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
     rates = Table(
-        ["final mask, %", "ERR", "FPR", "FNR"],
+        ["final mask, %", *SHORT],
         [
             [
                 variant_cell(name, [*findings.finals]),
-                Cell(percent(rates["ERR"]), bold=name == frame.variant),
-                percent(rates["FPR"]),
-                percent(rates["FNR"]),
+                *rate_cells(rates, bold=name == frame.variant),
             ]
             for name, rates in frame.rates.items()
         ],

@@ -6,14 +6,17 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from roadeval.data.words import DASH, percent
+from roadeval.evaluation.metrics import FULL
 from roadeval.report.blocks import Block, Cell, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.figures.figure import figures
 from roadeval.report.figures.files import svg_of
 from roadeval.report.findings import Findings
-from roadeval.report.sections.common import PAPER_RATES, SIDE_BY_SIDE, example_pictures
+from roadeval.report.sections.common import SIDE_BY_SIDE, example_pictures
 
 PAPER_WINDOW: Final = 10
 """Frames in a row of the paper's figures (section 5)."""
+RATES: Final = 4
+"""Rates that share a table where the variants stand side by side."""
 
 
 def section(findings: Findings) -> Iterator[Block]:
@@ -32,9 +35,10 @@ def section(findings: Findings) -> Iterator[Block]:
 
 def _tables(findings: Findings) -> Iterator[Block]:
     """Tabulate the windows; several tables where the variants do not fit side by side."""
-    together = len(findings.finals) <= SIDE_BY_SIDE
-    for rates in [PAPER_RATES] if together else [(rate,) for rate in PAPER_RATES]:
-        yield _table(findings, rates)
+    together = RATES if len(findings.finals) <= SIDE_BY_SIDE else 1
+    names = [*FULL]
+    for place in range(0, len(names), together):
+        yield _table(findings, names[place : place + together])
     size = findings.window_size
     long = "" if size == PAPER_WINDOW else f" The paper's rows are of {PAPER_WINDOW}."
     yield Text(
@@ -63,7 +67,7 @@ def _table(findings: Findings, rates: Sequence[str]) -> Table:
         .sort_values("window")
         .to_dict("records")
     ]
-    whole = [percent(findings.total(name)[rate]) for rate in rates for name in names]
+    whole = [percent(findings.total(name).get(rate)) for rate in rates for name in names]
     rows.append([Cell(text, bold=True) for text in ("all", *whole)])
     return Table(
         ["frames", *(name for _ in rates for name in names)],

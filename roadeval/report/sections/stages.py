@@ -7,11 +7,12 @@ from collections.abc import Iterator, Mapping
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import DASH, number, percent, points
 from roadeval.evaluation.analysis import FILTER
+from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.figures.charts import stages as chart
 from roadeval.report.figures.files import svg
 from roadeval.report.findings import Findings
-from roadeval.report.sections.common import sampled_frames, variant_cell
+from roadeval.report.sections.common import rate_cells, sampled_frames, variant_cell
 
 
 def section(findings: Findings) -> Iterator[Block]:
@@ -50,20 +51,19 @@ def stages_table(findings: Findings) -> Table:
                 [
                     variant_cell(variant, [*findings.totals]) if place == 0 else "",
                     stage,
-                    Cell(percent(total["ERR"]), bold=stage == findings.finals[variant]),
-                    percent(total["FPR"]),
-                    percent(total["FNR"]),
-                    percent(findings.overlap[variant][stage]["IoU"]),
+                    *rate_cells(total, bold=stage == findings.finals[variant]),
+                    *(percent(findings.overlap[variant][stage][name]) for name in SHORT_OVERLAP),
                     percent(repaired),
                     percent(spoiled),
                 ]
             )
+    meanings = "; ".join(f"{name}: {metric.in_words}" for name, metric in SHORT.items())
     return Table(
-        ["variant", "stage", "ERR", "FPR", "FNR", "IoU", "repaired", "spoiled"],
+        ["variant", "stage", *SHORT, *SHORT_OVERLAP, "repaired", "spoiled"],
         rows,
         text_columns=(0, 1),
         breaks=breaks[1:],
-        caption="Percent: of the frames' pixels (ERR), non-road (FPR) and road (FNR).",
+        caption=f"Percent. {meanings}.",
     )
 
 
@@ -113,7 +113,7 @@ def _oracles(findings: Findings) -> Iterator[Block]:
     yield Table(
         [
             *("variant", "if there were a", "ERR as it is", "ERR then", "change, pp"),
-            *("FPR then", "FNR then", "frames"),
+            *(*(f"{name} then" for name in SHORT if name != "ERR"), "frames"),
         ],
         [
             [
@@ -122,8 +122,7 @@ def _oracles(findings: Findings) -> Iterator[Block]:
                 percent(row["as_is"]),
                 Cell(percent(row["ERR"]), bold=True),
                 points(row["ERR"] - row["as_is"]),
-                percent(row["FPR"]),
-                percent(row["FNR"]),
+                *(percent(row[name]) for name in SHORT if name != "ERR"),
                 number(row["frames"]),
             ]
             for row in findings.oracles.to_dict("records")

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.data.words import defined, listing, number, percent
-from roadeval.evaluation.metrics import METRICS, OVERLAP
+from roadeval.evaluation.metrics import FULL, METRICS, OVERLAP
 from roadeval.report.blocks import (
     Block,
     BulletList,
@@ -23,7 +23,7 @@ from roadeval.report.blocks import (
 )
 from roadeval.report.findings import Findings
 from roadeval.report.images import jpeg
-from roadeval.report.sections.common import RATES, variant_cell
+from roadeval.report.sections.common import variant_cell
 
 CROWDED: Final = 7
 """Variants and warnings together that leave room for all thumbnails."""
@@ -98,9 +98,9 @@ def rates_table(findings: Findings) -> Table:
 
 def _columns(findings: Findings) -> Iterator[_Column]:
     finals = {name: findings.total(name) for name in findings.finals}
-    for rate in RATES:
+    for rate, metric in FULL.items():
         values = [total.get(rate) for total in finals.values()]
-        yield _Column(rate, values, METRICS[rate].higher_is_better)
+        yield _Column(rate, values, metric.higher_is_better)
     pooled = [total["pooled_ERR"] for total in finals.values()]
     yield _Column("pooled ERR", pooled, METRICS["ERR"].higher_is_better)
     overlap = [findings.overlap[name][stage] for name, stage in findings.finals.items()]

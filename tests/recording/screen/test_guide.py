@@ -19,7 +19,7 @@ def test_without_truth_the_words_say_that_nothing_is_scored():
 
 def test_rates_stand_in_a_table_in_percent_and_undefined_ones_as_a_dash():
     text = guide.overview(layout(), {"totals": TOTALS})
-    assert "| filtered | post | 25.00 % | - | 50.00 % | 20.00 % |" in text
+    assert "| filtered | post | 25.00 | \N{EN DASH} | 50.00 | 20.00 |" in text
 
 
 def test_warnings_and_lost_parts_of_the_log_are_told():

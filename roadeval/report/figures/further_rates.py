@@ -1,0 +1,32 @@
+"""Further rates over the drive: those of short tables that the paper's figures 3a and 3b lack."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from roadeval.evaluation.metrics import SHORT
+from roadeval.report.figures import fig3a_error_rate, fig3b_fp_fn_rate
+from roadeval.report.figures.figure import FigureData, FigureSpec
+from roadeval.report.figures.rates_over_drive import rates_over_drive
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def further_rates(data: FigureData) -> Figure | None:
+    """Draw every further rate of each variant's final mask over the drive."""
+    drawn = {*fig3a_error_rate.AXES, *fig3b_fp_fn_rate.AXES}
+    # Results that were made before a metric was added do not have it.
+    known = data.windows.dropna(axis="columns", how="all").columns
+    axes = {
+        name: f"{metric.in_words.capitalize()}\n({name})"
+        for name, metric in SHORT.items()
+        if name not in drawn and name in known
+    }
+    if not axes:
+        return None
+    title = f"Further rates on {data.drive}"
+    return rates_over_drive(title, data.windows, axes, height=1.9 + 2 * len(axes))
+
+
+FIGURE = FigureSpec("further_rates", "Further rates over the drive.", further_rates, in_report=True)
