@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from mcap.writer import Writer
 from pypdf import PdfReader
 
 import roadeval
+from tests.golden import texts
 
 ROOT = Path(__file__).resolve().parents[2]
 FENCED = re.compile(r"^`(?P<path>[^`\n]+)`\n\n```\w+\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -33,6 +35,8 @@ class Workshop:
     """A copy of the package with the page's files in it, and the results of a replay by it."""
 
     folder: Path
+    screen: str
+    """What the replay printed."""
 
     def roadeval(self, *words: str) -> subprocess.CompletedProcess[str]:
         """Run a command of the copy."""
@@ -87,18 +91,21 @@ def workshop(tmp_path_factory) -> Workshop:
         assert place.parent.is_dir(), f"{path} has no folder to lie in"
         place.write_text(text)
     write_drive(folder / "drive.mcap")
-    made = Workshop(folder)
     words = ("--variant", "bright=bright.toml", "--save", "out.rrd", "--reports", "reports")
-    made.done("replay", "drive.mcap", *words)
-    return made
+    return Workshop(folder, Workshop(folder, "").done("replay", "drive.mcap", *words))
+
+
+def words_of(path: Path) -> str:
+    """The words of a PDF, in one line."""
+    pages = PdfReader(path).pages
+    return " ".join(" ".join(page.extract_text() for page in pages).split())
 
 
 @pytest.fixture(scope="module")
 def report(workshop) -> str:
-    """The words of the drive's PDF, in one line."""
+    """The words of the drive's PDF."""
     workshop.done("report", "out.rrd", "-o", "report.pdf")
-    pages = PdfReader(workshop.folder / "report.pdf").pages
-    return " ".join(" ".join(page.extract_text() for page in pages).split())
+    return words_of(workshop.folder / "report.pdf")
 
 
 @pytest.fixture(scope="module")
@@ -166,15 +173,62 @@ def test_the_metric_is_in_the_recording(recording, workshop):
     assert "BACC" in recording.frames
 
 
-def test_the_metric_is_in_the_report(report):
-    assert "BACC" in report
+def test_the_metric_is_on_the_screen_of_replay(workshop):
+    # There is no room for it beside the others.
+    first, second = workshop.screen.split("\n\nvariant ")[1:]
+    assert first.startswith("    stage       frames  ERR %  pooled ERR %  FPR %  FNR %   ACC %\n")
+    assert second.startswith("    stage       BACC %\n")
+    assert max(map(len, workshop.screen.splitlines())) <= 80
+    assert re.search(r"\n  BACC +[+-]?\d+\.\d\d  ", workshop.screen)
+
+
+def test_the_metric_is_on_the_screen_of_compare(workshop):
+    screen = workshop.done("compare", "out.rrd")
+    rates = re.findall(r" (ERR|FPR|FNR|BACC) +\d+\.\d\d +\d+\.\d\d ", screen)
+    # Unfiltered against filtered, of three stages, and against bright, of their last.
+    assert Counter(rates) == {"ERR": 4, "FPR": 2, "FNR": 2, "BACC": 2}
+
+
+def test_the_metric_is_in_the_list_of_the_worst_frames(workshop):
+    screen = workshop.done("inspect", "out.rrd", "--list", "--worst", "1")
+    assert re.split("  +", screen.splitlines()[0].strip()) == [
+        *("frame", "ERR %", "FPR %", "FNR %", "BACC %", "why")
+    ]
+
+
+def test_the_metric_is_among_the_viewer_s_graphs_and_in_its_table(workshop):
+    recording = workshop.folder / "out.rrd"
+    graphs = texts.screen(recording)
+    assert "'BACC: balanced accuracy': /metrics/filtered/post/BACC" in graphs
+    assert "'BACC of svm': /metrics/filtered/svm/BACC" in graphs
+    guide = texts.documents(recording)["/results/overview"]
+    assert "| variant | stage | ERR | FPR | FNR | BACC | pooled ERR |" in guide
+
+
+def test_the_metric_is_in_the_tables_and_charts_of_the_report(report):
+    (key_table,) = re.findall(r"final mask frames (.*?) pooled", report)
+    assert key_table == "ERR FPR FNR ACC BACC"
+    # Over the drive, and in the chart of the stages.
+    assert report.count("BACC, %") == 2
+    assert "Further rates over the drive." in report
+    assert re.search(r"BACC (\d+\.\d\d ){2}", report), "paired differences"
+
+
+@pytest.mark.parametrize("ending", ["png", "pdf"])
+def test_the_metric_has_a_figure_over_the_drive(workshop, ending):
+    file = workshop.folder / "reports" / f"further_rates.{ending}"
+    assert file.stat().st_size > 1000
+    if ending == "pdf":
+        assert "higher is better" in words_of(file)
 
 
 def test_the_metric_is_compared_by_its_direction(workshop):
-    compared = json.loads(workshop.done("compare", "out.rrd", "--json"))
+    written = ("-o", "compared.pdf", "--json")
+    compared = json.loads(workshop.done("compare", "out.rrd", *written))
     final = [change for change in compared["changes"] if change["final"]]
     assert final
     assert all("BACC" in change["difference"] for change in final)
+    assert "BACC, pp" in words_of(workshop.folder / "compared.pdf")
     worse = workshop.roadeval("compare", "out.rrd", "--fail-if", "post.bright.BACC > 0%")
     assert worse.returncode == 4, worse.stderr
 
@@ -186,7 +240,8 @@ def test_the_region_is_counted(workshop):
 
 
 def test_the_region_is_in_the_report_by_its_title(report):
-    assert "ahead of the vehicle" in report
+    # In the chart, and in the tables: of four final masks there are two.
+    assert report.count("ahead of the vehicle") == 3
 
 
 def test_the_encoding_is_described(workshop):

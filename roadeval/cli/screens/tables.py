@@ -32,7 +32,10 @@ def show(names: Sequence[str], numbers: Sequence[str], rows: Sequence[Row], out:
 
     Columns that the console has no room for stand in a table of their own below.
     """
-    for part in _parts(len(names), _widths([*names, *numbers], rows), out.width):
+    widths = _widths([*names, *numbers], rows)
+    for part in _parts(len(names), widths, out.width):
+        if part[0] > len(names):
+            out.print()
         table = grid(names, [numbers[place - len(names)] for place in part])
         for row in rows:
             cells = [row.cells[place] for place in (*range(len(names)), *part)]

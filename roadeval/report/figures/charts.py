@@ -137,7 +137,8 @@ def stages(totals: Totals) -> Figure:
             _marks(ax, places, values, look)
         ax.set_xticks(range(len(names)), names)
         ax.set_xlim(-0.3, len(names) - 0.7)
-        ax.set_ylim(bottom=0)
+        if not SHORT[rate].higher_is_better:
+            ax.set_ylim(bottom=0)
         ax.set_title(f"{rate}, %", loc="left")
     _legend(figure, list(totals))
     return figure
@@ -225,7 +226,8 @@ def levels(rows: Sequence[MaskComparison]) -> Figure:
             values = [in_percent(row.new[rate]) for row in own]
             _marks(ax, values, [results.index(row.result) for row in own], look)
         ax.set_title(f"{rate}, %", loc="left")
-        ax.set_xlim(left=0)
+        if not SHORT[rate].higher_is_better:
+            ax.set_xlim(left=0)
         ax.grid(axis="x")
     first = next(iter(grid.values()))
     first.set_yticks(range(len(results)), results)

@@ -88,7 +88,8 @@ def _draw(ax: Axes, final: pd.DataFrame, rate: str, group: int) -> None:
     values = 100 * final[rate].to_numpy(float)
     if np.isnan(values).all():
         ax.text(0.5, 0.5, "undefined on every frame", transform=ax.transAxes, ha="center")
-    ax.set_ylim(0, max(1.08 * np.nanmax([*values, 0.1]), 0.5))
+    if not METRICS[rate].higher_is_better:
+        ax.set_ylim(0, max(1.08 * np.nanmax([*values, 0.1]), 0.5))
     ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
     ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g} %"))
 

@@ -15,7 +15,7 @@ ROWS = [Row(["filtered", "post", "1.00", "2.00", "3.00"])]
 def printed(width, numbers=NUMBERS, rows=ROWS):
     out = Console(file=io.StringIO(), width=width)
     tables.show(("variant", "stage"), numbers, rows, out)
-    return [line.split() for line in out.file.getvalue().splitlines() if "─" not in line]
+    return [line.split() for line in out.file.getvalue().splitlines() if line and "─" not in line]
 
 
 def test_all_columns_stand_in_one_table_where_there_is_room():
