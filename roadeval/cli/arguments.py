@@ -13,7 +13,7 @@ from roadeval.cli.options import FLAGS, Given, with_flags
 from roadeval.errors import RoadevalError
 
 if TYPE_CHECKING:
-    from roadeval.config import RunConfig, Variant
+    from roadeval.config import DriveSettings, RunConfig, Variant
     from roadeval.report.pdf.typeset import Paper
 
 Drive = Annotated[
@@ -75,6 +75,7 @@ def configuration(given: Given) -> RunConfig:
     variants = [_variant(*each) for each in given.get("variants", ())]
     with usage():
         whole = config.override(_tables(given)).with_variants(variants)
+    whole = whole.with_drives(_drive(*each) for each in given.get("drives", ()))
     if whole.training.model and {"training.frames", "training.gap"} & given.keys():
         raise typer.BadParameter(
             f"--train-frames and --train-gap do not go with a model ({whole.training.model})"
@@ -105,6 +106,12 @@ def _variant(name: str, path: str | None) -> Variant:
         return Variant.of(name, read_tables(path), path)
     with usage():
         return Variant.of(name, {"preset": name}, f"{FLAGS['variants']} {name} names no file")
+
+
+def _drive(path: str, file: str) -> DriveSettings:
+    from roadeval.config import DriveSettings, read_tables
+
+    return DriveSettings.of({**read_tables(file), "path": path}, file)
 
 
 def _check_names(names: Sequence[str]) -> None:

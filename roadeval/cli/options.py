@@ -46,8 +46,8 @@ class Option:
     Parameters
     ----------
     setting
-        ``table.key`` in a run's configuration; ``preset``, ``config`` and ``variants`` are read
-        by `roadeval.cli.arguments`.
+        ``table.key`` in a run's configuration; ``preset``, ``config``, ``variants`` and
+        ``drives`` are read by `roadeval.cli.arguments`.
     flags
         As they are typed; the last one is named in messages.
     metavar
@@ -119,6 +119,15 @@ OPTIONS: Final = (
         "Repeatable.",
         list[str],
         variant,
+    ),
+    Option(
+        "drives",
+        ("--drive",),
+        "DRIVE=FILE.toml",
+        "A file with the [topics], [labels] or [frames] of one drive, by its path or its file's "
+        "name, or of several, as 'monday*.mcap'. Repeatable.",
+        list[str],
+        named,
     ),
     Option(
         "training.model",
@@ -215,7 +224,7 @@ OPTIONS: Final = (
 """In the order of the help."""
 
 FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS}
-_MARKED: Final = re.compile(r"`(\w+\.\w+)`")
+_MARKED: Final = re.compile(r"`(\w+(?:\.\w+)?)`")
 
 Given = Mapping[str, Any]
 """Values of options by the names of their settings; one that was not typed is not there."""

@@ -1,5 +1,6 @@
 """Configurations: a run's and its variants', presets, and TOML both ways."""
 
+from roadeval.config.drives import DriveSettings
 from roadeval.config.errors import ConfigError
 from roadeval.config.presets import PRESETS
 from roadeval.config.run import RunConfig, configure
@@ -10,6 +11,7 @@ from roadeval.config.variants import Variant, check_variant_name
 __all__ = [
     "PRESETS",
     "ConfigError",
+    "DriveSettings",
     "ExecutionSettings",
     "OutputSettings",
     "RunConfig",

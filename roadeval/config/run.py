@@ -12,15 +12,21 @@ In a TOML file, and in the mapping that `configure` takes, it has this shape::
 
     [frames]                # and [topics], [labels], [training], [evaluation], [output], [run]
     every = 2
+
+    [[drives]]              # what differs in some drives: [topics], [labels] and [frames]
+    path = "monday/*.mcap"
+    labels = { road = [3], ignore = [11] }
 """
 
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from roadeval.config.drives import DriveSettings, drives_of
 from roadeval.config.errors import ConfigError
 from roadeval.config.override import override
 from roadeval.config.presets import PRESETS
@@ -59,6 +65,8 @@ class RunConfig:
         Further variants.
     topics, labels, frames
         What is asked of the log.
+    drives
+        What is asked of some logs instead; later ones override earlier ones.
     training, evaluation
         How every variant is trained and scored.
     output
@@ -78,6 +86,7 @@ class RunConfig:
     topics: TopicSettings = field(default_factory=TopicSettings)
     labels: LabelSettings = field(default_factory=LabelSettings)
     frames: FrameSettings = field(default_factory=FrameSettings)
+    drives: tuple[DriveSettings, ...] = ()
     training: TrainingSettings = field(default_factory=TrainingSettings)
     evaluation: EvaluationSettings = field(default_factory=EvaluationSettings)
     output: OutputSettings = field(default_factory=OutputSettings)
@@ -126,14 +135,14 @@ class RunConfig:
             For a key or a value that cannot be used; names it, and what is allowed.
         """
         pipeline = pipeline_of(self.pipeline, tables, where)
-        check_tables(tables, ("chain", *pipeline.chain, "variants", *SECTIONS), where)
+        check_tables(tables, ("chain", *pipeline.chain, "variants", "drives", *SECTIONS), where)
         try:
             return replace(
                 self,
                 pipeline=pipeline,
                 extra=self._with_variants(tables.get("variants", {}), where),
                 **{name: override(getattr(self, name), tables, name, where) for name in SECTIONS},
-            )
+            ).with_drives(drives_of(tables.get("drives", ()), where))
         except ConfigError as error:
             if not where:
                 raise
@@ -149,6 +158,29 @@ class RunConfig:
         """
         extra = {variant.name: variant for variant in (*self.extra, *variants)}
         return replace(self, extra=tuple(extra.values()))
+
+    def with_drives(self, drives: Iterable[DriveSettings]) -> RunConfig:
+        """Return the configuration with further settings of single drives.
+
+        A `ConfigError` if one cannot be used.
+        """
+        made = tuple(drives)
+        for drive in made:
+            self._with_drive(drive)
+        return replace(self, drives=(*self.drives, *made))
+
+    def for_drive(self, path: str | os.PathLike[str]) -> RunConfig:
+        """Return the configuration of one drive: what is asked of it stands in place."""
+        config = replace(self, drives=())
+        for drive in self.drives:
+            if drive.holds_for(path):
+                config = config._with_drive(drive)
+        return config
+
+    def _with_drive(self, drive: DriveSettings) -> RunConfig:
+        labels = LabelSettings() if "labels" in drive.tables else self.labels
+        base = replace(self, labels=labels)
+        return base.override(drive.tables, drive.where)
 
     def ignored(self) -> tuple[str, ...]:
         """Name what presets of further variants ask for, and what holds for the whole run."""
@@ -173,6 +205,7 @@ class RunConfig:
                 each.name: {"preset": each.preset, **each.pipeline.as_dict()} for each in self.extra
             },
             **{name: dataclasses.asdict(getattr(self, name)) for name in SECTIONS},
+            **({"drives": [drive.as_dict() for drive in self.drives]} if self.drives else {}),
         }
 
     def _with_variants(self, tables: Any, where: str) -> tuple[Variant, ...]:

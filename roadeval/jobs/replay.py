@@ -72,7 +72,7 @@ def replay(
     """
     given = {"save": save, "reports": reports, "mcap": mcap}
     wanted = {name: str(path) for name, path in given.items() if path is not None}
-    config = (config or RunConfig()).override({"output": wanted})
+    config = (config or RunConfig()).for_drive(drive).override({"output": wanted})
     with logs.open_log(drive, keep_corrupt=config.frames.keep_corrupt) as log:
         to = Outputs.of(config.output, log.name)
         keep_apart((drive, config.training.model), (to.recording, to.mcap))

@@ -154,6 +154,7 @@ class Log:
         labels: LabelSettings | None = None,
         *,
         scale: float = 1.0,
+        several: bool = False,
     ) -> Selection:
         """Settle what to replay.
 
@@ -166,6 +167,8 @@ class Log:
         scale
             Of the frames that `frames` returns, with their labels, to the logged ones' width and
             height.
+        several
+            Whether the labels are given for several logs at once, see `understand`.
 
         Raises
         ------
@@ -175,7 +178,7 @@ class Log:
         """
         topics, labels = topics or TopicSettings(), labels or LabelSettings()
         try:
-            return settle(self.topics, self._readers, topics, labels, scale)
+            return settle(self.topics, self._readers, topics, labels, scale, several=several)
         except LogError as error:
             raise LogError(f"{self.path.name}: {error}") from error
 

@@ -149,8 +149,11 @@ def from_drives(
     frames: Mapping[Path, Sequence[Frame]],
     pipelines: Mapping[str, Pipeline],
     settings: TrainingSettings,
+    warnings: Sequence[str] = (),
 ) -> Model:
     """Train on frames of some drives, by the drives' paths.
+
+    ``warnings`` are put before those of the training itself.
 
     Raises
     ------
@@ -166,9 +169,9 @@ def from_drives(
             'topics.truth, leave the drive out, or set training.source = "patch"'
         )
     guessed = bare and settings.source == "auto"
-    warnings = [f"no drive has road truth in the range: {BY_PATCH}"] if guessed else []
+    guess = [f"no drive has road truth in the range: {BY_PATCH}"] if guessed else []
     every = [frame for own in frames.values() for frame in own]
-    return train_on(every, pipelines, settings, warnings)
+    return train_on(every, pipelines, settings, [*warnings, *guess])
 
 
 def train_on(

@@ -19,6 +19,10 @@ OTHER = {
     "output.record": "worst:7",
     "preset": "gated",
     "variants": {"wide": {"preset": "printed", "shadow": {"ring_width": 3}}},
+    "drives": [
+        {"path": "a.mcap", "labels": {"road": [3]}, "frames": {"start": 5}},
+        {"path": "*/b*.mcap", "topics": {"masks": {"net": "/net"}}},
+    ],
     "training.model": "city.model",
     "training.frames": 4,
     "training.gap": 2,

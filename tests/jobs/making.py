@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import cv2
+import numpy as np
 
 from roadeval import RunConfig, configure
 from roadeval.logs import LogWriter
@@ -34,8 +35,18 @@ def settings(**values: Any) -> RunConfig:
     return configure(tables)
 
 
-def write_log(path: Path, *, truth: bool = True, net: bool = False, broken: int = -1) -> Path:
-    """Write a log of small frames; some have no truth, one may be broken."""
+def write_log(
+    path: Path,
+    *,
+    truth: bool = True,
+    net: bool = False,
+    broken: int = -1,
+    codes: tuple[int, int] = (0, 255),
+) -> Path:
+    """Write a log of small frames; some have no truth, one may be broken.
+
+    ``codes`` are the values of non-road and road in the truth.
+    """
     with LogWriter(path) as writer:
         for number in range(FRAMES):
             made, stamp = frame(number), (number + 1) * NS
@@ -46,7 +57,7 @@ def write_log(path: Path, *, truth: bool = True, net: bool = False, broken: int 
             data = b"no image" if number == broken else png.tobytes()
             writer.image("/camera/image", stamp, data, "png")
             if truth and number != 20:
-                writer.mask("/truth/road", stamp, made.truth * 255)
+                writer.mask("/truth/road", stamp, np.array(codes, np.uint8)[made.truth])
             if net:
                 writer.mask("/net/road_mask_prediction", stamp, made.truth * 255)
     return path

@@ -13,12 +13,12 @@ from roadeval.cli.options import Given, takes
 
 
 @takes(
-    *("preset", "config", "variants", "training.frames"),
+    *("preset", "config", "variants", "drives", "training.frames"),
     *("topics.image", "topics.truth", "topics.sync_tolerance_ms", "topics.resize_truth", "labels"),
     *("frames.scale", "frames.keep_corrupt", "frames.start", "frames.end"),
 )
 def train(
-    drives: Annotated[
+    paths: Annotated[
         list[Path], typer.Argument(metavar="DRIVE", help="Camera logs (MCAP), mostly with truth.")
     ],
     *,
@@ -38,7 +38,7 @@ def train(
     from roadeval.jobs.train import train as run
 
     with progress.watched(quiet) as watch:
-        model = run(drives, output, config, on_progress=watch)
+        model = run(paths, output, config, on_progress=watch)
     for warning in model.warnings:
         messages.warning(warning)
     if not quiet:

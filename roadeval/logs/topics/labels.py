@@ -47,6 +47,11 @@ class LabelMap:
     by_color: bool
     words: str
 
+    @property
+    def by_itself(self) -> bool:
+        """Whether a mask was understood without settings."""
+        return self.others == UNKNOWN
+
     @cached_property
     def _table(self) -> npt.NDArray[np.uint8]:
         """``(65536,)`` truth by label value."""
@@ -83,7 +88,7 @@ class LabelMap:
             truth: Truth = cv2.LUT(np.ascontiguousarray(labels), self._table[:256])
         else:
             truth = self._table[labels]
-        if self.others == UNKNOWN and (truth == UNKNOWN).any():
+        if self.by_itself and (truth == UNKNOWN).any():
             value = int(labels[truth == UNKNOWN][0])
             raise BadMessage(f"it holds the value {value}, unlike the frames before ({self.words})")
         return truth
@@ -132,7 +137,9 @@ def seen_in(picture: Picture, labels: LabelSettings, topic: str) -> set[int]:
     return set(np.flatnonzero(np.bincount(pixels.ravel())).tolist())
 
 
-def understand(labels: LabelSettings, seen: Iterable[int], topic: str) -> LabelMap:
+def understand(
+    labels: LabelSettings, seen: Iterable[int], topic: str, *, several: bool = False
+) -> LabelMap:
     """Decide what the values of a label topic mean.
 
     Parameters
@@ -143,6 +150,9 @@ def understand(labels: LabelSettings, seen: Iterable[int], topic: str) -> LabelM
         The values, or packed colours, that occur in some of the topic's images.
     topic
         Its name, for messages.
+    several
+        Whether the labels are given for several logs at once. Then a mask that needs no settings
+        is understood by itself where none of the given values occurs in it.
 
     Raises
     ------
@@ -150,13 +160,15 @@ def understand(labels: LabelSettings, seen: Iterable[int], topic: str) -> LabelM
         If a given value does not occur, or none is given and the values are class ids.
     """
     values = sorted(set(seen))
+    if several and _is_mask_of_its_own(labels, values):
+        labels = LabelSettings()
     if labels.road_colors:
         road, ignore = map(_packed, labels.road_colors), map(_packed, labels.ignore_colors)
         given = {"`labels.road_colors`": tuple(road), "`labels.ignore_colors`": tuple(ignore)}
-        return _as_given(given, values, topic, by_color=True)
+        return _as_given(given, values, topic, by_color=True, several=several)
     if labels.road:
         given = {"`labels.road`": labels.road, "`labels.ignore`": labels.ignore}
-        return _as_given(given, values, topic, by_color=False)
+        return _as_given(given, values, topic, by_color=False, several=several)
     for meaning in _MASKS:
         if set(values) <= set(meaning):
             return _as_mask(meaning, values)
@@ -166,17 +178,31 @@ def understand(labels: LabelSettings, seen: Iterable[int], topic: str) -> LabelM
     )
 
 
+def _is_mask_of_its_own(labels: LabelSettings, seen: list[int]) -> bool:
+    """Whether values are those of a mask of 0 and 255, and none of them is one that was given.
+
+    A mask of 0 and 1 could as well be class ids of a log without the given ones.
+    """
+    return {255} <= set(seen) <= set(_MASKS[0]) - {*labels.road, *labels.ignore}
+
+
 def _as_given(
-    given: Mapping[str, tuple[int, ...]], seen: list[int], topic: str, *, by_color: bool
+    given: Mapping[str, tuple[int, ...]],
+    seen: list[int],
+    topic: str,
+    *,
+    by_color: bool,
+    several: bool,
 ) -> LabelMap:
     """Return the meaning that the settings give to road and to ignore, in this order."""
     name = _color_name if by_color else str
+    help_ = "; say with `drives` what holds for this drive alone" if several else ""
     for setting, wanted in given.items():
         for value in wanted:
             if value not in seen:
                 raise LogError(
                     f"{setting} {name(value)} does not occur in {topic}, whose frames hold "
-                    f"{_listed(map(name, seen))}"
+                    f"{_listed(map(name, seen))}{help_}"
                 )
     road, ignore = given.values()
     meaning = dict.fromkeys(road, ROAD) | dict.fromkeys(ignore, IGNORE)

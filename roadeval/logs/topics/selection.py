@@ -110,6 +110,8 @@ def settle(
     asked: TopicSettings,
     labels: LabelSettings,
     scale: float,
+    *,
+    several: bool = False,
 ) -> Selection:
     """Settle what to replay of these topics.
 
@@ -127,7 +129,7 @@ def settle(
         name: Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")
         for name, topic in asked.masks.items()
     }
-    look = partial(_label_topic, readers, image, resize=asked.resize_truth)
+    look = partial(_label_topic, readers, image, resize=asked.resize_truth, several=several)
     clock = clock_of(images)
     return Selection(
         image=image,
@@ -150,6 +152,7 @@ def _label_topic(
     labels: LabelSettings | None = None,
     *,
     resize: bool,
+    several: bool,
 ) -> LabelTopic | None:
     """Look at some images of the chosen topic: their size must fit, and their values be known."""
     topic, labels = choice.topic, labels or LabelSettings()
@@ -165,7 +168,8 @@ def _label_topic(
     for picture in _samples(readers[topic.name]):
         with suppress(BadMessage):
             seen |= seen_in(picture, labels, topic.name)
-    return LabelTopic(topic, understand(labels, seen, topic.name), choice.why)
+    meaning = understand(labels, seen, topic.name, several=several)
+    return LabelTopic(topic, meaning, choice.why)
 
 
 def _notes(truth: Choice, clock: Clock) -> tuple[str, ...]:

@@ -62,6 +62,39 @@ def test_a_given_value_that_never_occurs_is_refused(labels: LabelSettings, setti
         truth([0, 3], labels)
 
 
+def several(values: list[int], labels: LabelSettings) -> list[int]:
+    table = understand(labels, values, "/labels", several=True)
+    return table.of_values(np.array([values], np.uint8))[0].tolist()
+
+
+@pytest.mark.parametrize("values", [[0, 255], [0, 128, 255]])
+def test_labels_for_several_logs_leave_a_plain_mask_to_be_understood_by_itself(values):
+    assert several(values, LabelSettings(road=(3,), ignore=(11,))) == truth(values)
+
+
+@pytest.mark.parametrize(
+    ("values", "road", "ignore"),
+    [
+        # These may be class ids of a log without the given ones.
+        ([0, 1], 3, 11),
+        ([0, 1, 255], 3, 11),
+        ([0, 128], 3, 11),
+        ([0, 3, 255], 7, 11),
+        # Here a given value occurs, so that the values are what the settings say.
+        ([0, 255], 3, 255),
+        ([0, 128, 255], 3, 128),
+    ],
+)
+def test_what_is_not_plainly_a_mask_is_not_guessed_for_several_logs(values, road, ignore):
+    labels = LabelSettings(road=(road,), ignore=(ignore,))
+    with pytest.raises(LogError, match=r"does not occur .*; say with `drives` what holds"):
+        several(values, labels)
+
+
+def test_given_values_hold_for_a_log_in_which_they_occur_among_several():
+    assert several([0, 255], LabelSettings(road=(0,))) == [1, 0]
+
+
 def test_a_value_cannot_mean_both() -> None:
     with pytest.raises(ValidationError, match="label 3 cannot mean road and ignore"):
         LabelSettings(road=(3,), ignore=(3,))

@@ -1,0 +1,80 @@
+"""Training on several drives whose truths have values of their own."""
+
+import re
+from importlib import import_module
+
+import pytest
+
+import roadeval
+from roadeval import RoadevalError
+from tests.jobs.making import settings, write_log
+
+CODES = {"road": [3], "ignore": []}
+
+
+@pytest.fixture(scope="module")
+def drives(tmp_path_factory):
+    """Two drives with the same frames: one truth is a 0/255 mask, one holds class ids."""
+    folder = tmp_path_factory.mktemp("drives")
+    mask = write_log(folder / "mask.mcap")
+    return mask, write_log(folder / "ids.mcap", codes=(5, 3))
+
+
+def train(paths, folder, **options):
+    made = settings(train_frames=3, **options)
+    return roadeval.train(paths, folder / "m.model", made)
+
+
+def test_a_drive_may_have_labels_of_its_own(drives, tmp_path):
+    model = train(drives, tmp_path, drives=[{"path": "ids.mcap", "labels": CODES}])
+    assert model.warnings == ()
+    # Road and non-road are the same pixels in both, so either drive alone gives the same prior.
+    assert (model.prior == train(drives[:1], tmp_path).prior).all()
+
+
+def test_labels_for_all_leave_a_mask_as_it_is_and_this_is_told(drives, tmp_path):
+    own = train(drives, tmp_path, drives=[{"path": "ids.mcap", "labels": CODES}])
+    model = train(drives, tmp_path, road=[3])
+    assert (model.prior == own.prior).all()
+    assert model.warnings == (
+        "mask: none of the given labels occurs in /truth/road, which was read as a mask of 0 255: "
+        "road is 255",
+    )
+
+
+def test_labels_for_one_drive_alone_are_not_guessed_at(drives, tmp_path):
+    with pytest.raises(RoadevalError, match=r"mask.mcap: `labels.road` 3 does not occur .*0 255$"):
+        train(drives[:1], tmp_path, road=[3])
+
+
+def test_labels_of_its_own_that_do_not_occur_are_refused(drives, tmp_path):
+    wrong = [{"path": "mask.mcap", "labels": {"road": [4]}}]
+    with pytest.raises(RoadevalError, match=r"mask.mcap: `labels.road` 4 does not occur .*0 255$"):
+        train(drives, tmp_path, road=[3], drives=wrong)
+
+
+def test_settings_for_none_of_the_drives_are_refused(drives, tmp_path):
+    wrong = [{"path": "maks.mcap", "labels": CODES}]
+    with pytest.raises(
+        RoadevalError,
+        match=rf"^`drives` maks.mcap: is none of the drives {re.escape(str(drives[0]))}",
+    ):
+        train(drives, tmp_path, drives=wrong)
+
+
+def test_a_drive_may_have_a_range_of_its_own(drives, tmp_path):
+    own = {"path": "ids.mcap", "labels": CODES}
+    # Both drives show the same pictures: frames 0, 8 and 17 of each, or 0 and 1 of the second.
+    assert len(train(drives, tmp_path, drives=[own]).digests) == 3
+    few = [{**own, "frames": {"max_frames": 2}}]
+    assert len(train(drives, tmp_path, drives=few).digests) == 4
+
+
+def test_a_replay_takes_what_is_asked_of_its_drive(drives, tmp_path, monkeypatch):
+    monkeypatch.setattr(import_module("roadeval.jobs.replay"), "write_figures", lambda *given: [])
+    asked = [{"path": "ids.mcap", "labels": CODES}, {"path": "mask.mcap", "labels": {"road": [9]}}]
+    config = settings(drives=asked, record="none", max_frames=13)
+    done = roadeval.replay(drives[1], config, reports=tmp_path / "out")
+    assert done.summary["frames"]["evaluated"] == 3
+    assert done.summary["run"]["labels"]["road"] == (3,)
+    assert "drives" not in done.summary["run"]
