@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -252,22 +252,27 @@ def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
     chosen = [o for o in OPTIONS if {o.setting, o.setting.partition(".")[0]} & {*settings}]
 
     def decorate(command: Callable[..., int]) -> Callable[..., int]:
-        signature = inspect.signature(command, eval_str=True)
-        own = [each for each in signature.parameters.values() if each.name != "given"]
-        place = next((i for i, each in enumerate(own) if each.kind is each.KEYWORD_ONLY), len(own))
-
         @wraps(command)
         def run(*args: Any, **values: Any) -> int:
             given = {o.setting: _value(o, values.pop(o.argument, None)) for o in chosen}
             typed = {name: value for name, value in given.items() if value is not None}
             return command(*args, given=typed, **values)
 
-        parameters = [*own[:place], *(o.parameter() for o in chosen), *own[place:]]
-        run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
-        run.__annotations__ = {each.name: each.annotation for each in parameters}
+        signature = _with_options(inspect.signature(command, eval_str=True), chosen)
+        run.__signature__ = signature  # type: ignore[attr-defined]
+        run.__annotations__ = {each.name: each.annotation for each in signature.parameters.values()}
         return run
 
     return decorate
+
+
+def _with_options(signature: inspect.Signature, options: Iterable[Option]) -> inspect.Signature:
+    """Put options in place of ``given``: after the arguments, before a command's own options."""
+    own = [each for each in signature.parameters.values() if each.name != "given"]
+    arguments = [each for each in own if each.kind is not each.KEYWORD_ONLY]
+    others = [each for each in own if each.kind is each.KEYWORD_ONLY]
+    parameters = [*arguments, *(option.parameter() for option in options), *others]
+    return signature.replace(parameters=parameters)
 
 
 def _value(option: Option, typed: Any) -> Any:

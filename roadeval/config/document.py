@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import textwrap
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin, get_type_hints
 
 from roadeval.config.run import RunConfig
@@ -94,13 +94,17 @@ def _allowed(hint: Any) -> str:
         return f"One of {', '.join(map(str, get_args(hint)))}."
     if get_origin(hint) is not Annotated:
         return ""
-    kind, *metadata = get_args(hint)
-    bounds = [
-        text.format(getattr(each, name))
-        for constraint in metadata
-        for each in (getattr(constraint, "metadata", None) or [constraint])
-        for name, text in _BOUNDS.items()
-        if hasattr(each, name)
-    ]
-    named = _allowed(kind)
-    return " ".join(filter(None, (named, f"{', '.join(bounds).capitalize()}." if bounds else "")))
+    kind, *constraints = get_args(hint)
+    bounds = ", ".join(_bounds(constraints)).capitalize()
+    return " ".join(filter(None, (_allowed(kind), f"{bounds}." if bounds else "")))
+
+
+def _bounds(constraints: Iterable[Any]) -> Iterator[str]:
+    """Yield the bounds among a type's constraints; a pydantic field holds several."""
+    for constraint in constraints:
+        for each in getattr(constraint, "metadata", None) or [constraint]:
+            yield from (
+                text.format(getattr(each, name))
+                for name, text in _BOUNDS.items()
+                if hasattr(each, name)
+            )

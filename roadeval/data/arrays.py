@@ -29,6 +29,8 @@ Columns = npt.NDArray[np.int32]
 """``(n,)``: first columns of runs, or those after their last."""
 Places = npt.NDArray[np.int64]
 """``(n,)``: indices of something."""
+Flags = npt.NDArray[np.bool_]
+"""``(n,)``: whether something holds of each of something."""
 Parents = npt.NDArray[np.uintp]
 """``(n,)``: of each run itself, or one before it that it is connected with."""
 Sums = npt.NDArray[np.int64]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from roadeval.data.arrays import CodeTable, Matrix, Plane, Planes, Sums, Values, Vector, Words
-from roadeval.kernels.compiler import compiled, inlined
+from roadeval.kernels.compiler import compiled, inlined, part
 
 
 @compiled
@@ -29,8 +29,8 @@ def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
         for x in range(width):
             histograms[x & 3, codes[y, x]] += 1
     for code in range(256):
-        for part in range(1, 4):
-            histograms[0, code] += histograms[part, code]
+        for counter in range(1, 4):
+            histograms[0, code] += histograms[counter, code]
     return codes, histograms[0].copy()
 
 
@@ -50,13 +50,7 @@ def mahalanobis(
     linear = _linear(mean, whitening, np.float32)
     exact = _linear(mean, whitening, np.float64)
     limit = np.sqrt(greatest)
-    # A rounding is 2^-24 of a number. Each of the three components is off by six roundings of
-    # `reach`, their norm by sqrt(3) times as much, and by three more of its own: 16 are enough.
-    reach = 0.0
-    for row in range(3):
-        total = abs(whitening[row, 0]) + abs(whitening[row, 1]) + abs(whitening[row, 2])
-        reach = max(reach, 255.0 * total)
-    error = 16.0 * 2.0**-24 * (reach + limit)
+    error = _rounding(whitening, limit)
     surely, perhaps = np.float32(limit - error), np.float32(limit + error)
     for y in range(height):
         for x in range(width):
@@ -72,6 +66,20 @@ def mahalanobis(
                     r, g, b = reds[y, x], greens[y, x], blues[y, x]
                     near[y, x] = _squared(r, g, b, exact) <= greatest
     return distance, near
+
+
+@part
+def _rounding(whitening: Matrix, limit: float) -> float:
+    """Return a bound on the rounding of a distance near the limit in single precision.
+
+    A rounding is 2^-24 of a number. Each of the three components is off by six roundings of
+    ``reach``, their norm by sqrt(3) times as much, and by three more of its own: 16 are enough.
+    """
+    reach = 0.0
+    for row in range(3):
+        total = abs(whitening[row, 0]) + abs(whitening[row, 1]) + abs(whitening[row, 2])
+        reach = max(reach, 255.0 * total)
+    return 16.0 * 2.0**-24 * (reach + limit)
 
 
 @inlined

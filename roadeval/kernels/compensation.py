@@ -191,12 +191,11 @@ def _tables(runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> tuple[L
             place[k] = count
             count += 1
     tables = np.empty(768 * count, np.uint8)
-    for k in range(len(source)):
-        if place[k] >= 0:
-            for c in range(3):
-                for level in range(256):
-                    moved = _moved(level, source[k, c], target[k, c], gain[k, c])
-                    tables[768 * place[k] + 256 * c + level] = moved
+    for each in np.flatnonzero(place >= 0):
+        for entry in range(768):
+            c, level = entry // 256, entry % 256
+            moved = _moved(level, source[each, c], target[each, c], gain[each, c])
+            tables[768 * place[each] + entry] = moved
     return tables, place
 
 

@@ -21,6 +21,7 @@ def rectified_sum(
     over them, and runs the loop over the pixels in vector instructions; for that, a pixel's
     features lie at fixed distances from each other in one array.
     """
+    planes, bias, weights = _in_pairs(planes, bias, weights)
     pixels = len(features[0])
     result = np.empty(pixels, np.float32)
     block = np.zeros(len(features) * _BLOCK, np.float32)
@@ -32,7 +33,7 @@ def rectified_sum(
         for pixel in range(_BLOCK):
             total[pixel] = 0
         # Two planes at a time: a feature that is read serves both.
-        for plane in range(0, len(bias) - 1, 2):
+        for plane in range(0, len(bias), 2):
             for pixel in range(_BLOCK):
                 side, next_side = bias[plane], bias[plane + 1]
                 for feature in range(len(features)):
@@ -41,15 +42,19 @@ def rectified_sum(
                     next_side += value * planes[plane + 1, feature]
                 total[pixel] += max(side, np.float32(0)) * weights[plane]
                 total[pixel] += max(next_side, np.float32(0)) * weights[plane + 1]
-        if len(bias) % 2:
-            for pixel in range(_BLOCK):
-                side = bias[-1]
-                for feature in range(len(features)):
-                    side += block[feature * _BLOCK + pixel] * planes[-1, feature]
-                total[pixel] += max(side, np.float32(0)) * weights[-1]
         for pixel in range(size):
             result[start + pixel] = total[pixel]
     return result
+
+
+@part
+def _in_pairs(planes: Values, bias: Values, weights: Values) -> tuple[Values, Values, Values]:
+    """Return an even number of planes: what a plane of zeros adds to the sum is 0."""
+    count, even = len(bias), len(bias) + len(bias) % 2
+    all_planes = np.zeros((even, planes.shape[1]), np.float32)
+    all_bias, all_weights = np.zeros(even, np.float32), np.zeros(even, np.float32)
+    all_planes[:count], all_bias[:count], all_weights[:count] = planes, bias, weights
+    return all_planes, all_bias, all_weights
 
 
 @part

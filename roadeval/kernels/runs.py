@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from roadeval.data.arrays import Bits, Columns, Labels, Parents, Places, Plane, Runs
+from roadeval.data.arrays import Bits, Columns, Flags, Labels, Parents, Places, Plane, Runs
 from roadeval.kernels.compiler import compiled, inlined, part
 from roadeval.kernels.words import lowest
 
@@ -66,9 +66,7 @@ def keep_region(bits: Bits, width: int, patch: Plane) -> Bits:
     """See `plain.keep_region`."""
     rows, starts, ends = _runs(bits, width, True)
     parents = _joined(rows, starts, ends, 1)
-    kept = np.zeros_like(bits)
-    if not len(parents):
-        return kept
+    chosen = np.zeros(len(parents), np.bool_)
     areas = np.zeros(len(parents), np.int64)
     inside = np.zeros(len(parents), np.int64)
     for y in range(len(bits)):
@@ -78,11 +76,10 @@ def keep_region(bits: Bits, width: int, patch: Plane) -> Bits:
                 for x in range(starts[run], ends[run]):
                     inside[parents[run]] += patch[y, x] > 0
     # A component's own number is its first run's: of equals the first from the top is found.
-    best = np.uintp(np.argmax(inside) if inside.any() else np.argmax(areas))
-    for y in range(len(bits)):
-        for run in range(rows[y], rows[y + 1]):
-            if parents[run] == best:
-                _set(kept, y, starts[run], ends[run])
+    if len(parents):
+        chosen[np.argmax(inside) if inside.any() else np.argmax(areas)] = True
+    kept = np.zeros_like(bits)
+    _set_runs(kept, rows, starts, ends, chosen[parents])
     return kept
 
 
@@ -98,11 +95,17 @@ def fill_holes(bits: Bits, width: int) -> Bits:
             if y == 0 or y == height - 1 or starts[run] == 0 or ends[run] == width:
                 outside[parents[run]] = True
     filled = bits.copy()
-    for y in range(height):
-        for run in range(rows[y], rows[y + 1]):
-            if not outside[parents[run]]:
-                _set(filled, y, starts[run], ends[run])
+    _set_runs(filled, rows, starts, ends, ~outside[parents])
     return filled
+
+
+@part
+def _set_runs(bits: Bits, rows: Places, starts: Columns, ends: Columns, chosen: Flags) -> None:
+    """Set the pixels of the chosen runs."""
+    for y in range(len(bits)):
+        for run in range(rows[y], rows[y + 1]):
+            if chosen[run]:
+                _set(bits, y, starts[run], ends[run])
 
 
 @part

@@ -150,11 +150,9 @@ class Chain:
             if step.oracle is not None and truth is not None:
                 rest = self.steps[place + 1 :]
                 key = _shared(step, rest)
-                masks = known.get(key) if key else None
-                if masks is None:
-                    masks = dict(_masks(rest, view.after(step.oracle(view, truth))))
-                    known[key] = masks
-                yield step.stage.reported, masks
+                if not key or key not in known:
+                    known[key] = dict(_masks(rest, view.after(step.oracle(view, truth))))
+                yield step.stage.reported, known[key]
             view = view.after(output)
 
     def filtered(self, image: Rgb) -> Rgb:

@@ -52,28 +52,17 @@ def fit(
         If there is no frame, or if the frames show road alone or no road at all.
     """
     source, truths = _truths(frames, settings)
-    pixels = sample(truths, settings)
-    if not len(pixels.road):
-        numbers = f"{frames[0].number} to {frames[-1].number}"
-        raise TrainingError(
-            f"frames {numbers} do not show both road and non-road, so nothing can be learnt from "
-            "them; choose other frames with `frames.start` or `training.frames`, or give "
-            "`training.model`"
-        )
-    images = tuple(frame.image for frame in frames)
-    training_set = TrainingSet(
-        images, pixels.frame, pixels.row, pixels.column, pixels.road, settings.seed
-    )
+    samples = _sampled(frames, truths, settings)
     parameters, warnings = {}, []
     for name, pipeline in pipelines.items():
-        parameters[name] = _fit_variant(training_set, pipeline)
-        warnings += _collapsed(name, images, pipeline, parameters[name])
+        parameters[name] = _fit_variant(samples, pipeline)
+        warnings += _collapsed(name, samples.images, pipeline, parameters[name])
     return Model(
         parameters,
         {name: pipeline.relevant() for name, pipeline in pipelines.items()},
         source,
         frozenset(frame.digest() for frame in frames),
-        len(pixels.road),
+        len(samples.road),
         prior,
         tuple(warnings),
     )
@@ -91,6 +80,22 @@ def _truths(frames: Sequence[Frame], settings: TrainingSettings) -> tuple[str, l
             '`training.model`, or allow training.source = "patch"'
         )
     return "patch", [patch_truth(frame.image, settings) for frame in frames]
+
+
+def _sampled(
+    frames: Sequence[Frame], truths: list[Truth], settings: TrainingSettings
+) -> TrainingSet:
+    """Draw the pixels that every variant learns from."""
+    pixels = sample(truths, settings)
+    if not len(pixels.road):
+        numbers = f"{frames[0].number} to {frames[-1].number}"
+        raise TrainingError(
+            f"frames {numbers} do not show both road and non-road, so nothing can be learnt from "
+            "them; choose other frames with `frames.start` or `training.frames`, or give "
+            "`training.model`"
+        )
+    images = tuple(frame.image for frame in frames)
+    return TrainingSet(images, pixels.frame, pixels.row, pixels.column, pixels.road, settings.seed)
 
 
 def _fit_variant(training_set: TrainingSet, pipeline: Pipeline) -> dict[str, Any]:

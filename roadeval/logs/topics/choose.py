@@ -90,24 +90,23 @@ def choose_truth(
         return _asked_for(topics, asked, "`topics.truth`")
     labels = _label_topics(topics, image)
     roads = [topic for topic in labels if not words(topic.name) & SHADOW_WORDS]
-    kinds = [
-        [topic for topic in roads if topic.channels == 3 and _is_plainly_truth(topic)],
-        [topic for topic in roads if topic.channels == 1 and _is_plainly_truth(topic)],
-        [topic for topic in roads if topic.channels == 1 and _is_plain_mask(topic, image)],
-    ]
-    order = kinds if colors else [*kinds[1:], kinds[0]]
-    plain = _most_alike(next((found for found in order if found), []), image)
-    if len(plain) == 1:
-        by = "colours" if plain[0].channels == 3 else "single channel"
-        return Choice(plain[0], f"the label image, by its name and its {by}")
-    if plain:
-        raise LogError(
-            f"{len(plain)} label topics: {_names(plain)}; choose one with `topics.truth`"
-        )
+    plain = _only(_plain_truths(roads, image, colors=colors), image, "label", "`topics.truth`")
+    if plain is not None:
+        by = "colours" if plain.channels == 3 else "single channel"
+        return Choice(plain, f"the label image, by its name and its {by}")
     if roads:
         why = f"no topic is plainly road truth; `topics.truth` takes one of: {_names(roads)}"
         return Choice(None, why)
     return Choice(None, "no label topic")
+
+
+def _plain_truths(roads: Sequence[TopicInfo], image: TopicInfo, *, colors: bool) -> list[TopicInfo]:
+    """Return the topics of the first kind that there is, in the order in which kinds count."""
+    single = [topic for topic in roads if topic.channels == 1]
+    by_name = [topic for topic in single if _is_plainly_truth(topic)]
+    masks = [topic for topic in single if _is_plain_mask(topic, image)]
+    coloured = [topic for topic in roads if topic.channels == 3 and _is_plainly_truth(topic)]
+    return (coloured if colors else []) or by_name or masks or coloured
 
 
 def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None) -> Choice:
@@ -122,14 +121,10 @@ def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, asked: str | No
         return _asked_for(topics, asked, "`topics.shadow`")
     labels = _label_topics(topics, image)
     shadows = [t for t in labels if words(t.name) & SHADOW_WORDS and t.channels == 1]
-    shadows = _most_alike(shadows, image)
-    if len(shadows) == 1:
-        return Choice(shadows[0], "the shadow mask, by its name and its single channel")
-    if shadows:
-        raise LogError(
-            f"{len(shadows)} shadow topics: {_names(shadows)}; choose one with `topics.shadow`"
-        )
-    return Choice(None, "no shadow topic")
+    shadow = _only(shadows, image, "shadow", "`topics.shadow`")
+    if shadow is None:
+        return Choice(None, "no shadow topic")
+    return Choice(shadow, "the shadow mask, by its name and its single channel")
 
 
 def _asked_for(topics: Sequence[TopicInfo], name: str, setting: str) -> Choice:
@@ -192,10 +187,18 @@ def _is_plain_mask(topic: TopicInfo, image: TopicInfo) -> bool:
     return not words(topic.name) - MASK_WORDS - PLAIN_WORDS - words(image.name)
 
 
-def _most_alike(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:
-    """Those that share the most words with the image's name: its own camera's."""
+def _only(
+    topics: Sequence[TopicInfo], image: TopicInfo, what: str, setting: str
+) -> TopicInfo | None:
+    """Return the topic that shares the most words with the image's name: its own camera's.
+
+    None if there is none, a `LogError` if several share as many.
+    """
     shared = [len(words(topic.name) & words(image.name)) for topic in topics]
-    return [t for t, s in zip(topics, shared, strict=True) if s == max(shared)]
+    best = [t for t, s in zip(topics, shared, strict=True) if s == max(shared)]
+    if len(best) > 1:
+        raise LogError(f"{len(best)} {what} topics: {_names(best)}; choose one with {setting}")
+    return best[0] if best else None
 
 
 def _no_image(topics: Sequence[TopicInfo], images: Sequence[TopicInfo]) -> str:

@@ -97,9 +97,9 @@ def pack(
 def _pack_folder(
     images: Path, output: Path, masks: Path | None, rate_hz: float | None
 ) -> PackResult:
-    files = _listed(images)
-    by_image = _pair(files, _listed(masks)) if masks else {}
-    if masks and not by_image:
+    files, labels = _listed(images), _listed(masks) if masks else []
+    by_image = _pair(files, labels)
+    if labels and not by_image:
         raise LogError(f"{masks}: no mask has the name of an image in {images}")
     stamps, words = _stamps(files, rate_hz)
     with LogWriter(output) as log:
@@ -109,8 +109,8 @@ def _pack_folder(
                 data = _label(by_image[file])
                 log.image(TRUTH, stamp, data, "png", log_time_ns=stamp + LABEL_DELAY_NS)
     used = set(by_image.values())
-    lonely = [file.name for file in _listed(masks) if file not in used] if masks else []
-    unlabelled = [file.name for file in files if file not in by_image] if masks else []
+    lonely = [file.name for file in labels if file not in used]
+    unlabelled = [file.name for file in files if labels and file not in by_image]
     return PackResult(output, len(files), len(by_image), tuple(unlabelled), tuple(lonely), words)
 
 

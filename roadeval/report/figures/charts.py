@@ -126,15 +126,13 @@ def stages(totals: Totals) -> Figure:
     names = list(dict.fromkeys(s for v, own in totals.items() for s in own if v != BASELINE))
     for rate, ax in grid.items():
         for variant, look in looks(list(totals)).items():
-            own = totals[variant]
+            values = np.array([in_percent(total.get(rate)) for total in totals[variant].values()])
             if variant == BASELINE:
-                value = in_percent(next(iter(own.values())).get(rate))
-                ax.axhline(value, **look.line)
-                continue
-            places = np.array([names.index(stage) for stage in own])
-            values = np.array([in_percent(total.get(rate)) for total in own.values()])
-            ax.plot(places, values, **look.line)
-            _marks(ax, places, values, look)
+                ax.axhline(values[0], **look.line)
+            else:
+                places = np.array([names.index(stage) for stage in totals[variant]])
+                ax.plot(places, values, **look.line)
+                _marks(ax, places, values, look)
         ax.set_xticks(range(len(names)), names)
         ax.set_xlim(-0.3, len(names) - 0.7)
         if not SHORT[rate].higher_is_better:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from roadeval.report.blocks import Block, Command, Heading, KeepTogether, Table, Text, TwoColumns
-from roadeval.report.findings import Findings
+from roadeval.report.findings import Commands, Findings
 
 TABLES: Final = ("topics", "labels", "frames", "training", "evaluation")
 """Of the run's configuration, beside its stages: what can change a number."""
@@ -16,12 +16,8 @@ def section(findings: Findings) -> Iterator[Block]:
     """Yield what was run on what, and how to run it again."""
     summary = findings.summary
     yield Heading("Settings, versions, and how to reproduce this")
-    if log := summary.get("log"):
-        yield Text(f"Log: {log['path']}")
-        yield Text(f"SHA-256: {log['sha256']}")
-    if log and findings.commands and findings.commands.again:
-        yield Command(findings.commands.again(log["path"]))
-        yield Text("The same log, configuration and versions give the same numbers.", "note")
+    if summary.get("log"):
+        yield from _log(summary["log"], findings.commands)
     for topic in summary["drive"].get("topics", ()):
         yield Text(str(topic), "note")
     if findings.properties:
@@ -31,14 +27,25 @@ def section(findings: Findings) -> Iterator[Block]:
         yield Text("; ".join(f"{name}: {value}" for name, value in known.items()), "note")
     yield from _versions_and_seconds(summary)
     if summary.get("settings"):
-        run = summary["run"]
-        shared = {name: run[name] for name in TABLES if name in run}
-        first = {"preset": run["preset"]} if "preset" in run else {}
-        settings = summary["settings"].items()
-        rows = settings_rows({name: first | each | shared for name, each in settings})
-        half = -(-len(rows) // 2)
-        left, right = (_words(["setting", "value"], part) for part in (rows[:half], rows[half:]))
-        yield KeepTogether([Heading("Settings", 2), TwoColumns([left], [right])])
+        yield _settings(summary["settings"], summary["run"])
+
+
+def _log(log: Mapping[str, Any], commands: Commands | None) -> Iterator[Block]:
+    yield Text(f"Log: {log['path']}")
+    yield Text(f"SHA-256: {log['sha256']}")
+    if commands and commands.again:
+        yield Command(commands.again(log["path"]))
+        yield Text("The same log, configuration and versions give the same numbers.", "note")
+
+
+def _settings(variants: Mapping[str, Mapping[str, Any]], run: Mapping[str, Any]) -> Block:
+    """Return the variants' settings, and the run's that can change a number, in two columns."""
+    first = {"preset": run["preset"]} if "preset" in run else {}
+    shared = {name: run[name] for name in TABLES if name in run}
+    rows = settings_rows({name: {**first, **own, **shared} for name, own in variants.items()})
+    half = -(-len(rows) // 2)
+    left, right = (_words(["setting", "value"], part) for part in (rows[:half], rows[half:]))
+    return KeepTogether([Heading("Settings", 2), TwoColumns([left], [right])])
 
 
 def _versions_and_seconds(summary: Mapping[str, Any]) -> Iterator[Block]:
@@ -69,15 +76,17 @@ def settings_rows(settings: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
         By variant, nested as in a TOML file.
     """
     own = {variant: dict(flattened(each)) for variant, each in settings.items()}
-    rows = []
-    for name in dict.fromkeys(name for each in own.values() for name in each):
-        values = {variant: each[name] for variant, each in own.items() if name in each}
-        if len(set(values.values())) == 1:
-            only = "" if len(values) == len(own) else f" ({', '.join(values)} only)"
-            rows.append([name, next(iter(values.values())) + only])
-        else:
-            rows.append([name, "; ".join(f"{v}: {text}" for v, text in values.items())])
-    return rows
+    names = dict.fromkeys(name for each in own.values() for name in each)
+    return [[name, _value(name, own)] for name in names]
+
+
+def _value(name: str, own: Mapping[str, Mapping[str, str]]) -> str:
+    """Return the value that a setting has in every variant that has it, or each one's."""
+    values = {variant: each[name] for variant, each in own.items() if name in each}
+    if len(set(values.values())) > 1:
+        return "; ".join(f"{variant}: {text}" for variant, text in values.items())
+    only = "" if len(values) == len(own) else f" ({', '.join(values)} only)"
+    return next(iter(values.values())) + only
 
 
 def _as_in_toml(value: Any) -> str:
