@@ -6,12 +6,12 @@ from pathlib import Path
 
 from roadeval.jobs.outputs import AnyPath
 from roadeval.jobs.progress import OnProgress, Progress, ignore
-from roadeval.synth import DriveSettings, write_drive
+from roadeval.synth import RenderSettings, write_drive
 
 
 def demo(
     output: AnyPath,
-    settings: DriveSettings | None = None,
+    settings: RenderSettings | None = None,
     *,
     on_progress: OnProgress = ignore,
 ) -> Path:
@@ -40,15 +40,15 @@ def demo(
     Examples
     --------
     >>> import roadeval
-    >>> from roadeval.synth import DriveSettings
-    >>> log = roadeval.demo("short.mcap", DriveSettings(frames=2, width=64, height=48, seed=7))
+    >>> from roadeval.synth import RenderSettings
+    >>> log = roadeval.demo("short.mcap", RenderSettings(frames=2, width=64, height=48, seed=7))
     >>> [topic.name for topic in roadeval.info(log).topics]
     ['/camera/image', '/truth/road', '/truth/shadow']
     """
     path = Path(output)
     write_drive(
         path,
-        settings or DriveSettings(),
+        settings or RenderSettings(),
         lambda done, total: on_progress(Progress(done, total, "rendering")),
     )
     return path

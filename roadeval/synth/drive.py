@@ -39,7 +39,7 @@ class DriveError(RoadevalError):
 
 
 @dataclass(frozen=True, slots=True)
-class DriveSettings:
+class RenderSettings:
     """What to render.
 
     Parameters
@@ -110,7 +110,7 @@ class SynthFrame:
     shadow: Mask
 
 
-def render_drive(settings: DriveSettings) -> Iterator[SynthFrame]:
+def render_drive(settings: RenderSettings) -> Iterator[SynthFrame]:
     """Render the frames of a drive, in order."""
 
     def random(*purpose: int) -> np.random.Generator:
@@ -132,7 +132,7 @@ def render_drive(settings: DriveSettings) -> Iterator[SynthFrame]:
 
 
 def write_drive(
-    path: str | Path, settings: DriveSettings, progress: Callable[[int, int], None] | None = None
+    path: str | Path, settings: RenderSettings, progress: Callable[[int, int], None] | None = None
 ) -> None:
     """Render a drive into an MCAP log: a JPEG, the road's and the shadow's mask a frame.
 

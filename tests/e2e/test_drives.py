@@ -63,28 +63,6 @@ def test_a_real_drive_has_101_frames_and_10_windows(real):
     assert "101 frames read, 10 trained on, 91 evaluated in 10 windows" in replayed.run.stdout
 
 
-def test_every_variant_stage_and_the_baseline_are_in_every_table(labelled):
-    expected = {
-        *((v, s) for v in ("filtered", "unfiltered") for s in ("similarity", "svm", "post")),
-        ("blind", "post"),
-    }
-    for table in ("frames", "windows", "regions"):
-        rows = labelled.table(table)
-        assert {(row["variant"], row["stage"]) for row in rows} == expected
-    totals = labelled.summary["totals"]
-    assert {(v, s) for v, stages in totals.items() for s in stages} == expected
-
-
-def test_no_training_frame_is_in_a_table(labelled):
-    evaluated = {int(row["frame"]) for row in labelled.table("frames")}
-    assert evaluated == set(range(10, labelled.summary["frames"]["read"]))
-
-
-def test_the_counts_of_every_frame_add_up(labelled):
-    for row in labelled.table("frames"):
-        assert int(row["N"]) == sum(int(row[name]) for name in ("TP", "TN", "FP", "FN"))
-
-
 def test_the_unfiltered_pipeline_does_what_a_prototype_did(real):
     name, replayed = real
     limits = {"camvid_0016E5_15hz": 0.12, "camvid_0006R0_1hz": 0.09}

@@ -6,7 +6,7 @@ import threading
 
 import roadeval
 from roadeval.cli.app import main
-from roadeval.synth import DriveSettings, write_drive
+from roadeval.synth import RenderSettings, write_drive
 
 IMPORTS = """
 import builtins, os, signal, sys
@@ -69,7 +69,7 @@ def test_a_command_runs_in_a_thread_that_may_not_handle_signals(capsys):
 
 def test_a_run_finds_its_workers_where_the_number_of_processors_is_unknown(monkeypatch, tmp_path):
     monkeypatch.setattr("os.cpu_count", lambda: None)
-    write_drive(tmp_path / "drive.mcap", DriveSettings(frames=12, width=64, height=48))
+    write_drive(tmp_path / "drive.mcap", RenderSettings(frames=12, width=64, height=48))
     outcome = roadeval.replay(
         tmp_path / "drive.mcap",
         roadeval.configure({"output": {"record": "none"}}),

@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from roadeval.synth import DriveSettings, SynthFrame, render_drive
+from roadeval.synth import RenderSettings, SynthFrame, render_drive
 from roadeval.synth.journey import Journey
 from roadeval.synth.scene import Scene, build
 
 
 @pytest.fixture(scope="session")
-def settings() -> DriveSettings:
+def settings() -> RenderSettings:
     """As long as the drive that ships, but with fewer and smaller frames."""
-    return DriveSettings(frames=50, width=160, height=120, rate_hz=5.0)
+    return RenderSettings(frames=50, width=160, height=120, rate_hz=5.0)
 
 
 @pytest.fixture(scope="session")
-def frames(settings: DriveSettings) -> list[SynthFrame]:
+def frames(settings: RenderSettings) -> list[SynthFrame]:
     return list(render_drive(settings))
 
 

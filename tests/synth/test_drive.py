@@ -12,7 +12,7 @@ from roadeval.synth import (
     ROAD_TOPIC,
     SHADOW_TOPIC,
     DriveError,
-    DriveSettings,
+    RenderSettings,
     SynthFrame,
     render_drive,
     write_drive,
@@ -85,7 +85,7 @@ def test_the_road_moves_in_the_image(frames: list[SynthFrame]) -> None:
 
 
 def test_the_same_settings_give_the_same_bytes(
-    settings: DriveSettings, frames: list[SynthFrame]
+    settings: RenderSettings, frames: list[SynthFrame]
 ) -> None:
     for again, frame in zip(islice(render_drive(settings), 2), frames, strict=False):
         assert to_jpeg(again.image) == to_jpeg(frame.image)
@@ -100,14 +100,14 @@ def test_the_same_settings_give_the_same_bytes(
 )  # fmt: skip
 def test_a_drive_that_cannot_be_is_refused_in_one_line(wrong: dict[str, float]) -> None:
     with pytest.raises(DriveError) as refusal:
-        DriveSettings(**wrong)  # type: ignore[arg-type]
+        RenderSettings(**wrong)  # type: ignore[arg-type]
     assert "\n" not in str(refusal.value)
 
 
 @pytest.fixture(scope="module")
 def other(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[int, int]]]:
     """The log of two frames of another seed, and what was told while it was written."""
-    settings = DriveSettings(frames=2, width=160, height=120, rate_hz=10.0, seed=3)
+    settings = RenderSettings(frames=2, width=160, height=120, rate_hz=10.0, seed=3)
     path, seen = tmp_path_factory.mktemp("other") / "drive.mcap", []
     write_drive(path, settings, lambda done, of: seen.append((done, of)))
     return path, seen
@@ -145,7 +145,7 @@ def test_the_shipped_drive_is_whole_and_small() -> None:
 def test_the_shipped_drive_is_what_the_code_renders() -> None:
     """Up to what another version of a library may round differently."""
     image, road, shadow = (data for _, _, data in messages(DEMO)[:3])
-    frame = next(render_drive(DriveSettings()))
+    frame = next(render_drive(RenderSettings()))
     jpeg = decoded(to_jpeg(frame.image)).astype(int)
     assert np.abs(jpeg - decoded(image)).mean() < 1.0
     assert np.mean(decoded(road) != frame.road * 255) < 0.001

@@ -26,10 +26,10 @@ def demo(
     drive.
     """
     from roadeval.jobs.demo import demo as render
-    from roadeval.synth import DriveSettings
+    from roadeval.synth import RenderSettings
 
     with progress.watched(quiet) as watch:
-        log = render(output, DriveSettings(seed=seed), on_progress=watch)
+        log = render(output, RenderSettings(seed=seed), on_progress=watch)
     if not quiet:
         console.emit(str(log))
     return ExitCode.DONE
