@@ -3,12 +3,40 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from json import dumps
+from typing import Any, Final
 
-from pydantic import ValidationError
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from roadeval.config.errors import ConfigError
+
+PLAIN_WORDS: Final[Mapping[str, str]] = {
+    "int_": "must be a whole number",
+    "float_": "must be a number",
+    "finite_number": "must be a finite number",
+    "bool_": "must be true or false",
+    "string_": "must be text",
+    "tuple_type": "must be a list",
+    "dict_type": "must be a table",
+    "dataclass_type": "must be a table",
+    "greater_than_equal": "must be at least {ge}",
+    "greater_than": "must be above {gt}",
+    "less_than_equal": "must be at most {le}",
+    "less_than": "must be below {lt}",
+    "literal_error": "must be {expected}",
+    "too_long": "must be a list of at most {max_length}",
+    "missing": "is too short a list",
+}
+"""What is wrong with a value, by how the validating library's name of the problem begins."""
+NOT_UTF8: Final = (
+    "its bytes are not UTF-8, which no configuration can hold: choose another name, or set "
+    "PYTHONUTF8=1 where the system speaks another encoding"
+)
+QUOTED: Final = 60
+"""Letters of a wrong value that a message quotes."""
+
+_JSON: Final = TypeAdapter(dict[str, Any], config=ConfigDict(ser_json_inf_nan="constants"))
 
 
 def override(settings: Any, tables: Mapping[str, Any], table: str, where: str = "") -> Any:
@@ -36,8 +64,14 @@ def override(settings: Any, tables: Mapping[str, Any], table: str, where: str = 
         raise ConfigError(f"{begin}[{table}] must be a table")
     if not values:
         return settings
+    merged = _merged(dataclasses.asdict(settings), values)
+    for path, text in _texts(merged):
+        if not _is_utf8(text):
+            raise ConfigError(named(table, path, where) + NOT_UTF8)
     try:
-        return type(settings)(**_merged(dataclasses.asdict(settings), values))
+        # As JSON, for then a list is a tuple and a table a dataclass, but true is no number.
+        json = _JSON.dump_json(merged, fallback=str)
+        return TypeAdapter(type(settings)).validate_json(json, strict=True)
     except ValidationError as error:
         keys, message = _first(error, settings)
         raise ConfigError(named(table, keys, where) + message) from error
@@ -84,9 +118,48 @@ def _first(error: ValidationError, settings: Any) -> tuple[tuple[str | int, ...]
             settings = getattr(settings, str(part))
         names = [entry.name for entry in dataclasses.fields(settings)]
         return keys, f"there is no such setting; choose {either(names)}"
-    message = problem["msg"].removeprefix("Value error, ")
-    if not keys:
-        return keys, message
+    if problem["type"] == "value_error":
+        message = problem["msg"].removeprefix("Value error, ")
+    else:
+        message = _plainly(problem)
     given = problem["input"]
-    shown = "" if isinstance(given, Mapping) else f" (given: {given!r})"
-    return keys, f"{message[0].lower()}{message[1:]}{shown}"
+    shown = "" if not keys or isinstance(given, Mapping) else f" (given: {quoted(given)})"
+    return keys, f"{message}{shown}"
+
+
+def quoted(value: Any) -> str:
+    """Write a value as it stands in a file, and no more of it than a message can hold.
+
+    >>> quoted(True)
+    'true'
+    """
+    text = dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= QUOTED else f"{text[:QUOTED]}..."
+
+
+def _plainly(problem: Mapping[str, Any]) -> str:
+    """Say what a value must be, in other words than the validating library's."""
+    facts = problem.get("ctx", {})
+    for begin, words in PLAIN_WORDS.items():
+        if problem["type"].startswith(begin):
+            return words.format_map(facts)
+    return str(problem["msg"])
+
+
+def _texts(
+    values: Mapping[str, Any], keys: tuple[str | int, ...] = ()
+) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Yield every text in tables, with the keys that lead to it."""
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _texts(value, (*keys, key))
+        elif isinstance(value, str):
+            yield (*keys, key), value
+
+
+def _is_utf8(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True

@@ -128,8 +128,8 @@ def test_nor_with_a_model_that_a_file_names(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("--road-label 3 --road-label 70000", "--road-label, item 2: input should be less than"),
-        ("--every 0", "--every: input should be greater than or equal to 1 (given: 0)"),
+        ("--road-label 3 --road-label 70000", "--road-label, item 2: must be at most 65535"),
+        ("--every 0", "--every: must be at least 1 (given: 0)"),
         ("--ignore-label 3", "--ignore-label needs --road-label"),
     ],
 )

@@ -481,7 +481,7 @@ def test_a_scale_reduces_images_truth_and_recording_alike(drive, tmp_path, once)
 
 @pytest.mark.parametrize("scale", [0, -1, 1.01, float("nan")])
 def test_a_scale_that_is_no_share_is_refused(scale):
-    with pytest.raises(RoadevalError, match=r"`frames\.scale`: input should be"):
+    with pytest.raises(RoadevalError, match=r"`frames\.scale`: must be"):
         settings(scale=scale)
 
 
