@@ -10,11 +10,13 @@ from typing import Annotated
 
 import typer
 
-from roadeval.cli import commands, messages, signals
+from roadeval.cli import commands, console, messages, signals, streams
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import with_flags
 from roadeval.errors import RoadevalError
+from roadeval.runtime import memory
 from roadeval.runtime.discovery import found_in
+from roadeval.runtime.text import visible_lines
 
 FIRST = ("replay", "report", "inspect", "compare", "info", "train", "config", "pack", "demo")
 """The order of the commands in the help; others follow by their names."""
@@ -39,7 +41,6 @@ for _command in sorted(found_in(commands, "COMMAND"), key=_place):
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from roadeval.cli import console
         from roadeval.version import VERSION
 
         console.emit(f"{messages.PROGRAM} {VERSION}")
@@ -62,6 +63,8 @@ def _root(
     if context.invoked_subcommand is None:
         typer.echo(context.get_help(), err=True)
         raise typer.Exit(ExitCode.USAGE)
+    if problem := memory.too_few_addresses():
+        raise RoadevalError(problem)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -72,46 +75,60 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments
         Words after the program's name; those of the process if None.
     """
+    if arguments is None:
+        streams.take_over(debug=_debug())
     try:
         with signals.raised():
             code = app(args=arguments, prog_name=messages.PROGRAM, standalone_mode=False)
-            sys.stdout.flush()
+            console.flush()
             return int(code or ExitCode.DONE)
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
         return explain(error)
 
 
-def explain(error: Exception | SystemExit) -> int:
+def explain(error: BaseException) -> int:
     """Write in one line what ended the command, and return the exit code for it.
 
     With ``ROADEVAL_DEBUG=1`` in the environment the traceback stands above the line.
     """
-    if os.environ.get("ROADEVAL_DEBUG") == "1":
-        traceback.print_exception(error)
+    if _debug():
+        sys.stderr.write(visible_lines("".join(traceback.format_exception(error))))
     match error:
-        case signals.Stopped():
+        case signals.Stopped() | KeyboardInterrupt():
             messages.interrupted(_with_notes("stopped before the end", error))
-            return error.exit_code
+            return getattr(error, "exit_code", ExitCode.INTERRUPTED)
         case typer.TyperException():
             messages.error(_usage(error))
             return error.exit_code
-        case RoadevalError():
-            messages.error(with_flags(_with_notes(str(error), error)))
-            return ExitCode.FAILED
         case BrokenPipeError() | SystemExit(__context__=BrokenPipeError()):
-            _drop_stdout()
+            console.drop()
             return ExitCode.BROKEN_PIPE
+    known, sentence = _known(error)
+    messages.error(with_flags(_with_notes(sentence, error)))
+    if isinstance(error, console.OutputError):
+        console.drop()
+    return ExitCode.FAILED if known else ExitCode.DEFECT
+
+
+def _known(error: BaseException) -> tuple[bool, str]:
+    """Return whether a user can mend what an error says, and the sentence that says it."""
+    match error:
+        case RoadevalError():
+            return True, str(error)
         case OSError(strerror=str(reason)):
-            where = f": {error.filename}" if error.filename else ""
-            messages.error(_with_notes(f"{reason}{where}", error))
-            return ExitCode.FAILED
+            return True, f"{reason}: {error.filename}" if error.filename else reason
+        case _ if memory.is_lacking(error):
+            return True, memory.LACKING
         case _:
-            defect = (
-                f"{type(error).__name__}: {error} (a defect of {messages.PROGRAM}, not of your "
-                "input: run again with ROADEVAL_DEBUG=1 to see where, and please report it)"
+            what = messages.one_line(f"{type(error).__name__}: {error}")
+            return False, (
+                f"{what} (a defect of {messages.PROGRAM}, not of your input: run again with "
+                "ROADEVAL_DEBUG=1 to see where, and please report it)"
             )
-            messages.error(_with_notes(defect, error))
-            return ExitCode.DEFECT
+
+
+def _debug() -> bool:
+    return os.environ.get("ROADEVAL_DEBUG") == "1"
 
 
 def _with_notes(sentence: str, error: BaseException) -> str:
@@ -124,9 +141,5 @@ def _usage(error: typer.TyperException) -> str:
     # Where options do not go together, no single one's value is the invalid one.
     sentence = sentence.removeprefix("Invalid value: ")
     context = getattr(error, "ctx", None)
+    sentence = messages.one_line(sentence)
     return f"{sentence}; see '{context.command_path} --help'" if context else sentence
-
-
-def _drop_stdout() -> None:
-    """Send what is still buffered nowhere: the interpreter flushes stdout as it ends."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

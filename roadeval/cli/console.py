@@ -2,30 +2,40 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 import textwrap
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import IO, TYPE_CHECKING, Any, Final, TextIO, cast
+
+from roadeval.errors import RoadevalError
+from roadeval.runtime.text import visible, visible_lines
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.text import Text
 
 _PADDING: Final = re.compile(r" +((?:\x1b\[0m)?\n)")
 
 
+class OutputError(RoadevalError):
+    """Standard output cannot be written: it is closed, or on a full disk."""
+
+
 def diagnostics() -> Console:
     """Return a console on stderr, for progress, warnings and errors."""
-    from rich.console import Console
+    from roadeval.cli.terminal import Terminal
 
-    return Console(stderr=True, highlight=False, markup=False, emoji=False)
+    return Terminal()
 
 
 def results() -> Console:
     """Return a console on stdout, for what the user asked for."""
-    from rich.console import Console
+    from roadeval.cli.terminal import Terminal
 
-    out = cast("IO[str]", _Trimmed(sys.stdout))
-    return Console(file=out, highlight=False, markup=False, emoji=False)
+    return Terminal(cast("IO[str]", _Trimmed(sys.stdout)))
 
 
 class _Trimmed:
@@ -35,27 +45,57 @@ class _Trimmed:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        return self._stream.write(_PADDING.sub(r"\1", text))
+        with _explained():
+            return self._stream.write(_PADDING.sub(r"\1", text))
+
+    def flush(self) -> None:
+        with _explained():
+            self._stream.flush()
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
 
 
 def emit(text: str) -> None:
-    """Write a line to stdout as it is, however long: for machines, and for paths to copy."""
-    sys.stdout.write(f"{text}\n")
+    """Write lines to stdout, however long: for machines, and for paths to copy."""
+    with _explained():
+        sys.stdout.write(f"{visible_lines(text)}\n")
 
 
-def wrapped(sentence: str, width: int, indent: int, hang: int = 0) -> str:
+def flush() -> None:
+    """Write what waits for stdout; an `OutputError` if that fails."""
+    with _explained():
+        sys.stdout.flush()
+
+
+def drop() -> None:
+    """Send nowhere what still waits for stdout: the interpreter flushes it as it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def wrapped(sentence: str, width: int, indent: int, hang: int = 0) -> Text:
     """Wrap a sentence between words only, so that names and paths stay whole.
 
     ``indent`` is the left margin, ``hang`` what is added to it from the second line on.
     """
-    return textwrap.fill(
-        sentence,
+    from rich.text import Text
+
+    lines = textwrap.fill(
+        visible(sentence),
         width,
         initial_indent=" " * indent,
         subsequent_indent=" " * (indent + hang),
         break_long_words=False,
         break_on_hyphens=False,
     )
+    return Text(lines)
+
+
+@contextmanager
+def _explained() -> Iterator[None]:
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise OutputError(f"standard output cannot be written: {error.strerror}") from error

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from typing import Final
 
 from roadeval.cli import console
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import with_flags
+from roadeval.runtime.text import visible
 
 PROGRAM: Final = "roadeval"
 
@@ -38,12 +40,17 @@ def interrupted(sentence: object) -> None:
 
 
 def one_line(sentence: object) -> str:
-    """Join the lines of a message, so that a script can count on one line a message."""
+    """Join the lines of what a library says, so that a message is one line."""
     return " ".join(line.strip() for line in str(sentence).splitlines())
 
 
 def _write(kind: str, style: str, sentence: object) -> None:
-    from rich.text import Text
+    said = visible(str(sentence))
+    try:
+        from rich.text import Text
 
-    line = Text.assemble(f"{PROGRAM}: ", (f"{kind}:", style), " ", one_line(sentence))
-    console.diagnostics().print(line, soft_wrap=True)
+        line = Text.assemble(f"{PROGRAM}: ", (f"{kind}:", style), " ", said)
+        console.diagnostics().print(line, soft_wrap=True)
+    except (ImportError, MemoryError):
+        # Where memory is short the library does not load.
+        sys.stderr.write(f"{PROGRAM}: {kind}: {said}\n")

@@ -9,6 +9,7 @@ from typing import Any
 
 from roadeval.config.errors import ConfigError
 from roadeval.config.run import RunConfig, configure
+from roadeval.runtime.text import visible, visible_lines
 
 
 def load_config(path: str | Path, preset: str | None = None) -> RunConfig:
@@ -64,7 +65,7 @@ def run_toml(config: RunConfig, drive: str, version: str) -> str:
 
     document = tomlkit.document()
     document.add(
-        tomlkit.comment(f"The configuration of a replay of {drive} by roadeval {version}.")
+        tomlkit.comment(f"The configuration of a replay of {visible(drive)} by roadeval {version}.")
     )
     document.add(
         tomlkit.comment(
@@ -73,7 +74,7 @@ def run_toml(config: RunConfig, drive: str, version: str) -> str:
     )
     for key, value in without_none(config.as_dict()).items():
         document.add(key, value)
-    return tomlkit.dumps(document)
+    return visible_lines(tomlkit.dumps(document))
 
 
 def without_none(value: Any) -> Any:

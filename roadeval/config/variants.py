@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from roadeval.config.errors import ConfigError
 from roadeval.config.override import either, override
 from roadeval.config.presets import PRESETS
 from roadeval.config.settings import SECTIONS
-from roadeval.data import FILTERED, FINAL_STAGE, RESERVED, UNFILTERED, VariantLayout
+from roadeval.data import FILTERED, FINAL_STAGE, RESERVED, UNFILTERED, VariantLayout, is_plain
 from roadeval.pipeline.chain import STAGES, Pipeline
+
+LONGEST: Final = 64
+"""Letters of a variant's name: it is printed in the columns of tables."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +76,17 @@ def variants_of(pipeline: Pipeline, extra: Iterable[Variant]) -> tuple[Variant, 
 
 
 def check_variant_name(name: str, taken: Collection[str]) -> None:
-    """Refuse, as a `ConfigError`, a variant's name that an entity path cannot bear."""
-    if not name.replace("_", "").replace("-", "").isalnum() or not name.isascii():
-        raise ConfigError(f"variant {name!r}: a name is made of letters, digits, '-' and '_' alone")
+    """Refuse, as a `ConfigError`, a variant's name that results cannot hold, or that is taken.
+
+    A spreadsheet takes a cell that begins with ``-`` for a formula, and Matplotlib leaves what
+    begins with ``_`` out of a legend.
+    """
+    if not is_plain(name) or name[0] in "-_" or len(name) > LONGEST:
+        shown = name if len(name) <= LONGEST else f"{name[:LONGEST]}..."
+        raise ConfigError(
+            f"variant {shown!r}: a name is made of letters, digits, '-' and '_' alone, begins with "
+            f"a letter or a digit, and has at most {LONGEST} of them"
+        )
     if name in RESERVED:
         raise ConfigError(f"variant {name!r}: the name is reserved ({either(RESERVED)})")
     if name in taken:

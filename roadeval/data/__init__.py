@@ -17,7 +17,15 @@ from roadeval.data.layer import (
     LayerSpec,
     mask_spec,
 )
-from roadeval.data.names import BASELINE, CAMERA, FILTERED, FINAL_STAGE, RESERVED, UNFILTERED
+from roadeval.data.names import (
+    BASELINE,
+    CAMERA,
+    FILTERED,
+    FINAL_STAGE,
+    RESERVED,
+    UNFILTERED,
+    is_plain,
+)
 from roadeval.data.packed import Packed, TruthBits, everywhere, ones, pack, unpack
 from roadeval.data.result import (
     FrameResult,
@@ -63,6 +71,7 @@ __all__ = [
     "VariantLayout",
     "VariantResult",
     "everywhere",
+    "is_plain",
     "mask_spec",
     "ones",
     "pack",

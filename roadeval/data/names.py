@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Final
 
 CAMERA: Final = "camera"
@@ -20,3 +21,13 @@ RESERVED: Final = frozenset(
     }
 )
 """Names that no variant may bear: the tables or the recording use them for something else."""
+
+_PLAIN: Final = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def is_plain(name: str) -> bool:
+    """Return whether a name of a variant, stage or region is one that results can hold.
+
+    It is a column's cell, a part of a path in the recording, and a word in figures and tables.
+    """
+    return _PLAIN.fullmatch(name) is not None

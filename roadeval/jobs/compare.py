@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +19,8 @@ from roadeval.report.comparison import document, markdown
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.lines import window_rows
 from roadeval.results.reading import table_of
-from roadeval.results.summary import plain
+from roadeval.results.summary import json_text, plain
+from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -147,7 +147,7 @@ def writer(path: Path) -> Callable[[Compared, Paper], bytes]:
 
 def as_json(compared: Compared) -> str:
     """Write a comparison as JSON; undefined numbers become null."""
-    return json.dumps(plain(compared.content), indent=2, ensure_ascii=False) + "\n"
+    return json_text(plain(compared.content))
 
 
 def _asked(summary: Mapping[str, Any]) -> dict[str, Any]:
@@ -179,11 +179,11 @@ def _chosen(opened: Result, variants: Sequence[str] | None) -> pd.DataFrame:
 
 def _labels(paths: Sequence[Path]) -> list[str]:
     """Call each result by its file's name, or where that is not its own by its whole path."""
-    stems = [path.stem or str(path) for path in paths]
+    stems = [visible(path.stem or str(path)) for path in paths]
     counted = Counter(stems)
     labels: list[str] = []
     for stem, path in zip(stems, paths, strict=True):
-        label = stem if counted[stem] == 1 else str(path)
+        label = stem if counted[stem] == 1 else visible(str(path))
         labels.append(f"{label} ({labels.count(label) + 1})" if label in labels else label)
     return labels
 

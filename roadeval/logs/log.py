@@ -25,6 +25,7 @@ from roadeval.logs.times import NS
 from roadeval.logs.topics.description import TopicInfo, describe_topic
 from roadeval.logs.topics.reader import topic_readers
 from roadeval.logs.topics.selection import Selection, settle
+from roadeval.runtime.text import visible
 
 
 def open_log(path: str | Path, *, keep_corrupt: bool = False) -> Log:
@@ -56,7 +57,7 @@ class Log:
     Attributes
     ----------
     path, name
-        Where it lies, and its name without folder and suffix.
+        Where it lies, and its name without folder and suffix, fit to be shown.
     topics
         Every topic, by name.
     damage
@@ -74,7 +75,7 @@ class Log:
         keep_corrupt: bool = False,
     ) -> None:
         self.path = path
-        self.name = path.stem if path.is_file() else path.resolve().name
+        self.name = visible(path.stem if path.is_file() else path.resolve().name)
         self._lost_files = damage
         self._containers = [
             Container(f, _is_image, message_is_whole, keep_corrupt=keep_corrupt) for f in files

@@ -17,6 +17,7 @@ from roadeval.data import (
     LayerKind,
     LayerSpec,
     VariantLayout,
+    is_plain,
 )
 from roadeval.data.colours import CLEAR, SHADOW, with_opacity
 from roadeval.data.layer import IGNORED_CLASS
@@ -102,10 +103,10 @@ class Layout:
 
     def __post_init__(self) -> None:
         for variant in self.variants:
-            if variant.name in RESERVED:
+            if variant.name in RESERVED or not is_plain(variant.name):
                 raise RecordingError(
-                    f"a variant cannot be named {variant.name!r}: "
-                    "the recording uses that name itself; choose another"
+                    f"a variant cannot be named {variant.name!r}: the recording uses that name "
+                    "itself, or no path in it can hold it; choose another"
                 )
 
     def images(self) -> Iterator[tuple[str, LayerSpec]]:

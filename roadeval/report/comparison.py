@@ -14,8 +14,8 @@ from roadeval.report.figures.charts import forest, levels
 from roadeval.report.figures.fig3a_error_rate import FIGURE
 from roadeval.report.figures.figure import FigureData
 from roadeval.report.figures.files import svg, svg_of
-from roadeval.report.markdown import escaped
 from roadeval.report.markdown import table as markdown_table
+from roadeval.runtime.text import as_markdown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,14 +63,15 @@ def document(
 
 def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     """Return a comparison as Markdown."""
-    lines = ["# roadeval comparison", "", escaped(headline(comparison)), ""]
+    lines = ["# roadeval comparison", "", as_markdown(headline(comparison)), ""]
     lines += [
-        f"- {'**FAIL**' if each.holds else 'ok'}: {escaped(each.sentence)}" for each in judgements
+        f"- {'**FAIL**' if each.holds else 'ok'}: {as_markdown(each.sentence)}"
+        for each in judgements
     ]
     lines += ["", *markdown_table(_rates_table(comparison)), ""]
     if comparison.moved:
         lines += ["Frames that changed most:", "", *markdown_table(_moved_table(comparison)), ""]
-    lines += [f"- {escaped(warning)}" for warning in comparison.warnings]
+    lines += [f"- {as_markdown(warning)}" for warning in comparison.warnings]
     lines += ["", _unit(comparison)]
     return "\n".join(lines).rstrip() + "\n"
 

@@ -8,6 +8,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from roadeval.data import is_plain
 from roadeval.errors import RoadevalError
 from roadeval.results.lines import Row
 from roadeval.results.schema import TABLES, Kind, TableSchema
@@ -23,6 +24,9 @@ TYPES: Final = {
     Kind.RATE: "float64",
 }
 """Each kind's type in Arrow."""
+
+NAMED: Final = 40
+"""Letters of a wrong name that a message quotes."""
 
 
 class ResultsError(RoadevalError):
@@ -124,6 +128,10 @@ def _parsed(content: bytes, table: TableSchema) -> pa.Table:
     lacking = [column for column in table.columns if column.name not in parsed.column_names]
     if missing := [column.name for column in lacking if column.kind is not Kind.RATE]:
         raise ValueError(f"no column {', '.join(missing)}")
+    for column in table.columns:
+        names = parsed[column.name].unique().to_pylist() if column.kind is Kind.NAME else ()
+        if strange := [name for name in names if not is_plain(name)]:
+            raise ValueError(f"column {column.name} holds {strange[0][:NAMED]!r}, which is no name")
     for column in lacking:
         parsed = parsed.append_column(column.name, pa.nulls(len(parsed), pa.float64()))
     return parsed

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from roadeval.results.reading import ResultsError
+from roadeval.runtime.text import visible_lines
 
 FORMAT: Final = {"name": "roadeval-summary", "version": 2}
 SUMMARY: Final = "summary.json"
@@ -55,7 +56,7 @@ def summary_text(parts: Mapping[str, Any]) -> str:
     if wrong := (document.keys() ^ set(PARTS)) - (LATER - document.keys()):
         raise ValueError(f"summary: unknown or missing {sorted(wrong)}")
     ordered = {name: plain(document[name]) for name in PARTS if name in document}
-    return json.dumps(ordered, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json_text(ordered)
 
 
 def read_summary(path: Path) -> dict[str, Any]:
@@ -123,6 +124,11 @@ def _of_version_1(summary: Mapping[str, Any]) -> dict[str, Any]:
         run.setdefault("preset", own.get("preset"))
     rest = {key: value for key, value in summary.items() if key != "selection"}
     return {**rest, "format": FORMAT, "run": run, "settings": settings}
+
+
+def json_text(value: Any) -> str:
+    """Write what JSON has as a document of it; what cannot be seen in a text is escaped."""
+    return visible_lines(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
 
 
 def plain(value: Any) -> Any:

@@ -1,1 +1,1 @@
-"""The machine: threads, files and memory. Knows nothing of the domain."""
+"""The machine: threads, files, memory, text from elsewhere. Knows nothing of the domain."""

@@ -3,7 +3,7 @@
 import pytest
 from rich.table import Table
 
-from roadeval.cli import console
+from roadeval.cli import console, messages
 
 
 @pytest.fixture
@@ -39,3 +39,32 @@ def test_nor_is_a_bold_line_of_a_terminal(shown, monkeypatch):
 
 def test_spaces_inside_a_line_and_before_it_stay(shown):
     assert shown("  a   b") == ["  a   b", ""]
+
+
+HOSTILE = "\x1b[2Ja\nb\u202e"
+ESCAPED = r"\u001b[2Ja\nb\u202e"
+
+
+def test_text_from_elsewhere_is_escaped_wherever_it_stands(shown, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    table = Table(title=HOSTILE, caption=HOSTILE)
+    table.add_column(HOSTILE)
+    table.add_row(HOSTILE)
+    lines = shown(table)
+    assert sum(ESCAPED in line for line in lines) == 4
+    assert ESCAPED in shown(HOSTILE)
+    assert shown(console.wrapped(f"one {HOSTILE}", 80, 2)) == [f"  one {ESCAPED}", ""]
+    assert all(line.isprintable() for line in lines)
+
+
+@pytest.mark.parametrize("columns", ["0", "1", "-5", "abc", "999999999999"])
+def test_a_width_that_no_terminal_has_is_no_width(columns, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", columns)
+    messages.warning("beware")
+    console.results().print("a line of some words")
+    assert capsys.readouterr() == ("a line of some words\n", "roadeval: warning: beware\n")
+
+
+def test_a_line_for_machines_is_escaped_too(capsys):
+    console.emit(f'["{HOSTILE}"]')
+    assert capsys.readouterr().out == '["\\u001b[2Ja\nb\\u202e"]\n'

@@ -21,7 +21,7 @@ def lines(capsys):
 
 
 def test_a_known_problem_is_one_line_and_exit_code_1(capsys):
-    assert explain(RoadevalError("drive.mcap:\n  no image topic")) == 1
+    assert explain(RoadevalError("drive.mcap: no image topic")) == 1
     assert lines(capsys) == ["roadeval: error: drive.mcap: no image topic"]
 
 
@@ -104,3 +104,46 @@ def test_a_reader_of_stdout_who_has_gone_is_no_error(length, monkeypatch):
         run.stdout.close()
         assert run.stderr.read() == b""
     assert run.returncode == ExitCode.BROKEN_PIPE
+
+
+def test_text_from_elsewhere_cannot_fake_a_line(capsys):
+    explain(RoadevalError("/cam\x1b[2K\r\nroadeval: done: no image"))
+    assert lines(capsys) == [r"roadeval: error: /cam\u001b[2K\r\nroadeval: done: no image"]
+
+
+def test_nor_can_it_in_a_traceback(capsys, monkeypatch):
+    monkeypatch.setenv("ROADEVAL_DEBUG", "1")
+    explain(KeyError("a\x1b[2K"))
+    assert "\x1b" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "error", [MemoryError("std::bad_alloc"), ImportError("failed to map segment")]
+)
+def test_too_little_memory_is_a_known_problem(error, capsys):
+    assert explain(error) == 1
+    assert lines(capsys) == [
+        "roadeval: error: not enough memory: give it more, or let it take less, by fewer --jobs "
+        "or a smaller --scale"
+    ]
+
+
+def test_a_message_comes_through_where_no_library_can_be_loaded(capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rich.text", None)
+    assert explain(MemoryError()) == 1
+    assert lines(capsys)[0].startswith("roadeval: error: not enough memory")
+
+
+def test_what_is_no_exception_to_python_is_explained_too(capsys, monkeypatch):
+    def panics(**_):
+        raise type("PanicException", (BaseException,), {})("index out of bounds")
+
+    monkeypatch.setattr(cli, "app", panics)
+    assert main([]) == 70
+    assert lines(capsys)[0].startswith("roadeval: error: PanicException: index out of bounds (a")
+
+
+def test_a_limit_of_addresses_that_stops_every_run_is_a_known_problem(capsys, monkeypatch):
+    monkeypatch.setattr("resource.getrlimit", lambda what: (1_000_000_000, -1))
+    assert main(["info", "drive.mcap"]) == 1
+    assert "address space is limited to 1.0 GB" in capsys.readouterr().err

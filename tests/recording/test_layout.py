@@ -37,8 +37,8 @@ def test_a_layout_survives_its_json():
     assert Layout.from_json(whole.to_json()) == whole
 
 
-@pytest.mark.parametrize("name", sorted(RESERVED))
-def test_a_variant_cannot_take_a_name_that_the_recording_uses(name):
+@pytest.mark.parametrize("name", [*sorted(RESERVED), "../x", "a b", "", "größe"])
+def test_a_variant_cannot_take_a_name_that_the_recording_uses_or_cannot_hold(name):
     variant = type(VARIANT)(name, "", ("post",), VARIANT.layers)
     with pytest.raises(RecordingError, match=f"named '{name}'"):
         layout(variants=(variant,))

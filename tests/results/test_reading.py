@@ -95,3 +95,14 @@ def test_text_that_is_not_the_summarys_is_refused_and_named():
     assert len(read_table("oracles", text, summary)) == 2
     with pytest.raises(ResultsError, match=r"^the recording's table oracles: .* \(1 of 2 rows\)"):
         read_table("oracles", HEADER + line(1), summary)
+
+
+@pytest.mark.parametrize("name", ["=cmd()", "../../x", "a b", "$x$", "\x1b[2J", "größe", "n,et"])
+def test_a_name_that_no_result_can_hold_is_damage(name):
+    with pytest.raises(ResultsError, match="damaged"):
+        read_table("oracles", HEADER + line() + line(variant=name))
+
+
+def test_a_long_one_is_quoted_in_part():
+    with pytest.raises(ResultsError, match=r"column variant holds '\+{40}', which is no name"):
+        read_table("oracles", HEADER + line(variant="+" * 10_000))

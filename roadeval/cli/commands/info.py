@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from json import dumps
 from typing import Final
 
 from roadeval.cli import arguments, console, messages
@@ -19,10 +18,11 @@ def info(drive: arguments.Drive, *, given: Given, json: arguments.Json = False) 
     config = arguments.configuration(given)
     from roadeval.cli.screens import info as screen
     from roadeval.jobs.info import info as describe
+    from roadeval.results.summary import json_text
 
     found = describe(drive, config)
     if json:
-        console.emit(dumps(found.as_dict(), indent=2, ensure_ascii=False))
+        console.emit(json_text(found.as_dict()).rstrip())
     else:
         screen.show(found.as_dict(), console.results())
     for damage in found.damage:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -81,10 +80,9 @@ def _list(found: list[WorstFrame], *, as_json: bool) -> None:
     from roadeval.cli.screens import inspect as screen
 
     if as_json:
-        from roadeval.results.summary import plain
+        from roadeval.results.summary import json_text, plain
 
-        listed = plain([asdict(each) for each in found])
-        console.emit(dumps(listed, indent=2, ensure_ascii=False, allow_nan=False))
+        console.emit(json_text(plain([asdict(each) for each in found])).rstrip())
     else:
         screen.show(found, console.results())
 

@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING, Any
 from roadeval.cli import console
 from roadeval.cli.options import with_flags
 from roadeval.data.words import timestamp
+from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
 NS = 1_000_000_000
+NAME = 50
+"""Letters of a topic's name that stand in a line, at most."""
 
 
 def show(found: Mapping[str, Any], out: Console) -> None:
@@ -51,7 +54,8 @@ def _topics(topics: list[dict[str, Any]]) -> RenderableType:
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    table.add_column("topic", no_wrap=True)
+    longest = max((len(visible(topic["name"])) for topic in topics), default=0)
+    table.add_column("topic", overflow="fold", min_width=min(longest, NAME), max_width=NAME)
     table.add_column("carries", overflow="fold")
     for name in ("size", "messages", "rate"):
         table.add_column(name, justify="right", no_wrap=True)

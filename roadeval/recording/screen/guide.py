@@ -9,6 +9,7 @@ from roadeval.data import VariantLayout
 from roadeval.data.words import percent
 from roadeval.evaluation.metrics import SHORT
 from roadeval.recording.layout import Layout
+from roadeval.runtime.text import as_markdown
 
 _ERRORS: Final = """\
 **Errors:** *green* road found, *orange* non-road called road (FP), *purple* road missed (FN),
@@ -33,20 +34,22 @@ _HANDLING: Final = """\
 def text(layout: Layout, verdict: str = "") -> str:
     """Return the guide to the first tab, after the verdict on the drive if there is one yet."""
     parts = [_ERRORS, _ROWS, _CURVES] if layout.has_truth else [_NO_TRUTH, _ROWS]
-    return "\n".join([f"### {layout.drive}", "", verdict, "", *parts, _HANDLING])
+    return "\n".join(
+        [f"### {as_markdown(layout.drive)}", "", as_markdown(verdict), "", *parts, _HANDLING]
+    )
 
 
 def variant(layout: VariantLayout) -> str:
     """Return the introduction of a variant."""
-    return f"### {layout.name}\n\n{layout.title}\n"
+    return f"### {as_markdown(layout.name)}\n\n{as_markdown(layout.title)}\n"
 
 
 def overview(layout: Layout, summary: Mapping[str, Any]) -> str:
     """Return the results for people, from the content of ``summary.json``."""
     return "\n".join(
         [
-            f"# {layout.drive}",
-            *("", str(summary.get("verdict", ""))),
+            f"# {as_markdown(layout.drive)}",
+            *("", as_markdown(str(summary.get("verdict", "")))),
             *_list("Warnings", summary.get("warnings", ())),
             *_list("Lost", summary.get("losses", ())),
             *_table(summary.get("totals", {})),
@@ -70,7 +73,7 @@ def _table(totals: Mapping[str, Any]) -> Iterator[str]:
         yield f"|---|---|{'---|' * len(titles)}"
     for variant, stage, total in rows:
         cells = (percent(total.get(name)) for name in titles)
-        yield f"| {' | '.join([variant, stage, *cells])} |"
+        yield f"| {' | '.join([as_markdown(variant), stage, *cells])} |"
 
 
 def _accounts(frames: Mapping[str, Any]) -> Iterator[str]:
@@ -82,5 +85,5 @@ def _accounts(frames: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _list(title: str, items: Any) -> list[str]:
-    lines = [f"- {item}" for item in items]
+    lines = [f"- {as_markdown(item)}" for item in items]
     return ["", f"## {title}", "", *lines] if lines else []

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, colours
+from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,6 +35,7 @@ RC: Final[dict[str, Any]] = {
     "pdf.fonttype": 42,
     "svg.fonttype": "none",
     "svg.hashsalt": "roadeval",
+    "text.parse_math": False,  # a dollar in a name is no formula
     "savefig.facecolor": "white",
 }
 """Matplotlib's settings for every figure; fonts go into a PDF as TrueType."""
@@ -116,5 +118,7 @@ def looks(variants: Sequence[str]) -> dict[str, Look]:
 def heading(figure: Figure, title: str, subtitle: str) -> None:
     """Write a figure's title and, smaller, what it shows, into its topmost half inch."""
     height = figure.get_figheight()
-    figure.text(0.012, 1 - 0.10 / height, title, size=11, weight="bold", color=INK, va="top")
+    figure.text(
+        0.012, 1 - 0.10 / height, visible(title), size=11, weight="bold", color=INK, va="top"
+    )
     figure.text(0.012, 1 - 0.32 / height, subtitle, size=8.5, color=FAINT, va="top")

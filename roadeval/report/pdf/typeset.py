@@ -10,7 +10,6 @@ become markup, and nothing is fetched from anywhere.
 from __future__ import annotations
 
 import json
-import re
 from enum import StrEnum
 from importlib.resources import files
 from pathlib import Path
@@ -21,9 +20,9 @@ from roadeval.data import colours
 from roadeval.errors import RoadevalError
 from roadeval.report.blocks import Document
 from roadeval.runtime.files import put
+from roadeval.runtime.text import visible
 
 _TEMPLATE: Final = "document.typ"
-_CONTROL: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 
 
 class Paper(StrEnum):
@@ -53,7 +52,7 @@ def pdf(document: Document, paper: Paper = Paper.A4) -> bytes:
     import typst
 
     page = {"paper": _TYPST_NAMES[paper], "colours": _COLOURS}
-    data = _printable(document.as_json() | page)
+    data = _visible(document.as_json() | page)
     sources = {
         _TEMPLATE: files("roadeval.report.pdf").joinpath(_TEMPLATE).read_bytes(),
         "document.json": json.dumps(data).encode(),
@@ -95,14 +94,14 @@ def _font_folder() -> str:
     return str(Path(get_data_path(), "fonts", "ttf"))
 
 
-def _printable(value: Any) -> Any:
-    """Return a value without control characters and lone surrogates, which no font has."""
+def _visible(value: Any) -> Any:
+    """Return a value with every text in it as `roadeval.runtime.text.visible` returns it."""
     match value:
         case str():
-            return _CONTROL.sub("", value.encode("utf-8", "replace").decode())
+            return visible(value)
         case dict():
-            return {key: _printable(item) for key, item in value.items()}
+            return {key: _visible(item) for key, item in value.items()}
         case list():
-            return [_printable(item) for item in value]
+            return [_visible(item) for item in value]
         case _:
             return value

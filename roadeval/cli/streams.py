@@ -1,0 +1,83 @@
+"""The three streams of the process, made fit before anything is written to them."""
+
+from __future__ import annotations
+
+import faulthandler
+import logging
+import os
+import sys
+import warnings
+from io import BufferedWriter, FileIO, TextIOWrapper
+from typing import Any, Final
+
+from roadeval.runtime.text import UNENCODABLE
+
+MISLEADING: Final = ("MPLBACKEND", "RERUN")
+"""Variables for programs that draw on a screen or show what they log to a viewer as an aside. Here
+they would only stop the figures and the recording."""
+
+
+def take_over(*, debug: bool) -> None:
+    """Make the streams of this process fit, and keep other libraries off them.
+
+    What C libraries, Rerun and Python's warnings say on their own is dropped: the rooms know what
+    of it concerns the user, and where. Only what kills the process is written as it comes.
+
+    Parameters
+    ----------
+    debug
+        Whether to let everything through.
+    """
+    _fill_closed()
+    sys.stderr = _stderr(os.dup(2))
+    if not debug:
+        _close_to_libraries()
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors=UNENCODABLE)
+    for name in MISLEADING:
+        os.environ.pop(name, None)
+
+
+def _fill_closed() -> None:
+    """Open what the process was started without, so that no file of ours takes its number.
+
+    Writing to standard output then still fails, as it should.
+    """
+    for number, flags in ((0, os.O_RDONLY), (1, os.O_RDONLY), (2, os.O_WRONLY)):
+        try:
+            os.fstat(number)
+        except OSError:
+            opened = os.open(os.devnull, flags)
+            if opened != number:
+                os.dup2(opened, number)
+                os.close(opened)
+    if sys.stdout is None:
+        sys.stdout = os.fdopen(1, "w", closefd=False)
+
+
+def _stderr(number: int) -> TextIOWrapper:
+    """Return standard error as a text stream, under a number of its own."""
+    encoding = sys.stderr.encoding if sys.stderr else None
+    buffered = BufferedWriter(_Lossy(number, "w"))
+    return TextIOWrapper(buffered, encoding, errors=UNENCODABLE, line_buffering=True)
+
+
+class _Lossy(FileIO):
+    """A file that accepts what it cannot write: that nobody listens must not stop the work."""
+
+    def write(self, content: Any) -> int:
+        try:
+            return super().write(content)
+        except OSError:
+            return len(content)
+
+
+def _close_to_libraries() -> None:
+    """Let nothing through but what this program itself says, and the reason of a crash."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    os.close(nowhere)
+    faulthandler.enable(sys.stderr, all_threads=False)
+    logging.disable()
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")

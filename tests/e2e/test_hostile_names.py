@@ -1,0 +1,138 @@
+"""Names from a log, a file or a command line reach no output as they are.
+
+They hold what terminals, Typst, Markdown, Matplotlib, spreadsheets and TOML act upon, and are long,
+empty, or not UTF-8.
+"""
+
+import json
+import re
+import tomllib
+
+import cv2
+import numpy as np
+import pytest
+from pypdf import PdfReader
+
+from roadeval import Recording
+from roadeval.logs import LogWriter
+from roadeval.runtime.text import as_markdown, visible
+from tests.e2e.commands import here
+from tests.jobs.making import NS
+from tests.training.making import frame
+
+ESCAPES = "\x1b[2J\x1b]0;owned\x07\r\nroadeval: error: fake\x9b31m\N{RIGHT-TO-LEFT OVERRIDE}"
+MARKUP = '$x_{1$ #panic() [red]b[/] **c** `d.e` =cmd() <b> | "\\u0041" @team ../../f'
+CAMERA = f"/cam {ESCAPES}{MARKUP}{'y' * 10_000}"
+TRUTH = f"/truth/road {ESCAPES}{MARKUP}"
+MASKS = f"/net/road_mask {ESCAPES}"
+DRIVE = f"a {ESCAPES}".replace("/", "") + "$x_{1$ #panic() [red] =cmd() caf\udce9"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a log full of such names, under such a name."""
+    folder = tmp_path_factory.mktemp("hostile")
+    with LogWriter(folder / "plain.mcap") as log:
+        for number in range(14):
+            made, stamp = frame(number), (number + 1) * NS
+            png = cv2.imencode(".png", made.image[..., ::-1])[1].tobytes()
+            log.image(CAMERA, stamp, png, "png")
+            log.image("", stamp, png, "png")
+            log.mask(TRUTH, stamp, made.truth * 255)
+            log.mask(MASKS, stamp, np.roll(made.truth, number, 1) * 255)
+    (folder / "plain.mcap").rename(folder / f"{DRIVE}.mcap")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def told(folder):
+    """What every command says on stdout and stderr, by its words."""
+    topics = ("--image-topic", CAMERA, "--mask-topic", f"net={MASKS}")
+    name = visible(DRIVE)
+    commands = {
+        "info": ("info", f"{DRIVE}.mcap", *topics),
+        "which": ("info", f"{DRIVE}.mcap"),
+        "no topic": ("replay", f"{DRIVE}.mcap", "--image-topic", f"/none{ESCAPES}"),
+        "info --json": ("info", f"{DRIVE}.mcap", *topics, "--json"),
+        "replay": ("replay", f"{DRIVE}.mcap", *topics, "--train-frames", 2),
+        "inspect": ("inspect", f"recordings/{name}.rrd", "--list"),
+        "inspect --json": ("inspect", f"reports/{name}", "--list", "--json"),
+        "report": ("report", f"reports/{name}"),
+        "compare": (
+            *("compare", f"recordings/{name}.rrd", f"reports/{name}"),
+            *("-o", "two.md", "-o", "two.pdf", "-o", "two.json"),
+        ),
+        "config": ("config", *topics),
+        "config of a run": ("config", "--config", f"reports/{name}/run.toml"),
+        "none": ("inspect", f"none{ESCAPES}.rrd"),
+        "usage": ("inspect", f"none{ESCAPES}", f"more{ESCAPES}"),
+    }
+    return {name: here(*words, cwd=folder) for name, words in commands.items()}
+
+
+def test_every_command_does_what_it_does_for_other_names(told):
+    codes = {name: done.returncode for name, done in told.items() if done.returncode}
+    assert codes == {"no topic": 1, "none": 1, "usage": 2}
+
+
+def test_what_they_say_is_lines_of_visible_text(told):
+    for done in told.values():
+        for line in (done.stdout + done.stderr).split("\n"):
+            assert line == visible(line)
+    assert "\nroadeval: error: fake" not in "".join(d.stdout + d.stderr for d in told.values())
+
+
+def test_json_holds_the_names_themselves(told, folder):
+    found = json.loads(told["info --json"].stdout)
+    assert {topic["name"] for topic in found["topics"]} == {"", CAMERA, TRUTH, MASKS}
+    summary = json.loads((folder / "reports" / visible(DRIVE) / "summary.json").read_text())
+    assert summary["run"]["topics"]["image"] == CAMERA
+    assert summary["log"]["path"] == f"{DRIVE}.mcap"
+
+
+def test_the_results_are_files_of_visible_text_in_the_folders_they_belong_to(told, folder):
+    made = [path.relative_to(folder) for path in folder.rglob("*")]
+    assert {path.parts[0] for path in made} == {
+        *("recordings", "reports", f"{DRIVE}.mcap", "two.md", "two.pdf", "two.json"),
+    }
+    texts = [path for path in made if path.suffix in (".csv", ".json", ".toml", ".md")]
+    assert len(texts) >= 8
+    for path in texts:
+        for line in (folder / path).read_text(encoding="utf-8").rstrip("\n").split("\n"):
+            assert line == visible(line)
+
+
+def test_the_configuration_of_the_run_is_read_back(told, folder):
+    text = (folder / "reports" / visible(DRIVE) / "run.toml").read_text(encoding="utf-8")
+    assert tomllib.loads(text)["topics"]["image"] == CAMERA
+    assert tomllib.loads(told["config"].stdout)["topics"]["masks"] == {"net": MASKS}
+
+
+def test_figures_and_reports_show_the_drive_escaped(told, folder):
+    for name in ("fig3a_error_rate.pdf", "report.pdf"):
+        page = PdfReader(folder / "reports" / visible(DRIVE) / name).pages[0].extract_text()
+        assert visible(DRIVE).replace(" ", "") in re.sub(r"\s|\u200b", "", page)
+
+
+def test_markdown_shows_the_names_and_no_markup(told, folder):
+    label = f"recordings/{visible(DRIVE)}.rrd"
+    assert as_markdown(f"Against {label}: ") in (folder / "two.md").read_text(encoding="utf-8")
+
+
+def test_the_viewers_texts_show_them_too(told, folder):
+    recording = Recording(folder / "recordings" / f"{visible(DRIVE)}.rrd")
+    guide, overview = recording.result("guide"), recording.result("overview")
+    assert guide.startswith(f"### {as_markdown(visible(DRIVE))}\n")
+    assert as_markdown(CAMERA) in overview
+    assert f"mask in {as_markdown(MASKS)}" in recording.result("guide/net")
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["@cmd()", "../../x", "-1+1", "@x", "a b", "a\nb", "\x1b[2J", "n" * 10_000, "größe", "$x$"],
+)
+def test_a_variant_cannot_have_such_a_name(name, tmp_path):
+    done = here("config", "--mask-topic", f"{name}=/net")
+    assert done.returncode == 2
+    assert "a name is made of letters" in done.stderr
+    assert len(done.stderr) < 400

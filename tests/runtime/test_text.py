@@ -1,0 +1,72 @@
+"""Text from elsewhere: nothing in it can act, and what it says stays readable."""
+
+import json
+import tomllib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roadeval.runtime.text import UNENCODABLE, as_markdown, visible, visible_lines
+
+ANYTHING = st.text(st.characters(codec=None))
+
+
+@pytest.mark.parametrize(
+    "plain",
+    ["", "/camera/image", "größe", "道路.mcap", "a b\N{NO-BREAK SPACE}c", "50 % \N{MINUS SIGN}3"],
+)
+def test_what_can_be_seen_stays_as_it_is(plain):
+    assert visible(plain) == plain
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("\x1b[31mred\x07", r"\u001b[31mred\u0007"),
+        ("a\r\nroadeval: done", r"a\r\nroadeval: done"),
+        ("\x9b2J\x7f", r"\u009b2J\u007f"),
+        ("gpj.\N{RIGHT-TO-LEFT OVERRIDE}mca", r"gpj.\u202emca"),
+        ("\N{RIGHT-TO-LEFT ISOLATE}\N{LINE SEPARATOR}", r"\u2067\u2028"),
+        ("\N{ZERO WIDTH SPACE}\N{BYTE ORDER MARK}\N{SOFT HYPHEN}", r"\u200b\ufeff\u00ad"),
+        (b"caf\xe9".decode("utf-8", "surrogateescape"), r"caf\udce9"),
+        ("\N{TAG SPACE}\uffff", r"\udb40\udc20\uffff"),
+    ],
+)
+def test_what_acts_without_being_seen_is_escaped(text, shown):
+    assert visible(text) == shown
+
+
+@pytest.mark.parametrize("word", ["می\N{ZERO WIDTH NON-JOINER}خواهم", "👩\N{ZERO WIDTH JOINER}🚀"])
+def test_joiners_are_parts_of_words(word):
+    assert visible(word) == word
+
+
+@given(ANYTHING)
+def test_escaped_text_is_a_line_that_any_stream_takes_and_is_escaped_once(text):
+    shown = visible(text)
+    assert len(shown.splitlines()) <= 1
+    assert visible(shown) == shown
+    assert shown.encode().decode() == shown
+
+
+@given(ANYTHING)
+def test_a_document_of_json_means_the_same(text):
+    document = visible_lines(json.dumps({text: [text]}, indent=2, ensure_ascii=False))
+    assert json.loads(document) == {text: [text]}
+
+
+def test_a_document_of_toml_means_the_same():
+    assert tomllib.loads(visible_lines('a = "\x85\u202e"\nb = 2')) == {"a": "\x85\u202e", "b": 2}
+
+
+def test_what_a_stream_cannot_encode_is_escaped_in_the_same_way():
+    assert "größe \udce9".encode("ascii", UNENCODABLE) == rb"gr\u00f6\u00dfe \udce9"
+    with pytest.raises(UnicodeDecodeError):
+        b"\xe9".decode("ascii", UNENCODABLE)
+
+
+def test_markdown_shows_the_text_itself():
+    assert as_markdown("[a](http://b) *c* `d` <e> | $f$ &g; @h #i_\x1b") == (
+        r"\[a\](http://b) \*c\* \`d\` \<e\> \| \$f\$ \&g; \@h \#i\_\\u001b"
+    )
