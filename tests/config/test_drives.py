@@ -77,7 +77,7 @@ def test_a_later_entry_overrides_an_earlier_one():
         ("[[drives]]\npath = 'a'\nlabels = 3", "[[drives]] a: [labels] must be a table"),
         (
             "[[drives]]\npath = 'a'\nlabels = {road = [3, -1]}",
-            "[[drives]] a: [labels] road, item 2: input should be greater",
+            "[[drives]] a: [labels] road, item 2: must be at least 0",
         ),
         (
             "[[drives]]\npath = 'a'\nlabels = {ignore = [3]}",
