@@ -18,10 +18,16 @@ from roadeval.evaluation import analysis
 from roadeval.evaluation.comparison_result import (
     ComparedResult,
     Comparison,
+    DrivesDiffer,
+    FramesLeftOut,
+    LogUnknown,
     MaskComparison,
     MovedFrame,
+    Note,
+    SettingsDiffer,
+    TruthDiffers,
 )
-from roadeval.evaluation.metrics import COMPARED, METRICS
+from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import mean_difference
 
@@ -126,7 +132,7 @@ def compare(
         changes=tuple(row for pair in pairs for row in pair.changes()),
         levels=tuple(row for side in others for row in _levels(side)),
         moved=tuple(frame for pair in pairs for frame in pair.moved()),
-        warnings=tuple(sentence for pair in pairs for sentence in pair.warnings()),
+        notes=tuple(note for pair in pairs for note in pair.notes()),
     )
 
 
@@ -165,7 +171,7 @@ class _Pair:
                     name: mean_difference(
                         (after[name] - before[name]).to_numpy(float), self._settings
                     )
-                    for name in (COMPARED if final else ("ERR",))
+                    for name in METRICS
                 },
             )
 
@@ -188,46 +194,28 @@ class _Pair:
                     change=row["ERR"],
                 )
 
-    def warnings(self) -> Iterator[str]:
+    def notes(self) -> Iterator[Note]:
         """Yield what was left out, and what makes the two less comparable than they look."""
         base, new = self._base, self._new
         both = self._after["stamp"].nunique()
         for side, other in ((base, new), (new, base)):
             rest = side.frames["frame"].nunique() - both
             if rest:
-                yield (
-                    f"{rest} frames that {side.label} evaluated are left out against "
-                    f"{other.label}, which lacks them or trained on them"
-                )
+                yield FramesLeftOut(side.label, other.label, rest)
         settings = _differing(base.asked, new.asked)
         if settings:
-            yield (
-                f"{base.label} and {new.label} were replayed with different settings "
-                f"({', '.join(settings)}): part of the change may be theirs"
-            )
+            yield SettingsDiffer(base.label, new.label, settings)
         differs = _truths(self._after).ne(_truths(self._before)).any(axis=1)
         if differs.any():
-            guess = "" if settings else " (other labels or topics?)"
-            yield (
-                f"the truth differs on {self._after['stamp'][differs].nunique()} frames between "
-                f"{base.label} and {new.label}{guess}: part of the change may be the truth's"
-            )
+            frames = self._after["stamp"][differs].nunique()
+            yield TruthDiffers(base.label, new.label, frames, bool(settings))
 
 
-def _differing(base: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """Return the settings that two results know and differ in, with both values."""
-    return [
-        f"`{name}` {_text(base[name])} and {_text(new[name])}"
-        for name in base
-        if name in new and base[name] != new[name]
-    ]
-
-
-def _text(value: Any) -> str:
-    """Write a setting's value for a person."""
-    if value is None or value in ({}, [], ()):
-        return "not given"
-    return f"{value:g}" if isinstance(value, float) else str(value)
+def _differing(base: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+    """Return both values of the settings that two results know and differ in."""
+    return {
+        name: (base[name], new[name]) for name in base if name in new and base[name] != new[name]
+    }
 
 
 def _truths(frames: pd.DataFrame) -> pd.DataFrame:
@@ -270,12 +258,9 @@ def _result(side: Side) -> ComparedResult:
     return ComparedResult(side.label, side.drive, side.digest, frames, scale)
 
 
-def _why_apart(sides: Sequence[Side]) -> str:
+def _why_apart(sides: Sequence[Side]) -> Note:
     for side in sides:
         if side.digest is None:
-            return f"{side.label} does not say which log it is of: nothing is subtracted"
+            return LogUnknown(side.label)
     a, b = next((a, b) for a, b in pairwise(sides) if a.digest != b.digest)
-    return (
-        f"{a.label} and {b.label} are of different drives: side by side only, for a difference "
-        "would mix the scene with the method"
-    )
+    return DrivesDiffer(a.label, b.label)

@@ -1,14 +1,12 @@
-"""The content of a comparison: results side by side, mask by mask, and judged limits."""
+"""The content of a comparison: results side by side, mask by mask, and what limits it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Any
 
 from roadeval.evaluation.uncertainty import Difference
-
-FORMAT: Final = {"name": "roadeval-comparison", "version": 1}
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +41,7 @@ class MaskComparison:
         Mean and pooled metrics and those of the overlap by name; ``base`` is empty where nothing is
         subtracted.
     difference
-        New minus base by metric: of the final mask several, of others the first alone.
+        New minus base by metric; empty where nothing is subtracted.
     """
 
     result: str
@@ -70,6 +68,52 @@ class MovedFrame:
 
 
 @dataclass(frozen=True, slots=True)
+class FramesLeftOut:
+    """Frames that a result evaluated, and that another lacks or trained on."""
+
+    result: str
+    other: str
+    frames: int
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsDiffer:
+    """Settings that two results were not made with alike: both values by the setting's name."""
+
+    base: str
+    new: str
+    settings: Mapping[str, tuple[Any, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class TruthDiffers:
+    """Frames whose truth is another in two results, and whether their settings differ, too."""
+
+    base: str
+    new: str
+    frames: int
+    settings_differ: bool
+
+
+@dataclass(frozen=True, slots=True)
+class LogUnknown:
+    """A result that does not know which log it is of, so that nothing is subtracted."""
+
+    result: str
+
+
+@dataclass(frozen=True, slots=True)
+class DrivesDiffer:
+    """Two results of different drives, so that nothing is subtracted."""
+
+    result: str
+    other: str
+
+
+Note = FramesLeftOut | SettingsDiffer | TruthDiffers | LogUnknown | DrivesDiffer
+
+
+@dataclass(frozen=True, slots=True)
 class Comparison:
     """Results compared with the first of them.
 
@@ -86,7 +130,7 @@ class Comparison:
         every result.
     moved
         The frames that changed most.
-    warnings
+    notes
         What was left out, and what makes the results less comparable than they look.
     """
 
@@ -95,19 +139,4 @@ class Comparison:
     changes: tuple[MaskComparison, ...]
     levels: tuple[MaskComparison, ...]
     moved: tuple[MovedFrame, ...]
-    warnings: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Judgement:
-    """A condition that was judged: its text, whether it holds, and why in a sentence."""
-
-    text: str
-    holds: bool
-    sentence: str
-
-
-def as_dict(comparison: Comparison, judgements: tuple[Judgement, ...] = ()) -> dict[str, Any]:
-    """Return the content of a comparison's JSON file."""
-    conditions = [asdict(judgement) for judgement in judgements]
-    return {"format": FORMAT, **asdict(comparison), "conditions": conditions}
+    notes: tuple[Note, ...]

@@ -1,8 +1,8 @@
 """Conditions: limits that a comparison must keep, and the small language they are written in.
 
-A condition is a quantity, an operator and a limit::
+A condition is a quantity, an operator and a limit, and may ask for certainty::
 
-    condition := STAGE "." VARIANT "." RATE operator limit
+    condition := STAGE "." VARIANT "." RATE operator limit ["surely"]
     operator  := ">" | ">=" | "<" | "<="
     limit     := number "pp"        the change from the base to the new result, percentage points
                | number "%"         the rate of the new result itself, percent
@@ -14,10 +14,16 @@ half a percentage point; ``post.filtered.ERR > 20%`` where it is above a fifth. 
 the frames that both results evaluated; a level is that of all the frames of the new result, and
 needs no base: between different drives it is judged on every result. Nothing is ever executed.
 
+``post.filtered.ERR > +0.5pp surely`` holds where the whole interval of the change lies beyond the
+limit: two models that only their training's seed sets apart seldom differ by that much. Only the
+mean of the frames' rates has an interval, and only a change: a level is that of these very frames,
+and an interval around it would tell of frames that nobody evaluated.
+
 A condition that cannot be judged is an error, and never taken for one that is kept: where a rate
-is undefined, where a change is asked for between different drives or scales, and where too few
-frames tell. They must be at least as many as an interval needs (``evaluation.effective_frames``,
-10 by default), and for a change at least half of the frames of the shorter result.
+is undefined, where a change is asked for between different drives or scales, where certainty is
+asked for and there is no interval, and where too few frames tell. They must be at least as many as
+an interval needs (``evaluation.effective_frames``, 10 by default), and for a change at least half
+of the frames of the shorter result.
 """
 
 from __future__ import annotations
@@ -30,12 +36,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.comparison_result import (
-    ComparedResult,
-    Comparison,
-    Judgement,
-    MaskComparison,
-)
+from roadeval.evaluation.comparison_result import ComparedResult, Comparison, MaskComparison
 from roadeval.evaluation.metrics import METRICS, OVERLAP
 from roadeval.evaluation.settings import EvaluationSettings
 
@@ -49,7 +50,8 @@ QUANTITIES: Final = (*METRICS, *(f"pooled_{name}" for name in METRICS), *OVERLAP
 _GRAMMAR: Final = re.compile(
     r"\s*(?P<stage>[\w-]+)\.(?P<variant>[\w-]+)\.(?P<rate>\w+)"
     r"\s*(?P<operator>>=|<=|>|<)"
-    r"\s*(?P<number>[+-]?\d+(?:\.\d+)?)\s*(?P<unit>pp|%)\s*"
+    r"\s*(?P<number>[+-]?\d+(?:\.\d+)?)\s*(?P<unit>pp|%)"
+    r"(?P<surely>\s+surely)?\s*"
 )
 
 
@@ -61,7 +63,8 @@ class ConditionError(RoadevalError):
 class Condition:
     """A limit on a rate of a stage of a variant.
 
-    ``limit`` is in percentage points of change if ``is_change``, else in percent.
+    ``limit`` is in percentage points of change if ``is_change``, else in percent. If ``surely``,
+    the whole interval of the change must lie beyond it.
     """
 
     text: str
@@ -71,6 +74,7 @@ class Condition:
     operator: str
     limit: float
     is_change: bool
+    surely: bool = False
 
     @classmethod
     def parse(cls, text: str) -> Condition:
@@ -79,18 +83,21 @@ class Condition:
         Raises
         ------
         ConditionError
-            If it does not follow the grammar.
+            If it does not follow the grammar, or asks for certainty where there is none.
         """
         match = _GRAMMAR.fullmatch(text)
         if match is None:
             raise ConditionError(
                 f"{text!r} is no condition; write STAGE.VARIANT.RATE, one of > >= < <=, and a "
-                "number with pp (change) or % (level), as 'post.filtered.ERR > +0.5pp'"
+                "number with pp (change) or % (level), as 'post.filtered.ERR > +0.5pp', and after "
+                "pp 'surely' where the whole interval must lie beyond it"
             )
         if match["rate"] not in QUANTITIES:
             raise ConditionError(
                 f"{text!r}: there is no rate {match['rate']}; there are {', '.join(QUANTITIES)}"
             )
+        if match["surely"]:
+            _check_certainty(text, match["rate"], match["unit"])
         return cls(
             " ".join(text.split()),
             match["stage"],
@@ -99,6 +106,7 @@ class Condition:
             match["operator"],
             float(match["number"]),
             match["unit"] == "pp",
+            match["surely"] is not None,
         )
 
     def judge(self, mask: MaskComparison) -> Judgement:
@@ -107,21 +115,52 @@ class Condition:
         Raises
         ------
         ConditionError
-            If the rate is undefined there.
+            If the rate is undefined there, or its change has no interval and one is asked for.
         """
         before, after = mask.base.get(self.rate, math.nan), mask.new[self.rate]
         value = 100 * (after - before if self.is_change else after)
         if math.isnan(value):
             raise ConditionError(f"{self.text}: undefined in {mask.result}, so not judged")
+        difference = mask.difference.get(self.rate)
+        low, high = (difference.low, difference.high) if difference else (None, None)
+        if self.surely:
+            # The end of the interval that is nearest to keeping the limit.
+            end = low if self.operator in (">", ">=") else high
+            if end is None:
+                raise ConditionError(
+                    f"{self.text}: not judged, because too few frames of {mask.result} tell how "
+                    "sure the change is; replay more of it, or leave out 'surely'"
+                )
+            value = 100 * end
         holds = OPERATORS[self.operator](value, self.limit)
-        found = (
-            f"changed by {value:+.2f} pp ({100 * before:.2f} % to {100 * after:.2f} %)"
-            if self.is_change
-            else f"is {value:.2f} %"
-        )
-        what = f"{self.stage}.{self.variant}.{self.rate} of {mask.result}"
-        verdict = "holds" if holds else "does not hold"
-        return Judgement(self.text, holds, f"{what} {found}: {self.text} {verdict}")
+        return Judgement(self, mask.result, before, after, low, high, holds)
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """A condition that was judged on a result.
+
+    Parameters
+    ----------
+    condition
+        The condition.
+    result
+        Label of the new result.
+    before, after
+        The rate of the base, NaN for a level, and of the new result.
+    low, high
+        The interval of the change, None where there is none.
+    holds
+        Whether the condition holds.
+    """
+
+    condition: Condition
+    result: str
+    before: float
+    after: float
+    low: float | None
+    high: float | None
+    holds: bool
 
 
 def judge(
@@ -147,11 +186,22 @@ def judge(
     judgements = []
     for condition in conditions:
         for mask in _named(condition, comparison):
-            why = _obstacle(condition, mask, comparison.results, settings.effective_frames)
-            if why:
-                raise ConditionError(f"{condition.text}: not judged, because {why}")
+            _check_frames(condition, mask, comparison.results, settings.effective_frames)
             judgements.append(condition.judge(mask))
     return tuple(judgements)
+
+
+def _check_certainty(text: str, rate: str, unit: str) -> None:
+    if unit == "%":
+        raise ConditionError(
+            f"{text!r}: 'surely' asks for the interval of a change (pp); a level (%) is that of "
+            "the frames themselves and has none: leave out 'surely', or limit the change"
+        )
+    if rate not in METRICS:
+        raise ConditionError(
+            f"{text!r}: {rate} is of all pixels together and has no interval; 'surely' goes with "
+            f"{', '.join(METRICS)}"
+        )
 
 
 def _named(condition: Condition, comparison: Comparison) -> list[MaskComparison]:
@@ -172,29 +222,39 @@ def _named(condition: Condition, comparison: Comparison) -> list[MaskComparison]
     return named
 
 
-def _obstacle(
+def _check_frames(
     condition: Condition, mask: MaskComparison, results: Sequence[ComparedResult], least: int
-) -> str:
-    """Return why a condition cannot be judged on a mask, or nothing."""
+) -> None:
+    """Refuse a condition on a mask of which too few frames tell, or other frames than the base's.
+
+    Raises
+    ------
+    ConditionError
+        See `judge`.
+    """
+    not_judged = f"{condition.text}: not judged, because"
     if not condition.is_change:
-        few = f"{mask.result} has {mask.frames} evaluated frames, and {least} are needed"
-        return "" if mask.frames >= least else f"{few}; replay more of it"
+        if mask.frames < least:
+            raise ConditionError(
+                f"{not_judged} {mask.result} has {mask.frames} evaluated frames, and {least} are "
+                "needed; replay more of it"
+            )
+        return
     base, new = results[0], next(each for each in results if each.label == mask.result)
     names = f"{base.label} and {new.label}"
     if base.scale is not None and new.scale is not None and base.scale != new.scale:
-        return (
-            f"{names} were replayed with `frames.scale` {base.scale:g} and {new.scale:g}; replay "
-            "both at one scale, or limit in %"
+        raise ConditionError(
+            f"{not_judged} {names} were replayed with `frames.scale` {base.scale:g} and "
+            f"{new.scale:g}; replay both at one scale, or limit in %"
         )
     shorter = min(base.frames, new.frames)
-    if mask.frames >= least and 2 * mask.frames >= shorter:
-        return ""
-    few = (
-        f"and {least} are needed"
-        if mask.frames < least
-        else f"fewer than half of the {shorter} of the shorter one"
-    )
-    return (
-        f"{names} have {mask.frames} evaluated frames in common, {few}; replay both over the same "
-        "range"
-    )
+    if mask.frames < least or 2 * mask.frames < shorter:
+        few = (
+            f"and {least} are needed"
+            if mask.frames < least
+            else f"fewer than half of the {shorter} of the shorter one"
+        )
+        raise ConditionError(
+            f"{not_judged} {names} have {mask.frames} evaluated frames in common, {few}; replay "
+            "both over the same range"
+        )

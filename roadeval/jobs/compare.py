@@ -12,11 +12,12 @@ from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import analysis, comparison
 from roadeval.evaluation.comparison import Side
-from roadeval.evaluation.comparison_result import Comparison, Judgement, as_dict
-from roadeval.evaluation.conditions import Condition, judge
+from roadeval.evaluation.comparison_result import Comparison
+from roadeval.evaluation.conditions import Condition, Judgement, judge
 from roadeval.jobs.result import Result
 from roadeval.report.comparison import document, markdown
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
+from roadeval.results.comparison import as_dict, judged
 from roadeval.results.lines import window_rows
 from roadeval.results.reading import table_of
 from roadeval.results.summary import json_text, plain
@@ -62,7 +63,7 @@ class Compared:
     @property
     def held(self) -> list[str]:
         """The sentences of the conditions that hold."""
-        return [judgement.sentence for judgement in self.judgements if judgement.holds]
+        return [judged(judgement) for judgement in self.judgements if judgement.holds]
 
 
 def compare(

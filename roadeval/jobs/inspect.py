@@ -27,6 +27,8 @@ class WorstFrame:
         1 is the worst.
     frame, stamp_ns
         Which.
+    variant, stage
+        Whose final mask.
     rates
         Of the final mask, as short tables show them.
     parts
@@ -38,6 +40,8 @@ class WorstFrame:
     rank: int
     frame: int
     stamp_ns: int
+    variant: str
+    stage: str
     rates: dict[str, float]
     parts: dict[str, float]
     notes: tuple[str, ...]
@@ -81,6 +85,8 @@ def worst_frames(
             rank,
             row["frame"],
             row["stamp_ns"],
+            chosen,
+            row["stage"],
             {rate: row[rate] for rate in SHORT},
             causes.loc[row["frame"]].to_dict(),
             result.notes(row["frame"], chosen),

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
-from roadeval.data.words import defined, interval, listing, number, percent, points, timestamp
-from roadeval.evaluation.comparison_result import Comparison, Judgement, MaskComparison, MovedFrame
+from roadeval.data.words import interval, listing, number, percent, points, timestamp
+from roadeval.evaluation.comparison_result import Comparison, MaskComparison, MovedFrame
+from roadeval.evaluation.conditions import Judgement
 from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
 from roadeval.report.blocks import Block, BulletList, Cell, Document, Figure, Heading, Table, Text
 from roadeval.report.figures.charts import forest, levels
@@ -15,6 +16,7 @@ from roadeval.report.figures.fig3a_error_rate import FIGURE
 from roadeval.report.figures.figure import FigureData
 from roadeval.report.figures.files import svg, svg_of
 from roadeval.report.markdown import table as markdown_table
+from roadeval.results.comparison import judged, verdict, warnings
 from roadeval.runtime.text import as_markdown
 
 if TYPE_CHECKING:
@@ -23,15 +25,6 @@ if TYPE_CHECKING:
 Rows = Sequence[MaskComparison] | Sequence[MovedFrame]
 OTHERS: Final = tuple(name for name in SHORT if name != "ERR")
 """The rates of short tables without ERR, which has columns of its own."""
-
-
-def headline(comparison: Comparison) -> str:
-    """Return the result in a sentence."""
-    if not comparison.same_drive:
-        return "Different drives, side by side: no difference is given."
-    base = comparison.results[0].label
-    changes = [_change(row) for row in comparison.changes if row.final]
-    return f"Against {base}: {'; '.join(changes)}."
 
 
 def document(
@@ -63,15 +56,15 @@ def document(
 
 def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     """Return a comparison as Markdown."""
-    lines = ["# roadeval comparison", "", as_markdown(headline(comparison)), ""]
+    lines = ["# roadeval comparison", "", as_markdown(verdict(comparison)), ""]
     lines += [
-        f"- {'**FAIL**' if each.holds else 'ok'}: {as_markdown(each.sentence)}"
+        f"- {'**FAIL**' if each.holds else 'ok'}: {as_markdown(judged(each))}"
         for each in judgements
     ]
     lines += ["", *markdown_table(_rates_table(comparison)), ""]
     if comparison.moved:
         lines += ["Frames that changed most:", "", *markdown_table(_moved_table(comparison)), ""]
-    lines += [f"- {as_markdown(warning)}" for warning in comparison.warnings]
+    lines += [f"- {as_markdown(warning)}" for warning in warnings(comparison)]
     lines += ["", _unit(comparison)]
     return "\n".join(lines).rstrip() + "\n"
 
@@ -80,13 +73,13 @@ def _blocks(
     comparison: Comparison, judgements: Sequence[Judgement], windows: pd.DataFrame
 ) -> Iterator[Block]:
     yield Heading("What changed")
-    yield Text(headline(comparison), "verdict")
+    yield Text(verdict(comparison), "verdict")
     yield from _limits(judgements)
     yield _rates_table(comparison)
     yield Text(_unit(comparison), "note")
     yield from _why_no_interval(comparison.changes)
-    if comparison.warnings:
-        yield BulletList("Beware", comparison.warnings, "warning")
+    if comparison.notes:
+        yield BulletList("Beware", warnings(comparison), "warning")
     finals = [row for row in comparison.changes if row.final]
     if comparison.same_drive:
         yield Figure(
@@ -104,8 +97,8 @@ def _blocks(
 
 
 def _limits(judgements: Sequence[Judgement]) -> Iterator[Block]:
-    failed = [each.sentence for each in judgements if each.holds]
-    kept = [each.sentence for each in judgements if not each.holds]
+    failed = [judged(each) for each in judgements if each.holds]
+    kept = [judged(each) for each in judgements if not each.holds]
     if failed:
         yield BulletList("Limits exceeded", failed, "warning")
     if kept:
@@ -221,16 +214,6 @@ def _why_no_interval(rows: Sequence[MaskComparison]) -> Iterator[Text]:
         if row.final and (change := row.difference.get("ERR")) and change.low is None
     ]
     yield from (Text(reason, "note") for reason in dict.fromkeys(reasons))
-
-
-def _change(row: MaskComparison) -> str:
-    change, name = row.difference["ERR"], _name(row)
-    if not defined(change.mean):
-        return f"{name}: ERR undefined"
-    if change.low == change.high == 0:
-        return f"{name}: ERR the same on every frame"
-    sure = "no interval" if change.low is None else interval(change.low, change.high)
-    return f"{name}: ERR {points(change.mean)} pp ({sure})"
 
 
 def _name(row: MaskComparison) -> str:

@@ -116,4 +116,4 @@ def test_where_err_is_undefined_on_every_frame_it_is_said(ignored, tmp_path):
     assert run.returncode == 0, run.stderr
     assert "filtered: ERR is undefined on every frame\n" in run.stdout
     assert "no interval" not in run.stdout
-    assert "filtered: ERR undefined" in text(names[0].read_bytes())
+    assert "filtered: ERR is undefined on every frame" in text(names[0].read_bytes())

@@ -1,11 +1,13 @@
 """Conditions: which are accepted, and what they say."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from roadeval.evaluation.comparison_result import MaskComparison
 from roadeval.evaluation.conditions import Condition, ConditionError
+from roadeval.evaluation.uncertainty import Difference
 
 MASK = MaskComparison(
     result="new",
@@ -17,6 +19,13 @@ MASK = MaskComparison(
     new={"ERR": 0.106, "IoU": 0.7, "FNR": math.nan},
     difference={},
 )
+
+
+def a_mask(low, high):
+    """A mask whose ERR rose by 0.6 points, with this interval in points."""
+    ends = (None, None) if low is None else (low / 100, high / 100)
+    change = Difference(0.006, *ends, 0.95, None, 12, None, None, None)
+    return replace(MASK, difference={"ERR": change})
 
 
 def test_a_change_is_in_percentage_points():
@@ -42,6 +51,9 @@ def test_a_level_is_in_percent():
         "post.filtered.ERR > 1e3pp",
         "post.filtered.ERR > nan%",
         "post.filtered.ERR > 1pp or True",
+        "post.filtered.ERR > 1ppsurely",
+        "post.filtered.ERR > 1pp surely surely",
+        "surely post.filtered.ERR > 1pp",
         "__import__('os').system('true') > 1pp",
     ],
 )
@@ -71,12 +83,55 @@ def test_a_condition_holds_or_not(text, holds):
     assert Condition.parse(text).judge(MASK).holds is holds
 
 
-def test_the_sentence_says_why():
-    judgement = Condition.parse("post.filtered.ERR > +0.5pp").judge(MASK)
-    assert judgement.sentence == (
-        "post.filtered.ERR of new changed by +0.60 pp (10.00 % to 10.60 %): "
-        "post.filtered.ERR > +0.5pp holds"
-    )
+def test_a_judgement_has_the_numbers_that_it_rests_on():
+    judgement = Condition.parse("post.filtered.ERR > +0.5pp").judge(a_mask(-0.1, 1.6))
+    assert (judgement.result, judgement.before, judgement.after) == ("new", 0.100, 0.106)
+    assert (judgement.low, judgement.high) == (-0.001, 0.016)
+    assert judgement.condition.text == "post.filtered.ERR > +0.5pp"
+
+
+@pytest.mark.parametrize(
+    ("limit", "interval", "holds"),
+    [
+        ("> +0.5pp", (0.51, 0.7), True),
+        ("> +0.5pp", (0.5, 0.7), False),
+        (">= +0.5pp", (0.5, 0.7), True),
+        ("> +0.5pp", (0.49, 9.0), False),
+        ("< -0.5pp", (-0.7, -0.51), True),
+        ("< -0.5pp", (-0.7, -0.5), False),
+        ("<= -0.5pp", (-0.7, -0.5), True),
+        ("< -0.5pp", (-9.0, -0.49), False),
+        ("> -1pp", (-0.9, 0.3), True),
+    ],
+)
+def test_what_is_surely_so_is_so_of_the_whole_interval(limit, interval, holds):
+    condition = Condition.parse(f"post.filtered.ERR {limit} surely")
+    assert condition.surely
+    assert condition.judge(a_mask(*interval)).holds is holds
+
+
+def test_the_plain_form_is_judged_by_the_change_itself_whatever_its_interval():
+    assert Condition.parse("post.filtered.ERR > +0.5pp").judge(a_mask(-9, 9)).holds
+
+
+@pytest.mark.parametrize("mask", [MASK, a_mask(None, None)])
+def test_certainty_without_an_interval_is_not_judged(mask):
+    condition = Condition.parse("post.filtered.ERR > -1pp surely")
+    with pytest.raises(ConditionError, match="too few frames of new tell how sure"):
+        condition.judge(mask)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("post.filtered.ERR > 20% surely", r"a level \(%\) .* has none"),
+        ("post.filtered.pooled_ERR > 1pp surely", "pooled_ERR is of all pixels together"),
+        ("post.filtered.IoU < -1pp surely", "has no interval; 'surely' goes with ACC, ERR"),
+    ],
+)
+def test_certainty_is_refused_where_there_is_none(text, why):
+    with pytest.raises(ConditionError, match=why):
+        Condition.parse(text)
 
 
 def test_what_is_undefined_is_not_judged_as_passed():

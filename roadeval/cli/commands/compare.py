@@ -27,43 +27,50 @@ def _ending(paths: list[Path] | None) -> list[Path] | None:
     return paths
 
 
+Results = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="BASE NEW...",
+        show_default=False,
+        help="Recordings or results folders; of a single one its variants are compared.",
+    ),
+]
+Variants = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--variant",
+        metavar="NAME",
+        help="Only this one; of a single result the first is the base. Repeatable.",
+    ),
+]
+Conditions = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fail-if",
+        metavar="CONDITION",
+        callback=_condition,
+        help="As 'post.filtered.ERR > +0.5pp' (change; with 'surely' at the end: its whole "
+        "interval) or '> 20%' (level). Repeatable.",
+    ),
+]
+Outputs = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "-o",
+        "--output",
+        metavar="FILE",
+        callback=_ending,
+        help="Write it as .pdf, .md or .json, by the ending. Repeatable.",
+    ),
+]
+
+
 def compare(
-    results: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="BASE NEW...",
-            show_default=False,
-            help="Recordings or results folders; of a single one its variants are compared.",
-        ),
-    ],
+    results: Results,
     *,
-    variant: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--variant",
-            metavar="NAME",
-            help="Only this one; of a single result the first is the base. Repeatable.",
-        ),
-    ] = None,
-    fail_if: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--fail-if",
-            metavar="CONDITION",
-            callback=_condition,
-            help="As 'post.filtered.ERR > +0.5pp' (change) or '> 20%' (level). Repeatable.",
-        ),
-    ] = None,
-    output: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            callback=_ending,
-            help="Write it as .pdf, .md or .json, by the ending. Repeatable.",
-        ),
-    ] = None,
+    variant: Variants = None,
+    fail_if: Conditions = None,
+    output: Outputs = None,
     paper: arguments.PaperSize = "a4",
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,

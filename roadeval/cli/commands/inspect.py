@@ -12,36 +12,37 @@ from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
 
 if TYPE_CHECKING:
-    from roadeval.jobs.inspect import WorstFrame
+    from roadeval.jobs.result import Result
+
+Listed = Annotated[bool, typer.Option("--list", help="Print the worst frames with reasons.")]
+Frame = Annotated[int | None, typer.Option("--frame", metavar="N", min=0, help="Open at frame N.")]
+Rank = Annotated[
+    int | None, typer.Option("--worst", metavar="K", min=1, help="Open at the K-th worst frame.")
+]
+Variant = Annotated[
+    str | None,
+    typer.Option(
+        "--variant", metavar="NAME", help="Whose failures count. Default: the first variant's."
+    ),
+]
+Screenshot = Annotated[
+    Path | None,
+    typer.Option(
+        "--screenshot",
+        metavar="FILE.png",
+        help="No window: draw it into a file instead. Without a frame, the worst pictured.",
+    ),
+]
 
 
 def inspect(
     recording: arguments.Result,
     *,
-    listed: Annotated[
-        bool, typer.Option("--list", help="Print the worst frames with reasons.")
-    ] = False,
-    frame: Annotated[
-        int | None, typer.Option("--frame", metavar="N", min=0, help="Open at frame N.")
-    ] = None,
-    worst: Annotated[
-        int | None,
-        typer.Option("--worst", metavar="K", min=1, help="Open at the K-th worst frame."),
-    ] = None,
-    variant: Annotated[
-        str | None,
-        typer.Option(
-            "--variant", metavar="NAME", help="Whose failures count. Default: the first variant's."
-        ),
-    ] = None,
-    screenshot: Annotated[
-        Path | None,
-        typer.Option(
-            "--screenshot",
-            metavar="FILE.png",
-            help="No window: draw it into a file instead. Without a frame, the worst pictured.",
-        ),
-    ] = None,
+    listed: Listed = False,
+    frame: Frame = None,
+    worst: Rank = None,
+    variant: Variant = None,
+    screenshot: Screenshot = None,
     json: arguments.Json = False,
 ) -> int:
     """Open the viewer at a frame, or list the frames worth opening.
@@ -49,7 +50,6 @@ def inspect(
     The viewer works offline and listens on 127.0.0.1 alone. Of neighbouring frames only the worst
     is listed.
     """
-    from roadeval.jobs import inspect as inspecting
     from roadeval.jobs.result import Result
 
     if frame is not None and worst is not None:
@@ -58,33 +58,55 @@ def inspect(
         raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
     opened = Result(recording)
     if listed:
-        _list(inspecting.worst_frames(opened, worst or inspecting.LISTED, variant), as_json=json)
-        return ExitCode.DONE
-    chosen = ""
-    if worst is not None:
-        ranked = inspecting.worst_frames(opened, worst, variant)
-        frame = ranked[-1].frame
-    elif frame is None and screenshot is not None and (bad := inspecting.worst(opened, variant)):
-        (first,) = inspecting.worst_frames(opened, 1, variant)
-        which = "the worst" if bad.frame == first.frame else "the worst that has pictures"
-        frame, chosen = bad.frame, f", {which} (--frame N or --worst K takes another)"
-    if frame is not None and (said := inspecting.without_pictures(opened, frame)):
-        messages.warning(said)
-    shown = inspecting.view(opened, frame, screenshot)
-    if screenshot is not None:
-        console.emit(f"{screenshot}: frame {shown}{chosen}")
+        _list(opened, worst, variant, as_json=json)
+    elif screenshot is not None:
+        _draw(opened, _asked_for(opened, frame, worst, variant), variant, screenshot)
+    else:
+        _open(opened, _asked_for(opened, frame, worst, variant))
     return ExitCode.DONE
 
 
-def _list(found: list[WorstFrame], *, as_json: bool) -> None:
+def _list(opened: Result, count: int | None, variant: str | None, *, as_json: bool) -> None:
+    """Print the worst frames, for people or as JSON."""
     from roadeval.cli.screens import inspect as screen
+    from roadeval.jobs import inspect as inspecting
+    from roadeval.results.summary import json_text, plain
 
+    found = inspecting.worst_frames(opened, count or inspecting.LISTED, variant)
     if as_json:
-        from roadeval.results.summary import json_text, plain
-
         console.emit(json_text(plain([asdict(each) for each in found])).rstrip())
     else:
-        screen.show(found, console.results())
+        screen.show(opened.name, found, console.results())
+
+
+def _asked_for(
+    opened: Result, frame: int | None, worst: int | None, variant: str | None
+) -> int | None:
+    """Return the number of the frame that was asked for, by itself or by its rank."""
+    from roadeval.jobs.inspect import worst_frames
+
+    return frame if worst is None else worst_frames(opened, worst, variant)[-1].frame
+
+
+def _draw(opened: Result, frame: int | None, variant: str | None, file: Path) -> None:
+    """Draw a frame into a file, the worst that has pictures if none was asked for."""
+    from roadeval.jobs import inspect as inspecting
+
+    why = ""
+    if frame is None and (bad := inspecting.worst(opened, variant)):
+        (first,) = inspecting.worst_frames(opened, 1, variant)
+        which = "the worst" if bad.frame == first.frame else "the worst that has pictures"
+        frame, why = bad.frame, f", {which} (--frame N or --worst K takes another)"
+    console.emit(f"{file}: frame {_open(opened, frame, file)}{why}")
+
+
+def _open(opened: Result, frame: int | None, file: Path | None = None) -> int | None:
+    """Open the viewer at a frame, or draw it into a file; return the frame that it shows."""
+    from roadeval.jobs import inspect as inspecting
+
+    if frame is not None and (said := inspecting.without_pictures(opened, frame)):
+        messages.warning(said)
+    return inspecting.view(opened, frame, file)
 
 
 COMMAND: Final = inspect

@@ -22,7 +22,7 @@ Change = Mapping[str, Any]
 
 
 def show(content: Mapping[str, Any], out: Console) -> None:
-    """Print what changed, and the conditions that were kept."""
+    """Print what changed, what that means, and the conditions that were kept."""
     base = content["results"][0]["label"]
     for title, rows in _groups(content["changes"]):
         if content["same_drive"]:
@@ -36,6 +36,7 @@ def show(content: Mapping[str, Any], out: Console) -> None:
             if change["final"] and told and told["low"] is None:
                 out.print(f"{change['variant']}: {_unsure(told)}", soft_wrap=True)
         out.print()
+    out.print(content["verdict"])
     for condition in content["conditions"]:
         if not condition["holds"]:
             out.print(condition["sentence"], soft_wrap=True)
@@ -50,12 +51,12 @@ def _groups(changes: Sequence[Change]) -> list[tuple[str, list[Change]]]:
 
 
 def _changes(changes: Sequence[Change]) -> Iterator[Row]:
-    """Yield a row for each rate of short tables of which a mask's change is known."""
+    """Yield a row for each change of ERR, and of final masks for the other rates, too."""
     for change, above in zip(changes, (None, *changes), strict=False):
         told = change["difference"]
-        known = [rate for rate in SHORT if rate in told]
-        for rate in known:
-            first = rate == known[0]
+        rates = [*SHORT] if change["final"] else ["ERR"]
+        for rate in rates:
+            first = rate == rates[0]
             yield Row(
                 [
                     change["variant"] if first and _begins(change, above) else "",
@@ -67,7 +68,7 @@ def _changes(changes: Sequence[Change]) -> Iterator[Row]:
                     interval(told[rate]["low"], told[rate]["high"]),
                 ],
                 bold=change["final"] and first,
-                ends=change["final"] and rate == known[-1],
+                ends=change["final"] and rate == rates[-1],
             )
 
 

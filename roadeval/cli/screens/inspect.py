@@ -14,8 +14,11 @@ if TYPE_CHECKING:
     from roadeval.jobs.inspect import WorstFrame
 
 
-def show(found: Sequence[WorstFrame], out: Console) -> None:
-    """Print the frames: their rates, where ERR comes from, and the recording's notes."""
+def show(drive: str, found: Sequence[WorstFrame], out: Console) -> None:
+    """Print a drive's worst frames: their rates, where ERR comes from, and the notes on them."""
+    mask = f"{found[0].variant} by ERR of {found[0].stage}"
+    out.print(f"{drive}: worst frames of {mask} (of neighbours only the worst)")
+    out.print()
     table = grid((), ("", "frame", *(f"{rate} %" for rate in SHORT)))
     table.add_column("why", overflow="fold")
     for each in found:

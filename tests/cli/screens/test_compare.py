@@ -12,13 +12,14 @@ def row(result, variant):
     unsure = {"mean": 0.01, "low": None, "high": None, "reason": "there are 4 frames"}
     rates = {"ERR": 0.1, "FPR": 0.1, "FNR": 0.1}
     names = {"result": result, "variant": variant, "stage": "post", "final": True, "frames": 4}
-    return {**names, "base": rates, "new": rates, "difference": {"ERR": unsure}}
+    return {**names, "base": rates, "new": rates, "difference": dict.fromkeys(rates, unsure)}
 
 
 def shown(rows):
     out = Console(file=io.StringIO(), width=80)
     results = [{"label": "base"}]
     content = {"results": results, "changes": rows, "same_drive": True, "conditions": []}
+    content["verdict"] = "Against base: it is worse."
     changes.show(content, out)
     return out.file.getvalue()
 
@@ -33,3 +34,19 @@ def test_the_variants_of_a_single_result_stand_together():
     told = shown([row("filtered", "filtered"), row("wide", "wide")])
     assert told.count("against base") == 1
     assert told.count("no interval, there are 4 frames") == 2
+
+
+def test_the_screen_ends_with_the_verdict():
+    assert shown([row("new", "filtered")]).endswith("\n\nAgainst base: it is worse.\n")
+
+
+def test_final_masks_have_every_rate_and_others_err():
+    before = row("new", "filtered") | {"stage": "svm", "final": False}
+    told = shown([before, row("new", "filtered")])
+    lines = [line.split()[:3] for line in told.splitlines() if " 10.00 " in line]
+    assert lines == [
+        ["filtered", "svm", "ERR"],
+        ["post", "ERR", "10.00"],
+        ["FPR", "10.00", "10.00"],
+        ["FNR", "10.00", "10.00"],
+    ]

@@ -1,0 +1,134 @@
+"""A comparison for people and machines: its sentences, and the content of its JSON file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any, Final
+
+from roadeval.data import BASELINE
+from roadeval.data.words import MINUS, defined, percent, points
+from roadeval.evaluation.comparison_result import (
+    Comparison,
+    DrivesDiffer,
+    FramesLeftOut,
+    LogUnknown,
+    MaskComparison,
+    Note,
+    SettingsDiffer,
+    TruthDiffers,
+)
+from roadeval.evaluation.conditions import Judgement
+
+FORMAT: Final = {"name": "roadeval-comparison", "version": 1}
+
+
+def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dict[str, Any]:
+    """Return the content of a comparison's JSON file: its facts, and the sentences on them."""
+    facts = asdict(comparison)
+    notes = [
+        {"kind": type(note).__name__, **fact}
+        for note, fact in zip(comparison.notes, facts.pop("notes"), strict=True)
+    ]
+    return {
+        "format": FORMAT,
+        "verdict": verdict(comparison),
+        **facts,
+        "notes": notes,
+        "warnings": warnings(comparison),
+        "conditions": [_condition(each) for each in judgements],
+    }
+
+
+def verdict(comparison: Comparison) -> str:
+    """Return whether results are better or worse than the base, and how sure that is."""
+    if not comparison.same_drive:
+        return "Different drives, side by side: no difference is given."
+    finals = [row for row in comparison.changes if row.final]
+    # The baseline never looks at the image: its change tells nothing of a method.
+    told = [row for row in finals if row.variant != BASELINE] or finals
+    base, confidence = comparison.results[0].label, told[0].difference["ERR"].confidence
+    changes = "; ".join(map(_change, told))
+    return f"Against {base}: {changes} ({percent(confidence, 0)} % intervals)."
+
+
+def warnings(comparison: Comparison) -> list[str]:
+    """Return what was left out and what makes results less comparable than they look."""
+    return [_note(note) for note in comparison.notes]
+
+
+def judged(judgement: Judgement) -> str:
+    """Return what was found of a condition, and whether it holds."""
+    condition = judgement.condition
+    rate = f"{condition.stage}.{condition.variant}.{condition.rate} of {judgement.result}"
+    holds = "holds" if judgement.holds else "does not hold"
+    after = f"{percent(judgement.after)} %"
+    if not condition.is_change:
+        return f"{rate} is {after}: {condition.text} {holds}"
+    change = f"{_points(judgement.after - judgement.before)} pp"
+    if condition.surely:
+        change += f" [{_points(judgement.low)}, {_points(judgement.high)}]"
+    before = f"{percent(judgement.before)} %"
+    return f"{rate} changed by {change} ({before} to {after}): {condition.text} {holds}"
+
+
+def _condition(judgement: Judgement) -> dict[str, Any]:
+    """Return the facts of a judged condition, and the sentence on them."""
+    facts = asdict(judgement)
+    return {**facts.pop("condition"), **facts, "sentence": judged(judgement)}
+
+
+def _change(row: MaskComparison) -> str:
+    """Return in a clause what happened to the ERR of a mask."""
+    change = row.difference["ERR"]
+    name = row.result if row.result == row.variant else f"{row.variant} of {row.result}"
+    if not defined(change.mean):
+        return f"{name}: ERR is undefined on every frame"
+    mean = f"ERR {_points(change.mean)} pp"
+    if change.low is None or change.high is None:
+        return f"{name}: cannot tell, {mean}, no interval"
+    if change.low == change.high == 0:
+        return f"{name} has the same ERR on every frame"
+    grade = "is worse" if change.low > 0 else "is better" if change.high < 0 else "cannot tell"
+    where = f"[{_points(change.low)}, {_points(change.high)}]"
+    return f"{name}{':' if grade == 'cannot tell' else ''} {grade}, {mean} {where}"
+
+
+def _note(note: Note) -> str:
+    match note:
+        case FramesLeftOut(result, other, frames):
+            return (
+                f"{frames} frames that {result} evaluated are left out against {other}, which "
+                "lacks them or trained on them"
+            )
+        case SettingsDiffer(base, new, settings):
+            both = (f"`{name}` {_value(a)} and {_value(b)}" for name, (a, b) in settings.items())
+            return (
+                f"{base} and {new} were replayed with different settings ({', '.join(both)}): "
+                "part of the change may be theirs"
+            )
+        case TruthDiffers(base, new, frames, settings_differ):
+            guess = "" if settings_differ else " (other labels or topics?)"
+            return (
+                f"the truth differs on {frames} frames between {base} and {new}{guess}: part of "
+                "the change may be the truth's"
+            )
+        case LogUnknown(result):
+            return f"{result} does not say which log it is of: nothing is subtracted"
+        case DrivesDiffer(result, other):
+            return (
+                f"{result} and {other} are of different drives: side by side only, for a "
+                "difference would mix the scene with the method"
+            )
+
+
+def _value(value: Any) -> str:
+    """Write a setting's value for a person."""
+    if value is None or value in ({}, [], ()):
+        return "not given"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _points(difference: float | None) -> str:
+    """Write a change as sentences do: in ASCII, so that a script can search for it."""
+    return points(difference).replace(MINUS, "-")
