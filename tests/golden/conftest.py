@@ -11,14 +11,6 @@ import pytest
 from tests.golden import commands
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption(
-        "--write-golden",
-        action="store_true",
-        help="Write the golden files anew instead of comparing with them.",
-    )
-
-
 @pytest.fixture(scope="session")
 def told(tmp_path_factory) -> commands.Told:
     """What the commands printed and wrote; by one worker for all."""

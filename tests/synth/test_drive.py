@@ -104,6 +104,27 @@ def test_a_drive_that_cannot_be_is_refused_in_one_line(wrong: dict[str, float]) 
     assert "\n" not in str(refusal.value)
 
 
+def test_the_drive_looks_as_it_did(frames: list[SynthFrame], request) -> None:
+    """Every fifth frame, small; ``python -m pytest tests/synth --write-golden`` draws them anew.
+
+    The masks stand below the image. A change of a few levels may be another library's rounding.
+    """
+    sheet = np.hstack([small(frame) for frame in frames[2::5]])
+    golden = Path(__file__).parent / "expected.png"
+    if request.config.getoption("--write-golden", default=False):
+        cv2.imwrite(str(golden), sheet)
+    off = np.abs(sheet.astype(int) - cv2.imread(str(golden)))
+    assert off.max() <= 6
+    assert off.mean() <= 0.1
+
+
+def small(frame: SynthFrame) -> np.ndarray:
+    """A frame and its masks, a quarter as wide and high: that takes most of the noise away."""
+    masks = np.hstack([frame.road, frame.shadow])[..., None].repeat(3, axis=2) * np.uint8(255)
+    whole = np.vstack([frame.image[..., ::-1], cv2.resize(masks, (160, 120))])
+    return cv2.resize(whole, (40, 60), interpolation=cv2.INTER_AREA)
+
+
 @pytest.fixture(scope="module")
 def other(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[tuple[int, int]]]:
     """The log of two frames of another seed, and what was told while it was written."""
