@@ -124,7 +124,13 @@ def _set(bits: Bits, y: int, start: int, end: int) -> None:
 def _runs(bits: Bits, width: int, inside: bool) -> tuple[Places, Columns, Columns]:
     """Find the runs of ones (or of zeros, if not ``inside``), row after row.
 
-    Those of row y are numbered from ``rows[y]`` up to but not including ``rows[y + 1]``.
+    Those of row y are numbered from ``rows[y]`` up to but not including ``rows[y + 1]``. A word is
+    walked from turn to turn, a bit that differs from the one to its left::
+
+        here     . . # # # . . # #      before the first stands a 0
+        turns    . . ^ . . ^ . ^ .      a run begins at 2, ends at 5, begins at 7
+
+    Turns alternate between beginning and end; a run that no turn ends, ends with the row.
     """
     height, words = bits.shape
     rows = np.zeros(height + 1, np.int64)
