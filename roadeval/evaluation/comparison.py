@@ -27,7 +27,7 @@ from roadeval.evaluation.comparison_result import (
     SettingsDiffer,
     TruthDiffers,
 )
-from roadeval.evaluation.metrics import METRICS
+from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import mean_difference
 
@@ -171,7 +171,7 @@ class _Pair:
                     name: mean_difference(
                         (after[name] - before[name]).to_numpy(float), self._settings
                     )
-                    for name in METRICS
+                    for name in COMPARED
                 },
             )
 

@@ -16,8 +16,9 @@ needs no base: between different drives it is judged on every result. Nothing is
 
 ``post.filtered.ERR > +0.5pp surely`` holds where the whole interval of the change lies beyond the
 limit: two models that only their training's seed sets apart seldom differ by that much. Only the
-mean of the frames' rates has an interval, and only a change: a level is that of these very frames,
-and an interval around it would tell of frames that nobody evaluated.
+change of a mean of the frames' rates has an interval: of ACC, ERR, FNR and FPR, and not of what
+mirrors them. A level is that of these very frames, and an interval around it would tell of frames
+that nobody evaluated.
 
 A condition that cannot be judged is an error, and never taken for one that is kept: where a rate
 is undefined, where a change is asked for between different drives or scales, where certainty is
@@ -37,7 +38,7 @@ from typing import Final
 
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.comparison_result import ComparedResult, Comparison, MaskComparison
-from roadeval.evaluation.metrics import METRICS, OVERLAP
+from roadeval.evaluation.metrics import COMPARED, METRICS, OVERLAP
 from roadeval.evaluation.settings import EvaluationSettings
 
 OPERATORS: Final[Mapping[str, Callable[[float, float], bool]]] = {
@@ -197,10 +198,9 @@ def _check_certainty(text: str, rate: str, unit: str) -> None:
             f"{text!r}: 'surely' asks for the interval of a change (pp); a level (%) is that of "
             "the frames themselves and has none: leave out 'surely', or limit the change"
         )
-    if rate not in METRICS:
+    if rate not in COMPARED:
         raise ConditionError(
-            f"{text!r}: {rate} is of all pixels together and has no interval; 'surely' goes with "
-            f"{', '.join(METRICS)}"
+            f"{text!r}: {rate} has no interval; 'surely' goes with {', '.join(COMPARED)}"
         )
 
 

@@ -215,7 +215,7 @@ def test_certainty_is_judged_by_the_interval_of_any_stage_and_rate():
     base = [(7 * number) % 23 for number in range(60)]
     new = [wrong + 5 + place % 2 for place, wrong in enumerate(base)]
     sides = [a_side("a", base), a_side("b", new)]
-    texts = ("post.filtered.ERR > 4pp surely", "post.filtered.TNR < -9pp surely")
+    texts = ("post.filtered.ERR > 4pp surely", "post.filtered.FPR > 9pp surely")
     judged = judge(compare(sides, SETTINGS), [Condition.parse(text) for text in texts], SETTINGS)
     assert [row.holds for row in judged] == [True, True]
 
