@@ -63,9 +63,13 @@ class Frame:
 
 
 class Role(StrEnum):
-    """The use of a frame in a run. Only `EVALUATED` frames are ever counted."""
+    """The use of a frame in a run. Only `EVALUATED` frames are ever counted.
+
+    A `COPY` shows the same picture as a training frame of a model file, encoded anew.
+    """
 
     EVALUATED = "evaluated"
     TRAINING = "training"
+    COPY = "copy"
     GAP = "gap"
     UNLABELLED = "unlabelled"

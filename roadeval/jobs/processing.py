@@ -32,12 +32,14 @@ class ProcessedFrame:
     """A scored frame without its layers, its lines of the tables, and its encoded form.
 
     ``position`` counts the frames that were read, from 1, those included that cannot be decoded.
+    ``beside`` are the training frames of a model file that show the same place.
     """
 
     position: int
     result: FrameResult
     lines: Mapping[str, str]
     encoded: Any
+    beside: frozenset[int]
 
 
 def process(run: Run, encoder: Encoder, on_progress: OnProgress) -> Iterator[ProcessedFrame]:
@@ -55,6 +57,7 @@ def process(run: Run, encoder: Encoder, on_progress: OnProgress) -> Iterator[Pro
             run.board.lose()
         else:
             run.board.add(done.result)
+            run.beside.update(done.beside)
             yield done
 
 
@@ -66,8 +69,8 @@ def _process(
         frame = logged.decode()
     except logs.FrameError:
         return None  # it stands in the log's accounting, with the reason
-    role = run.schedule.role(frame)
-    known = (frame.truth, frame.shadow_truth) if role is Role.EVALUATED else (None, None)
+    use = run.schedule.use(frame)
+    known = (frame.truth, frame.shadow_truth) if use.role is Role.EVALUATED else (None, None)
     shared: dict[Any, Any] = {}
     view = View.of(frame.image)
     variants = [
@@ -77,9 +80,9 @@ def _process(
         for name, chain in run.chains.items()
     ]
     variants += [one_frame.external_variant(name, mask) for name, mask in frame.external.items()]
-    result = run.board.score(frame, role, tuple(variants))
+    result = run.board.score(frame, use.role, tuple(variants))
     result = replace(result, notes=notes.of_tallies(result.tallies, run.config.evaluation))
     own = lines(result)
     encoded = encoder.encode(result, position - 1, own)
     # Results wait for their turn, and would wait with some 15 bytes a pixel.
-    return ProcessedFrame(position, result.without_layers(), own, encoded)
+    return ProcessedFrame(position, result.without_layers(), own, encoded, use.beside)

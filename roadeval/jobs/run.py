@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -53,6 +53,8 @@ class Run:
         Every variant that is scored, those included whose masks the log carries.
     board
         The score so far.
+    beside
+        The training frames of a model file that show a place of this drive, so far.
     """
 
     log: logs.Log
@@ -65,6 +67,7 @@ class Run:
     chains: Mapping[str, Chain]
     layouts: tuple[VariantLayout, ...]
     board: Scoreboard
+    beside: set[int] = field(default_factory=set)
 
     def layout(self) -> Layout:
         """Describe the recording before its first frame."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections import Counter
+from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Final
 
@@ -17,6 +18,9 @@ PACKAGES: Final = (
     *("numba", "rerun-sdk", "pandas", "matplotlib"),
 )
 """The packages whose version can change a number or a file."""
+JOURNEY: Final = 3
+"""So many training frames that show places of a drive tell that it is the same journey."""
+FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
 
 
 def of(run: Run) -> dict[str, Any]:
@@ -90,17 +94,33 @@ def _sizes(run: Run) -> tuple[str, ...]:
     return tuple(warned)
 
 
-def _near_training(run: Run) -> tuple[str, ...]:
-    """Warn where frames next to those that trained a model file are evaluated."""
-    roles = Counter(run.board.roles())
-    own = roles[Role.TRAINING]
-    if run.config.training.model is None or not own or not roles[Role.EVALUATED]:
-        return ()
-    return (
-        f"{own} of the model's {len(run.model.digests)} training frames lie in this drive; "
-        "their neighbours are evaluated and look alike, which flatters the result: use a "
-        "model of other drives",
-    )
+def _near_training(run: Run) -> Iterator[str]:
+    """Warn where frames that trained a model file, or their neighbours, lie in this drive."""
+    roles, trained = Counter(run.board.roles()), len(run.model.digests)
+    own, copies = roles[Role.TRAINING], roles[Role.COPY]
+    if run.config.training.model is None or not roles[Role.EVALUATED]:
+        return
+    if run.model.fingerprints is None:
+        yield (
+            "the model was made by an earlier version, which kept no fingerprints: training frames "
+            "that were encoded anew are not recognised; train it again"
+        )
+    if copies:
+        yield (
+            "frames that are left out because they show the model's training pictures, encoded "
+            f"anew: {copies}"
+        )
+    if own:
+        yield (
+            f"{own} of the model's {trained} training frames lie in this drive; their neighbours "
+            f"are evaluated and {FLATTERED}"
+        )
+    elif copies or len(run.beside) >= min(JOURNEY, trained):
+        yield (
+            f"{len(run.beside)} of the model's {trained} training frames show places of this "
+            "drive: it looks like the same journey, at another rate or encoded anew; frames beside "
+            f"them are evaluated and {FLATTERED}"
+        )
 
 
 def _drive(run: Run) -> dict[str, Any]:
@@ -122,6 +142,7 @@ def _accounting(run: Run) -> dict[str, Any]:
         "not read (stride or limit)": seen.in_range - seen.read,
         "undecodable": len(seen.undecodable),
         "trained on": roles[Role.TRAINING],
+        "copies of training frames": roles[Role.COPY],
         "gap after training": roles[Role.GAP],
         "unlabelled": roles[Role.UNLABELLED],
     }

@@ -48,7 +48,7 @@ def check_arrays(
 
 def check_range(name: str, values: npt.ArrayLike, least: float, greatest: float) -> None:
     """Raise a ValueError if a number lies outside a range, both ends included."""
-    array = np.asarray(values)
+    array = np.asarray(values, np.float64)  # no smaller type may have to hold the ends
     if not ((array >= least) & (array <= greatest)).all():
         raise ValueError(f"{name} holds a number outside {least:g} to {greatest:g}")
 

@@ -13,6 +13,7 @@ from roadeval.data import Frame, Rgb, Truth
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import TrainingSet, View
+from roadeval.training.likeness import fingerprint
 from roadeval.training.model import Model
 from roadeval.training.sampling import sample
 from roadeval.training.selfsupervision import patch_truth
@@ -65,6 +66,7 @@ def fit(
         len(samples.road),
         prior,
         tuple(warnings),
+        np.stack([fingerprint(frame.image) for frame in frames]),
     )
 
 

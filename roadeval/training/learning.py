@@ -14,6 +14,7 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.pipeline.chain import Pipeline
 from roadeval.training.fitting import TrainingError, fit
 from roadeval.training.held import HeldFrames
+from roadeval.training.likeness import Likeness
 from roadeval.training.model import Model, load_model
 from roadeval.training.schedule import Schedule
 from roadeval.training.settings import TrainingSettings
@@ -46,7 +47,8 @@ def from_file(path: Path, pipelines: Mapping[str, Pipeline]) -> tuple[Model, Sch
     model = load_model(path)
     for name, pipeline in pipelines.items():
         model.require(name, pipeline, path)
-    return model, Schedule(model.digests)
+    known = None if model.fingerprints is None else Likeness(model.fingerprints)
+    return model, Schedule(model.digests, likeness=known)
 
 
 def from_log(

@@ -19,11 +19,16 @@ from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import STAGES, Pipeline
 from roadeval.pipeline.parameters import check_arrays, check_range
 from roadeval.runtime.files import put
+from roadeval.training.likeness import SIDE
 
 FORMAT: Final = "roadeval-model"
-VERSION: Final = 2
-"""Of the file; raised when what a stage has learnt means something else. In 2 the machine of
-``context`` knows the column below a pixel."""
+VERSION: Final = 3
+"""Of the file; raised when what a stage has learnt means something else, or something is added. In
+2 the machine of ``context`` knows the column below a pixel, in 3 there are fingerprints."""
+OLDEST: Final = 2
+"""The earliest version that is read."""
+OWN: Final = ("prior", "fingerprints")
+"""The arrays that belong to no variant."""
 
 
 class ModelError(RoadevalError):
@@ -52,6 +57,9 @@ class Model:
         what the blind baseline thresholds; None without truth.
     warnings
         What a user should know before believing a result.
+    fingerprints
+        ``(n, SIDE * SIDE)`` float16: the pictures of the training frames, see
+        `roadeval.training.likeness`; None in files of version 2.
     """
 
     parameters: Mapping[str, Mapping[str, Any]]
@@ -61,8 +69,11 @@ class Model:
     pixels: int
     prior: npt.NDArray[np.float32] | None = None
     warnings: tuple[str, ...] = field(default=())
+    fingerprints: npt.NDArray[np.float16] | None = None
 
     def __post_init__(self) -> None:
+        if self.fingerprints is not None:
+            check_arrays(self, np.float16, fingerprints=("n", SIDE * SIDE))
         if self.prior is not None:
             check_arrays(self, np.float32, prior=("H", "W"))
             check_range("prior", self.prior, 0, 1)
@@ -115,8 +126,8 @@ def save_model(model: Model, path: Path) -> None:
                 arrays[f"{variant}/{stage}/{entry.name}"] = np.asarray(
                     getattr(parameters, entry.name)
                 )
-    if model.prior is not None:
-        arrays["prior"] = model.prior
+    own = {name: getattr(model, name) for name in OWN}
+    arrays |= {name: array for name, array in own.items() if array is not None}
     header = {
         "format": FORMAT,
         "version": VERSION,
@@ -148,9 +159,9 @@ def load_model(path: Path) -> Model:
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise ModelError(f"{path}: not a model file; make one with 'roadeval train'")
     version = header.get("version")
-    if isinstance(version, int) and version < VERSION:
+    if isinstance(version, int) and version < OLDEST:
         raise ModelError(f"{path}: made by an earlier version of roadeval; train it again")
-    if version != VERSION:
+    if version not in range(OLDEST, VERSION + 1):
         raise ModelError(
             f"{path}: model format {version}, this version reads {VERSION}; train it again"
         )
@@ -192,7 +203,9 @@ def _model(content: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) -
     given: dict[str, Any] = {name: content.get(name) for name in names}
     header = _Header(**given)
     parts: dict[str, dict[str, dict[str, Any]]] = {variant: {} for variant in header.settings}
-    for name in arrays.keys() - {"prior"}:
+    if "fingerprints" not in arrays and content["version"] > OLDEST:
+        raise ValueError("fingerprints are missing")
+    for name in arrays.keys() - {*OWN}:
         variant, _, rest = name.partition("/")
         stage, _, entry = rest.partition("/")
         if variant not in parts:
@@ -202,7 +215,8 @@ def _model(content: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) -
         variant: {stage: _parameters(variant, stage, each) for stage, each in stages.items()}
         for variant, stages in parts.items()
     }
-    return Model(parameters, **vars(header), prior=arrays.get("prior"))
+    prior, prints = (arrays.get(name) for name in OWN)
+    return Model(parameters, **vars(header), prior=prior, fingerprints=prints)
 
 
 def _parameters(variant: str, stage: str, arrays: Mapping[str, npt.NDArray[Any]]) -> Any:

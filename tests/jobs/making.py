@@ -1,5 +1,6 @@
 """Small logs and short ways to say how they are replayed."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -42,19 +43,22 @@ def write_log(
     net: bool = False,
     broken: int = -1,
     codes: tuple[int, int] = (0, 255),
+    numbers: Sequence[int] = range(FRAMES),
+    tail: bytes = b"",
 ) -> Path:
     """Write a log of small frames; some have no truth, one may be broken.
 
-    ``codes`` are the values of non-road and road in the truth.
+    ``codes`` are the values of non-road and road in the truth, ``numbers`` the frames that are
+    written, and ``tail`` are bytes after each image file.
     """
     with LogWriter(path) as writer:
-        for number in range(FRAMES):
+        for number in numbers:
             made, stamp = frame(number), (number + 1) * NS
             # The verge creeps over the road, so that no fixed mask is right everywhere.
             made.image[12 : 12 + number // 8] = made.image[0]
             made.truth[12 : 12 + number // 8] = 0
             _, png = cv2.imencode(".png", made.image[..., ::-1])
-            data = b"no image" if number == broken else png.tobytes()
+            data = b"no image" if number == broken else png.tobytes() + tail
             writer.image("/camera/image", stamp, data, "png")
             if truth and number != 20:
                 writer.mask("/truth/road", stamp, np.array(codes, np.uint8)[made.truth])

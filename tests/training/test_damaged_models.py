@@ -27,7 +27,8 @@ def filled(value):
 
     def damage(array):
         spoilt = array.copy()
-        spoilt[(0,) * array.ndim] = value
+        with np.errstate(over="ignore"):  # half precision makes infinity of a huge number
+            spoilt[(0,) * array.ndim] = value
         return spoilt
 
     return damage

@@ -9,7 +9,7 @@ from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
 from roadeval.training import TrainingError, TrainingSettings, held, save_model
 from roadeval.training.learning import from_drives, from_file, from_log, spread
-from roadeval.training.schedule import Schedule
+from roadeval.training.schedule import Schedule, Use
 from tests.training.making import frame, pipelines
 
 PIPELINES = pipelines()
@@ -42,7 +42,7 @@ def log(count: int, unlabelled: tuple[int, ...] = (), broken: tuple[int, ...] = 
 
 def roles(frames, schedule: Schedule) -> str:
     """Give the roles' first letters: t(raining), g(ap), u(nlabelled), e(valuated)."""
-    return "".join(schedule.role(f.frame)[0] for f in frames)
+    return "".join(schedule.use(f.frame).role[0] for f in frames)
 
 
 def learn(logged, *, labelled: bool = True, **settings):
@@ -113,7 +113,26 @@ def test_an_image_that_trained_is_recognised_wherever_it_lies():
     frames = log(5)
     _, schedule = learn(frames, frames=2)
     elsewhere = replace(frames[1].frame, number=77, stamp_ns=5)
-    assert schedule.role(elsewhere) is Role.TRAINING
+    assert schedule.use(elsewhere).role is Role.TRAINING
+
+
+def test_the_log_that_trains_evaluates_what_looks_like_its_training_frames():
+    frames = log(5)
+    _, schedule = learn(frames, frames=2)
+    again = replace(frames[1].frame, payload=b"encoded anew")
+    assert schedule.use(again) == Use(Role.EVALUATED)
+
+
+def test_a_model_from_a_file_leaves_pictures_of_its_own_frames_out(tmp_path):
+    frames = log(6)
+    model, _ = learn(frames, frames=3)
+    save_model(model, tmp_path / "m.model")
+    _, schedule = from_file(tmp_path / "m.model", PIPELINES)
+    again = replace(frames[1].frame, payload=b"encoded anew")
+    assert schedule.use(again).role is Role.COPY
+    assert schedule.use(replace(again, truth=None)).role is Role.COPY
+    # The noise of these small pictures tells them apart, and they all show one place.
+    assert schedule.use(frames[4].frame) == Use(Role.EVALUATED, frozenset({0, 1, 2}))
 
 
 def test_a_model_from_a_file_leaves_its_own_frames_out(tmp_path):
@@ -184,8 +203,8 @@ def test_a_frame_of_another_size_than_the_training_frames_is_not_hashed(monkeypa
     mine = frame(3)
     digests = frozenset([mine.digest()])
     known, unknown = Schedule(digests, sizes=frozenset([len(mine.payload)])), Schedule(digests)
-    assert known.role(mine) is unknown.role(mine) is Role.TRAINING
+    assert known.use(mine).role is unknown.use(mine).role is Role.TRAINING
     other = replace(mine, payload=bytes(mine.payload) + b"x")
-    assert unknown.role(other) is Role.EVALUATED
+    assert unknown.use(other).role is Role.EVALUATED
     monkeypatch.setattr(Frame, "digest", lambda _frame: pytest.fail("it was hashed"))
-    assert known.role(other) is Role.EVALUATED
+    assert known.use(other).role is Role.EVALUATED

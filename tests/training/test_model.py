@@ -32,6 +32,8 @@ def test_a_model_reads_back_equal(model, path):
     assert read.digests == model.digests
     assert read.source == model.source
     np.testing.assert_array_equal(read.prior, model.prior)
+    np.testing.assert_array_equal(read.fingerprints, model.fingerprints)
+    assert len(read.fingerprints) == 3
     for variant, stages in model.parameters.items():
         for stage, parameters in stages.items():
             for entry in dataclasses.fields(parameters):
@@ -142,20 +144,38 @@ def test_an_array_that_hides_code_is_not_run(tmp_path):
     ("version", "why"),
     [
         (1, "made by an earlier version of roadeval; train it again"),
-        (99, "model format 99, this version reads 2; train it again"),
-        (None, "model format None, this version reads 2; train it again"),
+        (99, "model format 99, this version reads 3; train it again"),
+        (None, "model format None, this version reads 3; train it again"),
     ],
 )
 def test_another_version_is_refused_in_one_line(path, version, why):
+    of_version(path, version, without="")
+    with pytest.raises(RoadevalError) as caught:
+        load_model(path)
+    assert str(caught.value) == f"{path}: {why}"
+
+
+def of_version(path, version, *, without: str):
+    """Make a model file what an earlier version wrote: of its number, and without an array."""
     with np.load(path) as archive:
-        arrays = dict(archive)
+        arrays = {name: archive[name] for name in archive.files if name != without}
     header = json.loads(arrays["header"].tobytes()) | {"version": version}
     arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
     with path.open("wb") as file:
         np.savez(file, **arrays)
-    with pytest.raises(RoadevalError) as caught:
+
+
+def test_a_model_of_version_2_is_read_and_has_no_fingerprints(model, path):
+    of_version(path, 2, without="fingerprints")
+    read = load_model(path)
+    assert read.fingerprints is None
+    assert read.digests == model.digests
+
+
+def test_a_model_of_today_without_fingerprints_is_damaged(path):
+    of_version(path, 3, without="fingerprints")
+    with pytest.raises(RoadevalError, match="a damaged model file: fingerprints are missing"):
         load_model(path)
-    assert str(caught.value) == f"{path}: {why}"
 
 
 def test_a_folder_that_is_missing_is_made(model, tmp_path):
