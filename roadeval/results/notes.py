@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Tally
+from roadeval.data.words import percent
 from roadeval.evaluation.settings import EvaluationSettings
 
 Rates = Mapping[str, float]
@@ -44,14 +45,14 @@ def _filter_note(finals: Mapping[str, Rates], settings: EvaluationSettings) -> I
     change = finals[FILTERED]["ERR"] - finals[UNFILTERED]["ERR"]
     if abs(change) >= settings.noteworthy:
         verb = "raised" if change > 0 else "lowered"
-        yield f"The filter {verb} ERR by {100 * abs(change):.1f} pp on this frame."
+        yield f"The filter {verb} ERR by {percent(abs(change), 1)} pp on this frame."
 
 
 def _failures(name: str, rates: Rates, settings: EvaluationSettings) -> Iterator[str]:
     if rates["FNR"] >= settings.failed_fnr:
-        yield f"{name} finds {100 * rates['TPR']:.1f} % of the road."
+        yield f"{name} finds {percent(rates['TPR'], 1)} % of the road."
     elif rates["ERR"] >= settings.failed_err:
-        yield f"{name} gets {100 * rates['ERR']:.1f} % of the pixels wrong."
+        yield f"{name} gets {percent(rates['ERR'], 1)} % of the pixels wrong."
 
 
 def _blind_notes(
@@ -63,6 +64,6 @@ def _blind_notes(
         excess = rates["ERR"] - blind["ERR"]
         if excess >= settings.noteworthy:
             yield (
-                f"{name} is {100 * excess:.1f} pp worse than {BASELINE}, which never looks at the "
-                f"image (ERR {100 * blind['ERR']:.1f} %)."
+                f"{name} is {percent(excess, 1)} pp worse than {BASELINE}, which never looks at "
+                f"the image (ERR {percent(blind['ERR'], 1)} %)."
             )
