@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from roadeval.jobs.outputs import AnyPath
+from roadeval.jobs.outputs import AnyPath, holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.synth import RenderSettings, write_drive
 
@@ -46,9 +46,10 @@ def demo(
     ['/camera/image', '/truth/road', '/truth/shadow']
     """
     path = Path(output)
-    write_drive(
-        path,
-        settings or RenderSettings(),
-        lambda done, total: on_progress(Progress(done, total, "rendering")),
-    )
+    with holding(path):
+        write_drive(
+            path,
+            settings or RenderSettings(),
+            lambda done, total: on_progress(Progress(done, total, "rendering")),
+        )
     return path

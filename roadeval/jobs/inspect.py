@@ -11,6 +11,7 @@ from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import analysis
 from roadeval.evaluation.metrics import SHORT
+from roadeval.jobs.outputs import holding
 from roadeval.jobs.result import Result
 
 LISTED: Final = 10
@@ -161,7 +162,8 @@ def view(result: Result, frame: int | None, picture: Path | None = None) -> int 
     if picture is None:
         viewer.show(recording.path, frame)
         return frame
-    return viewer.screenshot(recording.path, picture, frame)
+    with holding(picture, inputs=[result.path]):
+        return viewer.screenshot(recording.path, picture, frame)
 
 
 def _first(result: Result, begin: int | None) -> int | None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from roadeval import logs
-from roadeval.jobs.outputs import AnyPath, keep_apart
+from roadeval.jobs.outputs import AnyPath, holding
 
 NAMED: Final = 3
 """Files that a warning names, at most."""
@@ -72,8 +72,8 @@ def pack(
     >>> roadeval.pack("images", "packed.mcap").stamps
     "the times in the files' names"
     """
-    keep_apart((images, truth), (output,))
-    written = logs.pack(images, output, masks=truth, rate_hz=rate_hz)
+    with holding(output, inputs=(images, truth)):
+        written = logs.pack(images, output, masks=truth, rate_hz=rate_hz)
     warnings = tuple(_warnings(written)) if truth is not None else ()
     return PackOutcome(written.path, written.frames, written.labelled, written.stamps, warnings)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,14 +14,14 @@ from roadeval.config.toml import run_toml
 from roadeval.jobs import summary
 from roadeval.jobs.examples import ExampleFrames
 from roadeval.jobs.identity import deciding
-from roadeval.jobs.outputs import AnyPath, Outputs, keep_apart
+from roadeval.jobs.outputs import AnyPath, Outputs
 from roadeval.jobs.processing import process
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import Run, prepare
-from roadeval.recording import NullRecorder, RecordRule, recorder_for
+from roadeval.recording import NullRecorder, RecordRule, SelectiveRecorder, recorder_for
 from roadeval.report.figures.figure import ExampleFrame, FigureData
 from roadeval.report.figures.files import write_figures
-from roadeval.results.folder import ResultsFolder, ResultsWriter
+from roadeval.results.folder import ResultsWriter
 from roadeval.results.lines import sum_lines
 from roadeval.results.schema import TABLES
 from roadeval.results.summary import summary_text
@@ -75,42 +76,57 @@ def replay(
     config = (config or RunConfig()).for_drive(drive).override({"output": wanted})
     with logs.open_log(drive, keep_corrupt=config.frames.keep_corrupt) as log:
         to = Outputs.of(config.output, log.name)
-        keep_apart((drive, config.training.model), (to.recording, to.mcap))
-        outcome, examples = _run(log, config, to, on_progress)
-        # The run's frames and models are released here: figures take their room.
+        with to.holding((drive, config.training.model)) as left:
+            outcome = _written(log, config, to, on_progress)
+            warnings = (*outcome.warnings, *_unwritten(config, to), *_superseded(left))
+            return replace(outcome, warnings=warnings)
+
+
+def _written(log: logs.Log, config: RunConfig, to: Outputs, on_progress: OnProgress) -> Outcome:
+    """Run over the log. All outputs are whole before the first of them takes its name."""
+    run = prepare(log, config, on_progress)
+    rule = RecordRule.parse(config.output.record)
+    on_progress(Progress(0, None, "hashing"))
+    with (
+        logs.SidecarWriter(to.mcap) if to.mcap else logs.NoSidecar() as sidecar,
+        recorder_for(to.recording, run.layout(), rule) as recorder,
+        ResultsWriter(to.reports) as results,
+    ):
+        examples = _record(run, recorder, results, sidecar, on_progress)
+        sums = sum_lines(run.board.sums())
+        results.append(sums)
+        facts = summary.of(run) | {"tables": results.tables}
+        warnings, losses = summary.warnings(run), summary.losses(run)
+        recorder.finish(_texts(run, facts, sums))
+        sidecar.finish()
+        del run  # figures take the room of its frames and models
         trim()
-        windows = ResultsFolder(to.reports).windows
-        figures = write_figures(to.reports, FigureData(log.name, windows, examples))
-        return replace(outcome, files=(*outcome.files, *figures))
+        with results.explained():
+            data = FigureData(log.name, results.table("windows"), examples)
+            write_figures(results.folder, data)
+        facts = results.finish(facts, run_toml(config, log.name, VERSION))
+    files = [to.reports / name for name in facts["files"]] + ([to.mcap] if to.mcap else [])
+    return Outcome(to.recording, to.reports, facts, warnings, losses, tuple(files))
 
 
-def _run(
-    log: logs.Log, config: RunConfig, to: Outputs, on_progress: OnProgress
-) -> tuple[Outcome, list[ExampleFrame]]:
-    """Run over the log into a recording and tables; return the frames for the figure of masks."""
-    sidecar = logs.SidecarWriter(to.mcap) if to.mcap else logs.NoSidecar()
-    with ResultsWriter(to.reports) as results, sidecar:
-        run = prepare(log, config, on_progress)
-        examples = ExampleFrames(len(run.frames))
-        rule = RecordRule.parse(config.output.record)
-        with recorder_for(to.recording, run.layout(), rule) as recorder:
-            for done in process(run, recorder, on_progress):
-                recorder.write(done.encoded)
-                results.append(done.lines)
-                sidecar.write(done.result)
-                examples.offer(done.position, done.result)
-            on_progress(Progress(len(run.frames), len(run.frames), "writing"))
-            recorder.flush()
-            trim()
-            sums = sum_lines(run.board.sums())
-            results.append(sums)
-            facts = summary.of(run) | {"tables": results.tables}
-            recorder.finish(_texts(run, facts, sums))
-            files = results.finish(facts, run_toml(config, log.name, VERSION))
-    saved = None if isinstance(recorder, NullRecorder) else recorder.path
-    files += [sidecar.path] if sidecar.path else []
-    warnings, losses = summary.warnings(run), summary.losses(run)
-    return Outcome(saved, to.reports, facts, warnings, losses, tuple(files)), examples.kept
+def _record(
+    run: Run,
+    recorder: SelectiveRecorder | NullRecorder,
+    results: ResultsWriter,
+    sidecar: logs.SidecarWriter | logs.NoSidecar,
+    on_progress: OnProgress,
+) -> list[ExampleFrame]:
+    """Run over the frames; return those for the figure of masks."""
+    examples = ExampleFrames(len(run.frames))
+    for done in process(run, recorder, on_progress):
+        recorder.write(done.encoded)
+        results.append(done.lines)
+        sidecar.write(done.result)
+        examples.offer(done.position, done.result)
+    on_progress(Progress(len(run.frames), len(run.frames), "writing"))
+    recorder.flush()
+    trim()
+    return examples.kept
 
 
 def _texts(run: Run, facts: Mapping[str, Any], sums: Mapping[str, str]) -> dict[str, str]:
@@ -124,3 +140,19 @@ def _texts(run: Run, facts: Mapping[str, Any], sums: Mapping[str, str]) -> dict[
         "run": run_toml(config, run.log.name, VERSION),
         **{name: TABLES[name].header + text for name, text in sums.items()},
     }
+
+
+def _unwritten(config: RunConfig, to: Outputs) -> tuple[str, ...]:
+    """Warn where a recording has a name but is not made."""
+    if to.recording is not None or config.output.save is None:
+        return ()
+    return (f"`output.save` {config.output.save} is not written: `output.record` is none",)
+
+
+def _superseded(left: Path | None) -> tuple[str, ...]:
+    """Remove the partial recording that an earlier run has left, and say so."""
+    if left is None:
+        return ()
+    with suppress(OSError):
+        left.unlink()
+    return (f"removed {left}, the partial recording of an earlier run: this one is whole",)

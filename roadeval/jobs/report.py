@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from roadeval.jobs.outputs import holding
 from roadeval.jobs.report_findings import collect
 from roadeval.jobs.result import Result
 from roadeval.report.drive import document
@@ -45,4 +46,6 @@ def write_report(
     opened = result if isinstance(result, Result) else Result(result)
     beside = opened.path / "report.pdf"
     usual = beside if opened.recording is None else Path("reports", f"{opened.path.stem}.pdf")
-    return write_file(Path(output or usual), pdf(document(collect(opened, commands)), paper))
+    path = Path(output or usual)
+    with holding(path, inputs=[opened.path]):
+        return write_file(path, pdf(document(collect(opened, commands)), paper))

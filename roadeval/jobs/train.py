@@ -9,7 +9,7 @@ from pathlib import Path
 from roadeval import logs
 from roadeval.config import ConfigError, RunConfig
 from roadeval.data import Frame
-from roadeval.jobs.outputs import AnyPath, keep_apart
+from roadeval.jobs.outputs import AnyPath, holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.kernels import prepare
 from roadeval.training import Model, TrainingError, TrainingSettings, learning, save_model
@@ -36,7 +36,14 @@ def train(
         If some drives have truth and others none, or there is nothing to learn.
     """
     config = config or RunConfig()
-    keep_apart(drives, (output,))
+    with holding(output, inputs=drives):
+        model = _learnt(drives, config, on_progress)
+        save_model(model, Path(output))
+        return model
+
+
+def _learnt(drives: Sequence[AnyPath], config: RunConfig, on_progress: OnProgress) -> Model:
+    """Train on frames of all drives."""
     settings = config.training
     _require_a_drive_for_each(config, drives)
     total = settings.frames * len(drives)
@@ -55,9 +62,7 @@ def train(
             for frame in _held(there, settings, held):
                 frames[log.path].append(frame)
                 on_progress(Progress(len(held.frames), total, "training"))
-    model = learning.from_drives(frames, config.pipelines(), settings, readings)
-    save_model(model, Path(output))
-    return model
+    return learning.from_drives(frames, config.pipelines(), settings, readings)
 
 
 def _held(

@@ -42,6 +42,11 @@ class RecordRule:
     kind: RuleKind = RuleKind.ALL
     number: int = 0
 
+    @property
+    def recorded(self) -> bool:
+        """Whether there is a recording."""
+        return self.kind is not RuleKind.NONE
+
     @classmethod
     def parse(cls, text: str) -> RecordRule:
         """Read a rule as it is written in a configuration.

@@ -1,7 +1,6 @@
 """The results folder: tables and summary as plain files that any later version reads.
 
-Tables grow frame by frame under temporary names and take their own only when the run is complete,
-``summary.json`` last: where it lies, everything beside it belongs to it.
+It is built beside the one of its name, and replaces it as one: see `roadeval.runtime.folders`.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from typing import IO, TYPE_CHECKING, Any, Final, Self
 from roadeval.results.reading import ResultsError, read_table
 from roadeval.results.schema import TABLES, TableSchema
 from roadeval.results.summary import SUMMARY, read_summary, summary_text
-from roadeval.runtime import files
+from roadeval.runtime.folders import Content, NewFolder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,18 +23,39 @@ if TYPE_CHECKING:
 
 RUN: Final = "run.toml"
 """The file that makes the run again."""
+_UNLISTED: Final = frozenset(
+    f"{figure}.{kind}"
+    for figure in ("fig2_masks", "fig3a_error_rate", "fig3b_fp_fn_rate")
+    for kind in ("png", "pdf")
+)
+"""The figures of version 0.1, whose summaries do not list the folder's files."""
+
+
+def belonging(folder: Path) -> frozenset[str]:
+    """Return the names of the files in a folder that are results, there or not."""
+    try:
+        listed = read_summary(folder / SUMMARY).get("files")
+    except ResultsError:
+        listed = None
+    names = [str(name) for name in listed] if isinstance(listed, list) else []
+    plain = {name for name in names if Path(name).name == name != ".."}
+    return _UNLISTED | {SUMMARY, RUN, *(f"{table}.csv" for table in TABLES)} | plain
+
+
+CONTENT: Final = Content(SUMMARY, belonging)
+"""What a new results folder replaces in one that is there."""
 
 
 class ResultsWriter:
     """Writes a results folder while frames arrive; to be used as a context.
 
-    Leaving the context without `finish` removes what was begun and leaves earlier results as they
-    were.
+    After `finish` it takes its name at the end of the context. Left by an exception, or without
+    `finish`, it removes what was begun; earlier results stay.
 
     Parameters
     ----------
     folder
-        Made if it does not exist.
+        The folder's name.
 
     Raises
     ------
@@ -44,15 +64,20 @@ class ResultsWriter:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._folder: Final = folder
+        self._new: Final = NewFolder(folder, CONTENT)
         self._open: Final[dict[str, _Growing]] = {}
-        self._made: Final = [each for each in (folder, *folder.parents) if not each.exists()]
-        with self._explained():
-            folder.mkdir(parents=True, exist_ok=True)
-            for name, table in TABLES.items():
-                self._open[name] = _Growing(folder, table)
+        self._finished = False
+
+    @property
+    def folder(self) -> Path:
+        """Where the files lie until the end: for those that others write, as figures."""
+        return self._new.partial
 
     def __enter__(self) -> Self:
+        with self.explained():
+            self._new.begin()
+            for name, table in TABLES.items():
+                self._open[name] = _Growing(self.folder, table)
         return self
 
     def __exit__(
@@ -61,11 +86,19 @@ class ResultsWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._discard()
+        try:
+            if kind is None and self._finished:
+                with self.explained():
+                    self._new.publish()
+        finally:
+            for table in self._open.values():
+                with suppress(OSError):  # on a full disk closing fails, too
+                    table.close()
+            self._new.discard()
 
     def append(self, lines: Mapping[str, str]) -> None:
         """Add lines to tables, by their names."""
-        with self._explained():
+        with self.explained():
             for name, text in lines.items():
                 self._open[name].append(text)
 
@@ -74,11 +107,16 @@ class ResultsWriter:
         """Rows and SHA-256 of each table that has rows so far, as the summary states them."""
         return {name: table.stated for name, table in self._open.items() if table.rows}
 
-    def finish(self, summary: Mapping[str, Any], run_toml: str) -> list[Path]:
-        """Rename all files to their own names, the summary last.
+    def table(self, name: str) -> pd.DataFrame:
+        """Read back a table, to which nothing is added any more."""
+        with self.explained():
+            self._open[name].close()
+        return read_table(name, self._open[name].path, {"tables": self.tables})
 
-        A table without rows is not there, nor is that of an earlier run: it would not belong to
-        this summary.
+    def finish(self, summary: Mapping[str, Any], run_toml: str) -> dict[str, Any]:
+        """Write the last files, and return the content of the summary.
+
+        A table without rows is left out.
 
         Parameters
         ----------
@@ -86,56 +124,38 @@ class ResultsWriter:
             See `roadeval.results.summary.summary_text`.
         run_toml
             The configuration of the run, as the text of a TOML file.
-
-        Returns
-        -------
-        list of Path
-            The files written.
         """
-        path, text = self._folder / SUMMARY, summary_text({"tables": self.tables} | dict(summary))
-        config = self._folder / RUN
-        with (
-            self._explained(),
-            files.replacing(path) as whole,
-            files.replacing(config) as configured,
-        ):
-            configured.write_bytes(run_toml.encode())
-            whole.write_bytes(text.encode())
-            # From here an earlier run's summary would stand beside this one's tables.
-            path.unlink(missing_ok=True)
-            written = [table.path for table in self._open.values() if table.complete()]
-            self._open.clear()
-        return [*written, config, path]
-
-    def _discard(self) -> None:
-        for table in self._open.values():
-            table.discard()
-        self._open.clear()
-        for folder in self._made:
-            with suppress(OSError):  # one in which something lies by now stays
-                folder.rmdir()
+        with self.explained():
+            stated = self.tables
+            for table in self._open.values():
+                table.complete()
+            (self.folder / RUN).write_bytes(run_toml.encode())
+            names = sorted({SUMMARY, *(path.name for path in self.folder.iterdir())})
+            content = {"tables": stated} | dict(summary) | {"files": names}
+            (self.folder / SUMMARY).write_bytes(summary_text(content).encode())
+        self._finished = True
+        return content
 
     @contextmanager
-    def _explained(self) -> Iterator[None]:
+    def explained(self) -> Iterator[None]:
+        """Turn an OSError inside the block into a `ResultsError`."""
         try:
             yield
         except OSError as error:
-            self._discard()
             raise ResultsError(
-                f"{error.filename or self._folder}: cannot write results ({error.strerror}); "
+                f"{self._new.path}: cannot write results ({error.strerror}); "
                 "choose another folder with `output.reports`"
             ) from error
 
 
 class _Growing:
-    """A table that grows under a temporary name."""
+    """A table that grows."""
 
     def __init__(self, folder: Path, table: TableSchema) -> None:
         self.path: Final = folder / f"{table.name}.csv"
         self.rows = 0
-        self._temporary: Final = folder / f".{table.name}.csv.partial"
         self._digest: Final = hashlib.sha256()
-        self._file: Final[IO[bytes]] = self._temporary.open("wb")
+        self._file: Final[IO[bytes]] = self.path.open("wb")
         self._write(table.header)
 
     @property
@@ -147,20 +167,14 @@ class _Growing:
         self.rows += lines.count("\n")
         self._write(lines)
 
-    def complete(self) -> bool:
-        """Rename the file to its own name and return True; without rows remove it."""
+    def close(self) -> None:
         self._file.close()
-        if self.rows:
-            self._temporary.replace(self.path)
-        else:
-            self._temporary.unlink()
-            self.path.unlink(missing_ok=True)
-        return self.rows > 0
 
-    def discard(self) -> None:
-        with suppress(OSError):
-            self._file.close()
-        self._temporary.unlink(missing_ok=True)
+    def complete(self) -> None:
+        """Close the file; without rows remove it."""
+        self.close()
+        if not self.rows:
+            self.path.unlink()
 
     def _write(self, text: str) -> None:
         content = text.encode()

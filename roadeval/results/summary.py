@@ -16,11 +16,12 @@ SUMMARY: Final = "summary.json"
 PARTS: Final = (
     *("format", "verdict", "drive", "frames", "totals", "beyond", "difference", "oracles"),
     *("windows", "health", "training", "seconds", "warnings", "losses"),
-    *("run", "settings", "versions", "log", "tables"),
+    *("run", "settings", "versions", "log", "tables", "files"),
 )
 """The parts of the summary, in the file's order."""
-LATER: Final = frozenset({"tables"})
-"""Parts that version 1 did not write, and that readers must do without."""
+LATER: Final = frozenset({"tables", "files"})
+"""Parts that not every summary has, so that readers must do without them: earlier versions did not
+write them, and a recording has no files."""
 _SELECTION: Final[Mapping[str, Mapping[str, str]]] = {
     "topics": {
         "image": "image_topic",

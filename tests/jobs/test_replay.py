@@ -1,6 +1,8 @@
 """The main job, on a small log of our own."""
 
 import json
+import re
+import shutil
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -123,7 +125,7 @@ def test_the_summary_file_is_the_outcome_s_summary(once):
 def test_no_partial_file_is_left(once):
     folder, _ = once
     assert sorted(p.name for p in folder.iterdir()) == ["out.rrd", "reports"]
-    assert not [p for p in (folder / "reports").iterdir() if "partial" in p.name]
+    assert not [p for p in (folder / "reports").iterdir() if p.name.startswith(".")]
 
 
 def test_figures_are_written(once):
@@ -381,10 +383,96 @@ def test_an_error_on_the_way_leaves_no_results_and_a_partial_recording(
     monkeypatch.setattr(Scoreboard, "add", fail)
     with pytest.raises(KeyboardInterrupt):
         run(drive, tmp_path)
-    assert [p.name for p in tmp_path.iterdir()] == ["out.partial.rrd"]
-    partial = roadeval.Recording(tmp_path / "out.partial.rrd")
+    (left,) = tmp_path.iterdir()
+    assert re.fullmatch(r"out\.[0-9a-f]{8}\.partial\.rrd", left.name)
+    partial = roadeval.Recording(left)
     assert not partial.complete
     assert partial.layer("unfiltered", "svm", 5).shape == (24, 32)
+
+
+@pytest.fixture
+def earlier(once, tmp_path):
+    """A folder with the outputs of an earlier run, and what it holds."""
+    shutil.copytree(once[0], tmp_path, dirs_exist_ok=True)
+    return tmp_path, contents(tmp_path)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_where_figures_cannot_be_written_the_earlier_outputs_stay_all_three(
+    drive, earlier, monkeypatch
+):
+    """A disk that is full at the very last files costs neither folder nor recording nor log."""
+    folder, before = earlier
+    (folder / "out.mcap").write_text("an earlier log")
+
+    def fail(*given):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(import_module("roadeval.jobs.replay"), "write_figures", fail)
+    with pytest.raises(RoadevalError, match=r"reports: cannot write results \(No space") as caught:
+        roadeval.replay(
+            drive,
+            settings(max_frames=12),
+            save=folder / "out.rrd",
+            reports=folder / "reports",
+            mcap=folder / "out.mcap",
+        )
+    (left,) = folder.glob("out.*.partial.rrd")
+    assert caught.value.__notes__ == [f"the partial recording is {left}"]
+    assert roadeval.Recording(left).complete
+    left.unlink()
+    assert contents(folder) == before | {"out.mcap": b"an earlier log"}
+
+
+def test_a_recording_whose_name_is_taken_away_at_the_end_is_told_where_it_is(
+    drive, tmp_path, monkeypatch
+):
+    def take(*given):
+        (tmp_path / "out.rrd").mkdir()
+        return []
+
+    monkeypatch.setattr(import_module("roadeval.jobs.replay"), "write_figures", take)
+    with pytest.raises(RoadevalError, match=r"out\.rrd: cannot be written: Is a") as caught:
+        run(drive, tmp_path, max_frames=12)
+    (left,) = tmp_path.glob("out.*.partial.rrd")
+    assert caught.value.__notes__ == [f"the partial recording is {left}"]
+    assert ResultsFolder(tmp_path / "reports").summary["frames"]["evaluated"] == 2
+
+
+def test_a_run_that_ends_removes_an_earlier_one_s_partial_recording_and_says_so(drive, tmp_path):
+    left = tmp_path / "out.0123abcd.partial.rrd"
+    left.write_text("some frames")
+    outcome = run(drive, tmp_path, max_frames=12)
+    assert [each for each in outcome.warnings if str(left) in each] == [
+        f"removed {left}, the partial recording of an earlier run: this one is whole"
+    ]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out.rrd", "reports"]
+    assert left.name not in json.dumps(outcome.summary)
+
+
+def test_a_run_that_fails_leaves_an_earlier_one_s_partial_recording(drive, tmp_path):
+    left = tmp_path / "out.0123abcd.partial.rrd"
+    left.write_text("some frames")
+    with pytest.raises(RoadevalError, match="no frame in this range"):
+        run(drive, tmp_path, start="1000")
+    assert [path.name for path in tmp_path.iterdir()] == [left.name]
+
+
+def test_a_name_for_a_recording_that_is_not_made_is_warned_of(drive, tmp_path):
+    config = settings(record="none", max_frames=12)
+    outcome = roadeval.replay(drive, config, save=tmp_path / "o.rrd", reports=tmp_path / "r")
+    said = f"`output.save` {tmp_path / 'o.rrd'} is not written: `output.record` is none"
+    assert said in outcome.warnings
+    assert [path.name for path in tmp_path.iterdir()] == ["r"]
+    unnamed = roadeval.replay(drive, config, reports=tmp_path / "r")
+    assert not [each for each in unnamed.warnings if "output.save" in each]
 
 
 def test_an_output_never_replaces_the_drive(tmp_path):

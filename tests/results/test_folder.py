@@ -16,7 +16,7 @@ from roadeval.data.packed import Packed
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.folder import ResultsFolder, ResultsWriter
+from roadeval.results.folder import ResultsFolder, ResultsWriter, belonging
 from roadeval.results.lines import lines, sum_lines
 from roadeval.results.reading import ResultsError
 from roadeval.results.schema import TABLES
@@ -55,7 +55,8 @@ def write(folder: Path, role: Role = Role.EVALUATED) -> list[Path]:
         for result in scored(board, role):
             writer.append(lines(result))
         writer.append(sum_lines(board.sums()))
-        return writer.finish(the_rest(board), RUN_TOML)
+        files = writer.finish(the_rest(board), RUN_TOML)["files"]
+    return [folder / name for name in files]
 
 
 def names(folder: Path) -> set[str]:
@@ -182,13 +183,16 @@ def test_lines_end_alike_everywhere(tmp_path: Path) -> None:
 
 def test_nothing_bears_its_name_before_all_is_complete(tmp_path: Path) -> None:
     board = a_board()
-    with ResultsWriter(tmp_path) as writer:
+    with ResultsWriter(tmp_path / "new") as writer:
         for result in scored(board):
             writer.append(lines(result))
-        assert all(name.startswith(".") for name in names(tmp_path))
         writer.append(sum_lines(board.sums()))
         writer.finish(the_rest(board), RUN_TOML)
-    assert names(tmp_path) == {*(f"{table}.csv" for table in TABLES), "run.toml", "summary.json"}
+        assert names(tmp_path) == {writer.folder.name}
+        assert writer.folder.name.startswith(".new.")
+    assert names(tmp_path) == {"new"}
+    written = {*(f"{table}.csv" for table in TABLES), "run.toml", "summary.json"}
+    assert names(tmp_path / "new") == written
 
 
 def test_an_interrupted_run_leaves_the_earlier_results(tmp_path: Path) -> None:
@@ -199,6 +203,37 @@ def test_an_interrupted_run_leaves_the_earlier_results(tmp_path: Path) -> None:
         writer.append(lines(next(scored(board))))
         raise KeyboardInterrupt
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_the_next_run_s_files_are_all_that_is_left_of_results_and_others_stay(
+    tmp_path: Path,
+) -> None:
+    board = a_board()
+    with ResultsWriter(tmp_path) as writer:
+        (writer.folder / "fig9_weather.png").write_text("of this run alone")
+        writer.append(lines(next(scored(board))))
+        writer.finish(the_rest(board), RUN_TOML)
+    (tmp_path / "fig2_masks.png").write_text("of a version that listed no files")
+    (tmp_path / "notes.txt").write_text("mine")
+    assert {"fig9_weather.png", "frames.csv", "notes.txt"} < names(tmp_path)
+    written = {path.name for path in write(tmp_path)}
+    assert names(tmp_path) == {*written, "notes.txt"}
+    assert ResultsFolder(tmp_path).summary["files"] == sorted(written)
+
+
+@pytest.mark.parametrize(
+    "listed", [["../notes.txt", "/etc", "..", ".", 5], "notes", {"a": 1}, None]
+)
+def test_a_summary_names_no_file_elsewhere_as_a_result(tmp_path: Path, listed: Any) -> None:
+    write(tmp_path / "results")
+    summary = json.loads((tmp_path / "results" / "summary.json").read_text())
+    (tmp_path / "results" / "summary.json").write_text(json.dumps(summary | {"files": listed}))
+    assert not belonging(tmp_path / "results") & {"notes.txt", "..", ".", "n", "a", "/etc"}
+    for name in ("notes.txt", "results/n", "results/a"):
+        (tmp_path / name).write_text("mine")
+    write(tmp_path / "results")
+    assert {"n", "a"} < names(tmp_path / "results")
+    assert names(tmp_path) == {"results", "notes.txt"}
 
 
 def test_a_folder_that_was_there_stays(tmp_path: Path) -> None:
@@ -299,10 +334,13 @@ def test_a_run_that_scored_nothing_writes_no_tables_and_leaves_no_older_ones(
 
 def test_a_folder_that_cannot_be_written_is_one_line_with_a_remedy(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(
-        ResultsError, match=r"cannot write results.*with `output\.reports`"
-    ) as caught:
-        ResultsWriter(tmp_path / "file")
+    with (
+        pytest.raises(
+            ResultsError, match=r"cannot write results.*with `output\.reports`"
+        ) as caught,
+        ResultsWriter(tmp_path / "file"),
+    ):
+        pass
     assert "\n" not in str(caught.value)
 
 

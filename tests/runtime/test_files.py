@@ -1,5 +1,7 @@
 """Files that appear under their name only when they are complete."""
 
+import os
+import socket
 from pathlib import Path
 
 import pytest
@@ -8,7 +10,7 @@ from roadeval.runtime import files
 
 
 def names(folder):
-    return [path.name for path in folder.iterdir()]
+    return sorted(path.name for path in folder.iterdir())
 
 
 def test_a_file_is_put_whole_or_not_at_all(tmp_path, monkeypatch):
@@ -56,9 +58,130 @@ def test_what_bore_the_name_stays_if_the_block_fails(stop, tmp_path):
     assert path.read_text() == "before"
 
 
+def test_two_that_write_one_file_do_not_mix_and_the_last_one_stays(tmp_path):
+    path = tmp_path / "file"
+    with files.replacing(path) as one, files.replacing(path) as other:
+        one.write_text("one")
+        other.write_text("other")
+    assert path.read_text() == "one"
+    assert names(tmp_path) == ["file"]
+
+
+def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path):
+    (tmp_path / "far").mkdir()
+    (tmp_path / "near").symlink_to(tmp_path / "far" / "file")
+    for content in (b"first", b"second"):
+        files.put(tmp_path / "near", content)
+        assert (tmp_path / "far" / "file").read_bytes() == content
+    assert (tmp_path / "near").is_symlink()
+    assert names(tmp_path / "far") == ["file"]
+
+
 def test_a_folder_that_cannot_be_made_is_an_os_error(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(NotADirectoryError):
         files.put(tmp_path / "file" / "a" / "b", b"")
     with pytest.raises(OSError, match="File name too long"):
         files.put(tmp_path / (300 * "b") / "c", b"")
+
+
+def _pipe(path):
+    os.mkfifo(path)
+
+
+def _socket(path):
+    # The path of a socket is short.
+    with socket.socket(socket.AF_UNIX) as made:
+        os.chdir(path.parent)
+        made.bind(path.name)
+
+
+@pytest.mark.parametrize(
+    ("make", "kind"),
+    [(_pipe, "a pipe"), (_socket, "a socket"), (Path.mkdir, "a folder; name a file in it")],
+)
+@pytest.mark.parametrize("link", [False, True])
+def test_what_is_no_file_is_not_replaced(make, kind, link, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "taken"
+    make(path)
+    before = path.stat()
+    if link:
+        (tmp_path / "link").symlink_to(path)
+        path = tmp_path / "link"
+    with pytest.raises(OSError, match=kind):
+        files.put(path, b"")
+    assert os.path.samestat((tmp_path / "taken").stat(), before)
+
+
+@pytest.mark.parametrize("path", ["/dev/null", "/dev/full", "/", ".", ".."])
+def test_devices_and_folders_are_known(path):
+    with pytest.raises(OSError, match=r"is a (device|folder)"):
+        files.check_file(Path(path))
+
+
+@pytest.mark.parametrize(("name", "error"), [("a\0b", "null"), (245 * "a", "too long")])
+def test_a_name_that_no_file_can_have_or_none_of_a_run_s_own_is_an_os_error(name, error, tmp_path):
+    with pytest.raises(OSError, match=error):
+        files.check_file(tmp_path / name)
+    files.check_file(tmp_path / (230 * "a"))
+
+
+def test_a_folder_is_none_where_a_file_or_a_device_bears_the_name(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(OSError, match="is a file, not a folder"):
+        files.check_folder(tmp_path / "file")
+    with pytest.raises(OSError, match="is a device, not a folder"):
+        files.check_folder(Path("/dev/null"))
+    files.check_folder(tmp_path)
+    files.check_folder(tmp_path / "new")
+
+
+@pytest.mark.parametrize(
+    ("path", "hidden", "own", "others"),
+    [
+        (
+            "out.rrd",
+            False,
+            ["out.0123abcd.partial.rrd", "out.0123abcd.partial.rrd-images", "out.partial.rrd"],
+            ["out.rrd", "out.0123abcd.partial.mcap", "out.b.0123abcd.partial.rrd", "out.partial"],
+        ),
+        (
+            "drive",
+            True,
+            [".drive.0123abcd.partial", ".drive.0123abcd.partial-moving"],
+            ["drive.0123abcd.partial", "drive.0123abcd.partial.rrd", ".drive.partial", ".drive"],
+        ),
+        (
+            "a+b.pdf",
+            True,
+            [".a+b.0123abcd.partial.pdf"],
+            [".aab.0123abcd.partial.pdf", "a+b.partial.pdf", "a+b.0123abcd.partial.pdf"],
+        ),
+    ],
+)
+def test_only_an_output_s_own_unfinished_names_are_found(path, hidden, own, others, tmp_path):
+    for name in (*own, *others):
+        (tmp_path / name).touch()
+    found = files.own_names(tmp_path / path, hidden=hidden)
+    assert sorted(each.name for each in found) == sorted(own)
+
+
+def test_an_own_name_is_found_again_and_no_two_are_the_same(tmp_path):
+    for name in ("out.rrd", "drive", "a[1].b", ".hidden"):
+        for hidden in (False, True):
+            given = {files.own_name(tmp_path / name, hidden=hidden) for _ in range(4)}
+            for each in given:
+                each.touch()
+            assert set(files.own_names(tmp_path / name, hidden=hidden)) == given
+            assert len(given) == 4
+
+
+def test_folders_made_for_nothing_go_and_others_stay(tmp_path):
+    (tmp_path / "old").mkdir()
+    with files.made(tmp_path / "old"), files.made(tmp_path / "new" / "deep"):
+        assert (tmp_path / "new" / "deep").is_dir()
+    assert names(tmp_path) == ["old"]
+    with files.made(tmp_path / "new" / "deep"):
+        (tmp_path / "new" / "file").touch()
+    assert names(tmp_path / "new") == ["file"]

@@ -84,11 +84,13 @@ def compare(
     """
     from roadeval.cli.screens import compare as screen
     from roadeval.jobs import compare as comparing
+    from roadeval.jobs.outputs import holding
 
     size = arguments.paper_of(paper)
-    compared = comparing.compare(results, variants=variant, fail_if=fail_if or ())
-    for path in output or ():
-        comparing.write(compared, path, paper=size)
+    with holding(*(output or ()), inputs=results):
+        compared = comparing.compare(results, variants=variant, fail_if=fail_if or ())
+        for path in output or ():
+            comparing.write(compared, path, paper=size)
     if json:
         console.emit(comparing.as_json(compared).rstrip())
     elif not quiet:

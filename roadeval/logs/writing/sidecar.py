@@ -88,9 +88,9 @@ class SidecarWriter:
         schema = (METRICS, _schema(tuple(tally.rates)))
         self._log.json(topic, frame.stamp_ns, message, schema, log_time_ns=frame.log_time_ns)
 
-    def close(self) -> None:
-        """Complete the file and move it to its path."""
-        self._log.close()
+    def finish(self) -> None:
+        """Write the end of the file, which takes its name when the context ends."""
+        self._log.finish()
 
     def __enter__(self) -> SidecarWriter:
         return self
@@ -105,6 +105,9 @@ class NoSidecar:
     path: Final = None
 
     def write(self, result: FrameResult) -> None:
+        """Write nothing."""
+
+    def finish(self) -> None:
         """Write nothing."""
 
     def __enter__(self) -> NoSidecar:

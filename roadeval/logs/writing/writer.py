@@ -13,6 +13,7 @@ import numpy.typing as npt
 from mcap.writer import Writer
 
 from roadeval.logs.errors import LogError
+from roadeval.runtime.files import NewFile
 from roadeval.version import VERSION
 
 FORMATS: Final = ("jpeg", "png", "webp")
@@ -39,12 +40,10 @@ class LogWriter:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self._temporary = self.path.with_name(f".{self.path.stem}.part.mcap")
+        self._new = NewFile(self.path)
         with self._explained():
-            if self.path.is_dir():
-                raise LogError(f"{self.path}: is a folder; name a file in it, ending in .mcap")
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = self._temporary.open("wb")
+            self._new.begin()
+            self._file = self._new.partial.open("wb")
         self._writer = Writer(self._file)
         self._writer.start(library=f"roadeval {VERSION}")
         self._schemas: dict[str, int] = {}
@@ -152,8 +151,21 @@ class LogWriter:
         self._channels[topic] = self._writer.register_channel(topic, encoding, schema)
         return self._channels[topic]
 
+    def finish(self) -> None:
+        """Write the end of the file; `close` gives it its name.
+
+        Raises
+        ------
+        LogError
+            If the disk is full.
+        """
+        if not self._file.closed:
+            with self._explained():
+                self._writer.finish()  # type: ignore[no-untyped-call]
+                self._file.close()
+
     def close(self) -> None:
-        """Complete the file and move it to its path.
+        """Complete the file and give it its name.
 
         Raises
         ------
@@ -161,10 +173,9 @@ class LogWriter:
             If the disk is full.
         """
         try:
+            self.finish()
             with self._explained():
-                self._writer.finish()  # type: ignore[no-untyped-call]
-                self._file.close()
-                self._temporary.replace(self.path)
+                self._new.publish()
         except BaseException:
             self._discard()
             raise
@@ -179,11 +190,11 @@ class LogWriter:
             self._discard()
 
     def _discard(self) -> None:
-        """Remove the unfinished file, and its folder if it was made for it."""
+        """Remove the unfinished file."""
         # On a full disk closing fails as well, but the first error is the one to report.
         with suppress(OSError):
             self._file.close()
-        self._temporary.unlink(missing_ok=True)
+        self._new.discard()
 
     @contextmanager
     def _explained(self) -> Iterator[None]:

@@ -60,7 +60,7 @@ class PictureStore:
             return replace(bare, payloads={path: file.read(size) for path, size in sizes.items()})
 
     def clear(self) -> None:
-        """Remove the folder, also one that a killed run has left.
+        """Remove the folder.
 
         What cannot be removed is only clutter, and no reason to fail.
         """

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, Self
@@ -19,6 +20,7 @@ from roadeval.recording.screen import blueprint, static
 from roadeval.recording.write import columns
 from roadeval.recording.write.batching import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key
 from roadeval.recording.write.encoding import EncodedFrame, FrameEncoder, Images
+from roadeval.runtime.files import NewFile
 
 UNWRITTEN: Final = 4 << 20
 """Bytes that may wait for Rerun's own thread to write them; it would let any number wait."""
@@ -30,26 +32,27 @@ wait for it forever."""
 
 
 class Recorder:
-    """Writes one recording, under the name ``partial`` until `finish`.
+    """Writes one recording, under the name ``partial`` at first.
 
-    A context manager: left by an exception it closes the partial recording, which stays
-    readable.
+    A context manager: after `finish` the recording takes its name at the end. Left by an exception
+    it closes the partial recording, which stays readable.
 
     Parameters
     ----------
     path
-        Where the complete recording will stand. A file there is replaced by `finish` only.
+        Where the complete recording will stand. A file there is replaced at the end only.
     layout
         What will come.
     """
 
     def __init__(self, path: Path, layout: Layout) -> None:
         self.path = path
-        self.partial = path.with_name(f"{path.stem}.partial.rrd")
+        self._file = NewFile(path, hidden=False)
+        self.partial = self._file.partial
         self._layout = layout
         self._encoder = FrameEncoder(layout)
         self._rows, self._numbers = Batcher(IMAGES_AND_TEXT), Batcher(NUMBERS)
-        self._begun = False
+        self._begun = self._finished = False
         self._chunks = self._unwritten = 0
         self._states: dict[str, str] = {}
         self._shown: set[str] = set()
@@ -76,14 +79,19 @@ class Recorder:
         return self
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
-        if error is not None and self.partial.exists():
-            error.add_note(f"the partial recording is {self.partial}")
+        if error is not None:
+            self._tell(error)
+            with suppress(RecordingError):  # what went wrong first is what the user must hear
+                self._close()
+            return
         try:
             self._close()
-        except RecordingError:
-            # What went wrong first is what the user must hear.
-            if error is None:
-                raise
+            if self._finished:
+                with self._explained():
+                    self._file.publish()
+        except RecordingError as failed:
+            self._tell(failed)
+            raise
 
     def encode(
         self, result: FrameResult, lines: Mapping[str, str], images: Images = Images.ALL
@@ -143,7 +151,7 @@ class Recorder:
         self._flush_stream()
 
     def finish(self, results: Mapping[str, str]) -> None:
-        """Add the results, close the file and give it its name.
+        """Add the results and close the file, which takes its name when the context ends.
 
         Parameters
         ----------
@@ -160,11 +168,11 @@ class Recorder:
         self._close()
         if indexed_chunks(self.partial) < self._chunks:
             raise self._incomplete()
-        self.partial.replace(self.path)
+        self._finished = True
 
     def check_disk_space(self) -> None:
         """Raise a `RecordingError` if the disk is full, or as good as full."""
-        disk = shutil.disk_usage(self.path.parent)
+        disk = shutil.disk_usage(self.partial.parent)
         # A place that is no disk, as /proc, has no size.
         if disk.total and disk.free < LEAST_FREE + self._rows.size:
             raise RecordingError(f"{self.path}: cannot be written: the disk is full")
@@ -219,14 +227,22 @@ class Recorder:
         return self._stream
 
     def _make_file(self) -> None:
-        try:
-            if self.path.is_dir():
-                raise RecordingError(f"{self.path}: is a folder; name a file in it, ending in .rrd")
-            self.path.parent.mkdir(parents=True, exist_ok=True)
+        with self._explained():
+            self._file.begin()
             self.check_disk_space()
             self.partial.touch()
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
         except OSError as error:
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
+
+    def _tell(self, error: BaseException) -> None:
+        """Note on an error where the partial recording lies."""
+        if self.partial.exists():
+            error.add_note(f"the partial recording is {self.partial}")
 
     def _flush_stream(self) -> None:
         self._unwritten = 0

@@ -36,7 +36,7 @@ class SelectiveRecorder:
         self.path = path
         self._recorder = Recorder(path, layout)
         self._rule = rule
-        self._store = PictureStore(path.with_name(f"{path.stem}.partial.images"))
+        self._store = PictureStore(self.partial.with_name(f"{self.partial.name}-images"))
         self._worst: list[tuple[float, int]] = []
         """A heap of ERR and minus the number of the frames that are put aside."""
         self._end = ExitStack()
@@ -48,7 +48,6 @@ class SelectiveRecorder:
 
     def __enter__(self) -> Self:
         self._end.enter_context(self._recorder)
-        self._store.clear()
         # In reverse order: the images put aside, their folder, the recording.
         self._end.callback(self._store.clear)
         self._end.callback(self._rescue)
@@ -91,7 +90,7 @@ class SelectiveRecorder:
         self._recorder.flush()
 
     def finish(self, results: Mapping[str, str]) -> None:
-        """Add what still waits and the results, close the file and give it its name."""
+        """Add what still waits and the results, and close the file."""
         self._write_worst()
         self._recorder.finish(results)
 
@@ -129,8 +128,8 @@ class SelectiveRecorder:
         return worst[0][0] if len(worst) == self._rule.number else 0.0
 
 
-def recorder_for(path: Path, layout: Layout, rule: RecordRule) -> SelectiveRecorder | NullRecorder:
-    """Return the recorder that a rule asks for."""
-    if rule.kind is RuleKind.NONE:
-        return NullRecorder()
-    return SelectiveRecorder(path, layout, rule)
+def recorder_for(
+    path: Path | None, layout: Layout, rule: RecordRule
+) -> SelectiveRecorder | NullRecorder:
+    """Return the recorder that a rule asks for; for no path, one that does nothing."""
+    return NullRecorder() if path is None else SelectiveRecorder(path, layout, rule)

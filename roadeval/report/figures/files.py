@@ -11,11 +11,9 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.errors import RoadevalError
 from roadeval.report.blocks import ImageFile
 from roadeval.report.figures.figure import FigureData, FigureSpec, figures
 from roadeval.report.figures.style import RC
-from roadeval.runtime import files
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,15 +28,8 @@ _WRITTEN: Final = ("png", "pdf")
 _DPI: Final = 200
 
 
-class FiguresError(RoadevalError):
-    """The figures cannot be written."""
-
-
 def write_figures(folder: Path, data: FigureData) -> list[Path]:
-    """Write every figure as PNG and PDF.
-
-    A figure with nothing to draw is not written, and one of that name from an earlier run is
-    removed.
+    """Write every figure that has something to draw as PNG and PDF.
 
     Parameters
     ----------
@@ -54,16 +45,11 @@ def write_figures(folder: Path, data: FigureData) -> list[Path]:
 
     Raises
     ------
-    FiguresError
+    OSError
         If the folder cannot be written to.
     """
-    try:
-        return [path for figure in figures() for path in _write(folder, figure, data)]
-    except OSError as error:
-        raise FiguresError(
-            f"{error.filename or folder}: cannot write figures ({error.strerror}); "
-            "choose another folder with `output.reports`"
-        ) from error
+    folder.mkdir(parents=True, exist_ok=True)
+    return [path for figure in figures() for path in _write(folder, figure, data)]
 
 
 def svg(draw: Callable[[], Figure]) -> ImageFile:
@@ -84,15 +70,14 @@ def svg_of(spec: FigureSpec, data: FigureData) -> ImageFile | None:
 
 
 def _write(folder: Path, spec: FigureSpec, data: FigureData) -> Iterator[Path]:
-    paths = {kind: folder / f"{spec.name}.{kind}" for kind in _WRITTEN}
     with _style():
         figure = spec.draw(data)
-        for kind, path in paths.items():
-            if figure is None:
-                path.unlink(missing_ok=True)
-            else:
-                files.put(path, _encoded(figure, kind))
-                yield path
+        if figure is None:
+            return
+        for kind in _WRITTEN:
+            path = folder / f"{spec.name}.{kind}"
+            path.write_bytes(_encoded(figure, kind))
+            yield path
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """The recording as a file: complete under its name, partial where a run ended early."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -34,7 +35,8 @@ def test_nothing_stands_under_the_final_name_before_the_end(drive, tmp_path):
         assert not recorder.path.exists()
         assert recorder.partial.parent == recorder.path.parent
         recorder.finish(RESULTS)
-        assert recorder.path.exists()
+        assert not recorder.path.exists()
+    assert recorder.path.exists()
     assert not recorder.partial.exists()
 
 
@@ -144,7 +146,9 @@ def test_a_killed_run_leaves_all_but_the_frames_that_wait(frames, images, number
     written = [sys.executable, "-c", textwrap.dedent(KILLED), tmp_path / "out.rrd", str(frames)]
     root = Path(__file__).resolve().parents[3]
     assert subprocess.run(written, cwd=root, check=False).returncode == -signal.SIGKILL
-    partial = Recording(tmp_path / "out.partial.rrd")
+    (left,) = tmp_path.iterdir()
+    assert re.fullmatch(r"out\.[0-9a-f]{8}\.partial\.rrd", left.name)
+    partial = Recording(left)
     assert not partial.complete
     assert partial.frame_numbers == tuple(range(images))
     assert partial.unsure == tuple(range(images))

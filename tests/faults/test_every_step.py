@@ -1,0 +1,146 @@
+"""A run that is killed, or whose disk is full, at any of its steps on the file system."""
+
+import os
+import resource
+import shutil
+import sys
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from roadeval.runtime import folders
+from tests.faults import making, steps
+
+pytestmark = [
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="a run of its own is a forked process"),
+    pytest.mark.filterwarnings("ignore:.*use of fork:DeprecationWarning"),
+]
+
+
+def others_file(place):
+    (place / "reports" / "notes.txt").write_text("mine")
+
+
+def others_folder(place):
+    (place / "reports" / "sub").mkdir()
+    (place / "reports" / "sub" / "notes.txt").write_text("mine")
+
+
+IN_PLACE = "in place"
+SITUATIONS = {"exchange": others_file, IN_PLACE: others_folder, "first": None}
+if sys.platform != "linux":
+    del SITUATIONS["exchange"]
+
+
+@pytest.fixture(params=SITUATIONS)
+def situation(request):
+    return request.param
+
+
+@pytest.fixture
+def whole(tmp_path_factory):
+    """What a run of this name writes."""
+
+    def whole(name):
+        place = tmp_path_factory.mktemp("whole")
+        making.run(place, name)
+        return making.outputs(place)
+
+    return whole
+
+
+@pytest.fixture
+def again(tmp_path, situation):
+    """Returns a place with earlier outputs, each time as new."""
+    model = tmp_path / "model"
+    model.mkdir()
+    if SITUATIONS[situation]:
+        making.run(model, "old")
+        SITUATIONS[situation](model)
+
+    def again() -> Path:
+        shutil.rmtree(tmp_path / "place", ignore_errors=True)
+        return shutil.copytree(model, tmp_path / "place", symlinks=True)
+
+    return again
+
+
+def notes(place):
+    """Others' files under their names."""
+    paths = [path.relative_to(place) for path in place.rglob("notes.txt")]
+    return {path: (place / path).read_text() for path in paths if path.parts[0][0] != "."}
+
+
+def check_next_run(place, before, whole):
+    """The next run writes its own outputs, and leaves nothing of the one that was killed."""
+    making.run(place, "next")
+    assert making.outputs(place) == whole
+    assert notes(place) == notes(before)
+    hidden = [path for path in place.rglob("*") if path.name.startswith(".")]
+    assert hidden == []
+    assert {path.name for path in place.iterdir()} == set(making.PLACES)
+
+
+def test_a_run_that_is_killed_at_any_step_leaves_old_or_new_and_nothing_else(
+    again, whole, situation, tmp_path
+):
+    old, new, after = making.outputs(again()), whole("new"), whole("next")
+    moving, code, number = 0, steps.KILLED, 0
+    while code == steps.KILLED:
+        number += 1
+        place = again()
+        code = steps.run(partial(making.run, place, "new"), steps.killed_at(number))
+        found = making.outputs(place)
+        for name in ("out.rrd", "out.mcap"):
+            assert found[name] in (old[name], new[name])
+        if found["reports"] not in (old["reports"], new["reports"]):
+            assert situation == IN_PLACE
+            assert "summary.json" not in found["reports"]
+            moving += 1
+            folders.recover(place / "reports", making.CONTENT)
+            assert making.outputs(place)["reports"] == new["reports"]
+        assert notes(place) == notes(tmp_path / "model")
+        check_next_run(place, tmp_path / "model", after)
+    assert code == steps.DONE
+    assert number > 20
+    assert bool(moving) == (situation == IN_PLACE)
+
+
+def test_a_disk_that_is_full_from_any_step_on_costs_no_earlier_result(
+    again, whole, situation, tmp_path
+):
+    old, new, after = making.outputs(again()), whole("new"), whole("next")
+    code, number = steps.FAILED, 0
+    while code == steps.FAILED:
+        number += 1
+        place = again()
+        code = steps.run(partial(making.run, place, "new"), steps.full_from(number))
+        found = making.outputs(place)
+        if found["reports"] not in (old["reports"], new["reports"]):
+            assert "summary.json" not in found["reports"]
+            folders.recover(place / "reports", making.CONTENT)
+            assert making.outputs(place)["reports"] == new["reports"]
+        elif code == steps.FAILED and found["reports"] == old["reports"]:
+            # They take their names together, the folder first.
+            assert (found["out.rrd"], found["out.mcap"]) == (old["out.rrd"], old["out.mcap"])
+        assert notes(place) == notes(tmp_path / "model")
+        check_next_run(place, tmp_path / "model", after)
+    assert code == steps.DONE
+    assert number > 10
+
+
+@pytest.mark.parametrize("situation", [IN_PLACE], indirect=True)
+@pytest.mark.parametrize("size", [0, 3, 40, 400])
+def test_no_room_for_a_file_s_content_costs_no_earlier_result(again, whole, size, tmp_path):
+    old, after = making.outputs(again()), whole("next")
+    place = again()
+
+    def limited():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+        making.run(place, "new")
+
+    assert steps.run(limited, lambda _event: None) == steps.FAILED
+    assert making.outputs(place) == old
+    assert notes(place) == notes(tmp_path / "model")
+    check_next_run(place, tmp_path / "model", after)

@@ -1,0 +1,221 @@
+"""Folders that are replaced as one."""
+
+import errno
+import json
+import os
+import stat
+import sys
+from pathlib import Path
+
+import pytest
+
+from roadeval.runtime import folders
+from roadeval.runtime.folders import Content, NewFolder, recover
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="only Linux exchanges folders")
+
+
+def names(folder):
+    """What the seal lists, or else the names that are always of a content."""
+    try:
+        return frozenset(json.loads((folder / "seal").read_text()))
+    except OSError:
+        return frozenset({"seal", "table"})
+
+
+CONTENT = Content("seal", names)
+
+
+def begun(path, files):
+    """A new folder with these files, sealed."""
+    new = NewFolder(path, CONTENT)
+    new.begin()
+    for name, text in files.items():
+        (new.partial / name).write_text(text)
+    (new.partial / "seal").write_text(json.dumps([*files, "seal"]))
+    return new
+
+
+def write(path, **files):
+    begun(path, files).publish()
+
+
+def read(path):
+    return {each.name: each.read_text() for each in path.iterdir() if each.name != "seal"}
+
+
+@pytest.fixture(params=["exchange", "in place"])
+def folder(request, tmp_path, monkeypatch):
+    """An earlier content, replaced either way."""
+    if request.param == "in place":
+        monkeypatch.setattr(folders, "_exchange", no_exchange)
+    elif sys.platform != "linux":
+        pytest.skip("only Linux exchanges folders")
+    write(tmp_path / "folder", table="old", only_old="old")
+    return tmp_path / "folder"
+
+
+def no_exchange(_one, _other):
+    raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+
+
+def test_it_bears_its_name_when_it_is_published(tmp_path):
+    new = begun(tmp_path / "a" / "folder", {"table": "new"})
+    assert not new.path.exists()
+    new.publish()
+    assert read(new.path) == {"table": "new"}
+    assert [each.name for each in new.path.parent.iterdir()] == ["folder"]
+
+
+def test_the_earlier_content_is_replaced_and_what_is_of_others_stays(folder):
+    (folder / "notes").write_text("mine")
+    (folder / "link").symlink_to("notes")
+    write(folder, table="new", only_new="new")
+    mine = {"notes": "mine", "link": "mine"}
+    assert read(folder) == {"table": "new", "only_new": "new", **mine}
+    assert (folder / "link").is_symlink()
+    assert [each.name for each in folder.parent.iterdir()] == ["folder"]
+
+
+def test_what_was_begun_can_be_discarded(folder):
+    new = begun(folder, {"table": "new"})
+    new.discard()
+    new.discard()
+    assert read(folder) == {"table": "old", "only_old": "old"}
+    assert [each.name for each in folder.parent.iterdir()] == ["folder"]
+
+
+def test_what_a_killed_run_had_begun_goes(folder):
+    begun(folder, {"table": "new"})
+    (begun(folder, {"table": "half of"}).partial / "seal").unlink()
+    recover(folder, CONTENT)
+    assert read(folder) == {"table": "old", "only_old": "old"}
+    assert [each.name for each in folder.parent.iterdir()] == ["folder"]
+
+
+def test_a_file_of_others_that_only_the_replaced_folder_has_is_kept(folder):
+    """As when it was saved between the exchange's preparation and a kill right after it."""
+    left = begun(folder, {"table": "replaced"}).partial
+    for name, text in {"new": "mine", "older": "before", "newer": "after"}.items():
+        (left / name).write_text(text)
+    for name in ("older", "newer"):
+        (folder / name).write_text("now")
+    os.utime(left / "older", (1, 1))
+    os.utime(left / "newer", (2**31, 2**31))
+    recover(folder, CONTENT)
+    theirs = {"new": "mine", "older": "now", "newer": "after"}
+    assert read(folder) == {"table": "old", "only_old": "old", **theirs}
+    assert not left.exists()
+
+
+def test_a_file_of_others_that_the_new_content_has_is_its_own_now(folder):
+    (folder / "figure").write_text("of others")
+    write(folder, table="new", figure="new")
+    assert read(folder) == {"table": "new", "figure": "new"}
+
+
+def test_a_folder_of_others_is_never_moved_nor_replaced(folder):
+    (folder / "sub").mkdir()
+    (folder / "sub" / "notes").write_text("mine")
+    before = (folder / "sub").stat()
+    write(folder, table="new")
+    assert os.path.samestat((folder / "sub").stat(), before)
+    new = begun(folder, {"sub": "new"})
+    with pytest.raises(IsADirectoryError, match="is a folder"):
+        new.publish()
+    new.discard()
+    assert (folder / "table").read_text() == "new"
+    assert (folder / "sub" / "notes").read_text() == "mine"
+    assert {each.name for each in folder.parent.iterdir()} == {"folder"}
+
+
+def test_the_rights_of_a_folder_stay(folder):
+    folder.chmod(0o2771)
+    write(folder, table="new")
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o2771
+
+
+@linux
+def test_an_exchange_is_one_step(tmp_path, monkeypatch):
+    folder = tmp_path / "folder"
+    write(folder, table="old", only_old="old")
+    seen = []
+    usual = folders._exchange
+
+    def watched(one, other):
+        seen.append(read(other))
+        usual(one, other)
+        seen.append(read(other))
+
+    monkeypatch.setattr(folders, "_exchange", watched)
+    write(folder, table="new")
+    assert seen == [{"table": "old", "only_old": "old"}, {"table": "new"}]
+
+
+def _cwd(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+
+
+def _sticky(folder, _monkeypatch):
+    folder.chmod(0o1777)
+
+
+def _mounted(folder, monkeypatch):
+    monkeypatch.setattr(os.path, "ismount", lambda path: Path(path) == folder)
+
+
+def _parent_not_ours(folder, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda path, _mode: Path(path) != folder.parent)
+
+
+@linux
+@pytest.mark.parametrize("situation", [_cwd, _sticky, _mounted, _parent_not_ours])
+def test_a_folder_that_must_stay_where_it_is_stays(situation, tmp_path, monkeypatch):
+    folder = tmp_path / "folder"
+    write(folder, table="old", only_old="old")
+    situation(folder, monkeypatch)
+    before = folder.stat()
+    write(folder, table="new")
+    assert read(folder) == {"table": "new"}
+    assert os.path.samestat(folder.stat(), before)
+    assert [each.name for each in tmp_path.iterdir()] == ["folder"]
+
+
+@pytest.mark.parametrize("situation", [_mounted, _parent_not_ours])
+def test_beside_such_a_folder_nothing_is_written(situation, tmp_path, monkeypatch):
+    write(tmp_path / "folder", table="old")
+    situation(tmp_path / "folder", monkeypatch)
+    new = begun(tmp_path / "folder", {"table": "new"})
+    assert new.partial.parent == tmp_path / "folder"
+    recover(tmp_path / "folder", CONTENT)
+    assert read(tmp_path / "folder") == {"table": "old"}
+
+
+@linux
+@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="needs a second disk")
+def test_files_reach_a_folder_on_another_disk(tmp_path, monkeypatch):
+    """As where a folder is a mount that cannot be known for one."""
+    from tempfile import TemporaryDirectory
+
+    with TemporaryDirectory(dir="/dev/shm") as far:
+        write(Path(far, "folder"), table="old", only_old="old")
+        monkeypatch.setattr(folders, "home_of", lambda _target: tmp_path)
+        write(Path(far, "folder"), table="new")
+        assert read(Path(far, "folder")) == {"table": "new"}
+        assert not list(tmp_path.iterdir())
+
+
+def test_a_link_stays_and_the_folder_behind_it_is_replaced(folder):
+    link = folder.parent / "link"
+    link.symlink_to("folder")
+    write(link, table="new")
+    assert link.is_symlink()
+    assert read(folder) == {"table": "new"}
+
+
+@pytest.mark.parametrize("path", ["file", "file/folder"])
+def test_what_cannot_be_a_folder_is_told_at_the_beginning(path, tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(NotADirectoryError):
+        NewFolder(tmp_path / path, CONTENT).begin()
+    assert [each.name for each in tmp_path.iterdir()] == ["file"]
