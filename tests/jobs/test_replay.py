@@ -41,9 +41,8 @@ def _no_figures(request, monkeypatch):
 
 
 def run(drive: Path, folder: Path, **options):
-    return roadeval.replay(
-        drive, settings(**options), save=folder / "out.rrd", reports=folder / "reports"
-    )
+    save = None if options.get("record") == "none" else folder / "out.rrd"
+    return roadeval.replay(drive, settings(**options), save=save, reports=folder / "reports")
 
 
 def identity_of(recording: Path) -> str:
