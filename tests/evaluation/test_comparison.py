@@ -191,6 +191,14 @@ def test_a_condition_is_not_judged_where_two_ranges_hardly_overlap():
         judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
 
 
+def test_a_condition_is_judged_where_half_of_the_shorter_range_is_common():
+    base, new = a_side("base", [10] * 50), a_side("new", [90] * 40)
+    later = new.frames.assign(stamp_ns=new.frames["stamp_ns"] + 30 * 10**8)
+    found = compare([base, Side("new", "street", "d1", later)], SETTINGS)
+    assert found.changes[0].frames == 20
+    assert judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)[0].holds
+
+
 def test_a_condition_is_judged_where_one_result_covers_a_part_of_the_other():
     found = compare([a_side("base", [10] * 50), a_side("new", [90] * 12)], SETTINGS)
     (row,) = judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)

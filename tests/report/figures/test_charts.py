@@ -9,6 +9,7 @@ from matplotlib.colors import to_hex
 
 from roadeval.data import colours
 from roadeval.evaluation.comparison_result import MaskComparison
+from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.uncertainty import Difference
 from roadeval.report.figures import charts
 from roadeval.report.findings import ErrorHeatmap
@@ -58,6 +59,17 @@ def test_each_rate_of_the_stages_has_its_own_axes_and_the_baseline_is_a_level():
         line, _, level = ax.lines
         np.testing.assert_allclose(line.get_ydata(), [value, value])
         np.testing.assert_allclose(level.get_ydata(), [value, value])
+
+
+def test_a_fourth_rate_stands_in_a_row_of_its_own_and_need_not_begin_at_zero(monkeypatch):
+    monkeypatch.setattr(charts, "SHORT", SHORT | {"ACC": METRICS["ACC"]})
+    rates = {"ERR": 0.1, "FPR": 0.2, "FNR": 0.3, "ACC": 0.9}
+    figure = charts.stages({"filtered": {"svm": rates, "post": rates | {"ACC": 0.95}}})
+    *above, below = figure.axes
+    assert [ax.get_title(loc="left") for ax in figure.axes] == [f"{rate}, %" for rate in rates]
+    assert {ax.get_gridspec().nrows for ax in figure.axes} == {2}
+    assert [ax.get_ylim()[0] for ax in above] == [0, 0, 0]
+    assert 80 < below.get_ylim()[0] < 90
 
 
 def test_false_positives_are_left_and_false_negatives_right_in_their_colours():

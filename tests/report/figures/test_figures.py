@@ -19,7 +19,7 @@ from roadeval.report.figures.fig3a_error_rate import error_rate
 from roadeval.report.figures.fig3b_fp_fn_rate import fp_fn_rate
 from roadeval.report.figures.figure import ExampleFrame, FigureData, figures
 from roadeval.report.figures.files import svg_of, write_figures
-from roadeval.report.figures.rates_over_drive import CROWDED
+from roadeval.report.figures.rates_over_drive import CROWDED, rates_over_drive
 from roadeval.report.figures.style import looks
 
 NO_WINDOWS = pd.DataFrame()
@@ -126,6 +126,21 @@ def test_rates_are_in_percent_from_zero() -> None:
     labels = [label.get_text() for label in ax.get_yticklabels()]
     assert labels[0] == "0 %"
     assert all(label.endswith(" %") for label in labels)
+
+
+@pytest.mark.parametrize(
+    ("rates", "direction"),
+    [
+        (["ERR", "FNR"], "lower is better"),
+        (["ACC"], "higher is better"),
+        (["ERR", "ACC"], "higher is better for ACC, lower for the others"),
+    ],
+)
+def test_the_subtitle_says_which_direction_is_better(rates: list[str], direction: str) -> None:
+    table = a_table(3).eval("ACC = 1 - ERR")
+    figure = rates_over_drive("drive", table, {rate: rate for rate in rates}, 5)
+    assert figure is not None
+    assert figure.texts[1].get_text().endswith(f"; {direction}")
 
 
 def test_rows_are_named_by_their_frames() -> None:
