@@ -153,7 +153,7 @@ def test_a_video_is_packed_frame_by_frame_and_read_by_foxgloves_decoder(
 ) -> None:
     path, count = video
     packed = pack(path, tmp_path / "film.mcap")
-    assert packed.frames == count
+    assert (packed.frames, packed.labelled) == (count, 0)
     with packed.path.open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         times = [m.timestamp.ToNanoseconds() for *_, m in reader.iter_decoded_messages()]

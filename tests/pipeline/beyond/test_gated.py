@@ -153,6 +153,7 @@ def test_a_pixel_between_two_components_is_in_the_ring_of_the_nearer_one():
     found = components(look(image, GREY, settings), settings)
     row = found.rings[95]
     assert row[62:68].tolist() == [1, 1, 1, 2, 2, 2]
+    assert found.lowest[1:].tolist() == [104 / HEIGHT] * 2
 
 
 # --- Compensation ---------------------------------------------------------------------------------
