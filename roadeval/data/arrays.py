@@ -36,6 +36,8 @@ Parents = npt.NDArray[np.uintp]
 Sums = npt.NDArray[np.int64]
 """``(n, ...)``: whole numbers by label or kind."""
 Values = npt.NDArray[np.float32]
+Floats = npt.NDArray[np.float64]
+"""Of any shape."""
 Vector = npt.NDArray[np.float64]
 """``(n,)``."""
 Matrix = npt.NDArray[np.float64]

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 from numpy.polynomial.chebyshev import chebpts1, chebvander
 
-Floats = npt.NDArray[np.float64]
+from roadeval.data.arrays import Floats
+
 Factor = Callable[[int, Floats], Floats]
 
 LEVELS: Final = np.arange(256.0)

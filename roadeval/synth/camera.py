@@ -7,9 +7,9 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from roadeval.synth.noise import Field, Flags
+from roadeval.data.arrays import Flags, Matrix
+from roadeval.synth.noise import Field
 
 FOCAL_OVER_WIDTH: Final = 0.875
 """Focal length in image widths: a horizontal field of view of 59 degrees."""
@@ -17,8 +17,6 @@ NEAR: Final = 0.4
 """Nothing nearer than this is drawn, metres."""
 LEAST: Final = 1.5
 """Nothing lower than this in the image is drawn, pixels."""
-
-Matrix = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

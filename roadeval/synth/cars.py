@@ -9,9 +9,9 @@ from typing import Final
 import cv2
 import numpy as np
 
-from roadeval.synth.camera import Matrix
+from roadeval.data.arrays import Matrix
 from roadeval.synth.light import Sun
-from roadeval.synth.noise import Field
+from roadeval.synth.noise import Field, Reflectance
 from roadeval.synth.panel import Panel, Picture
 
 PIXELS_PER_METRE: Final = 90.0
@@ -31,13 +31,12 @@ LEAN: Final = 0.30
 SEAM: Final = 1.03
 """Panels are stretched by this over their upper neighbours, so that nothing shines through."""
 
-Colour = tuple[float, float, float]
-GLASS: Final[Colour] = (0.05, 0.06, 0.075)
-RUBBER: Final[Colour] = (0.02, 0.02, 0.02)
-TAIL_LAMP: Final[Colour] = (0.24, 0.02, 0.02)
-HEAD_LAMP: Final[Colour] = (0.60, 0.60, 0.58)
-PLATE: Final[Colour] = (0.60, 0.60, 0.50)
-HUB: Final[Colour] = (0.17, 0.17, 0.17)
+GLASS: Final[Reflectance] = (0.05, 0.06, 0.075)
+RUBBER: Final[Reflectance] = (0.02, 0.02, 0.02)
+TAIL_LAMP: Final[Reflectance] = (0.24, 0.02, 0.02)
+HEAD_LAMP: Final[Reflectance] = (0.60, 0.60, 0.58)
+PLATE: Final[Reflectance] = (0.60, 0.60, 0.50)
+HUB: Final[Reflectance] = (0.17, 0.17, 0.17)
 
 SIDE: Final = (
     (0.0, 0.35), (0.03, 0.95), (0.25, 1.0), (0.75, 1.40), (1.3, HEIGHT), (2.2, HEIGHT),
@@ -73,7 +72,7 @@ class CarPaint:
     oncoming: bool
 
 
-def paint(body: Colour, oncoming: bool, sun: Sun) -> CarPaint:
+def paint(body: Reflectance, oncoming: bool, sun: Sun) -> CarPaint:
     """Paint a car: from behind and its left, or, ``oncoming``, from ahead and its left."""
     near = sun.facing(np.array([0.0, 0.0, -1.0]))
     beside = sun.facing(np.array([1.0 if oncoming else -1.0, 0.0, 0.0]))
@@ -174,19 +173,19 @@ def _canvas(width: float) -> Field:
     )
 
 
-def _fill(image: Field, outline: Sequence[tuple[float, float]], colour: Colour) -> None:
+def _fill(image: Field, outline: Sequence[tuple[float, float]], colour: Reflectance) -> None:
     """Fill a polygon given in metres from the lower left corner."""
     points = np.array(outline) * (1, -1) + (0, HEIGHT)
     cv2.fillPoly(image, [np.round(points * PIXELS_PER_METRE).astype(np.int32)], (*colour, 1.0))
 
 
-def _box(image: Field, corners: tuple[float, float, float, float], colour: Colour) -> None:
+def _box(image: Field, corners: tuple[float, float, float, float], colour: Reflectance) -> None:
     """Fill a rectangle: left, bottom, right and top in metres from the lower left corner."""
     left, bottom, right, top = corners
     _fill(image, [(left, bottom), (right, bottom), (right, top), (left, top)], colour)
 
 
-def _end(body: Colour, oncoming: bool) -> Field:
+def _end(body: Reflectance, oncoming: bool) -> Field:
     """Paint the end of a car, ``(h, w, 4)`` RGB and opacity."""
     image = _canvas(WIDTH)
     for left in (0.1, WIDTH - 0.32):
@@ -203,7 +202,7 @@ def _end(body: Colour, oncoming: bool) -> Field:
     return image
 
 
-def _side(body: Colour) -> Field:
+def _side(body: Reflectance) -> Field:
     """Paint the side of a car, tail to the left, ``(h, w, 4)`` RGB and opacity."""
     image = _canvas(LENGTH)
     _fill(image, SIDE, body)

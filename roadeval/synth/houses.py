@@ -8,8 +8,8 @@ from typing import Final
 import cv2
 import numpy as np
 
-from roadeval.synth.camera import Matrix
-from roadeval.synth.noise import Field, coloured_noise
+from roadeval.data.arrays import Matrix
+from roadeval.synth.noise import Field, Reflectance, coloured_noise
 from roadeval.synth.panel import Panel, Picture
 from roadeval.synth.shadows import Silhouettes, SunMap
 
@@ -28,11 +28,10 @@ WALL_SKY: Final = 0.60
 ROOF_SKY: Final = 0.85
 """Shares of level ground's skylight that a wall and a roof get."""
 
-Colour = tuple[float, float, float]
-WALLS: Final[tuple[Colour, ...]] = (
+WALLS: Final[tuple[Reflectance, ...]] = (
     (0.20, 0.12, 0.092), (0.47, 0.44, 0.37), (0.33, 0.27, 0.20), (0.20, 0.15, 0.125),
 )  # fmt: skip
-ROOFS: Final[tuple[Colour, ...]] = (
+ROOFS: Final[tuple[Reflectance, ...]] = (
     (0.20, 0.11, 0.085), (0.13, 0.125, 0.125), (0.17, 0.13, 0.11),
 )  # fmt: skip
 GLASS: Final = (0.045, 0.055, 0.07)
@@ -59,8 +58,8 @@ class House:
     high: Matrix
     ridge: float
     side: float
-    wall: Colour
-    roof: Colour
+    wall: Reflectance
+    roof: Reflectance
 
     def occlude(self, silhouettes: Silhouettes) -> None:
         """Stand in the sun's way: the walls as a box, the roof as steps."""
@@ -106,7 +105,7 @@ NOTHING: Final = Picture((), ())
 """What hangs on a wall before it is painted."""
 
 
-def _blank(panel: Panel, colour: Colour, texture: Field | float) -> Field:
+def _blank(panel: Panel, colour: Reflectance, texture: Field | float) -> Field:
     """``(h, w, 4)`` RGB and opacity of a plain surface as large as the panel."""
     image = np.ones((*_size(panel), 4), np.float32)
     image[..., :3] = colour
@@ -123,7 +122,7 @@ def _size(panel: Panel) -> tuple[int, int]:
     return rows, columns
 
 
-def _wall(panel: Panel, colour: Colour, eaves: float, rng: np.random.Generator) -> Field:
+def _wall(panel: Panel, colour: Reflectance, eaves: float, rng: np.random.Generator) -> Field:
     """Paint a wall, ``(h, w, 4)`` RGB and opacity, with a row of windows on each storey."""
     rows, columns = _size(panel)
     image = _blank(panel, colour, 0.07 * coloured_noise(rng, (rows, columns), 2, 200, 1.0))
@@ -156,7 +155,7 @@ def _gabled(wall: Field, eaves: float) -> Field:
     return np.dstack([wall[..., :3], inside])
 
 
-def _tiles(panel: Panel, colour: Colour, rng: np.random.Generator) -> Field:
+def _tiles(panel: Panel, colour: Reflectance, rng: np.random.Generator) -> Field:
     """Paint rows of roof tiles, ``(h, w, 4)`` RGB and opacity."""
     rows, columns = _size(panel)
     courses = 0.12 * np.cos(2 * np.pi * np.arange(rows) / (COURSE * PIXELS_PER_METRE))

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from roadeval.data import Mask
-from roadeval.synth.camera import Matrix
+from roadeval.data.arrays import Matrix
 from roadeval.synth.noise import Field
 
 SUN_RADIUS: Final = np.radians(0.2665)

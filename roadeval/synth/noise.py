@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 Field = npt.NDArray[np.floating[Any]]
 """Any array of floats; each use states its shape."""
-Flags = npt.NDArray[np.bool_]
-"""Any array of bool."""
+Reflectance = tuple[float, float, float]
+"""Of a surface, in red, green and blue: shares of the light."""
 
 
 def coloured_noise(

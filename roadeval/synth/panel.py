@@ -13,7 +13,8 @@ from typing import Final
 import cv2
 import numpy as np
 
-from roadeval.synth.camera import NEAR, Camera, Matrix
+from roadeval.data.arrays import Matrix
+from roadeval.synth.camera import NEAR, Camera
 from roadeval.synth.light import Light
 from roadeval.synth.noise import Field
 

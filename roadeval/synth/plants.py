@@ -13,7 +13,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from roadeval.synth.camera import Matrix
+from roadeval.data.arrays import Matrix
 from roadeval.synth.light import Sun
 from roadeval.synth.noise import Field
 from roadeval.synth.panel import Picture

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from roadeval.synth.light import Sun
-from roadeval.synth.noise import Field
+from roadeval.synth.noise import Field, Reflectance
 from roadeval.synth.panel import Picture
 from roadeval.synth.standing import NO_LEAVES, Rod, Standing
 
@@ -22,8 +22,6 @@ RED: Final = (0.52, 0.045, 0.04)
 WHITE: Final = (0.74, 0.74, 0.73)
 BLACK: Final = (0.05, 0.05, 0.05, 1.0)
 
-Colour = tuple[float, float, float]
-
 
 class _Easel:
     """A picture in the making, as wide as it is needed, with the foot in the middle below."""
@@ -36,7 +34,7 @@ class _Easel:
         self.rods: list[Rod] = []
 
     def rod(self, foot: tuple[float, float], tip: tuple[float, float], radius: float,
-            colour: Colour) -> None:  # fmt: skip
+            colour: Reflectance) -> None:  # fmt: skip
         """Add a cylinder from ``foot`` to ``tip`` (X and Y), shaded across."""
         for side in np.linspace(-0.8, 0.8, 5):
             normal = np.array([side, 0.0, -np.sqrt(1 - side**2)])
@@ -46,7 +44,7 @@ class _Easel:
             cv2.line(self.direct, low, high, self.sun.facing(normal), width)
         self.rods.append(Rod(np.array([*foot, 0.0]), np.array([*tip, 0.0]), radius))
 
-    def disc(self, centre: tuple[float, float], radius: float, colour: Colour) -> None:
+    def disc(self, centre: tuple[float, float], radius: float, colour: Reflectance) -> None:
         """Add a round plate that faces the camera."""
         at, size = self.pixel(*centre), round(radius * PIXELS_PER_METRE)
         cv2.circle(self.image, at, size, (*colour, 1.0), -1)

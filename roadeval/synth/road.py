@@ -12,7 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from roadeval.synth.noise import Field, Flags
+from roadeval.data.arrays import Flags
+from roadeval.synth.noise import Field
 
 HALF_WIDTH: Final = 3.4
 """From the centre line to the edge of the asphalt, metres: two narrow suburban lanes."""

@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
+from roadeval.data.arrays import Matrix
 from roadeval.synth import plants, posts
-from roadeval.synth.camera import Matrix
 from roadeval.synth.grass import grass_strip
 from roadeval.synth.houses import ROOFS, STOREY, WALLS, House
 from roadeval.synth.journey import Journey, Stretch

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from roadeval.synth.camera import Matrix
+from roadeval.data.arrays import Matrix
 from roadeval.synth.ground import Ground
 from roadeval.synth.journey import Journey
 from roadeval.synth.light import Sun

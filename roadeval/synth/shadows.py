@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.synth.camera import Matrix
+from roadeval.data.arrays import Matrix
 from roadeval.synth.light import SUN_RADIUS, Sun
 from roadeval.synth.noise import Field
 from roadeval.synth.road import Road

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from roadeval.synth.camera import Matrix
+from roadeval.data.arrays import Matrix
 from roadeval.synth.panel import Panel, Picture
 from roadeval.synth.shadows import Silhouettes
 

@@ -7,14 +7,14 @@ from typing import Final
 
 import numpy as np
 
-from roadeval.synth.cars import LENGTH, WIDTH, Car, CarPaint, Colour, paint
+from roadeval.synth.cars import LENGTH, WIDTH, Car, CarPaint, paint
 from roadeval.synth.journey import LANE, SPEED, Journey
 from roadeval.synth.light import Sun
-from roadeval.synth.noise import Field
+from roadeval.synth.noise import Field, Reflectance
 from roadeval.synth.road import HALF_WIDTH, Road
 from roadeval.synth.shadows import SunMap
 
-COLOURS: Final[tuple[Colour, ...]] = (
+COLOURS: Final[tuple[Reflectance, ...]] = (
     (0.42, 0.43, 0.44), (0.62, 0.62, 0.60), (0.05, 0.05, 0.055), (0.05, 0.08, 0.17),
     (0.30, 0.04, 0.035), (0.16, 0.17, 0.18),
 )  # fmt: skip

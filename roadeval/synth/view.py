@@ -8,10 +8,11 @@ from typing import Final
 import cv2
 import numpy as np
 
-from roadeval.synth.camera import Camera, Matrix
+from roadeval.data.arrays import Flags, Matrix
+from roadeval.synth.camera import Camera
 from roadeval.synth.cars import Car
 from roadeval.synth.light import Light
-from roadeval.synth.noise import Field, Flags
+from roadeval.synth.noise import Field
 from roadeval.synth.panel import HAZE_LENGTH, Film, draw
 from roadeval.synth.scene import Scene
 from roadeval.synth.sky import air

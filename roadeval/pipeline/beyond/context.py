@@ -26,9 +26,10 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Rgb
+from roadeval.data.arrays import Floats, Values
 from roadeval.data.packed import Packed
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.beyond.context_features import BARE_FEATURES, Values, at_samples, features
+from roadeval.pipeline.beyond.context_features import BARE_FEATURES, at_samples, features
 from roadeval.pipeline.beyond.working_image import reduced, stretched
 from roadeval.pipeline.paper.svm import SVM, Penalty
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
@@ -40,8 +41,6 @@ from roadeval.pipeline.stage import (
     View,
     perfect_mask,
 )
-
-Floats = npt.NDArray[np.float64]
 
 DECISION: Final = LayerSpec(
     "decision", LayerKind.SCALAR, "Decision value (Eq. 16)", value_range=(-2.0, 2.0), exact=False

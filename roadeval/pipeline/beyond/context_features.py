@@ -7,15 +7,13 @@ from typing import Final
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import Rgb
+from roadeval.data.arrays import Values
 from roadeval.pipeline.beyond.road_light import LOGS
 from roadeval.pipeline.beyond.working_image import reduced
 from roadeval.pipeline.channels import split
 from roadeval.pipeline.training_set import TrainingSet
-
-Values = npt.NDArray[np.float32]
 
 BARE_FEATURES: Final = 9
 """Features apart from texture: three colours, two log-chromaticities, two coordinates, and two of

@@ -25,7 +25,7 @@ import numpy.typing as npt
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb, Truth, colours
 from roadeval.data.packed import Packed
 from roadeval.pipeline.beyond import road_light
-from roadeval.pipeline.beyond.road_light import RoadLight
+from roadeval.pipeline.beyond.road_light import Map, RoadLight
 from roadeval.pipeline.beyond.shadow_gates import (
     ACCEPTED,
     VERDICTS,
@@ -42,7 +42,6 @@ from roadeval.pipeline.paper.shadow import RING_COLOUR, SHADOW_COLOUR
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
 
 Verdicts = npt.NDArray[np.uint8]
-Map = npt.NDArray[np.float32]
 
 
 def _mask(name: str, title: str, inside: str) -> LayerSpec:

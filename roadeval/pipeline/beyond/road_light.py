@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Mask, Rgb
+from roadeval.data.arrays import Floats
 from roadeval.pipeline.parameters import check_arrays, check_covariance, check_range
 from roadeval.pipeline.stage import TrainingSet
 
-Floats = npt.NDArray[np.float64]
 Map = npt.NDArray[np.float32]
 
 SKYLIGHT: Final = np.array([-0.055, 0.085])

@@ -16,15 +16,14 @@ from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Mask, Rgb, colours
+from roadeval.data.arrays import Floats, Labels
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.beyond import road_light
 from roadeval.pipeline.beyond.road_light import RoadLight
 from roadeval.pipeline.channels import split
 from roadeval.pipeline.paper.shadow import RING_COLOUR, SHADOW_COLOUR
+from roadeval.pipeline.reference_patch import Share
 
-Floats = npt.NDArray[np.float64]
-Labels = npt.NDArray[np.int32]
-Share = Annotated[float, Field(ge=0, le=1)]
 Pixels = Annotated[int, Field(ge=0, le=64)]
 
 VERDICTS: Final = (

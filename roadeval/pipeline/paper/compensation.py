@@ -8,14 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Mask, Packed, Rgb
-from roadeval.data.arrays import Labels, Runs
+from roadeval.data.arrays import Floats, Labels, Runs
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.paper import hsi
 from roadeval.pipeline.paper.shadow_settings import ShadowSettings
 from roadeval.pipeline.stage import View
-
-Floats = npt.NDArray[np.float64]
-
 
 # --- Regions: Eq. 9-10 ----------------------------------------------------------------------------
 

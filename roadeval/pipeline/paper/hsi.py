@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from roadeval.data.arrays import Floats
 
 
 def value(rgb: npt.NDArray[np.uint8]) -> Floats:

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Mask
+from roadeval.data.arrays import Floats
 
-Floats = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
 
 

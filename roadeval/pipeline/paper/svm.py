@@ -13,13 +13,12 @@ from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerSpec, mask_spec
+from roadeval.data.arrays import Floats
 from roadeval.data.packed import Packed
 from roadeval.pipeline import colour_cube as cube
 from roadeval.pipeline.colour_table import ColourTable
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask
-
-Floats = npt.NDArray[np.float64]
 
 SVM: Final = mask_spec("svm", "SVM: road (Eq. 16)")
 
