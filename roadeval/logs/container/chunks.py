@@ -34,6 +34,8 @@ class ChunkReader:
         Why a chunk could not be read, by its offset.
     kept
         What is wrong with a chunk that was read nevertheless, by its offset.
+    whole
+        Offsets of the chunks that were found to be whole.
     """
 
     def __init__(self, source: FileReader, *, keep_corrupt: bool = False) -> None:
@@ -43,6 +45,7 @@ class ChunkReader:
         self._held = 0
         self.bad: dict[int, str] = {}
         self.kept: dict[int, str] = {}
+        self.whole: set[int] = set()
 
     def read(self, chunk: Chunk) -> ByteReader:
         """Read the records of a chunk; of one that is cut off, those before the cut.
@@ -74,6 +77,7 @@ class ChunkReader:
                 return records_before_damage(self._source, chunk)
             self.bad[chunk.offset] = str(error)
             raise
+        self.whole.add(chunk.offset)
         return records
 
     def _whole(self, chunk: Chunk) -> ByteReader:

@@ -15,7 +15,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
 from roadeval.logs.container.chunks import ChunkReader
-from roadeval.logs.container.readers import FileReader
+from roadeval.logs.container.readers import Buffer, FileReader
 from roadeval.logs.container.records import (
     MESSAGE_HEAD,
     Chunk,
@@ -157,8 +157,9 @@ class Container:
     def verify(self) -> None:
         """Read everything once, so that all damage is known."""
         for chunk in self.chunks:
-            with suppress(BadRecord):
-                self.reader.read(chunk)
+            if chunk.offset not in self.reader.whole:
+                with suppress(BadRecord):
+                    self.reader.read(chunk)
         self.verify_data()
 
     def read_all(self, take: Callable[[bytes], object]) -> None:
@@ -222,15 +223,18 @@ class Container:
                 head = records.peek(place.body, MESSAGE_HEAD.size)
                 channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
                 found.setdefault(channel_id, array("Q")).extend((log_time, place.offset))
-            elif place.opcode == Opcode.SCHEMA:
-                schema = parse(place.opcode, records.read(place.body, place.end - place.body))
-                self.schemas.setdefault(schema.id, schema)
-            elif place.opcode == Opcode.CHANNEL:
-                channel = parse(place.opcode, records.read(place.body, place.end - place.body))
-                self.channels.setdefault(channel.id, channel)
+            elif place.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                self._define(place.opcode, records.read(place.body, place.end - place.body))
         if self.chunks[number].cut:
             self.saved_ns = max((max(values[::2]) for values in found.values()), default=None)
         return {channel_id: _entries(values) for channel_id, values in found.items()}
+
+    def _define(self, opcode: int, body: Buffer) -> None:
+        """Learn a schema or channel; of a damaged one, its messages show that it is missing."""
+        with suppress(BadRecord):
+            record = parse(opcode, body)
+            known = self.schemas if opcode == Opcode.SCHEMA else self.channels
+            known.setdefault(record.id, record)
 
     def _log(self, logs: dict[int, ChannelLog], channel_id: int) -> ChannelLog:
         if channel_id not in logs:

@@ -37,6 +37,8 @@ INDEX_HEAD: Final = struct.Struct("<HI")
 """Channel, bytes of entries."""
 LARGEST: Final = 1 << 28
 """Bytes of a message or definition; one that claims more is damaged."""
+PRIVATE: Final = 0x80
+"""Opcodes from here on belong to applications."""
 PADDING: Final = 4
 """A message may be padded at its end to a multiple of so many bytes, as CDR does."""
 LONGEST_NAME: Final = 64

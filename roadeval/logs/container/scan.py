@@ -27,6 +27,7 @@ from roadeval.logs.container.records import (
     MAGIC,
     MESSAGE_HEAD,
     PADDING,
+    PRIVATE,
     Chunk,
     Entries,
     Message,
@@ -38,26 +39,13 @@ from roadeval.logs.container.records import (
 )
 from roadeval.logs.container.recovery.damaged_chunks import by_own_head, by_summary, is_within
 from roadeval.logs.container.recovery.next_record import RecordFinder
-from roadeval.logs.container.summary import Summary
+from roadeval.logs.container.summary import SUMMARY_RECORDS, Summary
 from roadeval.logs.errors import BadRecord
 
 _DEFINITIONS: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
 _SKIPPED: Final = (Opcode.ATTACHMENT, Opcode.METADATA)
-_AFTER_DATA: Final = (
-    Opcode.SCHEMA,
-    Opcode.CHANNEL,
-    Opcode.STATISTICS,
-    Opcode.CHUNK_INDEX,
-    Opcode.ATTACHMENT_INDEX,
-    Opcode.METADATA_INDEX,
-    Opcode.SUMMARY_OFFSET,
-    Opcode.FOOTER,
-)
 RECENT: Final = 8
 """Messages with whose log times another one's is compared."""
-PRIVATE: Final = 0x80
-"""Opcodes from here on belong to applications."""
-
 
 IsWhole = Callable[[Channel, Schema | None, Message], bool]
 """Whether a message, with its channel and schema, is as long as its own fields say."""
@@ -107,6 +95,7 @@ class Scan:
         self.data_end: int | None = None
         self.data_crc = 0
         self._source = source
+        self._summary_start = summary.start
         self._known = summary.chunks if summary.checked else {}
         self._known_offsets = sorted(self._known)
         self._first_ns, self._final_ns = _time_range(summary)
@@ -122,6 +111,10 @@ class Scan:
         if self._source.read(0, offset) != MAGIC:
             self._gap(0, offset, "the file does not begin as it should", lossy=False)
         while offset < self._source.size and self.data_end is None:
+            if offset == self._summary_start:
+                self._gap(offset, offset, "the record that ends the data is missing", lossy=False)
+                self.data_end = offset
+                break
             try:
                 offset = self._visit(self._place(offset))
             except BadRecord as error:
@@ -230,7 +223,7 @@ class Scan:
 
     def _data_end(self, place: Place) -> None:
         after = place.end < self._source.size and place_at(self._source, place.end).opcode
-        if place.end < self._source.size and after not in _AFTER_DATA:
+        if place.end < self._source.size and after not in (*SUMMARY_RECORDS, Opcode.FOOTER):
             raise BadRecord("an end of the data where there is none")
         body = self._source.peek(place.body, place.end - place.body)
         self.data_crc = parse(Opcode.DATA_END, body).data_section_crc

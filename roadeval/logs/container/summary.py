@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from mcap.opcode import Opcode
@@ -15,6 +15,7 @@ from roadeval.logs.container.records import (
     HEAD,
     LARGEST,
     MAGIC,
+    PRIVATE,
     ChunkIndex,
     parse,
     parse_chunk_index,
@@ -23,6 +24,16 @@ from roadeval.logs.container.records import (
 from roadeval.logs.errors import BadRecord
 
 FOOTER_SIZE: Final = HEAD.size + 20 + len(MAGIC)
+SUMMARY_RECORDS: Final = (
+    Opcode.SCHEMA,
+    Opcode.CHANNEL,
+    Opcode.STATISTICS,
+    Opcode.CHUNK_INDEX,
+    Opcode.ATTACHMENT_INDEX,
+    Opcode.METADATA_INDEX,
+    Opcode.SUMMARY_OFFSET,
+)
+"""The records that can stand in a summary."""
 _KEPT: Final = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.CHUNK_INDEX, Opcode.STATISTICS)
 _CHECKED: Final = HEAD.size + 16
 """Bytes of the footer that its own checksum covers."""
@@ -36,6 +47,8 @@ class Summary:
     ----------
     chunks
         Chunk indexes by the offset of their chunk.
+    start
+        Where it begins, and the data ends; None if it cannot be relied on.
     checked
         Whether its checksum is given, and right.
     problem
@@ -46,6 +59,7 @@ class Summary:
     channels: dict[int, Channel] = field(default_factory=dict)
     chunks: dict[int, ChunkIndex] = field(default_factory=dict)
     statistics: Statistics | None = None
+    start: int | None = None
     checked: bool = False
     problem: str = ""
 
@@ -65,20 +79,23 @@ def _read(source: FileReader) -> Summary:
         raise BadRecord("the file does not end as it should")
     footer: Footer = parse(Opcode.FOOTER, tail[HEAD.size : -len(MAGIC)])
     if footer.summary_start == 0:
-        return Summary()
+        return Summary(start=footer_at)
     size = footer_at - footer.summary_start
     if not 0 <= size <= LARGEST:
         raise BadRecord("its summary is not where it should be")
     part = PartReader(source, footer.summary_start, size)
     if footer.summary_crc and zlib.crc32(tail[:_CHECKED], crc_of(part)) != footer.summary_crc:
         raise BadRecord("the checksum of its summary is wrong")
-    return _collect(part, checked=footer.summary_crc != 0)
+    found = _collect(part)
+    return replace(found, start=footer.summary_start, checked=footer.summary_crc != 0)
 
 
-def _collect(part: PartReader, *, checked: bool) -> Summary:
+def _collect(part: PartReader) -> Summary:
     summary, statistics, end = Summary(), None, 0
     for place in walk(part):
         end = place.end
+        if place.opcode not in SUMMARY_RECORDS and place.opcode < PRIVATE:
+            raise BadRecord("its summary is not where it should be")
         if place.opcode not in _KEPT:
             continue
         body = part.peek(place.body, place.end - place.body)
@@ -95,4 +112,4 @@ def _collect(part: PartReader, *, checked: bool) -> Summary:
             statistics = record
     if end != part.size:
         raise BadRecord("its summary does not add up")
-    return Summary(summary.schemas, summary.channels, summary.chunks, statistics, checked)
+    return replace(summary, statistics=statistics)

@@ -9,6 +9,9 @@ from tests.logs.making import CAMERA, FRAMES, small_log
 
 MESSAGE = b"\x05"
 INDEX = b"\x07"
+DATA_END = b"\x0f"
+DATA_END_LENGTH = 9 + 4
+FOOTER = 9 + 20 + 8
 LENGTH_AT = 1
 
 
@@ -111,3 +114,41 @@ def test_an_empty_log_has_no_image_topic(tmp_path: Path) -> None:
     path.write_bytes(b"\x89MCAP0\r\n")
     with open_log(path) as log, pytest.raises(LogError, match="no image topic"):
         log.select()
+
+
+@pytest.mark.parametrize("container", ["unchunked", "zstd"])
+def test_a_missing_record_at_the_end_of_the_data_is_no_loss(tmp_path: Path, container: str) -> None:
+    path = tmp_path / "log.mcap"
+    small_log(path, container)
+    data = path.read_bytes()
+    at = records(data, DATA_END)[0]
+    footer = bytearray(data[-FOOTER:])
+    start = int.from_bytes(footer[9:17], "little") - DATA_END_LENGTH
+    # Writers that leave this record out give no checksums, and no offsets of summary sections.
+    footer[9:29] = start.to_bytes(8, "little") + bytes(12)
+    path.write_bytes(data[:at] + data[at + DATA_END_LENGTH : -FOOTER] + footer)
+    assert kept(path) == [*range(FRAMES)]
+    with open_log(path) as log:
+        log.verify()
+        assert log.losses == ()
+        assert "the record that ends the data is missing" in str(log.damage[0])
+
+
+def test_a_footer_that_points_into_the_data_ends_nothing(unchunked: Path) -> None:
+    data = bytearray(unchunked.read_bytes())
+    footer = len(data) - FOOTER
+    data[footer + 9 : footer + 29] = records(data, MESSAGE)[6].to_bytes(8, "little") + bytes(12)
+    unchunked.write_bytes(data)
+    assert kept(unchunked) == [*range(FRAMES)]
+
+
+def test_a_definition_that_does_not_add_up_costs_what_it_defines(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    small_log(path, "uncompressed")
+    data = path.read_bytes()
+    topic_length = data.index(b"\x07\0\0\0/camera")
+    changed(path, topic_length, b"\xff\xff")
+    with open_log(path, keep_corrupt=True) as log:
+        log.verify()
+        assert any("used all the same" in loss for loss in log.losses)
+        assert len(list(log.frames(log.select()))) == FRAMES
