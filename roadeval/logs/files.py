@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import stat
 from pathlib import Path
 from typing import Final
 
@@ -33,6 +34,10 @@ _OTHERS: Final = (
     (0, b"RIFF", "a video or image: roadeval pack {path} -o {stem}.mcap"),
 )
 """How many bytes to skip, the bytes that follow, what the file is and how it becomes a log."""
+
+
+_KINDS: Final = {stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
+"""What a path can be that is neither file nor folder; else it is a device."""
 
 
 def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
@@ -69,6 +74,13 @@ def natural(path: Path) -> list[tuple[int, str]]:
 
 def _check(path: Path) -> None:
     try:
+        kind = stat.S_IFMT(path.stat().st_mode)
+        if kind != stat.S_IFREG:
+            what = _KINDS.get(kind, "a device")
+            raise LogError(
+                f"{path}: {what}, and a log is read back and forth: write it to a file first, as "
+                "cat > drive.mcap does"
+            )
         with path.open("rb") as file:
             head = file.read(_HEAD)
             file.seek(max(path.stat().st_size - len(MAGIC), 0))

@@ -1,5 +1,6 @@
 """Frames and truth out of a log."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -173,7 +174,9 @@ def test_a_bad_image_costs_its_frame_and_is_named(tmp_path: Path) -> None:
         stream = log.frames(log.select())
         first, second, third = stream
         first.decode()
-        with pytest.raises(FrameError, match="frame 1: 8 bytes that are no jpeg image"):
+        with pytest.raises(
+            FrameError, match="frame 1: 8 bytes that are no image of a known format"
+        ):
             second.decode()
         third.decode()
     assert list(stream.accounting.undecodable) == [1]
@@ -282,3 +285,16 @@ def test_real_drives(
     folder: Path, name: str, labels: LabelSettings, frames: int, labelled: bool
 ) -> None:
     check_drive(folder / f"{name}.mcap", labels, frames, labelled=labelled)
+
+
+def test_a_pipe_is_no_log_and_never_waited_for(tmp_path: Path) -> None:
+    pipe = tmp_path / "drive.mcap"
+    os.mkfifo(pipe)
+    for path in (pipe, tmp_path):
+        with pytest.raises(LogError, match=r"a pipe, .*write it to a file first"):
+            open_log(path)
+
+
+def test_a_device_is_no_log() -> None:
+    with pytest.raises(LogError, match="/dev/null: a device"):
+        open_log("/dev/null")

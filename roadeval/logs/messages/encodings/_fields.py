@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
+from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, Final
 
 from roadeval.logs.container.readers import Buffer
 from roadeval.logs.errors import BadMessage
-from roadeval.logs.messages.schemas import Fields
+from roadeval.logs.messages.encoding import Decode
+from roadeval.logs.messages.schemas import SCHEMAS, Fields
 
 _CODES: Final = {"u1": "B", "u4": "I", "i4": "i", "u8": "Q"}
 
@@ -68,3 +71,46 @@ class FieldReader:
             raise BadMessage("a message that is cut off")
         self._at += length
         return self._data[self._at - length : self._at]
+
+
+@dataclass(frozen=True, slots=True)
+class Layouts:
+    """The layouts that messages of a channel can have.
+
+    Some writers log two kinds of message on a topic under the schema of the first.
+
+    Parameters
+    ----------
+    own
+        The one that the channel's schema names.
+    begin
+        Return a reader of a message's fields.
+    padding
+        A message may be longer by fewer bytes than that.
+    """
+
+    own: Fields
+    begin: Callable[[Buffer], FieldReader]
+    padding: int = 1
+
+    def read(self, data: Buffer, decode: Decode | None) -> Any:
+        """Read a message by ``decode``, or by another image's layout if it fits that alone."""
+        if not self.fits(self.own, data):
+            for fields in self._others():
+                if self.fits(fields, data):
+                    return self.begin(data).read(fields)
+        return decode(data) if decode else self.begin(data).read(self.own)
+
+    def fits(self, fields: Fields, data: Buffer) -> bool:
+        """Whether a message is exactly as long as these fields say."""
+        try:
+            reader = self.begin(data)
+            reader.read(fields)
+        except (BadMessage, struct.error):
+            return False
+        return reader.left < self.padding
+
+    def _others(self) -> list[Fields]:
+        """Return the layouts that begin as the own one does."""
+        known = (schema.fields for schema in SCHEMAS.values())
+        return [each for each in known if each[0] == self.own[0] and each != self.own]

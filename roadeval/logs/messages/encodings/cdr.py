@@ -10,7 +10,7 @@ from roadeval.logs.container.readers import Buffer
 from roadeval.logs.container.records import LARGEST, PADDING
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.encoding import Encoding, MessageReader, decode_by_library
-from roadeval.logs.messages.encodings._fields import FieldReader
+from roadeval.logs.messages.encodings._fields import FieldReader, Layouts
 from roadeval.logs.messages.schemas import Fields, fields_of
 
 _ZSTD: Final = b"\x28\xb5\x2f\xfd"
@@ -23,11 +23,11 @@ def _reader(schema: Schema | None) -> MessageReader | None:
     fields = fields_of(schema)
     if fields is None:
         return None if decode is None else MessageReader(lambda data: decode(_uncompressed(data)))
-    read = decode or (lambda data: _after_head(data).read(fields))
+    layouts = Layouts(fields, _after_head, PADDING)
     return MessageReader(
-        lambda data: read(_uncompressed(data)),
+        lambda data: layouts.read(_uncompressed(data), decode),
         lambda data: _stamp(fields, _uncompressed(data)),
-        lambda data: _is_whole(fields, data),
+        lambda data: layouts.fits(fields, data),
     )
 
 
@@ -35,15 +35,6 @@ def _stamp(fields: Fields, data: Buffer) -> Any:
     """Read only the first field, which is the stamp or a header that holds it."""
     first = _after_head(data).read(fields[:1])
     return first.timestamp if hasattr(first, "timestamp") else first.header.stamp
-
-
-def _is_whole(fields: Fields, data: Buffer) -> bool:
-    try:
-        reader = _after_head(data)
-        reader.read(fields)
-    except BadMessage:
-        return False
-    return reader.left < PADDING
 
 
 def _after_head(data: Buffer) -> FieldReader:

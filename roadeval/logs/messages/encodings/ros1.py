@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from mcap.records import Schema
 
 from roadeval.logs.messages.encoding import Encoding, MessageReader, decode_by_library
-from roadeval.logs.messages.encodings._fields import FieldReader
+from roadeval.logs.messages.encodings._fields import FieldReader, Layouts
 from roadeval.logs.messages.schemas import fields_of
 
 
@@ -14,9 +16,10 @@ def _reader(schema: Schema | None) -> MessageReader | None:
 
     decode = decode_by_library(DecoderFactory(), "ros1", schema)
     fields = fields_of(schema)
-    if decode is None and fields is not None:
-        return MessageReader(lambda data: FieldReader(data, "<", 0, aligned=False).read(fields))
-    return None if decode is None else MessageReader(decode)
+    if fields is None:
+        return None if decode is None else MessageReader(decode)
+    layouts = Layouts(fields, partial(FieldReader, order="<", start=0, aligned=False))
+    return MessageReader(lambda data: layouts.read(data, decode))
 
 
 ENCODING = Encoding("ros1", _reader)
