@@ -89,6 +89,7 @@ def from_log(
     warnings = []
     if held.is_full:
         warnings.append(f"trained on {len(held.frames)} of {settings.frames} frames: {held.full()}")
+    warnings += _repeated(held.frames)
     if labelled and not by_truth:
         warnings.append(f"no frame of the range has road truth: {BY_PATCH}")
     model = train_on(held.frames, pipelines, settings, warnings)
@@ -172,8 +173,9 @@ def from_drives(
         )
     guessed = bare and settings.source == "auto"
     guess = [f"no drive has road truth in the range: {BY_PATCH}"] if guessed else []
+    repeated = [told for path, own in frames.items() for told in _repeated(own, f"{path.name}: ")]
     every = [frame for own in frames.values() for frame in own]
-    return train_on(every, pipelines, settings, [*warnings, *guess])
+    return train_on(every, pipelines, settings, [*warnings, *repeated, *guess])
 
 
 def train_on(
@@ -190,6 +192,17 @@ def train_on(
     prior = BlindPrior.of_truths(truths).road if truths else None
     model = fit(frames, pipelines, settings, prior)
     return replace(model, warnings=(*warnings, *model.warnings))
+
+
+def _repeated(frames: Sequence[Frame], drive: str = "") -> list[str]:
+    """Tell that some training frames of a drive show the same image as others, if they do."""
+    repeated = len(frames) - len({frame.digest() for frame in frames})
+    if not repeated:
+        return []
+    return [
+        f"{drive}{repeated} of the {len(frames)} training frames repeat another one: the model "
+        "learnt from fewer than was asked for"
+    ]
 
 
 def spread(

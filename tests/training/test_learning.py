@@ -208,3 +208,19 @@ def test_a_frame_of_another_size_than_the_training_frames_is_not_hashed(monkeypa
     assert unknown.use(other).role is Role.EVALUATED
     monkeypatch.setattr(Frame, "digest", lambda _frame: pytest.fail("it was hashed"))
     assert known.use(other).role is Role.EVALUATED
+
+
+def test_repeated_training_frames_are_told():
+    first = log(1)[0]
+    again = [replace(first, frame=replace(first.frame, number=n)) for n in range(4)]
+    model, _ = learn([*again, *log(8)[4:]], frames=5)
+    assert any("3 of the 5 training frames repeat another one" in w for w in model.warnings)
+
+
+def test_images_that_a_drive_repeats_are_told_with_its_name():
+    drives = {Path("a.mcap"): [frame(1), frame(1)], Path("b.mcap"): [frame(1)]}
+    model = from_drives(drives, PIPELINES, TrainingSettings())
+    assert list(model.warnings) == [
+        "a.mcap: 1 of the 2 training frames repeat another one: the model learnt from fewer than "
+        "was asked for"
+    ]
