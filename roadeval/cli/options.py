@@ -179,6 +179,13 @@ OPTIONS: Final = (
         color,
     ),
     Option(
+        "labels.tolerance",
+        ("--label-tolerance",),
+        "N",
+        "For masks compressed as JPEG: ignore values farther than N from the known ones.",
+        int,
+    ),
+    Option(
         "topics.masks",
         ("--mask-topic",),
         "NAME=TOPIC",
@@ -201,7 +208,14 @@ OPTIONS: Final = (
         "Reduce frames and truth to this share of their size first: quicker, and coarser.",
         float,
     ),
-    _switch("frames.keep_corrupt", "--keep-corrupt", "Use data whose checksum is wrong."),
+    _switch("frames.keep_corrupt", "--keep-corrupt", "Use damaged data as far as it goes."),
+    Option(
+        "frames.max_pixels",
+        ("--max-pixels",),
+        "N",
+        "Leave out images of more pixels. Default: 33554432, a little more than 7680x4320.",
+        int,
+    ),
     Option(
         "frames.start",
         ("-S", "--start"),

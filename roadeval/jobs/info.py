@@ -17,5 +17,9 @@ def info(drive: AnyPath, config: RunConfig | None = None) -> logs.LogDescription
     """
     config = config or RunConfig()
     return logs.describe(
-        drive, config.topics, config.labels, keep_corrupt=config.frames.keep_corrupt
+        drive,
+        config.topics,
+        config.labels,
+        keep_corrupt=config.frames.keep_corrupt,
+        max_pixels=config.frames.max_pixels,
     )

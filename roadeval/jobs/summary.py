@@ -14,8 +14,8 @@ from roadeval.results.verdict import verdict_of
 from roadeval.version import VERSION
 
 PACKAGES: Final = (
-    *("mcap", "numpy", "opencv-python-headless", "scikit-learn", "scipy"),
-    *("numba", "rerun-sdk", "pandas", "matplotlib"),
+    *("mcap", "numpy", "opencv-python-headless", "pillow", "scikit-learn", "scipy"),
+    *("simplejpeg", "numba", "rerun-sdk", "pandas", "matplotlib"),
 )
 """The packages whose version can change a number or a file."""
 JOURNEY: Final = 3
@@ -53,13 +53,11 @@ def versions() -> dict[str, str]:
 
 def warnings(run: Run) -> tuple[str, ...]:
     """List what a user should know before believing the results."""
-    unlabelled = (
-        ()
-        if run.selection.truth
-        else ("the log has no road truth: there is nothing to score, only masks to look at",)
-    )
+    missing = run.selection.no_truth
+    unlabelled = f"there is no road truth to score against, only masks to look at: {missing}"
     return (
-        *unlabelled,
+        *((unlabelled,) if missing else ()),
+        *run.frames.oddities,
         *_sizes(run),
         *run.config.ignored(),
         *_near_training(run),
@@ -69,7 +67,8 @@ def warnings(run: Run) -> tuple[str, ...]:
 
 def losses(run: Run) -> tuple[str, ...]:
     """List the parts of the log that were lost."""
-    frames = sorted(run.frames.accounting.undecodable.items())
+    seen = run.frames.accounting
+    frames = sorted((seen.undecodable | seen.damaged).items())
     return (*run.log.losses, *(f"frame {number}: {reason}" for number, reason in frames))
 
 

@@ -53,7 +53,9 @@ def _learnt(drives: Sequence[AnyPath], config: RunConfig, on_progress: OnProgres
     for drive in drives:
         own = config.for_drive(drive)
         several = len(drives) > 1 and own.labels == config.labels
-        with logs.open_log(drive, keep_corrupt=own.frames.keep_corrupt) as log:
+        with logs.open_log(
+            drive, keep_corrupt=own.frames.keep_corrupt, max_pixels=own.frames.max_pixels
+        ) as log:
             selection = log.select(own.topics, own.labels, scale=own.frames.scale, several=several)
             readings += _understood(log, selection, own)
             there = partial(log.frames, selection, logs.Span.of(own.frames))

@@ -5,10 +5,11 @@ A log goes from bytes to frames through its sub-rooms: ``container`` (records, c
 belongs to which image); `Log.frames` puts them together. ``writing`` writes logs.
 """
 
+from roadeval.logs.accounting import Accounting
 from roadeval.logs.container.damage import Damage
 from roadeval.logs.description import LogDescription, describe
 from roadeval.logs.errors import FrameError, LogError
-from roadeval.logs.frames import Accounting, FrameStream
+from roadeval.logs.frames import FrameStream
 from roadeval.logs.log import Log, open_log
 from roadeval.logs.logged_frame import LoggedFrame
 from roadeval.logs.messages.schemas import TopicKind

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from roadeval.images import MAX_PIXELS
 from roadeval.logs.errors import LogError
 from roadeval.logs.log import open_log
 from roadeval.logs.settings import LabelSettings, TopicSettings
@@ -28,6 +29,8 @@ class LogDescription:
         What a replay would pick and why, a sentence each.
     problem
         Why a replay could not pick, or empty.
+    oddities
+        Of the images that a replay would pick: several sizes, repeated ones; a sentence each.
     damage, losses
         What is wrong with the files, and what is lost by it, a sentence each.
     """
@@ -39,6 +42,7 @@ class LogDescription:
     topics: tuple[TopicInfo, ...]
     picks: tuple[str, ...]
     problem: str
+    oddities: tuple[str, ...]
     damage: tuple[str, ...]
     losses: tuple[str, ...]
 
@@ -53,6 +57,7 @@ def describe(
     labels: LabelSettings | None = None,
     *,
     keep_corrupt: bool = False,
+    max_pixels: int = MAX_PIXELS,
 ) -> LogDescription:
     """Read a log whole, so that all damage is found, and describe it.
 
@@ -62,22 +67,24 @@ def describe(
         File or folder.
     topics, labels
         What a replay would be asked for.
-    keep_corrupt
-        Whether data with a wrong checksum count as readable.
+    keep_corrupt, max_pixels
+        As `open_log` takes them.
 
     Raises
     ------
     LogError
         If it is missing, unreadable, or no MCAP log.
     """
-    with open_log(path, keep_corrupt=keep_corrupt) as log:
-        log.verify()
+    with open_log(path, keep_corrupt=keep_corrupt, max_pixels=max_pixels) as log:
         picks: tuple[str, ...] = ()
+        oddities: tuple[str, ...] = ()
         problem = ""
         try:
-            picks = log.select(topics, labels).reasons
+            selection = log.select(topics, labels)
+            picks, oddities = selection.reasons, log.oddities(selection)
         except LogError as error:
             problem = str(error)
+        log.verify()
         return LogDescription(
             path=str(path),
             bytes=log.size,
@@ -86,6 +93,7 @@ def describe(
             topics=log.topics,
             picks=picks,
             problem=problem,
+            oddities=oddities,
             damage=tuple(map(str, log.damage)),
             losses=log.losses,
         )

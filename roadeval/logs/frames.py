@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from functools import cached_property
 
-from roadeval.logs.logged_frame import SHADOW, TRUTH, LoggedFrame
+import numpy as np
+
+from roadeval.logs.accounting import Accounting
+from roadeval.logs.logged_frame import SHADOW, TRUTH, FrameRules, LoggedFrame
 from roadeval.logs.messages.schemas import TopicKind
 from roadeval.logs.messages.video import PictureSequence, Video
 from roadeval.logs.span import Span
@@ -13,36 +17,7 @@ from roadeval.logs.topics.label_reader import LabelReader, read_or_error
 from roadeval.logs.topics.pairing import UNREADABLE
 from roadeval.logs.topics.reader import TopicReader
 from roadeval.logs.topics.selection import Clock, Selection
-
-
-@dataclass(slots=True)
-class Accounting:
-    """Counts of frames and of truth, which grow while frames are read.
-
-    Parameters
-    ----------
-    in_log
-        Messages of the image topic.
-    in_range
-        Those inside the span, before its stride and its limit.
-    read
-        Frames returned so far.
-    labelled
-        Of these, those with truth.
-    undecodable
-        Of these, those that could not be decoded: number and reason.
-    truth_in_log, truth_unused
-        Truth messages, and those between the first and last paired one that belong to no image
-        (counted only if every frame is read).
-    """
-
-    in_log: int = 0
-    in_range: int = 0
-    read: int = 0
-    labelled: int = 0
-    undecodable: dict[int, str] = field(default_factory=dict)
-    truth_in_log: int = 0
-    truth_unused: int = 0
+from roadeval.logs.topics.survey import repeats, tell_fringes, tell_repeats, tell_sizes
 
 
 class FrameStream:
@@ -60,7 +35,7 @@ class FrameStream:
         self._images = readers[selection.image.name]
         self._pictures: PictureSequence = self._images
         if selection.image.kind is TopicKind.VIDEO:
-            self._pictures = Video(self._images)
+            self._pictures = Video(self._images, self._images.limits)
         self._selection = selection
         self._numbers = numbers
         self._labels = self._label_readers(readers)
@@ -71,6 +46,13 @@ class FrameStream:
             truth_in_log=len(truth.reader) if truth else 0,
         )
         self._span = span
+        self._rules = FrameRules(
+            limits=self._images.limits,
+            size=selection.image.size,
+            resize=selection.resize_truth,
+            scale=selection.scale,
+        )
+        self._stamps = array("q")
         self._iterator = self._run()
 
     def __iter__(self) -> Iterator[LoggedFrame]:
@@ -80,11 +62,30 @@ class FrameStream:
         return next(self._iterator)
 
     def __len__(self) -> int:
-        taken = len(self._numbers[:: self._span.every])
-        return min(taken, self._span.max_frames or taken)
+        return len(self._taken)
+
+    @cached_property
+    def oddities(self) -> tuple[str, ...]:
+        """What a user should know of the frames that were read, a sentence each.
+
+        Ask for it after the last frame was decoded.
+        """
+        read, size = len(self._stamps), self._selection.image.size
+        numbers = self._taken[:read]
+        repeated = repeats(self._images, numbers, np.array(self._stamps, np.int64))
+        return (
+            *tell_sizes(self.accounting.sizes, read, size),
+            *tell_repeats(repeated, read),
+            *tell_fringes(self.accounting.fringes),
+        )
+
+    @property
+    def _taken(self) -> range:
+        taken = self._numbers[:: self._span.every]
+        return taken[: self._span.max_frames or len(taken)]
 
     def _run(self) -> Iterator[LoggedFrame]:
-        for number in self._numbers[:: self._span.every][: len(self)]:
+        for number in self._taken:
             yield self._frame(number)
 
     def _frame(self, number: int) -> LoggedFrame:
@@ -98,15 +99,15 @@ class FrameStream:
         # Reading a message corrects its log time where the file's index is wrong.
         picture = read_or_error(self._pictures, number)
         log_time = int(self._images.log_times[number])
+        self._stamps.append(self._stamp(number, log_time))
         return LoggedFrame(
             number=number,
-            stamp_ns=self._stamp(number, log_time),
+            stamp_ns=self._stamps[-1],
             log_time_ns=log_time,
             picture=picture,
             labels=labels,
-            resize=self._selection.resize_truth,
-            scale=self._selection.scale,
-            report=self.accounting.undecodable.__setitem__,
+            rules=self._rules,
+            accounting=self.accounting,
         )
 
     def _stamp(self, number: int, log_time: int) -> int:

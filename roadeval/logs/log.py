@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from mcap.records import Channel, Schema
 
+from roadeval.images import MAX_PIXELS, Limits
 from roadeval.logs.container.damage import Damage, damage_of
 from roadeval.logs.container.file import Container
 from roadeval.logs.errors import BadRecord, LogError
@@ -25,10 +26,11 @@ from roadeval.logs.times import NS
 from roadeval.logs.topics.description import TopicInfo, describe_topic
 from roadeval.logs.topics.reader import topic_readers
 from roadeval.logs.topics.selection import Selection, settle
+from roadeval.logs.topics.survey import survey
 from roadeval.runtime.text import visible
 
 
-def open_log(path: str | Path, *, keep_corrupt: bool = False) -> Log:
+def open_log(path: str | Path, *, keep_corrupt: bool = False, max_pixels: int = MAX_PIXELS) -> Log:
     """Open an MCAP file, or a rosbag2 folder of split files, as one log.
 
     Parameters
@@ -36,7 +38,9 @@ def open_log(path: str | Path, *, keep_corrupt: bool = False) -> Log:
     path
         File or folder.
     keep_corrupt
-        Whether to use data whose checksum is wrong.
+        Whether to use data whose checksum is wrong, and images of which a part is lost.
+    max_pixels
+        Most pixels of an image; one that has more is not decoded.
 
     Raises
     ------
@@ -46,7 +50,7 @@ def open_log(path: str | Path, *, keep_corrupt: bool = False) -> Log:
     path = Path(path)
     files, damage = files_of(path)
     try:
-        return Log(path, files, damage, keep_corrupt=keep_corrupt)
+        return Log(path, files, damage, Limits(max_pixels, keep_corrupt))
     except (BadRecord, OSError) as error:
         raise LogError(f"{path}: {error}") from error
 
@@ -70,17 +74,17 @@ class Log:
         self,
         path: Path,
         files: Sequence[Path],
-        damage: Sequence[Damage] = (),
-        *,
-        keep_corrupt: bool = False,
+        damage: Sequence[Damage],
+        limits: Limits,
     ) -> None:
         self.path = path
         self.name = visible(path.stem if path.is_file() else path.resolve().name)
         self._lost_files = damage
         self._containers = [
-            Container(f, _is_image, message_is_whole, keep_corrupt=keep_corrupt) for f in files
+            Container(f, _is_image, message_is_whole, keep_corrupt=limits.keep_damaged)
+            for f in files
         ]
-        self._readers = topic_readers(self._containers)
+        self._readers = topic_readers(self._containers, limits)
         self.topics: tuple[TopicInfo, ...] = tuple(
             describe_topic(reader) for _, reader in sorted(self._readers.items())
         )
@@ -182,6 +186,13 @@ class Log:
             return settle(self.topics, self._readers, topics, labels, scale, several=several)
         except LogError as error:
             raise LogError(f"{self.path.name}: {error}") from error
+
+    def oddities(self, selection: Selection) -> tuple[str, ...]:
+        """Go through all selected images, without decoding them: see `LogDescription.oddities`."""
+        image = selection.image
+        return tuple(
+            f"{image.name}: {oddity}" for oddity in survey(self._readers[image.name], image.size)
+        )
 
     def frames(self, selection: Selection, span: Span | None = None) -> FrameStream:
         """Read the selected frames, by log time; each call begins anew.

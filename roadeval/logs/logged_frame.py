@@ -3,22 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any, Final
+from dataclasses import dataclass, replace
+from typing import Any, Final, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import IGNORE, Frame, Mask, Rgb, Truth
-from roadeval.logs.errors import BadMessage, FrameError
+from roadeval.images import Limits, format_of
+from roadeval.logs.accounting import Accounting
+from roadeval.logs.errors import BadMessage, DamagedMessage, FrameError
 from roadeval.logs.messages.pictures import CompressedPicture, Picture
-from roadeval.logs.messages.pixels import media_type, to_rgb
+from roadeval.logs.messages.pixels import to_rgb
 from roadeval.logs.scaling import at_scale, nearest
 from roadeval.logs.topics.labels import Label
+
+T = TypeVar("T")
 
 TRUTH: Final = "/truth"
 SHADOW: Final = "/shadow"
 """Keys among a frame's labels; no mask's name begins with a slash."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameRules:
+    """How frames are decoded.
+
+    Parameters
+    ----------
+    limits
+        On their images: how large, and whether damaged.
+    size
+        Width and height of the topic's images, if known.
+    resize
+        Whether labels are resized to the image.
+    scale
+        Scale of image and labels together.
+    """
+
+    limits: Limits
+    size: tuple[int, int] | None
+    resize: bool
+    scale: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,10 +61,10 @@ class LoggedFrame:
         The image, or why it cannot be read.
     labels
         The labels that belong to it: `TRUTH`, `SHADOW`, and masks by their name.
-    resize, scale
-        Whether labels are resized to the image, and the scale of both together.
-    report
-        Called with the number and the reason if it cannot be decoded.
+    rules
+        How it is decoded.
+    accounting
+        Where it says what it found.
     """
 
     number: int
@@ -46,9 +72,8 @@ class LoggedFrame:
     log_time_ns: int
     picture: Picture | FrameError
     labels: Mapping[str, Label]
-    resize: bool
-    scale: float
-    report: Callable[[int, str], None]
+    rules: FrameRules
+    accounting: Accounting
 
     @property
     def labelled(self) -> bool:
@@ -64,48 +89,76 @@ class LoggedFrame:
             If the image or a label of it cannot be decoded.
         """
         try:
-            return at_scale(self._decode(), self.scale)
+            return at_scale(self._decode(), self.rules.scale)
         except (BadMessage, FrameError) as error:
             reason = f"frame {self.number}: {error}"
-            self.report(self.number, str(error))
+            self.accounting.undecodable[self.number] = str(error)
             raise FrameError(reason) from error
 
     def _decode(self) -> Frame:
         picture = _readable(self.picture)
-        image = to_rgb(picture)
+        image, is_whole = self._pixels(lambda limits: to_rgb(picture, limits))
+        self._check_size(image)
         labels = {name: self._label(label, image) for name, label in self.labels.items()}
         truth, shadow = labels.pop(TRUTH, None), labels.pop(SHADOW, None)
-        media = media_type(picture.data) if isinstance(picture, CompressedPicture) else None
         return Frame(
             self.number,
             self.stamp_ns,
             self.log_time_ns,
             image,
             picture.data,
-            media,
+            _media_type(picture) if is_whole else None,
             truth,
             shadow,
             {name: _as_mask(mask) for name, mask in labels.items()},
         )
 
+    def _pixels(self, decode: Callable[[Limits], T], topic: str = "") -> tuple[T, bool]:
+        """Decode, damaged or not as the limits say; return also whether it was undamaged."""
+        try:
+            return decode(replace(self.rules.limits, keep_damaged=False)), True
+        except DamagedMessage as error:
+            if not self.rules.limits.keep_damaged:
+                raise
+            found = decode(self.rules.limits)
+            where = f"{topic}: " if topic else ""
+            self.accounting.damaged[self.number] = f"{where}{error.damage}, used all the same"
+            return found, False
+
+    def _check_size(self, image: Rgb) -> None:
+        size = image.shape[1], image.shape[0]
+        if self.rules.size is not None and size != self.rules.size:
+            self.accounting.sizes[self.number] = size
+
     def _label(self, label: Label, image: Rgb) -> Truth:
         try:
-            truth = label.labels.read(_readable(label.picture))
+            picture = _readable(label.picture)
+            (truth, fringe), _ = self._pixels(
+                lambda limits: label.labels.read(picture, limits), label.topic
+            )
         except BadMessage as error:
             raise FrameError(f"{label.topic}: {error}") from error
+        if fringe:
+            self.accounting.fringes[self.number, label.topic] = fringe, truth.size
         return self._fitted(truth, image, label.topic)
 
     def _fitted(self, truth: Truth, image: Rgb, topic: str) -> Truth:
         height, width = image.shape[:2]
         if truth.shape == (height, width):
             return truth
-        if not self.resize:
+        if not self.rules.resize:
             size = f"{truth.shape[1]}x{truth.shape[0]}"
             raise FrameError(
                 f"{topic} is {size}, its image {width}x{height}: "
                 "scale the labels with `topics.resize_truth`"
             )
         return nearest(truth, (width, height))
+
+
+def _media_type(picture: Picture) -> str | None:
+    """Return the media type of a file that every viewer knows."""
+    format_ = format_of(picture.data) if isinstance(picture, CompressedPicture) else None
+    return format_.media_type if format_ else None
 
 
 def _readable(picture: Picture | FrameError) -> Picture:

@@ -10,6 +10,7 @@ from typing import Annotated, Self
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass as validated
 
+from roadeval.images import MAX_PIXELS
 from roadeval.logs.errors import LogError
 from roadeval.logs.times import parse_time
 
@@ -84,12 +85,18 @@ class LabelSettings:
         Colours that are road, red, green and blue.
     ignore_colors
         Colours that are counted nowhere.
+    tolerance
+        For masks whose compression changes values, as JPEG does: a value at most so far from one
+        that means road (255 by default), from 0 or from one to ignore means the same; the others,
+        which lie at edges, are counted nowhere, and their share is told. Without it such masks are
+        refused.
     """
 
     road: tuple[Label, ...] = ()
     ignore: tuple[Label, ...] = ()
     road_colors: tuple[Color, ...] = ()
     ignore_colors: tuple[Color, ...] = ()
+    tolerance: Annotated[int, Field(ge=1, le=127)] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -101,6 +108,8 @@ class LabelSettings:
             raise ValueError(
                 "`labels.ignore_colors` needs `labels.road_colors`: name the colours that mean road"
             )
+        if self.tolerance is not None and (self.road_colors or 0 in self.road):
+            raise ValueError("`labels.tolerance` is for masks of values, in which 0 is non-road")
         for both in {*self.road} & {*self.ignore} or {*self.road_colors} & {*self.ignore_colors}:
             raise ValueError(f"label {both} cannot mean road and ignore at once")
         return self
@@ -124,7 +133,10 @@ class FrameSettings:
         Reduce frames and truth to this share of their width and height first: a cheaper look at a
         long log, with other results.
     keep_corrupt
-        Use messages whose checksum is wrong.
+        Use damaged data: messages whose checksum is wrong, and images of which a part is lost.
+    max_pixels
+        Most pixels of an image. One whose head claims more is not decoded: a damaged head may
+        claim any size.
     """
 
     start: Time | None = None
@@ -133,3 +145,4 @@ class FrameSettings:
     max_frames: Annotated[int, Field(ge=1, le=1_000_000_000)] | None = None
     scale: Annotated[float, Field(gt=0, le=1)] = 1.0
     keep_corrupt: bool = False
+    max_pixels: Annotated[int, Field(ge=1, le=1 << 30)] = MAX_PIXELS

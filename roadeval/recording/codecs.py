@@ -27,8 +27,10 @@ import numpy as np
 import numpy.typing as npt
 import rerun as rr
 
+from roadeval import images
 from roadeval.data import ERRORS, TRUTH, LayerKind, LayerSpec
 from roadeval.data.packed import Packed
+from roadeval.images import MAX_PIXELS, Limits
 from roadeval.recording import indexed_png
 from roadeval.recording.layout import CAMERA, FORMAT, SHADOW_TRUTH, Layout
 
@@ -62,7 +64,7 @@ class Codec(Protocol):
         """Return the viewer's columns of the payloads of many frames."""
 
     def decode(self, payload: bytes) -> Array:
-        """Return the array of a payload."""
+        """Return the array of a payload; a ValueError if it is damaged or of another kind."""
 
 
 def codecs_of(layout: Layout, version: int = FORMAT) -> dict[str, Codec]:
@@ -75,7 +77,7 @@ def codecs_of(layout: Layout, version: int = FORMAT) -> dict[str, Codec]:
     version
         Of its format.
     """
-    codecs: dict[str, Codec] = {CAMERA: CameraCodec()}
+    codecs: dict[str, Codec] = {CAMERA: CameraCodec(layout.width, layout.height)}
     for path, spec in layout.images():
         if version < 3 and spec in (TRUTH, SHADOW_TRUTH, ERRORS):
             codecs[path] = LabelCodec(spec, layout.width, layout.height)
@@ -88,7 +90,7 @@ def codec(spec: LayerSpec, width: int, height: int) -> Codec:
     """Return the codec of a layer of ``width`` x ``height`` pixels."""
     match spec.kind:
         case LayerKind.MASK:
-            return MaskCodec(spec)
+            return MaskCodec(spec, width, height)
         case LayerKind.LABELS:
             return LabelCodec(spec, width, height)
         case LayerKind.SCALAR:
@@ -102,6 +104,8 @@ class MaskCodec:
     """A mask: a PNG of a few bits a pixel whose palette holds the classes' colours."""
 
     spec: LayerSpec
+    width: int
+    height: int
     component = "EncodedImage:blob"
 
     @cached_property
@@ -137,7 +141,7 @@ class MaskCodec:
 
     def decode(self, payload: bytes) -> Array:
         """Return the same array."""
-        labels = indexed_png.decode(payload)
+        labels = images.palette_indices(payload, _limits(self.width, self.height))
         return labels if self._places is None else np.asarray(self._values[labels])
 
 
@@ -215,7 +219,7 @@ class ScalarCodec:
 
     def decode(self, payload: bytes) -> Array:
         """Return ``(H, W)`` float32 in the layer's own unit, at full resolution."""
-        codes = _read(payload, cv2.IMREAD_UNCHANGED)
+        codes = images.to_labels(payload, _limits(self.width, self.height))
         low, high = self.spec.value_range
         values: Array = codes * np.float32((high - low) / 255) + np.float32(low)
         return _restore(values, self.width, self.height)
@@ -229,6 +233,8 @@ _FIFTHS: Final = (np.rint(np.arange(256) / 5) * 5).astype(np.uint8)
 class CameraCodec:
     """The camera's image: JPEG or PNG, whatever the log holds."""
 
+    width: int
+    height: int
     component = "EncodedImage:blob"
 
     def style(self) -> Sequence[Any]:
@@ -245,15 +251,13 @@ class CameraCodec:
 
     def decode(self, payload: bytes) -> Array:
         """Return ``(H, W, 3)`` uint8 RGB."""
-        return _read(payload, cv2.IMREAD_COLOR_RGB)
+        return images.to_rgb(payload, _limits(self.width, self.height))
 
 
 @dataclass(frozen=True)
 class ImageCodec(CameraCodec):
     """A colour image that a stage made."""
 
-    width: int
-    height: int
     exact: bool
 
     def encode(self, array: Array) -> bytes:
@@ -287,8 +291,6 @@ def _jpeg(rgb: Array) -> bytes:
     return cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1].tobytes()
 
 
-def _read(payload: bytes, flags: int) -> Array:
-    image: Array | None = cv2.imdecode(np.frombuffer(payload, np.uint8), flags)
-    if image is None:
-        raise ValueError("not an image")
-    return image
+def _limits(width: int, height: int) -> Limits:
+    """Return the limits on pictures of a recording: its own size is always allowed."""
+    return Limits(max(MAX_PIXELS, width * height))

@@ -1,8 +1,8 @@
 """Label images as PNG files of 1, 2, 4 or 8 bits a pixel with a palette.
 
 The value of a pixel is its index; the palette only colours it. A binary mask of a real frame takes
-a quarter of what its raw bytes take after LZ4. Pillow, which decodes these files, takes several
-times as long to encode them, and holds the interpreter's lock for much of it.
+a quarter of what its raw bytes take after LZ4. Pillow, by which `roadeval.images` decodes these
+files, takes several times as long to encode them, and holds the interpreter's lock for much of it.
 
 References
 ----------
@@ -14,7 +14,6 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Sequence
-from io import BytesIO
 from typing import Final
 
 import cv2
@@ -62,24 +61,6 @@ def encode(labels: npt.NDArray[np.uint8] | Packed, palette: Sequence[ColourWithO
             _chunk(b"IEND", b""),
         )
     )
-
-
-def decode(png: bytes) -> npt.NDArray[np.uint8]:
-    """Return the ``(H, W)`` uint8 labels of a PNG file with a palette.
-
-    Raises
-    ------
-    ValueError
-        If it has none.
-    OSError
-        If it is no image.
-    """
-    from PIL import Image
-
-    with Image.open(BytesIO(png)) as image:
-        if image.mode != "P":
-            raise ValueError("not a PNG file with a palette")
-        return np.array(image)
 
 
 def _reversed(mask: Packed) -> npt.NDArray[np.uint8]:

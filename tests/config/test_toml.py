@@ -36,12 +36,14 @@ OTHER = {
     "labels.ignore": [11],
     "labels.road_colors": [[128, 64, 128]],
     "labels.ignore_colors": [[0, 0, 0]],
+    "labels.tolerance": 32,
     "frames.start": "2013-05-01T12:00:00Z",
     "frames.end": "90",
     "frames.every": 3,
     "frames.max_frames": 50,
     "frames.scale": 0.5,
     "frames.keep_corrupt": True,
+    "frames.max_pixels": 1_000_000,
     "run.jobs": 1,
 }
 """A value other than the default for every option of the command line."""

@@ -15,9 +15,10 @@ FRAMES: Final = 26
 NS: Final = 100_000_000
 
 TABLES: Final = {
-    **dict.fromkeys(("start", "end", "every", "max_frames", "scale", "keep_corrupt"), "frames"),
+    **dict.fromkeys(("start", "end", "every", "max_frames", "scale"), "frames"),
+    **dict.fromkeys(("keep_corrupt", "max_pixels"), "frames"),
     **dict.fromkeys(("masks", "resize_truth", "sync_tolerance_ms", "image", "truth"), "topics"),
-    **dict.fromkeys(("road", "ignore", "road_colors", "ignore_colors"), "labels"),
+    **dict.fromkeys(("road", "ignore", "road_colors", "ignore_colors", "tolerance"), "labels"),
     **dict.fromkeys(("model", "gap", "train_frames", "source"), "training"),
     "record": "output",
     "jobs": "run",

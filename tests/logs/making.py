@@ -68,9 +68,12 @@ def compressed(stamp_ns: int, data: bytes, name: str = "jpeg") -> dict[str, Any]
 
 
 def ros2_log(
-    path: Path, messages: Iterable[tuple[str, int, dict[str, Any]]], **options: Any
+    path: Path,
+    messages: Iterable[tuple[str, int, dict[str, Any]]],
+    empty: Iterable[str] = (),
+    **options: Any,
 ) -> Path:
-    """Write (topic, log time, message) in the order given."""
+    """Write (topic, log time, message) in the order given; and topics without messages."""
     with path.open("wb") as file:
         writer = Ros2Writer(file, **options)
         image = writer.register_msgdef("sensor_msgs/msg/Image", IMAGE)
@@ -78,6 +81,8 @@ def ros2_log(
         for topic, log_time, message in messages:
             schema = packed if "format" in message else image
             writer.write_message(topic, schema, message, log_time)
+        for topic in empty:
+            writer._writer.register_channel(topic, "cdr", packed.id)
         writer.finish()
     return path
 

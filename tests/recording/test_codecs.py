@@ -85,3 +85,13 @@ def test_what_need_not_be_exact_takes_less_than_half():
     noise = DRAW.integers(0, 256, (480, 640)).astype(np.uint8)
     sizes = [len(codec(spec, 640, 480).encode(noise)) for spec in (NDI, replace(NDI, exact=False))]
     assert sizes[1] < sizes[0] / 2
+
+
+@pytest.mark.parametrize("spec", [POST, NDI, LayerSpec("aligned", LayerKind.RGB, "")])
+def test_a_damaged_picture_is_refused(spec):
+    chosen = codec(spec, WIDTH, HEIGHT)
+    shape = (HEIGHT, WIDTH, 3) if spec.kind is LayerKind.RGB else (HEIGHT, WIDTH)
+    payload = bytearray(chosen.encode(np.ones(shape, np.uint8)))
+    payload[len(payload) // 2] ^= 1
+    with pytest.raises(ValueError, match="a damaged PNG"):
+        chosen.decode(bytes(payload))

@@ -7,10 +7,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from roadeval import images
 from roadeval.data.packed import Packed
 from roadeval.recording import indexed_png
 
 ROAD = [(0, 0, 0, 0), (0, 158, 115, 160)]
+
+
+def decode(png):
+    return images.palette_indices(png, images.Limits())
 
 
 @pytest.mark.parametrize("classes", [2, 3, 4, 5, 16, 17, 256])
@@ -18,7 +23,7 @@ ROAD = [(0, 0, 0, 0), (0, 158, 115, 160)]
 def test_labels_come_back_whatever_their_number_and_the_width(classes, width):
     labels = np.random.default_rng(0).integers(0, classes, (5, width)).astype(np.uint8)
     png = indexed_png.encode(labels, [(i, 0, 0, 255) for i in range(classes)])
-    np.testing.assert_array_equal(indexed_png.decode(png), labels)
+    np.testing.assert_array_equal(decode(png), labels)
 
 
 @pytest.mark.parametrize("classes", [2, 3])
@@ -41,26 +46,15 @@ def test_a_mask_takes_a_bit_a_pixel_before_compression():
     assert len(indexed_png.encode(noise, ROAD)) < noise.size / 8 * 1.05
 
 
-def test_a_file_of_another_kind_is_refused():
-    with pytest.raises(OSError, match="cannot identify image file"):
-        indexed_png.decode(b"whatever")
-
-
-def test_a_png_file_without_a_palette_is_refused():
-    grey = io.BytesIO()
-    Image.fromarray(np.zeros((2, 2), np.uint8)).save(grey, "PNG")
-    with pytest.raises(ValueError, match="palette"):
-        indexed_png.decode(grey.getvalue())
-
-
 def test_rows_without_a_filter_are_read_as_earlier_recordings_have_them():
     labels = np.random.default_rng(0).integers(0, 2, (5, 16)).astype(np.uint8)
     rows = b"".join(b"\0" + np.packbits(row).tobytes() for row in labels)
-    np.testing.assert_array_equal(indexed_png.decode(_with_rows(labels, rows)), labels)
+    np.testing.assert_array_equal(decode(_with_rows(labels, rows)), labels)
 
 
 def _with_rows(labels, rows):
     """Encode labels, and put other rows in the place of theirs."""
-    png, packed = indexed_png.encode(labels, ROAD), zlib.compress(rows)
-    start, end = png.index(b"IDAT") - 4, png.index(b"IEND") - 8
-    return png[:start] + len(packed).to_bytes(4, "big") + b"IDAT" + packed + png[end:]
+    png, data = indexed_png.encode(labels, ROAD), b"IDAT" + zlib.compress(rows)
+    start, end = png.index(b"IDAT") - 4, png.index(b"IEND") - 4
+    length, checksum = (len(data) - 4).to_bytes(4, "big"), zlib.crc32(data).to_bytes(4, "big")
+    return png[:start] + length + data + checksum + png[end:]

@@ -36,11 +36,15 @@ class CompressedPicture:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DecodedPicture:
-    """A video's frame: its packet, and what became of it together with those before it."""
+    """A video's frame: its packet, and what became of it together with those before it.
+
+    ``damage`` says what is wrong with the pixels; empty if nothing is.
+    """
 
     stamp_ns: int
     data: Buffer
     pixels: Rgb
+    damage: str = ""
 
 
 Picture = RawPicture | CompressedPicture | DecodedPicture

@@ -9,13 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Rgb
+from roadeval.images import Limits
+from roadeval.images.samples import eight_bits
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import RawPicture
 
 Array = npt.NDArray[Any]
-
-LARGEST: Final = 1 << 28
-"""Most pixels of an image; one that claims more is damaged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,13 +22,15 @@ class PixelFormat:
     """How an encoding lays out its pixels.
 
     ``dtype`` and ``channels`` give a row's items; ``rows`` the rows stored per image row (3/2
-    for planar 4:2:0); ``code`` names OpenCV's conversion to RGB, None for RGB itself.
+    for planar 4:2:0); ``code`` names OpenCV's conversion to RGB, None for RGB itself. Width and
+    height are whole multiples of ``block``: pixels of one block share their colours.
     """
 
     dtype: str
     channels: int
     code: str | None
     rows: float = 1.0
+    block: tuple[int, int] = (1, 1)
 
     @property
     def is_grey(self) -> bool:
@@ -39,12 +40,12 @@ class PixelFormat:
 
 def _formats() -> dict[str, PixelFormat]:
     formats = {
-        "yuv422": PixelFormat("u1", 2, "COLOR_YUV2RGB_UYVY"),
-        "uyvy": PixelFormat("u1", 2, "COLOR_YUV2RGB_UYVY"),
-        "yuyv": PixelFormat("u1", 2, "COLOR_YUV2RGB_YUY2"),
-        "yuv422_yuy2": PixelFormat("u1", 2, "COLOR_YUV2RGB_YUY2"),
-        "nv12": PixelFormat("u1", 1, "COLOR_YUV2RGB_NV12", 1.5),
-        "nv21": PixelFormat("u1", 1, "COLOR_YUV2RGB_NV21", 1.5),
+        "yuv422": PixelFormat("u1", 2, "COLOR_YUV2RGB_UYVY", block=(2, 1)),
+        "uyvy": PixelFormat("u1", 2, "COLOR_YUV2RGB_UYVY", block=(2, 1)),
+        "yuyv": PixelFormat("u1", 2, "COLOR_YUV2RGB_YUY2", block=(2, 1)),
+        "yuv422_yuy2": PixelFormat("u1", 2, "COLOR_YUV2RGB_YUY2", block=(2, 1)),
+        "nv12": PixelFormat("u1", 1, "COLOR_YUV2RGB_NV12", 1.5, (2, 2)),
+        "nv21": PixelFormat("u1", 1, "COLOR_YUV2RGB_NV21", 1.5, (2, 2)),
         "32fc1": PixelFormat("f4", 1, "COLOR_GRAY2RGB"),
     }
     for bits, dtype in (("8", "u1"), ("16", "u2")):
@@ -82,20 +83,23 @@ def format_of(picture: RawPicture) -> PixelFormat:
     return format_
 
 
-def rows_of(picture: RawPicture, format_: PixelFormat) -> Array:
+def rows_of(picture: RawPicture, format_: PixelFormat, limits: Limits) -> Array:
     """Return the samples of a picture as rows, without padding, in this machine's byte order.
 
     Raises
     ------
     BadMessage
         If the data is shorter than its size says, or the size cannot be.
+    ImageError
+        If it is larger than the limits allow.
     """
     width, height = picture.width, picture.height
+    check_size(picture, format_, limits)
     rows = int(height * format_.rows)
     dtype = np.dtype(format_.dtype).newbyteorder(">" if picture.big_endian else "<")
     row = width * format_.channels * dtype.itemsize
     step = picture.step or row
-    if not 0 < width * height <= LARGEST or step < row:
+    if step < row:
         raise BadMessage(f"an image of {width}x{height} with {step} bytes a row")
     needed = step * (rows - 1) + row
     if len(picture.data) < needed:
@@ -108,29 +112,36 @@ def rows_of(picture: RawPicture, format_: PixelFormat) -> Array:
     return np.ascontiguousarray(array, dtype.newbyteorder("="))
 
 
-def raw_to_rgb(picture: RawPicture) -> Rgb:
+def check_size(picture: RawPicture, format_: PixelFormat, limits: Limits) -> None:
+    """Refuse a size that the limits forbid, or that the format cannot have."""
+    width, height = picture.width, picture.height
+    limits.check(width, height)
+    wide, high = format_.block
+    if width % wide or height % high:
+        even = "width and height" if high > 1 else "width"
+        raise BadMessage(
+            f"an image of {width}x{height} in {picture.encoding}, which needs an even {even}"
+        )
+
+
+def raw_to_rgb(picture: RawPicture, limits: Limits) -> Rgb:
     """Convert a picture to ``(H, W, 3)`` uint8 RGB, an array of its own.
 
     Raises
     ------
-    BadMessage
-        If its encoding is unknown or its data too short.
+    BadMessage, ImageError
+        If its encoding is unknown, or as `rows_of`.
     """
     import cv2
 
     format_ = format_of(picture)
-    samples = eight_bits(rows_of(picture, format_))
+    samples = eight_bits(rows_of(picture, format_, limits))
     if format_.code is None:
         # A loop is compiled anew for parts of a message: they may not be written to.
         return np.require(samples, requirements=["C", "W"])
-    rgb: Rgb = np.asarray(cv2.cvtColor(samples, getattr(cv2, format_.code)), np.uint8)
-    return rgb
-
-
-def eight_bits(array: Array) -> npt.NDArray[np.uint8]:
-    """Convert samples to 0..255: the upper half of 16 bits, floats from 0..1."""
-    if array.dtype == np.uint16:
-        array = array >> 8
-    elif array.dtype == np.float32:
-        array = np.rint(np.clip(np.nan_to_num(array), 0, 1) * 255)
-    return np.asarray(array, np.uint8)
+    try:
+        rgb = cv2.cvtColor(samples, getattr(cv2, format_.code))
+    except cv2.error as error:
+        size = f"{picture.width}x{picture.height}"
+        raise BadMessage(f"an image of {size} in {picture.encoding}: {error.err}") from error
+    return np.asarray(rgb, np.uint8)

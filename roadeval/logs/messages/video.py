@@ -6,6 +6,7 @@ import re
 from contextlib import suppress
 from typing import Any, Final, Protocol
 
+from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages.pictures import CompressedPicture, DecodedPicture, Picture, codec_of
 
@@ -50,18 +51,27 @@ def import_av() -> Any:
 class Video:
     """The frames of a video topic, by position; fastest one after the other.
 
+    Parameters
+    ----------
+    packets
+        Its messages.
+    limits
+        On the frames' size; what is larger is not decoded.
+
     Raises
     ------
     LogError
         If PyAV, which decodes video, is not installed.
     """
 
-    def __init__(self, packets: PictureSequence) -> None:
+    def __init__(self, packets: PictureSequence, limits: Limits) -> None:
         self._av = import_av()
         self._packets = packets
+        self._limits = limits
         self._decoder: Any = None
         self._next = 0
         self._broken = ""
+        self._damaged = False
         self._waiting: dict[int, Picture] = {}
         self._ready: dict[int, DecodedPicture | FrameError] = {}
 
@@ -98,8 +108,8 @@ class Video:
             return
         keyframe = self._keyframe(position)
         if position < self._next or keyframe > self._next:
-            self._decoder, self._waiting, self._ready, self._broken = None, {}, {}, ""
-            self._next = keyframe
+            self._decoder, self._waiting, self._ready = None, {}, {}
+            self._next, self._broken, self._damaged = keyframe, "", False
 
     def _flush(self) -> None:
         """Take what the decoder still holds at the end of the video."""
@@ -145,6 +155,7 @@ class Video:
                 raise BadMessage("its video codec is unknown")
             self._decoder = self._av.CodecContext.create(_DECODERS.get(codec, codec), "r")
             self._decoder.thread_count = 1
+            self._decoder.options = {"max_pixels": str(self._limits.max_pixels)}
         self._waiting[position] = packet
         unit = self._av.Packet(bytes(packet.data))
         unit.pts = unit.dts = position
@@ -156,12 +167,31 @@ class Video:
         try:
             frames = self._decoder.decode(unit)
         except self._av.FFmpegError as error:
-            raise BadMessage(f"its video cannot be decoded: {error.strerror}") from error
+            raise BadMessage(self._reason(error)) from error
         for frame in frames:
+            damage = self._damage_of(frame)
             packet = self._waiting.pop(frame.pts, None)
             if packet is not None:
                 pixels = frame.to_ndarray(format="rgb24")
-                self._ready[frame.pts] = DecodedPicture(packet.stamp_ns, packet.data, pixels)
+                found = DecodedPicture(packet.stamp_ns, packet.data, pixels, damage)
+                self._ready[frame.pts] = found
+
+    def _reason(self, error: Any) -> str:
+        """Return why a packet cannot be decoded: its size, where the decoder tells that."""
+        if self._decoder.width and self._decoder.height:
+            try:
+                self._limits.check(self._decoder.width, self._decoder.height)
+            except ImageError as too_large:
+                return str(too_large)
+        return f"its video cannot be decoded: {error.strerror}"
+
+    def _damage_of(self, frame: Any) -> str:
+        """Return what is wrong with a frame, in which the decoder has filled in what is damaged."""
+        if frame.is_corrupt:
+            self._damaged = True
+            return "its video is damaged"
+        self._damaged &= not frame.key_frame
+        return "a frame that it builds upon is damaged" if self._damaged else ""
 
 
 def is_keyframe(packet: Picture) -> bool:

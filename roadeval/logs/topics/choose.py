@@ -7,8 +7,9 @@ from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
 from roadeval.logs.errors import LogError
-from roadeval.logs.messages.schemas import TopicKind
+from roadeval.logs.settings import LabelSettings
 from roadeval.logs.topics.description import TopicInfo
+from roadeval.logs.topics.labels import lossy
 
 
 def _set(text: str) -> frozenset[str]:
@@ -74,28 +75,35 @@ def choose_image(topics: Sequence[TopicInfo], asked: str | None) -> tuple[TopicI
 
 
 def choose_truth(
-    topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None, *, colors: bool = False
+    topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None, labels: LabelSettings
 ) -> Choice:
     """Choose the topic of the road truth.
 
-    An image of single values is preferred; one of ``colors`` where those are asked for, or
+    An image of single values is preferred; one of colours where those are asked for, or
     where there is no other.
 
     Raises
     ------
     LogError
-        If the one asked for is not there or no image, or if several are candidates.
+        If the one asked for is not there or no image, or if several are candidates; or if what
+        values mean is said, and the only label images are compressed with loss.
     """
     if asked is not None:
         return _asked_for(topics, asked, "`topics.truth`")
-    labels = _label_topics(topics, image)
-    roads = [topic for topic in labels if not words(topic.name) & SHADOW_WORDS]
+    found = [t for t in _label_topics(topics, image) if not words(t.name) & SHADOW_WORDS]
+    roads = [topic for topic in found if labels.tolerance or not topic.lossy]
+    colors = bool(labels.road_colors)
     plain = _only(_plain_truths(roads, image, colors=colors), image, "label", "`topics.truth`")
     if plain is not None:
         by = "colours" if plain.channels == 3 else "single channel"
         return Choice(plain, f"the label image, by its name and its {by}")
     if roads:
         why = f"no topic is plainly road truth; `topics.truth` takes one of: {_names(roads)}"
+        return Choice(None, why)
+    if found:
+        why = f"{found[0].name} {lossy(found[0].lossy)}"
+        if labels != LabelSettings():
+            raise LogError(why)
         return Choice(None, why)
     return Choice(None, "no label topic")
 
@@ -109,7 +117,9 @@ def _plain_truths(roads: Sequence[TopicInfo], image: TopicInfo, *, colors: bool)
     return (coloured if colors else []) or by_name or masks or coloured
 
 
-def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None) -> Choice:
+def choose_shadow(
+    topics: Sequence[TopicInfo], image: TopicInfo, asked: str | None, labels: LabelSettings
+) -> Choice:
     """Choose the topic of the true shadow.
 
     Raises
@@ -119,9 +129,10 @@ def choose_shadow(topics: Sequence[TopicInfo], image: TopicInfo, asked: str | No
     """
     if asked is not None:
         return _asked_for(topics, asked, "`topics.shadow`")
-    labels = _label_topics(topics, image)
-    shadows = [t for t in labels if words(t.name) & SHADOW_WORDS and t.channels == 1]
-    shadow = _only(shadows, image, "shadow", "`topics.shadow`")
+    masks = [topic for topic in _label_topics(topics, image) if topic.channels == 1]
+    shadows = [topic for topic in masks if words(topic.name) & SHADOW_WORDS]
+    exact = [topic for topic in shadows if labels.tolerance or not topic.lossy]
+    shadow = _only(exact, image, "shadow", "`topics.shadow`")
     if shadow is None:
         return Choice(None, "no shadow topic")
     return Choice(shadow, "the shadow mask, by its name and its single channel")
@@ -143,6 +154,8 @@ def named(topics: Sequence[TopicInfo], name: str, setting: str) -> TopicInfo:
     """
     for topic in topics:
         if topic.name == name and topic.is_image:
+            if not topic.count:
+                raise LogError(f"{setting} {name}: the topic holds no message")
             return topic
     valid = _names(topic for topic in topics if topic.is_image) or "none"
     there = any(topic.name == name for topic in topics)
@@ -151,25 +164,19 @@ def named(topics: Sequence[TopicInfo], name: str, setting: str) -> TopicInfo:
 
 
 def _label_topics(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:
-    """Topics without loss that look like label images and are no network's output."""
+    """Topics that look like label images and are no network's output."""
     return [
         topic
         for topic in topics
         if topic.name != image.name
         and topic.count
         and _looks_like_label(topic)
-        and not _is_lossy(topic)
         and not words(topic.name) & (OUTPUT_WORDS | PICTURE_WORDS)
     ]
 
 
 def _looks_like_label(topic: TopicInfo) -> bool:
     return topic.is_image and bool(words(topic.name) & (LABEL_WORDS | MASK_WORDS | SHADOW_WORDS))
-
-
-def _is_lossy(topic: TopicInfo) -> bool:
-    name = topic.format.lower()
-    return topic.kind is TopicKind.VIDEO or "jpeg" in name or "jpg" in name
 
 
 def _looks_like_depth(topic: TopicInfo) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -11,8 +11,7 @@ import numpy.typing as npt
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages.decoders import kind_of
 from roadeval.logs.messages.pictures import CompressedPicture, RawPicture, codec_of
-from roadeval.logs.messages.pixel_formats import format_of
-from roadeval.logs.messages.pixels import to_labels
+from roadeval.logs.messages.pixels import lossy_format, raw_format, to_labels
 from roadeval.logs.messages.schemas import TopicKind
 from roadeval.logs.messages.video import Video
 from roadeval.logs.times import NS
@@ -48,6 +47,9 @@ class TopicInfo:
         For images: width and height of it.
     channels
         For images: 1 if it is an image of single values, 3 if of colours.
+    lossy
+        For images: the format of the first readable one if its compression changes values, as
+        JPEG; else empty.
     problem
         Why no message could be decoded, or empty.
     """
@@ -64,6 +66,7 @@ class TopicInfo:
     format: str = ""
     size: tuple[int, int] | None = None
     channels: int | None = None
+    lossy: str = ""
     problem: str = ""
 
     @property
@@ -120,33 +123,40 @@ def _with_picture(topic: TopicInfo, reader: TopicReader) -> TopicInfo:
     problem = ""
     for position in range(min(PROBES, len(reader))):
         try:
-            kind, name, size, channels = _look(reader, position)
+            return replace(topic, **_look(reader, position))
         except (FrameError, BadMessage) as error:
             problem = problem or str(error)
-        else:
-            return replace(topic, kind=kind, format=name, size=size, channels=channels)
     return replace(topic, problem=problem) if topic.schema else replace(topic, kind=TopicKind.OTHER)
 
 
-def _look(reader: TopicReader, position: int) -> tuple[TopicKind, str, tuple[int, int] | None, int]:
-    """Return kind, format, size and number of channels of an image."""
+def _look(reader: TopicReader, position: int) -> dict[str, Any]:
+    """Return the fields of a `TopicInfo` that a message shows."""
     picture = reader.picture(position)
     if isinstance(picture, RawPicture):
-        channels = 1 if format_of(picture).is_grey else 3
-        return TopicKind.IMAGE, picture.encoding, (picture.width, picture.height), channels
+        channels = 1 if raw_format(picture, reader.limits).is_grey else 3
+        return {
+            "kind": TopicKind.IMAGE,
+            "format": picture.encoding,
+            "size": (picture.width, picture.height),
+            "channels": channels,
+        }
+    found = {"kind": TopicKind.COMPRESSED, "lossy": lossy_format(picture)}
     codec = codec_of(picture)
     if codec is not None:
-        return TopicKind.VIDEO, codec, _video_size(reader), 3
-    pixels = to_labels(picture)
-    name = picture.format if isinstance(picture, CompressedPicture) else ""
-    size = (pixels.shape[1], pixels.shape[0])
-    return TopicKind.COMPRESSED, name, size, 1 if pixels.ndim == 2 else 3
+        size = _video_size(reader)
+        return found | {"kind": TopicKind.VIDEO, "format": codec, "size": size, "channels": 3}
+    pixels = to_labels(picture, reader.limits)
+    return found | {
+        "format": picture.format if isinstance(picture, CompressedPicture) else "",
+        "size": (pixels.shape[1], pixels.shape[0]),
+        "channels": 1 if pixels.ndim == 2 else 3,
+    }
 
 
 def _video_size(reader: TopicReader) -> tuple[int, int] | None:
     """Return the size of the first frame, or None where video cannot be decoded."""
     try:
-        pixels = Video(reader).picture(0).pixels
+        pixels = Video(reader, reader.limits).picture(0).pixels
     except (FrameError, LogError):
         return None
     return pixels.shape[1], pixels.shape[0]

@@ -5,19 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Truth
+from roadeval.images import Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages.pictures import Picture
-from roadeval.logs.messages.pixels import to_labels, to_rgb
+from roadeval.logs.messages.pixels import lossy_format, to_labels, to_rgb
 from roadeval.logs.settings import Color, LabelSettings
 
 UNKNOWN: Final = 254
 """Marks a value whose meaning is not known."""
+FRINGE: Final = 253
+"""Marks a value that lies too far from every known one, as compression makes them at edges."""
 
 _MASKS: Final = (
     {0: NON_ROAD, 255: ROAD, 128: IGNORE},
@@ -35,7 +39,10 @@ class LabelMap:
     meaning
         Truth by label value, or by packed colour (`pack_colors`).
     others
-        Truth of any other value; with `UNKNOWN` such a value is an error where it occurs.
+        Truth of any other value; with `UNKNOWN` such a value is an error where it occurs, with
+        `FRINGE` it is ignored and counted.
+    tolerance
+        How far a value may lie from one in ``meaning`` to mean the same.
     by_color
         Whether colours are looked up instead of values.
     words
@@ -46,6 +53,7 @@ class LabelMap:
     others: int
     by_color: bool
     words: str
+    tolerance: int = 0
 
     @property
     def by_itself(self) -> bool:
@@ -56,23 +64,35 @@ class LabelMap:
     def _table(self) -> npt.NDArray[np.uint8]:
         """``(65536,)`` truth by label value."""
         table = np.full(65536, self.others, np.uint8)
-        table[list(self.meaning)] = list(self.meaning.values())
+        for value, truth in self.meaning.items():
+            table[max(value - self.tolerance, 0) : value + self.tolerance + 1] = truth
         return table
 
-    def read(self, picture: Picture) -> Truth:
-        """Decode a label picture to ``(H, W)`` uint8 truth.
+    def read(self, picture: Picture, limits: Limits) -> tuple[Truth, int]:
+        """Decode a label picture.
+
+        Returns
+        -------
+        (H, W) uint8, int
+            The truth, and how many of its pixels are ignored because they are fringes.
 
         Raises
         ------
         BadMessage
-            If it cannot be decoded, or holds an unknown value, or colours instead of values.
+            If it cannot be decoded, or holds an unknown value, or colours instead of values; or
+            is compressed in a way that changes values, without a tolerance for that.
         """
+        if self.others != FRINGE and (name := lossy_format(picture)):
+            raise BadMessage(f"a {name}, whose compression changes label values")
         if self.by_color:
-            return self._of_colors(pack_colors(to_rgb(picture)))
-        labels = to_labels(picture)
+            return self._of_colors(pack_colors(to_rgb(picture, limits))), 0
+        labels = to_labels(picture, limits)
         if labels.ndim != 2:
             raise BadMessage("it holds colours, not label values")
-        return self.of_values(labels)
+        truth = self.of_values(labels)
+        fringe = truth == FRINGE
+        truth[fringe] = IGNORE
+        return truth, int(np.count_nonzero(fringe))
 
     def of_values(self, labels: npt.NDArray[Any]) -> Truth:
         """Translate ``(H, W)`` uint8 or uint16 labels.
@@ -115,7 +135,7 @@ def pack_colors(colors: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint32]:
     return np.asarray(wide[..., 0] << 16 | wide[..., 1] << 8 | wide[..., 2], np.uint32)
 
 
-def seen_in(picture: Picture, labels: LabelSettings, topic: str) -> set[int]:
+def seen_in(picture: Picture, labels: LabelSettings, topic: str, limits: Limits) -> set[int]:
     """Return the values, or packed colours, that occur in a label picture.
 
     Raises
@@ -123,11 +143,14 @@ def seen_in(picture: Picture, labels: LabelSettings, topic: str) -> set[int]:
     BadMessage
         If it cannot be decoded.
     LogError
-        If it holds colours, and values are looked for.
+        If it holds colours, and values are looked for; or is compressed in a way that changes
+        values, without a tolerance for that.
     """
+    if labels.tolerance is None and (name := lossy_format(picture)):
+        raise LogError(f"{topic} {lossy(name)}")
     if labels.road_colors:
-        return set(np.unique(pack_colors(to_rgb(picture))).tolist())
-    pixels = to_labels(picture)
+        return set(np.unique(pack_colors(to_rgb(picture, limits))).tolist())
+    pixels = to_labels(picture, limits)
     if pixels.ndim != 2:
         colors = map(_color_name, np.unique(pack_colors(pixels)).tolist())
         raise LogError(
@@ -135,6 +158,15 @@ def seen_in(picture: Picture, labels: LabelSettings, topic: str) -> set[int]:
             "`labels.road_colors`"
         )
     return set(np.flatnonzero(np.bincount(pixels.ravel())).tolist())
+
+
+def lossy(name: str) -> str:
+    """Return what is wrong with label images in a format that changes values, and the way out."""
+    return (
+        f"is {name}, whose compression changes the values at every edge: log labels as PNG, or "
+        "give `labels.tolerance` (32, for example), and values farther than that from 0 and from "
+        "those that mean road are ignored"
+    )
 
 
 def understand(
@@ -160,6 +192,8 @@ def understand(
         If a given value does not occur, or none is given and the values are class ids.
     """
     values = sorted(set(seen))
+    if labels.tolerance is not None:
+        return _within(labels, labels.tolerance, values, topic)
     if several and _is_mask_of_its_own(labels, values):
         labels = LabelSettings()
     if labels.road_colors:
@@ -207,6 +241,26 @@ def _as_given(
     road, ignore = given.values()
     meaning = dict.fromkeys(road, ROAD) | dict.fromkeys(ignore, IGNORE)
     return LabelMap(meaning, NON_ROAD, by_color, _words(map(name, road), map(name, ignore)))
+
+
+def _within(labels: LabelSettings, tolerance: int, seen: list[int], topic: str) -> LabelMap:
+    """Return the meaning of a mask whose values are near the known ones: 0 is non-road."""
+    road, ignore = labels.road or (255,), labels.ignore
+    meaning = {0: NON_ROAD} | dict.fromkeys(road, ROAD) | dict.fromkeys(ignore, IGNORE)
+    known = sorted(meaning)
+    for low, high in pairwise(known):
+        if meaning[low] != meaning[high] and high - low <= 2 * tolerance:
+            raise LogError(
+                f"{topic}: `labels.tolerance` {tolerance} does not keep {low} and {high} apart"
+            )
+    for value in (*labels.road, *ignore):
+        if not any(abs(value - each) <= tolerance for each in seen):
+            raise LogError(
+                f"{topic} holds nothing within {tolerance} of {value}; its frames hold "
+                f"{_listed(map(str, seen))}"
+            )
+    words = f"{_words(map(str, road), map(str, ignore))}, 0 is non-road, each within {tolerance}"
+    return LabelMap(meaning, FRINGE, False, words, tolerance)
 
 
 def _as_mask(meaning: dict[int, int], seen: list[int]) -> LabelMap:

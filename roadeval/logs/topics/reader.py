@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from mcap.records import Channel, Schema
 
+from roadeval.images import Limits
 from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError
@@ -54,13 +55,16 @@ class TopicReader:
     ----------
     name, channels
         The topic, and the channels that carry it.
+    limits
+        On the images that are decoded of it.
     log_times
         ``(n,)`` int64 nanoseconds, ascending; equal ones in the order of the file.
     """
 
-    def __init__(self, name: str, channels: Sequence[FileChannel]) -> None:
+    def __init__(self, name: str, channels: Sequence[FileChannel], limits: Limits) -> None:
         self.name = name
         self.channels = channels
+        self.limits = limits
         self._decoders: dict[int, Decoder | BadMessage] = {}
         rows = [np.empty((0, 4), np.int64)]
         for number, source in enumerate(channels):
@@ -179,10 +183,10 @@ class TopicReader:
         return FrameError(f"{self.name} message {position}: {reason}")
 
 
-def topic_readers(containers: Sequence[Container]) -> dict[str, TopicReader]:
+def topic_readers(containers: Sequence[Container], limits: Limits) -> dict[str, TopicReader]:
     """Return a reader for each topic, over the channels that carry it in the files' order."""
     channels: dict[str, list[FileChannel]] = {}
     for container in containers:
         for channel_id, channel in sorted(container.channels.items()):
             channels.setdefault(channel.topic, []).append(FileChannel(container, channel_id))
-    return {topic: TopicReader(topic, found) for topic, found in channels.items()}
+    return {topic: TopicReader(topic, found, limits) for topic, found in channels.items()}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
 from itertools import islice
@@ -60,6 +60,8 @@ class Selection:
         The camera's topic, and why that one.
     truth, shadow, masks
         Road truth, truth of shadow, and other systems' road masks by name.
+    no_truth
+        Why there is no road truth; empty if there is.
     tolerance_ns
         Largest difference of the header stamps of an image and its label.
     clock
@@ -69,8 +71,6 @@ class Selection:
         Whether label images of another size are scaled to the image's (nearest neighbour).
     scale
         Scale of the frames that are read, relative to the camera's; at most 1.
-    notes
-        Sentences for a person: every choice that was made, and why.
     """
 
     image: TopicInfo
@@ -82,7 +82,7 @@ class Selection:
     clock: Clock = Clock.STAMP
     resize_truth: bool = False
     scale: float = 1.0
-    notes: tuple[str, ...] = field(default=())
+    no_truth: str = ""
 
     @property
     def size(self) -> tuple[int, int] | None:
@@ -101,7 +101,11 @@ class Selection:
                 if label is self.shadow:
                     words = words.replace("road is", "shadow is")
                 lines.append(f"{name}: {label.topic.name} ({label.why}; {words})")
-        return (*lines, *self.notes)
+        if self.no_truth:
+            lines.append(f"no truth: {self.no_truth}")
+        if self.clock is not Clock.STAMP:
+            lines.append(f"the header stamps are all zero or equal: {self.clock} take their place")
+        return tuple(lines)
 
 
 def settle(
@@ -123,25 +127,25 @@ def settle(
     image, why = choose_image(topics, asked.image)
     images = readers[image.name]
     check_readable(images, image)
-    truth = choose_truth(topics, image, asked.truth, colors=bool(labels.road_colors))
-    shadow = choose_shadow(topics, image, asked.shadow)
+    truth = choose_truth(topics, image, asked.truth, labels)
+    shadow = choose_shadow(topics, image, asked.shadow, labels)
+    masks_only = LabelSettings(tolerance=labels.tolerance)
     masks = {
         name: Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")
         for name, topic in asked.masks.items()
     }
     look = partial(_label_topic, readers, image, resize=asked.resize_truth, several=several)
-    clock = clock_of(images)
     return Selection(
         image=image,
         image_why=why,
         truth=look(truth, labels),
-        shadow=look(shadow),
-        masks={name: label for name, mask in masks.items() if (label := look(mask))},
+        shadow=look(shadow, masks_only),
+        masks={name: label for name, mask in masks.items() if (label := look(mask, masks_only))},
         tolerance_ns=tolerance(images, asked.sync_tolerance_ms),
-        clock=clock,
+        clock=clock_of(images),
         resize_truth=asked.resize_truth,
         scale=scale,
-        notes=_notes(truth, clock),
+        no_truth="" if truth.topic else truth.why,
     )
 
 
@@ -149,13 +153,13 @@ def _label_topic(
     readers: Mapping[str, TopicReader],
     image: TopicInfo,
     choice: Choice,
-    labels: LabelSettings | None = None,
+    labels: LabelSettings,
     *,
     resize: bool,
     several: bool,
 ) -> LabelTopic | None:
     """Look at some images of the chosen topic: their size must fit, and their values be known."""
-    topic, labels = choice.topic, labels or LabelSettings()
+    topic = choice.topic
     if topic is None:
         return None
     if not resize and topic.size and image.size and topic.size != image.size:
@@ -164,21 +168,16 @@ def _label_topic(
             f"{topic.name} is {sizes[0]}, but {image.name} is {sizes[1]}: "
             "scale the labels with `topics.resize_truth`"
         )
-    seen: set[int] = set()
-    for picture in _samples(readers[topic.name]):
-        with suppress(BadMessage):
-            seen |= seen_in(picture, labels, topic.name)
+    reader, seen, problem = readers[topic.name], set[int](), ""
+    for picture in _samples(reader):
+        try:
+            seen |= seen_in(picture, labels, topic.name, reader.limits)
+        except BadMessage as error:
+            problem = problem or str(error)
+    if not seen:
+        raise LogError(_nothing(topic, problem))
     meaning = understand(labels, seen, topic.name, several=several)
     return LabelTopic(topic, meaning, choice.why)
-
-
-def _notes(truth: Choice, clock: Clock) -> tuple[str, ...]:
-    notes = []
-    if truth.topic is None:
-        notes.append(f"no truth: {truth.why}")
-    if clock is not Clock.STAMP:
-        notes.append(f"the header stamps are all zero or equal: {clock} take their place")
-    return tuple(notes)
 
 
 def check_readable(reader: TopicReader, topic: TopicInfo) -> None:
@@ -193,9 +192,14 @@ def check_readable(reader: TopicReader, topic: TopicInfo) -> None:
         return
     for picture in _samples(reader):
         with suppress(BadMessage):
-            to_rgb(picture)
+            to_rgb(picture, reader.limits)
             return
-    raise LogError(f"nothing of {topic.name} can be decoded: {topic.problem}")
+    raise LogError(_nothing(topic, topic.problem))
+
+
+def _nothing(topic: TopicInfo, problem: str) -> str:
+    why = problem or topic.problem or "its messages cannot be read"
+    return f"nothing of {topic.name} can be decoded: {why}"
 
 
 def clock_of(reader: TopicReader) -> Clock:
@@ -221,7 +225,9 @@ def tolerance(reader: TopicReader, asked_ms: float | None) -> int:
 
 
 def _samples(reader: TopicReader) -> Iterator[Picture]:
-    """Read the first label images and some spread over the rest."""
+    """Read the first images of a topic and some spread over the rest."""
+    if not len(reader):
+        return
     spread = np.linspace(0, max(len(reader) - 1, 0), LOOKED_AT, dtype=int).tolist()
     for position in sorted({*range(min(LOOKED_AT, len(reader))), *spread}):
         with suppress(FrameError):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from roadeval.images import ImageError, Limits, to_png
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import natural
 from roadeval.logs.times import NS
@@ -22,6 +23,8 @@ LABEL_DELAY_NS: Final = 1
 
 _VERBATIM: Final = {".jpg": "jpeg", ".jpeg": "jpeg", ".png": "png"}
 _CONVERTED: Final = (".bmp", ".tif", ".tiff", ".webp", ".ppm", ".pgm")
+GREATEST: Final = 1 << 30
+"""Most pixels of an image that is converted."""
 _LABEL_SUFFIX: Final = re.compile(
     r"[_.-]?(labelids|labels?|masks?|gt|truth|road|seg|segmentation|annotations?|L)$"
 )
@@ -177,13 +180,10 @@ def _read(file: Path) -> bytes:
 
 
 def _as_png(file: Path) -> bytes:
-    import cv2
-    import numpy as np
-
-    pixels = cv2.imdecode(np.frombuffer(_read(file), np.uint8), cv2.IMREAD_UNCHANGED)
-    if pixels is None:
-        raise LogError(f"{file}: not a readable image")
-    return cv2.imencode(".png", pixels)[1].tobytes()
+    try:
+        return to_png(_read(file), Limits(GREATEST))
+    except ImageError as error:
+        raise LogError(f"{file}: {error}") from error
 
 
 def _time_in(stem: str) -> int | None:

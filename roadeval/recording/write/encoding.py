@@ -19,7 +19,7 @@ from roadeval.data import (
     Tally,
 )
 from roadeval.recording import layout as at
-from roadeval.recording.codecs import CameraCodec, codecs_of
+from roadeval.recording.codecs import codecs_of
 from roadeval.recording.layout import Layout
 
 FLAT: Final = (LayerKind.MASK, LayerKind.LABELS)
@@ -84,7 +84,7 @@ class FrameEncoder:
 
     def _payloads(self, result: FrameResult, images: Images) -> Iterator[tuple[str, bytes]]:
         frame = result.frame
-        yield at.CAMERA, _camera_file(frame)
+        yield at.CAMERA, self._camera_file(frame)
         for path, mask in ((at.TRUTH_PATH, frame.truth), (at.TRUE_SHADOW, frame.shadow_truth)):
             if mask is not None:
                 yield path, self.codecs[path].encode(mask)
@@ -96,6 +96,12 @@ class FrameEncoder:
         for name, layer in result.errors.items():
             path = at.layer_path(name, ERRORS.name)
             yield path, self.codecs[path].encode(layer.array)
+
+    def _camera_file(self, frame: Frame) -> bytes:
+        """Return the camera's own file where the log holds one, so that nothing is lost twice."""
+        if frame.media_type in ("image/jpeg", "image/png"):
+            return bytes(frame.payload)
+        return self.codecs[at.CAMERA].encode(frame.image)
 
     def _scalars(self, result: FrameResult) -> Iterator[tuple[str, float]]:
         for tally in result.tallies:
@@ -114,13 +120,6 @@ def worst_error(result: FrameResult) -> float:
     """Return the greatest ERR of any variant's final mask; -1 for a frame not evaluated."""
     finals = (t for t in result.tallies if t.stage == FINAL_STAGE and t.variant != BASELINE)
     return max((t.rates["ERR"] for t in finals), default=-1.0)
-
-
-def _camera_file(frame: Frame) -> bytes:
-    """Return the camera's own file where the log holds one, so that nothing is lost twice."""
-    if frame.media_type in ("image/jpeg", "image/png"):
-        return bytes(frame.payload)
-    return CameraCodec().encode(frame.image)
 
 
 def _row(tally: Tally) -> tuple[int, ...]:

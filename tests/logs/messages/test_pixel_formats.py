@@ -6,9 +6,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from roadeval.images import Limits
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import RawPicture
 from roadeval.logs.messages.pixels import to_labels, to_rgb
+
+LIMITS = Limits()
 
 
 def picture(data: bytes, encoding: str, width: int, height: int = 1, **more: Any) -> RawPicture:
@@ -17,7 +20,7 @@ def picture(data: bytes, encoding: str, width: int, height: int = 1, **more: Any
 
 
 def row(data: bytes, encoding: str, width: int = 1, **more: Any) -> list[list[int]]:
-    found: npt.NDArray[np.uint8] = to_rgb(picture(data, encoding, width, **more))
+    found: npt.NDArray[np.uint8] = to_rgb(picture(data, encoding, width, **more), LIMITS)
     pixels: list[list[int]] = found[0].tolist()
     return pixels
 
@@ -61,22 +64,22 @@ def test_floats_count_from_zero_to_one_and_nan_is_black() -> None:
 def test_an_image_is_an_array_of_its_own(encoding: str, pixel: int, padding: int) -> None:
     """Else every loop would be compiled again, for arrays of another kind."""
     step = 2 * pixel + padding
-    image = to_rgb(picture(bytes(2 * step), encoding, 2, 2, step=step))
+    image = to_rgb(picture(bytes(2 * step), encoding, 2, 2, step=step), LIMITS)
     assert image.flags.c_contiguous
     assert image.flags.writeable
 
 
 def test_padding_between_rows_is_skipped() -> None:
     padded = picture(b"\x01\x02xx\x03\x04xx", "mono8", 2, 2, step=4)
-    assert to_rgb(padded)[..., 0].tolist() == [[1, 2], [3, 4]]
+    assert to_rgb(padded, LIMITS)[..., 0].tolist() == [[1, 2], [3, 4]]
 
 
 def test_the_last_row_may_lack_its_padding() -> None:
-    assert to_rgb(picture(b"\x01\x02xx\x03\x04", "mono8", 2, 2, step=4))[1, 1, 0] == 4
+    assert to_rgb(picture(b"\x01\x02xx\x03\x04", "mono8", 2, 2, step=4), LIMITS)[1, 1, 0] == 4
 
 
 def test_labels_keep_sixteen_bits() -> None:
-    assert to_labels(picture(b"\x2c\x01", "16UC1", 1)).tolist() == [[300]]
+    assert to_labels(picture(b"\x2c\x01", "16UC1", 1), LIMITS).tolist() == [[300]]
 
 
 @pytest.mark.parametrize(
@@ -91,4 +94,4 @@ def test_labels_keep_sixteen_bits() -> None:
 )
 def test_what_cannot_be_is_refused(bad: RawPicture, reason: str) -> None:
     with pytest.raises(BadMessage, match=reason):
-        to_rgb(bad)
+        to_rgb(bad, LIMITS)

@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 
 from roadeval.data import Frame
+from roadeval.images import Limits
 from roadeval.logs import FrameError, Instant, LogError, Span, TopicKind, open_log
+from roadeval.logs.errors import DamagedMessage
 from roadeval.logs.messages.pictures import CompressedPicture, Picture
+from roadeval.logs.messages.pixels import to_rgb
 from roadeval.logs.messages.video import Video, is_keyframe
 from tests.fixtures.flavours import ENCODERS, VIDEO_FRAMES, bar
 from tests.fixtures.make import make
@@ -83,7 +86,7 @@ class Packets:
 
 
 def readable(packets: Packets) -> list[int]:
-    video, found = Video(packets), []
+    video, found = Video(packets, Limits()), []
     for position in range(len(packets)):
         try:
             video.picture(position)
@@ -107,7 +110,7 @@ def test_frames_that_build_upon_a_lost_one_are_lost_until_the_next_keyframe(log:
 def test_a_video_without_its_keyframe_is_not_guessed_at(log: Path) -> None:
     packets = Packets(log, {0})
     with pytest.raises(FrameError, match=r"keyframe|builds upon"):
-        Video(packets).picture(1)
+        Video(packets, Limits()).picture(1)
 
 
 @pytest.mark.parametrize("log", both("flavours", H264), indirect=True)
@@ -135,3 +138,30 @@ def test_parameters_in_a_packet_of_their_own_announce_a_keyframe(log: Path) -> N
     parameters = whole[: whole.index(b"\x00\x00\x01\x65")]
     assert is_keyframe(CompressedPicture(0, "h264", parameters))
     assert not is_keyframe(CompressedPicture(0, "h264", b"no video"))
+
+
+def damaged_at(log: Path, number: int) -> Packets:
+    """Return the packets of a log, the second half of one of them with wrong bytes."""
+    packets = Packets(log, set())
+    data = bytes(packets.packets[number].data)
+    half = len(data) // 2
+    data = data[:half] + b"U" * (len(data) - half)
+    packets.packets[number] = CompressedPicture(number, "h264", data)
+    return packets
+
+
+@pytest.mark.parametrize("log", both("flavours", H264), indirect=True)
+def test_a_damaged_frame_and_those_that_build_upon_it_are_told(log: Path) -> None:
+    video = Video(damaged_at(log, 2), Limits())
+    found = [video.picture(number) for number in range(4)]
+    damages = ["its video is damaged", "a frame that it builds upon is damaged"]
+    assert [picture.damage for picture in found] == ["", "", *damages]
+    with pytest.raises(DamagedMessage, match="its video is damaged"):
+        to_rgb(found[2], Limits())
+    assert to_rgb(found[2], Limits(keep_damaged=True)) is found[2].pixels
+
+
+@pytest.mark.parametrize("log", both("flavours", H264), indirect=True)
+def test_a_video_of_too_many_pixels_is_not_decoded(log: Path) -> None:
+    with pytest.raises(FrameError, match=r"an image of \d+x\d+, more than the 1000 pixels"):
+        Video(Packets(log, set()), Limits(max_pixels=1000)).picture(0)

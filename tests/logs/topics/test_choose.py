@@ -2,7 +2,7 @@
 
 import pytest
 
-from roadeval.logs import LogError, TopicInfo, TopicKind
+from roadeval.logs import LabelSettings, LogError, TopicInfo, TopicKind
 from roadeval.logs.topics.choose import choose_image, choose_shadow, choose_truth
 
 
@@ -22,7 +22,7 @@ def other(name: str) -> TopicInfo:
 
 def truth_of(*labels: TopicInfo, image: str = "/front/image") -> str | None:
     topics = [camera(image), *labels]
-    topic = choose_truth(topics, topics[0], None).topic
+    topic = choose_truth(topics, topics[0], None, LabelSettings()).topic
     return topic.name if topic else None
 
 
@@ -98,10 +98,43 @@ def test_two_label_topics_are_listed_with_the_setting() -> None:
 
 def test_shadow_truth_is_told_from_road_truth_by_its_name() -> None:
     topics = [camera("/cam"), label("/truth/road"), label("/truth/shadow")]
-    assert choose_truth(topics, topics[0], None).topic == topics[1]
-    assert choose_shadow(topics, topics[0], None).topic == topics[2]
+    assert choose_truth(topics, topics[0], None, LabelSettings()).topic == topics[1]
+    assert choose_shadow(topics, topics[0], None, LabelSettings()).topic == topics[2]
 
 
 def test_an_empty_name_takes_none() -> None:
     topics = [camera("/cam"), label("/labels")]
-    assert choose_truth(topics, topics[0], "").topic is None
+    assert choose_truth(topics, topics[0], "", LabelSettings()).topic is None
+
+
+def lossy(name: str) -> TopicInfo:
+    return TopicInfo(
+        name, "CompressedImage", "cdr", TopicKind.COMPRESSED, 5, channels=1, lossy="JPEG"
+    )
+
+
+def test_label_images_with_loss_are_named_as_such() -> None:
+    topics = [camera("/cam"), lossy("/cam/road_mask")]
+    topic, why = choose_truth(topics, topics[0], None, LabelSettings())
+    assert topic is None
+    assert "/cam/road_mask is JPEG, whose compression changes the values" in why
+
+
+def test_label_images_with_loss_are_refused_to_who_says_what_their_values_mean() -> None:
+    topics = [camera("/cam"), lossy("/cam/road_mask")]
+    with pytest.raises(LogError, match=r"/cam/road_mask is JPEG.*`labels\.tolerance`"):
+        choose_truth(topics, topics[0], None, LabelSettings(road=(255,)))
+
+
+def test_label_images_with_loss_are_picked_where_there_is_a_tolerance() -> None:
+    topics = [camera("/cam"), lossy("/cam/road_mask"), lossy("/cam/shadow_mask")]
+    labels = LabelSettings(tolerance=32)
+    assert choose_truth(topics, topics[0], None, labels).topic == topics[1]
+    assert choose_shadow(topics, topics[0], None, labels).topic == topics[2]
+    assert choose_shadow(topics, topics[0], None, LabelSettings()).topic is None
+
+
+def test_a_named_topic_without_messages_is_refused() -> None:
+    topics = [camera("/cam"), TopicInfo("/labels", "Image", "cdr", TopicKind.IMAGE, 0)]
+    with pytest.raises(LogError, match=r"`topics\.truth` /labels: the topic holds no message"):
+        choose_truth(topics, topics[0], "/labels", LabelSettings())

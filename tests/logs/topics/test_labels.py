@@ -8,12 +8,16 @@ import pytest
 from PIL import Image
 from pydantic import ValidationError
 
+from roadeval.images import Limits
 from roadeval.logs import LabelSettings, LogError
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import CompressedPicture
 from roadeval.logs.messages.pixels import to_labels
 from roadeval.logs.topics.labels import seen_in, understand
+from tests.images.making import file
 from tests.logs.making import grey, jpeg, png
+
+LIMITS = Limits()
 
 
 def truth(values: list[int], labels: LabelSettings | None = None) -> list[int]:
@@ -141,8 +145,8 @@ ROAD, LANE, SKY, CAR = (64, 32, 32), (255, 0, 0), (0, 0, 255), (204, 0, 255)
 def test_colours_can_mean_road_and_ignore() -> None:
     picture = colors([ROAD, LANE, SKY, CAR])
     labels = LabelSettings(road_colors=(ROAD, LANE), ignore_colors=(CAR,))
-    table = understand(labels, seen_in(picture, labels, "/labels"), "/labels")
-    assert table.read(picture).tolist() == [[1, 1, 0, 255]]
+    table = understand(labels, seen_in(picture, labels, "/labels", LIMITS), "/labels")
+    assert table.read(picture, LIMITS)[0].tolist() == [[1, 1, 0, 255]]
     assert table.words == "road is 64,32,32 255,0,0, 204,0,255 is ignored"
 
 
@@ -150,13 +154,13 @@ def test_colours_are_asked_for_with_those_seen() -> None:
     with pytest.raises(
         LogError, match=r"/labels holds the colours 0,0,255 64,32,32: .*`labels.road_colors`"
     ):
-        seen_in(colors([ROAD, SKY]), LabelSettings(), "/labels")
+        seen_in(colors([ROAD, SKY]), LabelSettings(), "/labels", LIMITS)
 
 
 def test_a_colour_that_never_occurs_is_refused() -> None:
     labels = LabelSettings(road_colors=(LANE,))
     with pytest.raises(LogError, match=r"`labels\.road_colors` 255,0,0 does not occur in /labels"):
-        understand(labels, seen_in(colors([ROAD, SKY]), labels, "/labels"), "/labels")
+        understand(labels, seen_in(colors([ROAD, SKY]), labels, "/labels", LIMITS), "/labels")
 
 
 def test_values_and_colours_cannot_be_mixed() -> None:
@@ -166,22 +170,73 @@ def test_values_and_colours_cannot_be_mixed() -> None:
 
 def test_of_a_palette_the_indices_count_or_its_colours_as_asked() -> None:
     picture = palette_png([[0, 1, 2]], [*SKY, *ROAD, *CAR])
-    assert to_labels(picture).tolist() == [[0, 1, 2]]
+    assert to_labels(picture, LIMITS).tolist() == [[0, 1, 2]]
     labels = LabelSettings(road_colors=(ROAD,))
-    table = understand(labels, seen_in(picture, labels, "/labels"), "/labels")
-    assert table.read(picture).tolist() == [[0, 1, 0]]
+    table = understand(labels, seen_in(picture, labels, "/labels", LIMITS), "/labels")
+    assert table.read(picture, LIMITS)[0].tolist() == [[0, 1, 0]]
 
 
 def test_a_palette_of_greys_is_a_grey_image() -> None:
     picture = palette_png([[0, 1, 2]], [0, 0, 0, 128, 128, 128, 255, 255, 255])
-    assert to_labels(picture).tolist() == [[0, 128, 255]]
+    assert to_labels(picture, LIMITS).tolist() == [[0, 128, 255]]
 
 
 def test_three_equal_channels_are_one() -> None:
-    assert to_labels(colors([(0, 0, 0), (3, 3, 3)])).tolist() == [[0, 3]]
+    assert to_labels(colors([(0, 0, 0), (3, 3, 3)]), LIMITS).tolist() == [[0, 3]]
 
 
-@pytest.mark.parametrize("data", [png(grey(0)), jpeg(grey(0))])
-def test_half_a_file_is_refused(data: bytes) -> None:
-    with pytest.raises(BadMessage, match="file that is cut off"):
-        to_labels(CompressedPicture(0, "", data[:-8]))
+def fringed(values: list[int], labels: LabelSettings) -> tuple[list[int], int]:
+    """Return the truth of an exact image of these values, and how many are fringes."""
+    table = understand(labels, values, "/labels")
+    picture = CompressedPicture(0, "", png(np.array([values], np.uint8)))
+    found, fringe = table.read(picture, LIMITS)
+    return found[0].tolist(), fringe
+
+
+def test_with_a_tolerance_values_far_from_all_known_ones_are_ignored_and_counted() -> None:
+    values = [0, 9, 10, 11, 244, 245, 255]
+    found = fringed(values, LabelSettings(tolerance=10))
+    assert found == ([0, 0, 0, 255, 255, 1, 1], 2)
+
+
+def test_a_tolerance_holds_around_the_given_values() -> None:
+    labels = LabelSettings(road=(100,), ignore=(200,), tolerance=5)
+    assert fringed([3, 6, 95, 106, 198, 255], labels) == ([0, 255, 1, 255, 255, 255], 3)
+
+
+@pytest.mark.parametrize(
+    ("labels", "reason"),
+    [
+        (LabelSettings(road=(20,), tolerance=10), "10 does not keep 0 and 20 apart"),
+        (LabelSettings(road=(90,), tolerance=10), "holds nothing within 10 of 90"),
+    ],
+)
+def test_a_tolerance_that_cannot_be_is_refused(labels: LabelSettings, reason: str) -> None:
+    with pytest.raises(LogError, match=reason):
+        understand(labels, [0, 20, 255], "/labels")
+
+
+@pytest.mark.parametrize("given", [{"road": (0,)}, {"road_colors": (ROAD,)}])
+def test_a_tolerance_is_for_masks_of_values_in_which_zero_is_non_road(given: Any) -> None:
+    with pytest.raises(ValidationError, match="in which 0 is non-road"):
+        LabelSettings(tolerance=10, **given)
+
+
+@pytest.mark.parametrize("labels", [LabelSettings(), LabelSettings(road=(255,))])
+def test_labels_compressed_with_loss_are_refused_with_the_way_out(labels: LabelSettings) -> None:
+    picture = CompressedPicture(0, "jpeg", jpeg(grey(255)))
+    with pytest.raises(LogError, match=r"/labels is JPEG, .*PNG, or give `labels\.tolerance`"):
+        seen_in(picture, labels, "/labels", LIMITS)
+    with pytest.raises(BadMessage, match="a JPEG, whose compression changes label values"):
+        understand(labels, [0, 255], "/labels").read(picture, LIMITS)
+
+
+def test_labels_compressed_with_loss_are_read_with_a_tolerance() -> None:
+    mask = 255 * np.tri(32, dtype=np.uint8)
+    picture = CompressedPicture(0, "jpeg", file("JPEG", mask, quality=20))
+    labels = LabelSettings(tolerance=20)
+    table = understand(labels, seen_in(picture, labels, "/labels", LIMITS), "/labels")
+    found, fringe = table.read(picture, LIMITS)
+    assert 0 < fringe < 200
+    assert np.count_nonzero(found == 255) == fringe
+    np.testing.assert_array_equal(found == 1, (mask == 255) & (found != 255))

@@ -1,0 +1,224 @@
+"""Decoding of image files.
+
+`simplejpeg` tells of damage that other decoders hide: they fill in what they cannot read. Its
+pixels are those of OpenCV, bit for bit. All other formats are read by Pillow, after the checksums
+of a PNG were verified. Damage that leaves a valid file cannot be known.
+
+A rotation that EXIF data asks for is not applied: labels and calibrations belong to the sensor's
+own rows and columns.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from importlib import import_module
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import Rgb
+from roadeval.images.errors import DamagedImageError, ImageError
+from roadeval.images.formats import ImageFormat, format_of
+from roadeval.images.limits import Limits
+from roadeval.images.samples import eight_bits
+
+Array = npt.NDArray[Any]
+File = bytes | memoryview
+
+_SAMPLES: Final = ("L", "I;16", "I;16B", "I;16L", "I", "F")
+"""Pillow's modes of images with one number a pixel."""
+
+
+def to_rgb(data: File, limits: Limits) -> Rgb:
+    """Decode an image file to ``(H, W, 3)`` uint8 RGB.
+
+    16-bit samples keep their upper eight bits, floats count as 0..1, grey fills all channels, and
+    opacity is left out.
+
+    Raises
+    ------
+    DamagedImageError
+        If it is damaged, unless the limits allow that and something can be decoded.
+    ImageError
+        If it is of no known format, or too large.
+    """
+    format_ = _known_format(data)
+    if format_.plugin is None:
+        return _jpeg(data, limits)
+    image = _loaded(data, format_, limits)
+    if image.mode in _SAMPLES:
+        return np.repeat(eight_bits(_samples(image))[..., None], 3, axis=2)
+    # An array of its own, which may be written to: a loop is compiled anew for one that may not.
+    return np.array(image.convert("RGB"))
+
+
+def to_labels(data: File, limits: Limits) -> Array:
+    """Decode a label image to ``(H, W)`` uint8 or uint16, or to ``(H, W, 3)`` if it has colours.
+
+    Of a file with a palette these are the palette's indices, or its greys if it has only greys.
+    An image of three equal channels is a label image of one.
+
+    Raises
+    ------
+    DamagedImageError, ImageError
+        As `to_rgb`.
+    """
+    format_ = _known_format(data)
+    if format_.plugin is None:
+        return without_colours(_jpeg(data, limits))
+    image = _loaded(data, format_, limits)
+    if image.mode == "P":
+        return _indices_or_greys(image)
+    if image.mode in _SAMPLES:
+        samples = _samples(image)
+        return samples if samples.dtype == np.uint16 else eight_bits(samples)
+    return without_colours(np.array(image.convert("RGB")))
+
+
+def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
+    """Return the ``(H, W)`` uint8 indices of a PNG file with a palette.
+
+    Raises
+    ------
+    DamagedImageError, ImageError
+        As `to_rgb`, and if it has no palette.
+    """
+    format_ = _known_format(data)
+    image = None if format_.plugin is None else _loaded(data, format_, limits)
+    if image is None or image.mode != "P":
+        raise ImageError("an image without a palette")
+    return np.array(image)
+
+
+def to_png(data: File, limits: Limits) -> bytes:
+    """Return an image file as a PNG file of the same pixels.
+
+    Raises
+    ------
+    DamagedImageError, ImageError
+        As `to_rgb`, and if PNG has no such pixels.
+    """
+    from PIL import Image
+
+    format_, png = _known_format(data), io.BytesIO()
+    is_jpeg = format_.plugin is None
+    image = Image.fromarray(_jpeg(data, limits)) if is_jpeg else _loaded(data, format_, limits)
+    try:
+        image.save(png, "PNG")
+    except OSError as error:
+        raise ImageError(str(error)) from error
+    return png.getvalue()
+
+
+def without_colours(image: Rgb) -> Array:
+    """Return one channel of an image whose three are equal, else the image itself."""
+    grey = image[..., 0]
+    same = np.array_equal(grey, image[..., 1]) and np.array_equal(grey, image[..., 2])
+    return np.ascontiguousarray(grey) if same else image
+
+
+def _known_format(data: File) -> ImageFormat:
+    format_ = format_of(data)
+    if format_ is None:
+        raise ImageError(f"{len(data)} bytes that are no image of a known format")
+    return format_
+
+
+def size_of(data: File) -> tuple[int, int]:
+    """Return width and height of an image file, by its head alone; errors as of `to_rgb`."""
+    format_ = _known_format(data)
+    if format_.plugin is None:
+        return _jpeg_size(data)
+    with _damage_in(format_), _opened(data, format_) as image:
+        width, height = image.size
+        return width, height
+
+
+def _jpeg(data: File, limits: Limits) -> Rgb:
+    import simplejpeg
+
+    limits.check(*_jpeg_size(data))
+    try:
+        pixels: Rgb = simplejpeg.decode_jpeg(data, "RGB", strict=not limits.keep_damaged)
+    except ValueError as error:
+        raise DamagedImageError(f"a damaged JPEG ({error})") from error
+    return pixels
+
+
+def _jpeg_size(data: File) -> tuple[int, int]:
+    import simplejpeg
+
+    try:
+        height, width, *_ = simplejpeg.decode_jpeg_header(data)
+    except (ValueError, KeyError) as error:  # KeyError for a subsampling that has no name
+        raise ImageError("a JPEG whose head is damaged, or of a rare chroma subsampling") from error
+    return width, height
+
+
+def _loaded(data: File, format_: ImageFormat, limits: Limits) -> Any:
+    """Return a decoded image of Pillow's."""
+    with _damage_in(format_):
+        with _opened(data, format_) as image:
+            limits.check(*image.size)
+            if not limits.keep_damaged:
+                image.verify()
+        with _opened(data, format_) as image:
+            image.load()
+            return image
+
+
+def _opened(data: File, format_: ImageFormat) -> Any:
+    """Return an image of Pillow's, of which no more than the head is read yet."""
+    _silence_pillow()
+    module = import_module(f"PIL.{format_.plugin}ImagePlugin")
+    return getattr(module, f"{format_.plugin}ImageFile")(io.BytesIO(data))
+
+
+@cache
+def _silence_pillow() -> None:
+    """Keep Pillow and libtiff from printing: Pillow raises what matters, and we name the frame.
+
+    There is no switch for libtiff; where it is not a library of its own, nothing is changed.
+    """
+    import ctypes
+    import warnings
+
+    from PIL import _imaging
+
+    warnings.filterwarnings("ignore", module=r"PIL\.")
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(_imaging.__file__).TIFFSetErrorHandler(None)
+
+
+@contextmanager
+def _damage_in(format_: ImageFormat) -> Iterator[None]:
+    """Turn whatever Pillow raises on a damaged file into a `DamagedImageError`."""
+    try:
+        yield
+    except (ImageError, MemoryError):
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise DamagedImageError(f"a damaged {format_.name} ({reason})") from error
+
+
+def _samples(image: Any) -> Array:
+    """Return the numbers of an image as uint8, uint16 or float32, in this machine's byte order."""
+    samples = np.array(image)
+    if samples.dtype == np.int32:  # how Pillow holds 16 bits of some formats, and all 32 of others
+        if samples.min() < 0 or samples.max() > np.iinfo(np.uint16).max:
+            raise ImageError("an image of 32-bit numbers")
+        samples = samples.astype(np.uint16)
+    return samples.astype(samples.dtype.newbyteorder("="), copy=False)
+
+
+def _indices_or_greys(image: Any) -> Array:
+    indices = np.array(image)
+    palette = np.array(image.getpalette("RGB"), np.uint8).reshape(-1, 3)
+    used = palette[: int(indices.max()) + 1]
+    greys = (used == used[:, :1]).all() and len(used) > 1
+    return np.ascontiguousarray(used[indices, 0] if greys else indices)

@@ -1,0 +1,47 @@
+"""The account of the frames that were read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(slots=True)
+class Accounting:
+    """Counts of frames and of truth, which grow while frames are read.
+
+    The dictionaries are by frame number, and any thread may add to them.
+
+    Parameters
+    ----------
+    in_log
+        Messages of the image topic.
+    in_range
+        Those inside the span, before its stride and its limit.
+    read
+        Frames returned so far.
+    labelled
+        Of these, those with truth.
+    undecodable
+        Of these, those that could not be decoded, and why.
+    damaged
+        Those that are damaged and were decoded all the same, and what is wrong.
+    sizes
+        Width and height of those that are not of the topic's size.
+    fringes
+        By frame number and label topic: pixels ignored because their value is too far from every
+        known one, and pixels in all. Only of images that have any.
+    truth_in_log, truth_unused
+        Truth messages, and those between the first and last paired one that belong to no image
+        (counted only if every frame is read).
+    """
+
+    in_log: int = 0
+    in_range: int = 0
+    read: int = 0
+    labelled: int = 0
+    undecodable: dict[int, str] = field(default_factory=dict)
+    damaged: dict[int, str] = field(default_factory=dict)
+    sizes: dict[int, tuple[int, int]] = field(default_factory=dict)
+    fringes: dict[tuple[int, str], tuple[int, int]] = field(default_factory=dict)
+    truth_in_log: int = 0
+    truth_unused: int = 0

@@ -1,0 +1,194 @@
+"""Image files to arrays; damage and size are told before anything else."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from roadeval import images
+from roadeval.images import DamagedImageError, ImageError, Limits
+from tests.images.making import (
+    EXACT,
+    HEIGHT,
+    LOSSY,
+    WIDTH,
+    by_opencv,
+    file,
+    jpeg_of_size,
+    png_of_size,
+    scene,
+    zeroed,
+)
+
+pytestmark = pytest.mark.filterwarnings("ignore:Corrupt EXIF:UserWarning")
+
+LIMITS, KEEP = Limits(), Limits(keep_damaged=True)
+JPEG, PNG = LOSSY["JPEG"], EXACT["PNG"]
+
+
+def turned() -> bytes:
+    """Return a JPEG whose EXIF data asks for a quarter turn."""
+    exif = Image.Exif()
+    exif[0x112] = 6
+    return file("JPEG", exif=exif)
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_a_format_without_loss_gives_the_same_pixels(name: str) -> None:
+    np.testing.assert_array_equal(images.to_rgb(EXACT[name], LIMITS), scene())
+
+
+@pytest.mark.parametrize("name", LOSSY)
+def test_a_format_with_loss_gives_pixels_near_by(name: str) -> None:
+    found = images.to_rgb(LOSSY[name], LIMITS)
+    assert np.abs(found[40:].astype(int) - scene()[40:]).mean() < 4
+
+
+@pytest.mark.parametrize("name", [*EXACT, *LOSSY])
+def test_the_format_is_told_by_the_first_bytes_and_the_size_by_the_head(name: str) -> None:
+    data = (EXACT | LOSSY)[name]
+    format_ = images.format_of(data)
+    assert format_ is not None
+    assert (format_.name, format_.exact) == (name, name in EXACT)
+    assert images.size_of(data) == (WIDTH, HEIGHT)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        *(file("JPEG", subsampling=kind) for kind in ("4:4:4", "4:2:2", "4:2:0")),
+        file("JPEG", progressive=True),
+        file("JPEG", restart_marker_blocks=2),
+        file("JPEG", scene()[..., 0]),
+        file("JPEG", np.dstack([scene(), scene()[..., :1]])[..., :3], keep_rgb=True),
+        turned(),
+        JPEG + b"padding of a camera" * 300,
+    ],
+    ids=["444", "422", "420", "progressive", "restart", "grey", "rgb", "turned", "padded"],
+)
+def test_a_jpegs_pixels_are_those_of_opencv(data: bytes) -> None:
+    np.testing.assert_array_equal(images.to_rgb(data, LIMITS), by_opencv(data))
+
+
+def test_a_rotation_that_exif_asks_for_is_not_applied() -> None:
+    assert images.to_rgb(turned(), LIMITS).shape == (HEIGHT, WIDTH, 3)
+
+
+def test_sixteen_bits_keep_the_upper_half() -> None:
+    samples = np.array([[0x1234, 0xFFFF]], np.uint16)
+    for format_ in ("PNG", "TIFF", "PPM"):
+        data = file(format_, samples)
+        assert images.to_rgb(data, LIMITS).tolist() == [[[0x12] * 3, [0xFF] * 3]]
+        assert images.to_labels(data, LIMITS).tolist() == samples.tolist()
+
+
+def test_whole_numbers_of_thirty_two_bits_are_refused() -> None:
+    with pytest.raises(ImageError, match="32-bit"):
+        images.to_rgb(file("TIFF", np.array([[70_000]], np.int32)), LIMITS)
+
+
+def test_what_is_decoded_may_be_written_to() -> None:
+    for data in (JPEG, PNG, file("PNG", scene()[..., 0])):
+        assert images.to_rgb(data, LIMITS).flags.writeable
+
+
+def test_a_mask_of_one_bit_is_black_and_white() -> None:
+    mask = np.array([[True, False]])
+    assert images.to_labels(file("PNG", mask), LIMITS).tolist() == [[255, 0]]
+
+
+@pytest.mark.parametrize("name", [*EXACT, *LOSSY])
+def test_a_file_becomes_a_png_of_the_same_pixels(name: str) -> None:
+    data = (EXACT | LOSSY)[name]
+    png = images.to_png(data, LIMITS)
+    np.testing.assert_array_equal(images.to_rgb(png, LIMITS), images.to_rgb(data, LIMITS))
+
+
+def test_pixels_that_png_has_not_are_refused() -> None:
+    with pytest.raises(ImageError, match="cannot write mode F"):
+        images.to_png(file("TIFF", np.array([[0.5]], np.float32)), LIMITS)
+
+
+@pytest.mark.parametrize("name", [*EXACT, *LOSSY])
+@pytest.mark.parametrize("limits", [LIMITS, KEEP])
+def test_half_a_file_is_damaged(name: str, limits: Limits) -> None:
+    data = (EXACT | LOSSY)[name]
+    half = data[: len(data) // 2]
+    if limits is KEEP and name == "JPEG":
+        assert images.to_rgb(half, limits).shape == (HEIGHT, WIDTH, 3)
+        return
+    with pytest.raises(DamagedImageError, match=f"a damaged {name}"):
+        images.to_rgb(half, limits)
+
+
+def test_a_jpeg_without_its_end_is_damaged() -> None:
+    with pytest.raises(DamagedImageError, match="Premature end"):
+        images.to_rgb(JPEG[:-2], LIMITS)
+
+
+def test_a_jpeg_damaged_inside_is_told_and_can_be_kept() -> None:
+    data = zeroed(JPEG, 1500)
+    with pytest.raises(DamagedImageError, match=r"a damaged JPEG \(Corrupt JPEG data"):
+        images.to_rgb(data, LIMITS)
+    assert images.to_rgb(data, KEEP).shape == (HEIGHT, WIDTH, 3)
+
+
+@pytest.mark.parametrize("at", [20, 50, len(PNG) // 2, len(PNG) - 14])
+def test_a_flipped_bit_of_a_png_is_told_wherever_it_lies(at: int) -> None:
+    data = bytearray(PNG)
+    data[at] ^= 8
+    with pytest.raises(DamagedImageError, match="a damaged PNG"):
+        images.to_rgb(bytes(data), LIMITS)
+
+
+def test_a_png_with_a_wrong_checksum_can_be_kept() -> None:
+    at = PNG.index(b"IEND") - 8
+    data = PNG[:at] + b"\0\0\0\0" + PNG[at + 4 :]
+    with pytest.raises(DamagedImageError):
+        images.to_labels(data, LIMITS)
+    np.testing.assert_array_equal(images.to_rgb(data, KEEP), scene())
+
+
+def test_a_jpeg_of_a_subsampling_that_is_not_read_is_refused() -> None:
+    data = bytearray(JPEG)
+    factors = data.index(b"\xff\xc0") + 11
+    assert data[factors] == 0x22
+    data[factors] = 0x31
+    with pytest.raises(ImageError, match="rare chroma subsampling"):
+        images.to_rgb(bytes(data), LIMITS)
+
+
+@pytest.mark.parametrize("data", [b"", b"no image", b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"])
+def test_what_is_no_image_is_refused(data: bytes) -> None:
+    for read in (images.to_rgb, images.to_labels, images.palette_indices):
+        with pytest.raises(ImageError):
+            read(data, KEEP)
+
+
+@pytest.mark.parametrize("data", [jpeg_of_size(30_000, 30_000), png_of_size(30_000, 30_000)])
+def test_a_size_is_refused_before_anything_is_decoded(data: bytes) -> None:
+    for read in (images.to_rgb, images.to_labels):
+        with pytest.raises(ImageError, match=r"30000x30000, more than the 33554432 pixels"):
+            read(data, KEEP)
+
+
+def test_the_limit_on_pixels_is_inclusive() -> None:
+    assert images.to_rgb(JPEG, Limits(WIDTH * HEIGHT)).shape == (HEIGHT, WIDTH, 3)
+    with pytest.raises(ImageError, match=r"`frames\.max_pixels`"):
+        images.to_rgb(JPEG, Limits(WIDTH * HEIGHT - 1))
+
+
+def test_a_picture_without_a_palette_has_no_indices() -> None:
+    for data in (JPEG, PNG):
+        with pytest.raises(ImageError, match="palette"):
+            images.palette_indices(data, LIMITS)
+
+
+def test_libraries_print_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    for name, data in (EXACT | LOSSY).items():
+        for broken in (data[: len(data) // 2], zeroed(data, len(data) // 3, 100)):
+            for limits in (LIMITS, KEEP):
+                try:
+                    images.to_rgb(broken, limits)
+                except ImageError:
+                    continue
+        assert capfd.readouterr() == ("", ""), name

@@ -1,0 +1,140 @@
+"""Images that are damaged, too large or otherwise not to be trusted: left out or kept, and told."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from roadeval.logs import FrameError, FrameStream, LogError, TopicSettings, open_log
+from tests.images.making import EXACT, LOSSY, jpeg_of_size, zeroed
+from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log
+
+JPEG = LOSSY["JPEG"]
+BROKEN = zeroed(JPEG, 1500)
+HEIGHT, WIDTH = 48, 72
+
+
+def camera(*files: bytes) -> list[tuple[str, int, dict[str, Any]]]:
+    return [("/camera", i, compressed(i, data)) for i, data in enumerate(files)]
+
+
+def masks(*files: bytes) -> list[tuple[str, int, dict[str, Any]]]:
+    return [("/road_mask", i, compressed(i, data, "png")) for i, data in enumerate(files)]
+
+
+def read(path: Path, **options: Any) -> tuple[list[Any], FrameStream]:
+    """Return every frame, or the message of its error, and the stream they came from."""
+    found: list[Any] = []
+    with open_log(path, **options) as log:
+        stream = log.frames(log.select())
+        for logged in stream:
+            try:
+                found.append(logged.decode())
+            except FrameError as error:
+                found.append(str(error))
+    return found, stream
+
+
+def test_a_damaged_image_is_left_out_and_named(tmp_path: Path) -> None:
+    path = ros2_log(tmp_path / "a.mcap", camera(JPEG, BROKEN, JPEG))
+    (first, second, third), stream = read(path)
+    np.testing.assert_array_equal(first.image, third.image)
+    assert second.startswith("frame 1: a damaged JPEG (Corrupt JPEG data")
+    assert second.endswith("`frames.keep_corrupt` uses what is left of it")
+    assert [*stream.accounting.undecodable] == [1]
+    assert not stream.accounting.damaged
+
+
+def test_a_damaged_image_can_be_kept_and_is_told_all_the_same(tmp_path: Path) -> None:
+    path = ros2_log(tmp_path / "a.mcap", camera(JPEG, BROKEN))
+    (first, second), stream = read(path, keep_corrupt=True)
+    assert (first.media_type, second.media_type) == ("image/jpeg", None)
+    assert second.image.shape == first.image.shape
+    assert not stream.accounting.undecodable
+    assert stream.accounting.damaged[1].endswith(", used all the same")
+
+
+def test_damaged_truth_costs_its_frame_and_names_its_topic(tmp_path: Path) -> None:
+    mask = grey(255, WIDTH, HEIGHT)
+    whole, broken = png(mask), zeroed(png(mask), 40, 3)
+    path = ros2_log(tmp_path / "a.mcap", camera(JPEG, JPEG) + masks(whole, broken))
+    (first, second), _ = read(path)
+    assert first.truth.min() == 1
+    assert second.startswith("frame 1: /road_mask: a damaged PNG")
+
+
+def test_a_log_of_damaged_images_is_refused_with_the_way_to_use_it(tmp_path: Path) -> None:
+    path = ros2_log(tmp_path / "a.mcap", camera(BROKEN, BROKEN))
+    with pytest.raises(LogError, match=r"nothing of /camera .*: a damaged JPEG .*keep_corrupt"):
+        read(path)
+    assert len(read(path, keep_corrupt=True)[0]) == 2
+
+
+def test_an_image_that_claims_to_be_too_large_is_left_out(tmp_path: Path) -> None:
+    path = ros2_log(tmp_path / "a.mcap", camera(JPEG, jpeg_of_size(30_000, 30_000)))
+    (_, second), _ = read(path)
+    assert "an image of 30000x30000, more than the 33554432 pixels that `frames.max_" in second
+
+
+def test_one_limit_holds_for_raw_and_compressed_images(tmp_path: Path) -> None:
+    small, large = raw(0, grey(9, 8, 8), "mono8"), raw(1, grey(9, 9, 8), "mono8")
+    path = ros2_log(tmp_path / "a.mcap", [("/camera", 0, small), ("/camera", 1, large)])
+    (_, refused), _ = read(path, max_pixels=64)
+    assert "an image of 9x8, more than the 64 pixels" in refused
+    path = ros2_log(tmp_path / "b.mcap", camera(jpeg(grey(9, 8, 8)), jpeg(grey(9, 9, 8))))
+    (_, refused), _ = read(path, max_pixels=64)
+    assert "an image of 9x8, more than the 64 pixels" in refused
+
+
+@pytest.mark.parametrize(
+    ("encoding", "size", "reason"),
+    [
+        ("yuv422", (15, 12), "an even width"),
+        ("yuyv", (15, 12), "an even width"),
+        ("nv12", (15, 12), "an even width and height"),
+        ("nv21", (16, 11), "an even width and height"),
+    ],
+)
+def test_colours_shared_by_pixels_need_an_even_size(
+    tmp_path: Path, encoding: str, size: tuple[int, int], reason: str
+) -> None:
+    width, height = size
+    data = {"width": width, "height": height, "step": 2 * width, "data": bytes(4 * width * height)}
+    image = raw(0, grey(0), encoding, **data)
+    path = ros2_log(tmp_path / "a.mcap", [("/camera", 0, image)])
+    with pytest.raises(LogError, match=rf"an image of {width}x{height} in {encoding}.*{reason}$"):
+        read(path)
+
+
+def test_a_bayer_image_too_small_to_convert_is_refused(tmp_path: Path) -> None:
+    images = [raw(i, grey(9, 1 + 7 * i, 1 + 7 * i), "bayer_rggb8") for i in range(2)]
+    path = ros2_log(tmp_path / "a.mcap", [("/camera", i, each) for i, each in enumerate(images)])
+    assert all(found is not None for found in read(path)[0])
+
+
+def test_messages_of_two_kinds_on_a_topic_are_read_as_what_they_are(tmp_path: Path) -> None:
+    """The writer logs the second kind under the schema of the first."""
+    pixels = grey(60, WIDTH, HEIGHT)
+    both = [raw(0, pixels, "mono8"), compressed(1, png(pixels), "png")] * 2
+    for name, order in (("a", both), ("b", both[::-1])):
+        path = ros2_log(tmp_path / f"{name}.mcap", [("/camera", i, m) for i, m in enumerate(order)])
+        frames, _ = read(path)
+        assert [frame.image[0, 0].tolist() for frame in frames] == [[60, 60, 60]] * 4
+
+
+@pytest.mark.parametrize("topic", ["truth", "shadow", "image"])
+def test_a_topic_without_messages_that_was_named_is_refused(tmp_path: Path, topic: str) -> None:
+    path = ros2_log(tmp_path / "a.mcap", camera(JPEG), empty=("/empty",))
+    with (
+        open_log(path) as log,
+        pytest.raises(LogError, match=rf"`topics\.{topic}` /empty: the topic holds no message"),
+    ):
+        log.select(TopicSettings(**{topic: "/empty"}))
+
+
+def test_labels_of_which_nothing_can_be_decoded_are_refused(tmp_path: Path) -> None:
+    path = ros2_log(tmp_path / "a.mcap", camera(JPEG) + masks(EXACT["PNG"][:60]))
+    reason = "nothing of /road_mask can be decoded: a damaged PNG"
+    with open_log(path) as log, pytest.raises(LogError, match=reason):
+        log.select(TopicSettings(truth="/road_mask"))
