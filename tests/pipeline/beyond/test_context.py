@@ -34,6 +34,16 @@ def fit_and_run(images, truths, image, settings=PLAIN):
 # --- Features -------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(("columns", "fits"), [(8, False), (9, True), (10, False), (11, True)])
+def test_a_machine_has_nine_features_and_two_for_each_window(columns, fits):
+    arrays = np.zeros((2, columns), np.float32), np.zeros(2, np.float32), np.zeros(2, np.float32)
+    if fits:
+        context.RectifiedMachine(*arrays, 0.0, 0.0)
+    else:
+        with pytest.raises(ValueError, match="nine columns and two"):
+            context.RectifiedMachine(*arrays, 0.0, 0.0)
+
+
 def test_colours_come_first_as_they_are():
     image = np.random.default_rng(0).integers(0, 256, (5, 7, 3), dtype=np.uint8)
     np.testing.assert_array_equal(features(image, (3,))[:3], np.moveaxis(image, 2, 0))
