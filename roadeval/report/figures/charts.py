@@ -125,14 +125,7 @@ def stages(totals: Totals) -> Figure:
     figure, grid = _rate_axes(2.5)
     names = list(dict.fromkeys(s for v, own in totals.items() for s in own if v != BASELINE))
     for rate, ax in grid.items():
-        for variant, look in looks(list(totals)).items():
-            values = np.array([in_percent(total.get(rate)) for total in totals[variant].values()])
-            if variant == BASELINE:
-                ax.axhline(values[0], **look.line)
-            else:
-                places = np.array([names.index(stage) for stage in totals[variant]])
-                ax.plot(places, values, **look.line)
-                _marks(ax, places, values, look)
+        _stage_lines(ax, totals, names, rate)
         ax.set_xticks(range(len(names)), names)
         ax.set_xlim(-0.3, len(names) - 0.7)
         if not SHORT[rate].higher_is_better:
@@ -140,6 +133,18 @@ def stages(totals: Totals) -> Figure:
         ax.set_title(f"{rate}, %", loc="left")
     _legend(figure, list(totals))
     return figure
+
+
+def _stage_lines(ax: Axes, totals: Totals, names: Sequence[str], rate: str) -> None:
+    """Draw a line a variant over the stages, and the baseline as a level."""
+    for variant, look in looks(list(totals)).items():
+        values = np.array([in_percent(total.get(rate)) for total in totals[variant].values()])
+        if variant == BASELINE:
+            ax.axhline(values[0], **look.line)
+        else:
+            places = np.array([names.index(stage) for stage in totals[variant]])
+            ax.plot(places, values, **look.line)
+            _marks(ax, places, values, look)
 
 
 def heatmap(maps: Sequence[ErrorHeatmap]) -> Figure:
