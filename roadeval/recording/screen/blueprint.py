@@ -10,7 +10,7 @@ from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout
 from roadeval.recording.screen import views
 from roadeval.recording.screen.overview import overview
-from roadeval.recording.screen.views import View
+from roadeval.recording.screen.views import BlueprintPart
 
 
 def arrange(layout: Layout) -> rrb.Blueprint:
@@ -29,7 +29,7 @@ def arrange(layout: Layout) -> rrb.Blueprint:
     )
 
 
-def _every_layer(layout: Layout, variant: VariantLayout) -> View:
+def _every_layer(layout: Layout, variant: VariantLayout) -> BlueprintPart:
     pictures = [
         views.camera(),
         *(views.layers(spec.title, variant.name, (spec,)) for spec in variant.layers),
@@ -41,7 +41,7 @@ def _every_layer(layout: Layout, variant: VariantLayout) -> View:
     return rrb.Grid(*pictures, grid_columns=4, name=f"{variant.name}: every layer")
 
 
-def _rates(layout: Layout) -> View:
+def _rates(layout: Layout) -> BlueprintPart:
     """Return graphs, a row a stage and a column a rate."""
     plots = [
         views.plot(
@@ -59,7 +59,7 @@ def _rates(layout: Layout) -> View:
     return rrb.Grid(*plots, grid_columns=len(SHORT), name="Rates by stage")
 
 
-def _counts(layout: Layout) -> View:
+def _counts(layout: Layout) -> BlueprintPart:
     """Return graphs, a row a variant and a column a stage."""
     plots = [
         views.plot(f"{variant}: pixels of {stage}", [at.scalar_path("counts", variant, stage)])
@@ -69,11 +69,11 @@ def _counts(layout: Layout) -> View:
     return rrb.Grid(*plots, grid_columns=columns, name="Counts")
 
 
-def _timing(layout: Layout) -> View:
+def _timing(layout: Layout) -> BlueprintPart:
     return rrb.Vertical(*map(views.stage_times, layout.variants), name="Timing")
 
 
-def _results() -> View:
+def _results() -> BlueprintPart:
     return rrb.Horizontal(
         views.document(at.result_path(at.OVERVIEW), "Results"),
         views.document(at.result_path("windows"), "Windows (CSV)"),

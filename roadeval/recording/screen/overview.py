@@ -16,7 +16,7 @@ from roadeval.evaluation.metrics import SHORT
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout
 from roadeval.recording.screen import views
-from roadeval.recording.screen.views import View
+from roadeval.recording.screen.views import BlueprintPart
 
 # All sizes are points; the viewer takes them as shares of the room that it has.
 _WIDTH: Final = 1920
@@ -36,7 +36,7 @@ Cell = tuple[LayerSpec, ...]
 """Layers that share a picture."""
 
 
-def overview(layout: Layout) -> View:
+def overview(layout: Layout) -> BlueprintPart:
     """Return the first tab."""
     rows = {variant.name: _cells(variant) for variant in layout.variants[:_ROWS]}
     columns = max(len(cells) for cells in rows.values())
@@ -59,7 +59,7 @@ def overview(layout: Layout) -> View:
     )
 
 
-def _pictures(layout: Layout) -> list[View]:
+def _pictures(layout: Layout) -> list[BlueprintPart]:
     """Return views of the camera, the truth, and what each variant made of it."""
     return [
         views.camera(),
@@ -68,7 +68,7 @@ def _pictures(layout: Layout) -> list[View]:
     ]
 
 
-def _top(pictures: Sequence[View], width: float) -> View:
+def _top(pictures: Sequence[BlueprintPart], width: float) -> BlueprintPart:
     words = views.document(at.GUIDE, "What you see")
     shares = [*[width] * len(pictures), _WIDTH - width * len(pictures)]
     return rrb.Horizontal(*pictures, words, column_shares=shares)
@@ -90,7 +90,9 @@ def _cells(variant: VariantLayout) -> list[Cell]:
     return cells
 
 
-def _row(variant: str, cells: Sequence[Cell], columns: int, aside: View | None) -> View:
+def _row(
+    variant: str, cells: Sequence[Cell], columns: int, aside: BlueprintPart | None
+) -> BlueprintPart:
     """Return a variant's row, filled from the right: equal phases stand below each other."""
     width = (_WIDTH - _HEADER) / columns
     space = (columns - len(cells)) * width
@@ -102,7 +104,7 @@ def _row(variant: str, cells: Sequence[Cell], columns: int, aside: View | None) 
     return rrb.Horizontal(*start, *pictures, column_shares=[*shares, *[width] * len(cells)])
 
 
-def _bottom(layout: Layout, aside: View | None) -> View:
+def _bottom(layout: Layout, aside: BlueprintPart | None) -> BlueprintPart:
     plots = (
         [_rate(layout, rate) for rate in SHORT if rate in layout.rates]
         if layout.has_truth
@@ -111,7 +113,7 @@ def _bottom(layout: Layout, aside: View | None) -> View:
     return rrb.Horizontal(*plots, *([aside] if aside else []))
 
 
-def _rate(layout: Layout, rate: str) -> View:
+def _rate(layout: Layout, rate: str) -> BlueprintPart:
     """Return a graph that compares a rate of the final masks."""
     finals = [(variant.name, variant.stages[-1]) for variant in layout.variants]
     finals += [(BASELINE, FINAL_STAGE)] * layout.baseline

@@ -11,26 +11,26 @@ from roadeval.data import ERRORS, LayerKind, LayerSpec, VariantLayout
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout
 
-View = Any
+BlueprintPart = Any
 """A view or a container of views."""
 
 
-def picture(title: str, paths: Sequence[str]) -> View:
+def picture(title: str, paths: Sequence[str]) -> BlueprintPart:
     """Return a view of images drawn over each other."""
     return rrb.Spatial2DView(origin="/", contents=list(paths), name=title)
 
 
-def camera() -> View:
+def camera() -> BlueprintPart:
     """Return a view of the image as logged."""
     return picture("Camera", [at.CAMERA])
 
 
-def truth() -> View:
+def truth() -> BlueprintPart:
     """Return a view of the truth: which pixels are road."""
     return picture("Truth: road", [at.CAMERA, at.TRUTH_PATH])
 
 
-def outcome(layout: Layout, variant: VariantLayout) -> View:
+def outcome(layout: Layout, variant: VariantLayout) -> BlueprintPart:
     """Return a view of the variant's errors, or without truth of what it calls road."""
     name = ERRORS.name if layout.has_truth else variant.stages[-1]
     title = f"{variant.name}: {'errors' if layout.has_truth else 'road'}"
@@ -42,13 +42,13 @@ def is_overlay(spec: LayerSpec) -> bool:
     return spec.kind in (LayerKind.MASK, LayerKind.LABELS)
 
 
-def layers(title: str, variant: str, specs: Sequence[LayerSpec]) -> View:
+def layers(title: str, variant: str, specs: Sequence[LayerSpec]) -> BlueprintPart:
     """Return one view of layers of a variant."""
     below = [at.CAMERA] if is_overlay(specs[0]) else []
     return picture(title, [*below, *(at.layer_path(variant, spec.name) for spec in specs)])
 
 
-def plot(title: str, paths: Sequence[str]) -> View:
+def plot(title: str, paths: Sequence[str]) -> BlueprintPart:
     """Return a graph of numbers over time."""
     return rrb.TimeSeriesView(
         origin="/",
@@ -58,19 +58,19 @@ def plot(title: str, paths: Sequence[str]) -> View:
     )
 
 
-def stage_times(variant: VariantLayout) -> View:
+def stage_times(variant: VariantLayout) -> BlueprintPart:
     """Return a graph of how long each stage of a variant took."""
     return plot(f"{variant.name}: milliseconds a stage", [f"/timing/{variant.name}/**"])
 
 
-def document(path: str, title: str | None = None) -> View:
+def document(path: str, title: str | None = None) -> BlueprintPart:
     """Return a view of a text; without a title it has no title bar either."""
     return rrb.TextDocumentView(
         origin=path, contents=[path], name=title, titlebar=title is not None
     )
 
 
-def events(*, wide: bool) -> View:
+def events(*, wide: bool) -> BlueprintPart:
     """Return views of how frames were used, of each variant's health, and of the notes."""
     state = rrb.StateTimelineView(origin="/state", name="How it went")
     notes = rrb.TextLogView(
