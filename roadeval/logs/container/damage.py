@@ -127,10 +127,23 @@ def _unnamed(container: Container) -> Iterator[Damage]:
 def _wrong_sums(container: Container) -> Iterator[Damage]:
     scan, summary = container.scan, container.summary
     if scan.data_end is not None and summary.problem:
-        yield Damage(container.path, scan.data_end, summary.problem, lossy=False)
+        shift = _shift(container)
+        reason = summary.problem + (f", and {shift} before it" if shift else "")
+        yield Damage(container.path, scan.data_end, reason, lossy=bool(shift))
     if container.data_is_right is False:
         unchecked = bool(scan.loose) or not all(chunk.crc for chunk in container.chunks)
         reason = "the checksum of all data is wrong"
         if unchecked:
             reason += ", and nothing tells which message is; any may be"
-        yield Damage(container.path, scan.data_end or 0, reason, lossy=unchecked)
+        elif summary.problem:
+            reason += ", and no summary tells whether messages are missing"
+        lossy = unchecked or bool(summary.problem)
+        yield Damage(container.path, scan.data_end or 0, reason, lossy)
+
+
+def _shift(container: Container) -> str:
+    """Return how many bytes lie before the summary that the file's end does not know of."""
+    start, found = container.summary.start, container.scan.after_data
+    if start is None or found is None or start == found:
+        return ""
+    return f"{abs(start - found)} bytes " + ("are missing" if start > found else "too many lie")

@@ -6,7 +6,7 @@ import zlib
 from array import array
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -26,7 +26,7 @@ from roadeval.logs.container.records import (
     walk,
 )
 from roadeval.logs.container.scan import IsWhole, Scan
-from roadeval.logs.container.summary import read_summary
+from roadeval.logs.container.summary import read_summary, statistics_after
 from roadeval.logs.errors import BadRecord
 
 BLOCK: Final = 1 << 20
@@ -105,6 +105,9 @@ class Container:
         self.reader = ChunkReader(self.source, keep_corrupt=keep_corrupt)
         self.summary = read_summary(self.source)
         self.scan = Scan(self.source, self.summary, is_whole)
+        if self.summary.problem and self.scan.after_data is not None:
+            found = statistics_after(self.source, self.scan.after_data)
+            self.summary = replace(self.summary, statistics=found)
         self.schemas, self.channels = self.scan.schemas, self.scan.channels
         self.data_is_right: bool | None = None
         self.saved_ns: int | None = None
@@ -216,16 +219,21 @@ class Container:
 
     def _look(self, number: int) -> Mapping[int, Entries]:
         """Walk through the records of a chunk; learn its channels and where its messages lie."""
-        records = self.reader.read(self.chunks[number])
+        chunk = self.chunks[number]
+        records = self.reader.read(chunk)
         found: dict[int, array[int]] = {}
+        end = 0
         for place in walk(records):
+            end = place.end
             if place.opcode == Opcode.MESSAGE and place.end - place.body >= MESSAGE_HEAD.size:
                 head = records.peek(place.body, MESSAGE_HEAD.size)
                 channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
                 found.setdefault(channel_id, array("Q")).extend((log_time, place.offset))
             elif place.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 self._define(place.opcode, records.read(place.body, place.end - place.body))
-        if self.chunks[number].cut:
+        if end != records.size and not chunk.cut:
+            self.reader.kept.setdefault(chunk.offset, "a chunk whose records do not add up")
+        if chunk.cut:
             self.saved_ns = max((max(values[::2]) for values in found.values()), default=None)
         return {channel_id: _entries(values) for channel_id, values in found.items()}
 

@@ -187,9 +187,10 @@ def parse_chunk_index(body: Buffer) -> ChunkIndex:
         data_size, size = struct.unpack_from("<QQ", body, at + 12 + name_length)
     except (struct.error, UnicodeDecodeError) as error:
         raise BadRecord("a chunk index that does not add up") from error
-    if map_length % INDEX_OFFSET.size:
-        raise BadRecord("a chunk index that does not add up")
     data_offset = offset + length - data_size
+    head = data_offset - offset - HEAD.size
+    if map_length % INDEX_OFFSET.size or head != CHUNK_HEAD.size + name_length + 8:
+        raise BadRecord("a chunk index that does not add up")
     chunk = Chunk(offset, start, end, size, None, name, data_offset, data_size)
     return ChunkIndex(chunk, offset + length, bytes(body[CHUNK_INDEX_HEAD.size : at]))
 

@@ -79,8 +79,8 @@ class Scan:
         Those defined outside chunks.
     gaps
         What made no sense.
-    data_end
-        Where the data section ends, None if the file ends before.
+    data_end, after_data
+        Where the data section ends, None if the file ends before; and what comes after it begins.
     data_crc
         Its checksum, 0 if not given.
     """
@@ -93,9 +93,10 @@ class Scan:
         self.channels: dict[int, Channel] = dict(summary.channels)
         self.gaps: list[Gap] = []
         self.data_end: int | None = None
+        self.after_data: int | None = None
         self.data_crc = 0
         self._source = source
-        self._summary_start = summary.start
+        self._summary_start = None if summary.problem else summary.start
         self._known = summary.chunks if summary.checked else {}
         self._known_offsets = sorted(self._known)
         self._first_ns, self._final_ns = _time_range(summary)
@@ -113,7 +114,7 @@ class Scan:
         while offset < self._source.size and self.data_end is None:
             if offset == self._summary_start:
                 self._gap(offset, offset, "the record that ends the data is missing", lossy=False)
-                self.data_end = offset
+                self.data_end = self.after_data = offset
                 break
             try:
                 offset = self._visit(self._place(offset))
@@ -227,7 +228,7 @@ class Scan:
             raise BadRecord("an end of the data where there is none")
         body = self._source.peek(place.body, place.end - place.body)
         self.data_crc = parse(Opcode.DATA_END, body).data_section_crc
-        self.data_end = place.offset
+        self.data_end, self.after_data = place.offset, place.end
 
     def _is_skipped(self, place: Place) -> bool:
         is_header = place.opcode == Opcode.HEADER and place.offset == len(MAGIC)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -48,11 +49,12 @@ class Summary:
     chunks
         Chunk indexes by the offset of their chunk.
     start
-        Where it begins, and the data ends; None if it cannot be relied on.
+        Where it begins, and the data ends, as the end of the file says; None if that is missing.
     checked
         Whether its checksum is given, and right.
     problem
-        Why the summary cannot be relied on, or empty; then all else is empty too.
+        Why the summary cannot be relied on, or empty. Then all else is empty, but for ``start`` and
+        for what `statistics_after` finds.
     """
 
     schemas: dict[int, Schema] = field(default_factory=dict)
@@ -66,28 +68,42 @@ class Summary:
 
 def read_summary(source: FileReader) -> Summary:
     """Read the summary, if it can be relied on."""
-    try:
-        return _read(source)
-    except BadRecord as error:
-        return Summary(problem=str(error))
-
-
-def _read(source: FileReader) -> Summary:
     footer_at = source.size - FOOTER_SIZE
     tail = source.read(max(footer_at, 0), FOOTER_SIZE)
     if len(tail) < FOOTER_SIZE or not tail.endswith(MAGIC) or tail[0] != Opcode.FOOTER:
-        raise BadRecord("the file does not end as it should")
+        return Summary(problem="the file does not end as it should")
     footer: Footer = parse(Opcode.FOOTER, tail[HEAD.size : -len(MAGIC)])
     if footer.summary_start == 0:
         return Summary(start=footer_at)
-    size = footer_at - footer.summary_start
+    try:
+        found = _collect(_checked(source, footer, tail[:_CHECKED]))
+    except BadRecord as error:
+        return Summary(start=footer.summary_start, problem=str(error))
+    return replace(found, start=footer.summary_start, checked=footer.summary_crc != 0)
+
+
+def statistics_after(source: FileReader, offset: int) -> Statistics | None:
+    """Find the counts of messages among the records behind the data, whose checksum is wrong."""
+    part = PartReader(source, offset, source.size - offset)
+    with suppress(BadRecord):
+        for place in walk(part):
+            if place.opcode == Opcode.STATISTICS:
+                found: Statistics = parse(
+                    place.opcode, part.peek(place.body, place.end - place.body)
+                )
+                return found
+    return None
+
+
+def _checked(source: FileReader, footer: Footer, head: bytes) -> PartReader:
+    """Return the part of the file where the footer says the summary is, its checksum verified."""
+    size = source.size - FOOTER_SIZE - footer.summary_start
     if not 0 <= size <= LARGEST:
         raise BadRecord("its summary is not where it should be")
     part = PartReader(source, footer.summary_start, size)
-    if footer.summary_crc and zlib.crc32(tail[:_CHECKED], crc_of(part)) != footer.summary_crc:
+    if footer.summary_crc and zlib.crc32(head, crc_of(part)) != footer.summary_crc:
         raise BadRecord("the checksum of its summary is wrong")
-    found = _collect(part)
-    return replace(found, start=footer.summary_start, checked=footer.summary_crc != 0)
+    return part
 
 
 def _collect(part: PartReader) -> Summary:

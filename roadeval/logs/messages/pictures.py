@@ -47,6 +47,8 @@ class DecodedPicture:
     damage: str = ""
 
 
+BUFFERS: Final = (bytes, bytearray, memoryview)
+
 Picture = RawPicture | CompressedPicture | DecodedPicture
 
 _SECONDS: Final = ("sec", "secs", "seconds")
@@ -87,18 +89,25 @@ def picture_in(message: Any) -> Picture:
         stamp_ns = _stamp_ns(message)
         if not hasattr(message, "height") or hasattr(message, "pts"):
             name = message.format if hasattr(message, "format") else message.encoding
-            return CompressedPicture(stamp_ns, name, message.data)
+            return CompressedPicture(stamp_ns, _as(str, name), _as(BUFFERS, message.data))
         return RawPicture(
             stamp_ns,
             int(message.width),
             int(message.height),
-            message.encoding,
+            _as(str, message.encoding),
             int(getattr(message, "step", 0)),
             bool(getattr(message, "is_bigendian", False)),
-            message.data,
+            _as(BUFFERS, message.data),
         )
     except (AttributeError, StopIteration, TypeError, ValueError, LogError) as error:
         raise BadMessage("it has not the fields of an image") from error
+
+
+def _as(kind: type | tuple[type, ...], value: Any) -> Any:
+    """Return a value of a kind: a damaged schema may give a field another; a TypeError if so."""
+    if not isinstance(value, kind):
+        raise TypeError(value)
+    return value
 
 
 def _stamp_ns(message: Any) -> int:

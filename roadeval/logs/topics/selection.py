@@ -205,8 +205,8 @@ def _nothing(topic: TopicInfo, problem: str) -> str:
 def clock_of(reader: TopicReader) -> Clock:
     """Return what differs among the first images of a topic."""
     stamps = (reader.stamp(position) for position in range(len(reader)))
-    known = [stamp for stamp in islice(stamps, LOOKED_AT) if stamp != UNREADABLE]
-    if len(set(known)) > 1 or (len(reader) <= 1 and any(known)):
+    known = list(islice((stamp for stamp in stamps if stamp != UNREADABLE), LOOKED_AT))
+    if len(set(known)) > 1 or (len(known) == 1 and any(known)):
         return Clock.STAMP
     times = reader.log_times[:LOOKED_AT]
     return Clock.LOG_TIME if len(times) <= 1 or times[0] != times[-1] else Clock.ORDER

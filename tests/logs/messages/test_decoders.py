@@ -108,6 +108,14 @@ def test_json_is_read_with_every_form_of_a_stamp(fields: dict[str, Any]) -> None
     )
 
 
+def test_fields_of_another_type_than_an_image_has_are_refused() -> None:
+    """A damaged schema may make a number of the format's name."""
+    for name in (None, 1.5, ["jpeg"]):
+        message = {"format": name, "data": "ZmlsZQ=="}
+        with pytest.raises(BadMessage, match="not the fields of an image"):
+            read("json", None, json.dumps(message).encode())
+
+
 def test_json_may_hold_its_bytes_as_numbers_and_no_stamp() -> None:
     message = {"width": 2, "height": 1, "encoding": "mono8", "step": 2, "data": [7, 8]}
     picture = read("json", None, json.dumps(message).encode())
