@@ -175,6 +175,9 @@ def _content(path: Path) -> tuple[Any, dict[str, npt.NDArray[Any]]]:
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
+        # What does not begin as an array does comes out of the archive as bytes.
+        if not all(isinstance(array, np.ndarray) for array in arrays.values()):
+            raise ValueError("not all of it is arrays")
         return json.loads(arrays.pop("header").tobytes()), arrays
     except FileNotFoundError as error:
         raise ModelError(f"{path}: there is no such model file") from error

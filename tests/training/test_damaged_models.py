@@ -2,8 +2,10 @@
 
 import json
 import re
+import zipfile
 from contextlib import suppress
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -123,6 +125,18 @@ def test_a_stage_that_learnt_nothing_is_refused(arrays, tmp_path, stage):
 @pytest.mark.parametrize("name", ["night/svm/mean", "filtered/post/mean", "filtered/x/y", "x", "/"])
 def test_an_array_that_belongs_nowhere_is_refused(arrays, tmp_path, name):
     assert name.rpartition("/")[0] in refusal({**arrays, name: np.zeros(3)}, tmp_path)
+
+
+def test_what_is_no_array_is_refused(arrays, tmp_path):
+    """A file of an archive that does not begin as an array comes out of it as bytes."""
+    with zipfile.ZipFile(tmp_path / "x.model", "w") as archive:
+        for name, array in arrays.items():
+            content = BytesIO()
+            np.save(content, array)
+            text = content.getvalue()
+            archive.writestr(f"{name}.npy", b"?" + text[1:] if name == "prior" else text)
+    with pytest.raises(RoadevalError, match="not a model file, or a damaged one"):
+        from_file(tmp_path / "x.model", PIPELINES)
 
 
 @pytest.mark.parametrize(
