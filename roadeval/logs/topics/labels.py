@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -179,7 +180,8 @@ def understand(
     labels
         The meaning as the user gave it.
     seen
-        The values, or packed colours, that occur in some of the topic's images.
+        The values, or packed colours, that occur in some of the topic's images, once for each image
+        in which they do.
     topic
         Its name, for messages.
     several
@@ -191,7 +193,8 @@ def understand(
     LogError
         If a given value does not occur, or none is given and the values are class ids.
     """
-    values = sorted(set(seen))
+    images = Counter(seen)
+    values = sorted(images)
     if labels.tolerance is not None:
         return _within(labels, labels.tolerance, values, topic)
     if several and _is_mask_of_its_own(labels, values):
@@ -204,12 +207,22 @@ def understand(
         given = {"`labels.road`": labels.road, "`labels.ignore`": labels.ignore}
         return _as_given(given, values, topic, by_color=False, several=several)
     for meaning in _MASKS:
-        if set(values) <= set(meaning):
+        if set(values) <= set(meaning) and _is_plain(meaning, images):
             return _as_mask(meaning, values)
     raise LogError(
         f"{topic} holds the values {_listed(map(str, values))}: name those that mean road with "
         "`labels.road`, and those to leave out with `labels.ignore`"
     )
+
+
+def _is_plain(meaning: Mapping[int, int], images: Mapping[int, int]) -> bool:
+    """Whether values leave no doubt about their meaning, by the number of images that have each.
+
+    A 1 in few images of a mask of 0 and 255 may be damage: were it road, all the road would be
+    ignored.
+    """
+    road = next(value for value, truth in meaning.items() if truth == ROAD)
+    return road > 1 or 2 * images.get(road, 0) >= images.get(255, 0)
 
 
 def _is_mask_of_its_own(labels: LabelSettings, seen: list[int]) -> bool:

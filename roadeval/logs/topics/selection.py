@@ -168,10 +168,10 @@ def _label_topic(
             f"{topic.name} is {sizes[0]}, but {image.name} is {sizes[1]}: "
             "scale the labels with `topics.resize_truth`"
         )
-    reader, seen, problem = readers[topic.name], set[int](), ""
+    reader, seen, problem = readers[topic.name], list[int](), ""
     for picture in _samples(reader):
         try:
-            seen |= seen_in(picture, labels, topic.name, reader.limits)
+            seen += seen_in(picture, labels, topic.name, reader.limits)
         except BadMessage as error:
             problem = problem or str(error)
     if not seen:

@@ -39,6 +39,17 @@ def test_a_mask_is_understood_by_itself(values: list[int], expected: list[int]) 
     assert truth(values) == expected
 
 
+@pytest.mark.parametrize(("images", "plain"), [(3, True), (2, True), (1, False)])
+def test_a_one_in_few_images_of_a_mask_turns_nothing_around(images, plain):
+    """Were it road, 255 would be ignored: then one damaged pixel would take all the road away."""
+    seen = [0, 255] * 4 + [1] * images
+    if plain:
+        assert understand(LabelSettings(), seen, "/mask").meaning == {0: 0, 1: 1, 255: 255}
+    else:
+        with pytest.raises(LogError, match="/mask holds the values 0 1 255: name those"):
+            understand(LabelSettings(), seen, "/mask")
+
+
 def test_class_ids_are_asked_for_with_the_values_seen() -> None:
     with pytest.raises(LogError, match=r"/labels holds the values 0 3 11: .*`labels.road`"):
         truth([0, 3, 11])
