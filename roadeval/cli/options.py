@@ -149,6 +149,13 @@ OPTIONS: Final = (
         "Frames to leave out after those trained on. Default: 0.",
         int,
     ),
+    Option(
+        "training.seeds",
+        ("--seeds",),
+        "N",
+        "Train N times, each with another draw of pixels: shows how far the rates depend on it.",
+        int,
+    ),
     Option("topics.image", ("--image-topic",), "T", "The camera, where the log has several."),
     Option("topics.truth", ("--truth-topic",), "T", "The label images that say where road is."),
     Option("topics.shadow", ("--shadow-topic",), "T", "The masks that say where shadow truly is."),

@@ -57,11 +57,13 @@ class VariantResult:
 
     ``oracles`` holds, by the name of a stage that was replaced by the truth, the road masks of
     the stages after it by theirs. They are no results: see `roadeval.pipeline.chain.Chain`.
+    ``repeats`` holds, by the seed of another training, the masks by the stages' names.
     """
 
     variant: str
     stages: tuple[StageResult, ...]
     oracles: Mapping[str, Mapping[str, Packed]] = field(default_factory=dict)
+    repeats: Mapping[int, Mapping[str, Packed]] = field(default_factory=dict)
 
     def masks(self) -> Iterator[tuple[str, Packed]]:
         """Yield each stage that has a road mask, with the mask; `Packed.pixels` gives its array."""
@@ -105,7 +107,8 @@ class FrameResult:
     ``tallies`` is empty unless the frame is evaluated. ``truth_bits`` is what the masks were held
     against. ``changes`` are from stage to stage and from final mask to final mask, ``contours``
     the boundary F of each final mask by variant, and ``oracles`` the counts of what the stages
-    made once one was replaced by the truth, by that one. ``notes`` are sentences for a person.
+    made once one was replaced by the truth, by that one; ``repeats`` those of other trainings, by
+    their seed. ``notes`` are sentences for a person.
     """
 
     frame: Frame
@@ -119,6 +122,7 @@ class FrameResult:
     changes: Mapping[Transition, Change] = field(default_factory=dict)
     contours: Mapping[str, float] = field(default_factory=dict)
     oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)
+    repeats: Mapping[int, tuple[Tally, ...]] = field(default_factory=dict)
 
     def without_layers(self) -> FrameResult:
         """Return the result without layers, which take most memory, for summing up."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import Counts
+from roadeval.data import FILTERED, UNFILTERED, Counts
 from roadeval.evaluation import metrics
 
 FourCounts = npt.NDArray[np.int64]
@@ -58,6 +59,21 @@ class GrowingCounts:
         """Return what was added, as counts of this mask."""
         counts = np.array(self._counts, np.int64).reshape(-1, 4)
         return FrameCounts(variant, stage, np.array(self._positions, np.int64), counts)
+
+
+def paired(masks: Sequence[FrameCounts]) -> Iterator[tuple[str, npt.NDArray[np.float64]]]:
+    """Yield each stage of both default variants with the ``(n, m)`` differences of its rates.
+
+    Filtered minus unfiltered, on the frames that both have.
+    """
+    named = {(mask.variant, mask.stage): mask for mask in masks}
+    for (variant, stage), treated in named.items():
+        control = named.get((UNFILTERED, stage))
+        if variant == FILTERED and control is not None:
+            _, mine, theirs = np.intersect1d(
+                treated.positions, control.positions, return_indices=True
+            )
+            yield stage, treated.rates[mine] - control.rates[theirs]
 
 
 def sum_up(counts: FourCounts) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.maps import Name
 from roadeval.evaluation.region import LabelledFrame
 from roadeval.evaluation.settings import EvaluationSettings
+
+K = TypeVar("K", str, int)
+"""What further masks are of: the stage that was replaced by the truth, or a training's seed."""
 
 
 class CountsNotConservedError(RuntimeError):
@@ -74,7 +78,8 @@ def score_frame(
         truth_bits=truth,
         changes=maps.changes(list(masks), bits, truth),
         contours=contours.boundary_f(final_bits, truth, settings.boundary_width),
-        oracles=_oracles(variants, truth),
+        oracles=_tallies({v.variant: v.oracles for v in variants}, truth),
+        repeats=_tallies({v.variant: v.repeats for v in variants}, truth),
     )
 
 
@@ -122,16 +127,18 @@ def check_conserved(
         )
 
 
-def _oracles(variants: Sequence[VariantResult], truth: TruthBits) -> dict[str, tuple[Tally, ...]]:
-    """Count the masks that stages made once one was replaced by the truth, by that one."""
-    named: dict[str, dict[Name, Packed]] = {}
-    for variant in variants:
-        for oracle, masks in variant.oracles.items():
-            own = {(variant.variant, stage): mask for stage, mask in masks.items()}
-            named.setdefault(oracle, {}).update(own)
+def _tallies(
+    variants: Mapping[str, Mapping[K, Mapping[str, Packed]]], truth: TruthBits
+) -> dict[K, tuple[Tally, ...]]:
+    """Count the variants' further masks, each by what it is of and by its stage."""
+    named: dict[K, dict[Name, Packed]] = {}
+    for variant, further in variants.items():
+        for key, masks in further.items():
+            own = {(variant, stage): mask for stage, mask in masks.items()}
+            named.setdefault(key, {}).update(own)
     return {
-        oracle: tally(list(masks), truth.bits_of(masks.values()), truth, {})
-        for oracle, masks in named.items()
+        key: tally(list(masks), truth.bits_of(masks.values()), truth, {})
+        for key, masks in named.items()
     }
 
 

@@ -9,13 +9,8 @@ from dataclasses import asdict, dataclass
 from operator import attrgetter
 from typing import Any, Final
 
-import numpy as np
-import numpy.typing as npt
-
 from roadeval.data import (
     BASELINE,
-    FILTERED,
-    UNFILTERED,
     Change,
     Frame,
     FrameResult,
@@ -26,9 +21,10 @@ from roadeval.data import (
 from roadeval.evaluation import windows
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.edges_and_flicker import EdgesAndFlicker
-from roadeval.evaluation.frame_counts import FrameCounts, GrowingCounts, sum_up
+from roadeval.evaluation.frame_counts import FrameCounts, GrowingCounts, paired, sum_up
 from roadeval.evaluation.maps import HeatMap, Maps, Name
 from roadeval.evaluation.metrics import COMPARED, METRICS
+from roadeval.evaluation.repeats import Repeats
 from roadeval.evaluation.score import score_frame
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference, mean_difference
@@ -71,6 +67,7 @@ class Scoreboard:
         self._oracles: Final[defaultdict[tuple[str, str, str], GrowingCounts]] = defaultdict(
             GrowingCounts
         )
+        self._repeats: Final = Repeats()
         self._maps: Final = Maps()
         self._beyond: Final = EdgesAndFlicker(settings.boundary_width)
         self._seconds: Final[defaultdict[Name, float]] = defaultdict(float)
@@ -98,6 +95,7 @@ class Scoreboard:
         for oracle, tallies in result.oracles.items():
             for tally in tallies:
                 self._oracles[tally.variant, oracle, tally.stage].append(position, tally.counts)
+        self._repeats.add(position, result)
         self._maps.add(result.errors, result.changes)
         self._frames.append(result.frame.number)
 
@@ -145,8 +143,12 @@ class Scoreboard:
                 for column, rate in enumerate(METRICS)
                 if rate in COMPARED
             }
-            for stage, table in self._paired()
+            for stage, table in paired(self._masks())
         }
+
+    def repeats(self) -> dict[str, Any]:
+        """Return the rates with each seed: see `roadeval.evaluation.repeats.Repeats.rates`."""
+        return self._repeats.rates(self._masks())
 
     def summary(self) -> dict[str, Any]:
         """Return the parts of ``summary.json`` that the evaluation knows, fit for JSON."""
@@ -167,17 +169,6 @@ class Scoreboard:
         """Return the counts by variant in the tables' order, then by stage as they ran."""
         names = sorted(self._counts, key=lambda name: self._order.index(name[0]))
         return [self._counts[name].so_far(*name) for name in names]
-
-    def _paired(self) -> Iterator[tuple[str, npt.NDArray[np.float64]]]:
-        """Yield each stage of both default variants with ``(n, m)`` differences of its rates."""
-        masks = {(mask.variant, mask.stage): mask for mask in self._masks()}
-        for (variant, stage), treated in masks.items():
-            control = masks.get((UNFILTERED, stage))
-            if variant == FILTERED and control is not None:
-                _, mine, theirs = np.intersect1d(
-                    treated.positions, control.positions, return_indices=True
-                )
-                yield stage, treated.rates[mine] - control.rates[theirs]
 
     def _mean_seconds(self) -> dict[str, dict[str, float]]:
         mean: dict[str, dict[str, float]] = {}

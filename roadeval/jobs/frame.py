@@ -37,11 +37,13 @@ def run_variant(
     truth: Truth | None = None,
     shadow_truth: Truth | None = None,
     known: dict[Any, dict[str, Packed]] | None = None,
+    repeats: Mapping[int, Chain] | None = None,
 ) -> VariantResult:
     """Run a chain on a frame and time each of its stages.
 
     Given the truth, run it also with each stage that has an oracle replaced by that, untimed;
-    ``known`` is what the frame's variants share of it, see `Chain.oracles`.
+    ``known`` is what the frame's variants share of it, see `Chain.oracles`. Then the chains of
+    further trainings run, too, by their seeds.
     """
     results, outputs = [], []
     start = perf_counter()
@@ -50,11 +52,12 @@ def run_variant(
         results.append(StageResult(stage, output, seconds))
         outputs.append(output)
         start = perf_counter()
-    oracles = {}
-    if truth is not None:
-        shared = {} if known is None else known
-        oracles = dict(chain.oracles(view, outputs, truth, shadow_truth, shared))
-    return VariantResult(name, tuple(results), oracles)
+    if truth is None:
+        return VariantResult(name, tuple(results))
+    shared = {} if known is None else known
+    oracles = dict(chain.oracles(view, outputs, truth, shadow_truth, shared))
+    again = {s: dict(other.repeated(view, outputs)) for s, other in (repeats or {}).items()}
+    return VariantResult(name, tuple(results), oracles, again)
 
 
 def external_layout(name: str, topic: str) -> VariantLayout:

@@ -75,7 +75,13 @@ def _process(
     view = View.of(frame.image)
     variants = [
         one_frame.run_variant(
-            name, chain, view, truth=known[0], shadow_truth=known[1], known=shared
+            name,
+            chain,
+            view,
+            truth=known[0],
+            shadow_truth=known[1],
+            known=shared,
+            repeats={seed: chains[name] for seed, chains in run.repeats.items()},
         )
         for name, chain in run.chains.items()
     ]

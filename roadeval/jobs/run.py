@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -49,6 +49,8 @@ class Run:
         What they learnt, and which frames are not evaluated because of it.
     chains
         The variants' chains, ready to run, by name.
+    repeats
+        The same for each further seed of the training, by the seed.
     layouts
         Every variant that is scored, those included whose masks the log carries.
     board
@@ -65,6 +67,7 @@ class Run:
     model: Model
     schedule: Schedule
     chains: Mapping[str, Chain]
+    repeats: Mapping[int, Mapping[str, Chain]]
     layouts: tuple[VariantLayout, ...]
     board: Scoreboard
     beside: set[int] = field(default_factory=set)
@@ -112,15 +115,28 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress) -> Run:
     selection = log.select(config.topics, config.labels, scale=config.frames.scale)
     again = partial(log.frames, selection, logs.Span.of(config.frames))
     variants = config.variants()
-    model, schedule = _learn(
-        again, variants, config.training, on_progress, labelled=selection.truth is not None
-    )
-    chains = _bind(variants, model, config.training.model)
+    labelled = selection.truth is not None
+    # Without truth no rate could tell the trainings apart.
+    training = config.training if labelled else replace(config.training, seeds=1)
+    (model, *others), schedule = _learn(again, variants, training, on_progress, labelled=labelled)
+    chains, *repeats = (_bind(variants, each, training.model) for each in (model, *others))
     trim()
     layouts = (*(variant.layout() for variant in variants), *_external(selection))
     prior = None if model.prior is None else BlindPrior(model.prior)
     board = Scoreboard(config.evaluation, [layout.name for layout in layouts], prior)
-    return Run(log, config, selection, again(), variants, model, schedule, chains, layouts, board)
+    return Run(
+        log,
+        config,
+        selection,
+        again(),
+        variants,
+        model,
+        schedule,
+        chains,
+        dict(enumerate(repeats, training.seed + 1)),
+        layouts,
+        board,
+    )
 
 
 def _learn(
@@ -130,13 +146,13 @@ def _learn(
     on_progress: OnProgress,
     *,
     labelled: bool,
-) -> tuple[Model, Schedule]:
+) -> tuple[tuple[Model, ...], Schedule]:
     pipelines = {variant.name: variant.pipeline for variant in variants}
     compiling = Progress(0, None, "compiling")
     if settings.model is not None:
-        learnt = learning.from_file(Path(settings.model), pipelines)
+        model, schedule = learning.from_file(Path(settings.model), pipelines)
         load_kernels(lambda: on_progress(compiling))  # a wrong file is told before that
-        return learnt
+        return (model,), schedule
     load_kernels(lambda: on_progress(compiling))
     total = min(settings.frames, len(frames()))
     return learning.from_log(

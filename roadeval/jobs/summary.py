@@ -26,8 +26,11 @@ FLATTERED: Final = "look alike, which flatters the result: use a model of other 
 def of(run: Run) -> dict[str, Any]:
     """Return the content of ``summary.json``, but for its format, of a run at its end."""
     found = run.board.summary()
+    repeats = run.board.repeats()
+    seeds = {"seeds": [run.config.training.seed, *run.repeats], **repeats} if repeats else None
     return found | {
         "verdict": verdict_of(found["totals"], run.board.differences()),
+        **({"seeds": seeds} if seeds else {}),
         "drive": _drive(run),
         "frames": _accounting(run),
         "training": _training(run),

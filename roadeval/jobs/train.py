@@ -46,6 +46,10 @@ def _learnt(drives: Sequence[AnyPath], config: RunConfig, on_progress: OnProgres
     """Train on frames of all drives."""
     settings = config.training
     _require_a_drive_for_each(config, drives)
+    if settings.seeds > 1:
+        raise TrainingError(
+            "`training.seeds`: a model file holds one training; set training.seed for another"
+        )
     total = settings.frames * len(drives)
     held = HeldFrames()
     frames: dict[Path, list[Frame]] = {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import Any, Final
 
 from roadeval.data import LayerSpec, Output, Packed, Rgb, Truth
@@ -154,6 +155,20 @@ class Chain:
                     known[key] = dict(_masks(rest, view.after(step.oracle(view, truth))))
                 yield step.stage.reported, known[key]
             view = view.after(output)
+
+    def repeated(self, view: View, outputs: Sequence[Output]) -> Iterator[tuple[str, Packed]]:
+        """Yield the masks of this chain where another of the same stages has run already.
+
+        Parameters
+        ----------
+        view, outputs
+            The argument and the outputs of the other's `run`. They hold for this one, too, up to
+            the first stage that learns: from there on the masks are computed and yielded.
+        """
+        taken = list(takewhile(lambda step: step.stage.fit is None, self.steps))
+        for output in outputs[: len(taken)]:
+            view = view.after(output)
+        yield from _masks(self.steps[len(taken) :], view)
 
     def filtered(self, image: Rgb) -> Rgb:
         """Return the image as the chain's filters leave it; itself where there are none."""

@@ -14,14 +14,14 @@ from roadeval.runtime.text import visible_lines
 FORMAT: Final = {"name": "roadeval-summary", "version": 2}
 SUMMARY: Final = "summary.json"
 PARTS: Final = (
-    *("format", "verdict", "drive", "frames", "totals", "beyond", "difference", "oracles"),
-    *("windows", "health", "training", "seconds", "warnings", "losses"),
+    *("format", "verdict", "drive", "frames", "totals", "beyond", "difference", "seeds"),
+    *("oracles", "windows", "health", "training", "seconds", "warnings", "losses"),
     *("run", "settings", "versions", "log", "tables", "files"),
 )
 """The parts of the summary, in the file's order."""
-LATER: Final = frozenset({"tables", "files"})
+LATER: Final = frozenset({"seeds", "tables", "files"})
 """Parts that not every summary has, so that readers must do without them: earlier versions did not
-write them, and a recording has no files."""
+write them, a recording has no files, and most runs train with one seed."""
 _SELECTION: Final[Mapping[str, Mapping[str, str]]] = {
     "topics": {
         "image": "image_topic",

@@ -58,8 +58,8 @@ def from_log(
     on_frame: Callable[[int], None],
     *,
     labelled: bool,
-) -> tuple[Model, Schedule]:
-    """Train on the first frames of a log.
+) -> tuple[tuple[Model, ...], Schedule]:
+    """Train on the first frames of a log, with each seed of the settings.
 
     Parameters
     ----------
@@ -75,6 +75,11 @@ def from_log(
     labelled
         Whether the log's truth may be used; then only frames that have one train, and some must
         be left to evaluate. Where no frame of the range has one, the first ones train.
+
+    Returns
+    -------
+    models, schedule
+        The model of each seed, the first with the warnings of all, and which frames are left out.
 
     Raises
     ------
@@ -92,13 +97,29 @@ def from_log(
     warnings += _repeated(held.frames)
     if labelled and not by_truth:
         warnings.append(f"no frame of the range has road truth: {BY_PATCH}")
-    model = train_on(held.frames, pipelines, settings, warnings)
-    return model, Schedule(
-        model.digests,
+    models = _with_each_seed(held.frames, pipelines, settings, warnings)
+    return models, Schedule(
+        models[0].digests,
         gap=frozenset(following[: settings.gap]),
         first=following[settings.gap] if len(following) > settings.gap else None,
         sizes=frozenset(len(frame.payload) for frame in held.frames),
     )
+
+
+def _with_each_seed(
+    frames: Sequence[Frame],
+    pipelines: Mapping[str, Pipeline],
+    settings: TrainingSettings,
+    warnings: Sequence[str],
+) -> tuple[Model, ...]:
+    """Train once a seed; the first model tells what any of the trainings warns of."""
+    first, *others = (train_on(frames, pipelines, each) for each in settings.by_seed())
+    told = [
+        f"seed {seed}: {warning}"
+        for seed, model in enumerate(others, settings.seed + 1)
+        for warning in model.warnings
+    ]
+    return replace(first, warnings=(*warnings, *first.warnings, *told)), *others
 
 
 def _candidates(

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Annotated, Final, Literal, Self
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.pipeline.reference_patch import ReferencePatch
+
+GREATEST_SEED: Final = 1_000_000_000
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
@@ -35,6 +39,11 @@ class TrainingSettings:
         square.
     seed
         Of the draw.
+    seeds
+        How often a replay trains: with ``seed`` and the numbers after it. Recording and tables are
+        the first one's; the others tell how far each rate depends on the draw. It is not the one
+        with the middle rate: which that is differs from rate to rate, and a result that was
+        chosen by its numbers is no longer the result of a rule that was fixed before.
     patch
         Self-supervision: the trapezoid in front of the vehicle that is taken for road.
     horizon
@@ -51,7 +60,23 @@ class TrainingSettings:
     gap: Annotated[int, Field(ge=0, le=1_000_000_000)] = 0
     pixels_per_class: Annotated[int, Field(ge=1, le=1_000_000_000)] = 200
     max_pixels: Annotated[int, Field(ge=2, le=100_000)] = 8000
-    seed: Annotated[int, Field(ge=0, le=1_000_000_000)] = 0
+    seed: Annotated[int, Field(ge=0, le=GREATEST_SEED)] = 0
+    seeds: Annotated[int, Field(ge=1, le=100)] = 1
     patch: ReferencePatch = ReferencePatch()
     horizon: Annotated[float, Field(ge=0, le=1)] = 0.4
     far: Annotated[float, Field(gt=0, lt=1)] = 0.9999
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.model is not None and self.seeds > 1:
+            raise ValueError(
+                "`training.seeds` trains several times, and `training.model` is trained already"
+            )
+        if self.seed + self.seeds - 1 > GREATEST_SEED:
+            raise ValueError(f"`training.seeds`: no seed may be above {GREATEST_SEED}")
+        return self
+
+    def by_seed(self) -> Iterator[TrainingSettings]:
+        """Yield the settings of each training, in the order of their seeds."""
+        for seed in range(self.seed, self.seed + self.seeds):
+            yield replace(self, seed=seed, seeds=1)

@@ -29,6 +29,13 @@ def test_printed_takes_the_misprints_literally():
     assert printed["svm"].kernel == "linear"
 
 
+def test_seeds_are_for_what_learns():
+    chain = {"chain": ["post"], "training": {"seeds": 2}}
+    with pytest.raises(ConfigError, match=r"`training.seeds`: no stage of any variant learns"):
+        configure(chain)
+    assert configure(chain | {"variants": {"v": {}}}).training.seeds == 2
+
+
 @pytest.mark.parametrize(
     ("preset", "stage", "key", "value"),
     [

@@ -26,6 +26,7 @@ OTHER = {
     "training.model": "city.model",
     "training.frames": 4,
     "training.gap": 2,
+    "training.seeds": 5,
     "topics.image": "/left/image",
     "topics.truth": '/a "quoted" topic',
     "topics.shadow": "/shadow",

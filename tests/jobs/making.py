@@ -19,7 +19,7 @@ TABLES: Final = {
     **dict.fromkeys(("keep_corrupt", "max_pixels"), "frames"),
     **dict.fromkeys(("masks", "resize_truth", "sync_tolerance_ms", "image", "truth"), "topics"),
     **dict.fromkeys(("road", "ignore", "road_colors", "ignore_colors", "tolerance"), "labels"),
-    **dict.fromkeys(("model", "gap", "train_frames", "source"), "training"),
+    **dict.fromkeys(("model", "gap", "train_frames", "source", "seed", "seeds"), "training"),
     "record": "output",
     "jobs": "run",
 }

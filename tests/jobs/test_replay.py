@@ -643,3 +643,42 @@ def test_results_that_wait_have_lost_their_layers_but_not_their_masks(drive):
     assert lean.tallies == whole.tallies
     for mine, its in zip(lean.variants, whole.variants, strict=True):
         assert [name for name, _ in mine.masks()] == [name for name, _ in its.masks()]
+
+
+def test_further_seeds_tell_the_spread_and_change_no_table(drive, tmp_path):
+    common = {"record": "none", "train_frames": 3, "max_frames": 12, "seed": 4}
+    alone, other, both = (
+        run(drive, tmp_path / name, **common | given)
+        for name, given in {"a": {}, "b": {"seed": 5}, "c": {"seeds": 2, "jobs": 3}}.items()
+    )
+    for table in ("frames", "oracles", "windows"):
+        first, again = (tmp_path / name / "reports" / f"{table}.csv" for name in "ac")
+        assert first.read_bytes() == again.read_bytes()
+    assert "seeds" not in alone.summary
+    seeds = both.summary["seeds"]
+    assert seeds["seeds"] == [4, 5]
+    for variant, stages in seeds["totals"].items():
+        for stage, rates in stages.items():
+            for rate, values in rates.items():
+                each = [run.summary["totals"][variant][stage][rate] for run in (alone, other)]
+                assert values == each
+    assert list(seeds["totals"]) == ["filtered", "unfiltered"]
+    for stage, rates in seeds["difference"].items():
+        for rate, values in rates.items():
+            each = [run.summary["difference"][stage][rate]["mean"] for run in (alone, other)]
+            assert values == each
+    assert summary_text({**both.summary, "tables": {}}).index('"seeds": {') > 0
+
+
+def test_without_truth_there_is_no_rate_for_seeds_to_spread(tmp_path, monkeypatch):
+    def counted(*given):
+        fits.append(given)
+        return fit(*given)
+
+    fits, fit = [], learning.fit
+    monkeypatch.setattr(learning, "fit", counted)
+    bare = write_log(tmp_path / "bare.mcap", truth=False, numbers=range(4))
+    outcome = run(bare, tmp_path, seeds=3, train_frames=2, record="none")
+    assert len(fits) == 1
+    assert "seeds" not in outcome.summary
+    assert outcome.warnings[0].startswith("there is no road truth to score against")

@@ -70,6 +70,11 @@ def test_a_drive_may_have_a_range_of_its_own(drives, tmp_path):
     assert len(train(drives, tmp_path, drives=few).digests) == 4
 
 
+def test_a_model_file_holds_one_training(drives, tmp_path):
+    with pytest.raises(RoadevalError, match=r"`training.seeds`: a model file holds one training"):
+        train(drives[:1], tmp_path, seeds=2)
+
+
 def test_a_replay_takes_what_is_asked_of_its_drive(drives, tmp_path, monkeypatch):
     monkeypatch.setattr(import_module("roadeval.jobs.replay"), "write_figures", lambda *given: [])
     asked = [{"path": "ids.mcap", "labels": CODES}, {"path": "mask.mcap", "labels": {"road": [9]}}]

@@ -7,7 +7,7 @@ import pytest
 
 from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
-from roadeval.training import TrainingError, TrainingSettings, held, save_model
+from roadeval.training import TrainingError, TrainingSettings, held, learning, save_model
 from roadeval.training.learning import from_drives, from_file, from_log, spread
 from roadeval.training.schedule import Schedule, Use
 from tests.training.making import frame, pipelines
@@ -46,6 +46,11 @@ def roles(frames, schedule: Schedule) -> str:
 
 
 def learn(logged, *, labelled: bool = True, **settings):
+    (model,), schedule = with_seeds(logged, labelled=labelled, **settings)
+    return model, schedule
+
+
+def with_seeds(logged, *, labelled: bool = True, **settings):
     wanted = TrainingSettings(**settings)
     return from_log(lambda: logged, PIPELINES, wanted, lambda done: None, labelled=labelled)
 
@@ -54,6 +59,32 @@ def test_the_first_labelled_frames_train_and_the_rest_is_evaluated():
     frames = log(8, unlabelled=(0, 2))
     _, schedule = learn(frames, frames=2)
     assert roles(frames, schedule) == "ututeeee"
+
+
+def test_every_further_seed_trains_as_it_would_by_itself():
+    frames = log(8)
+    models, schedule = with_seeds(frames, frames=3, pixels_per_class=20, seed=5, seeds=3)
+    assert roles(frames, schedule) == "ttteeeee"
+    alone = [learn(frames, frames=3, pixels_per_class=20, seed=seed)[0] for seed in (5, 6, 7)]
+    means = [
+        [model.parameters["unfiltered"]["similarity"].mean.tolist() for model in each]
+        for each in (models, alone)
+    ]
+    assert means[0] == means[1]
+    assert means[0][0] != means[0][1] != means[0][2]
+
+
+def test_what_a_further_seed_warns_of_is_told_with_it(monkeypatch):
+    def collapsing(frames, pipelines, settings, prior):
+        told = ("filtered: svm has collapsed",) if settings.seed != 4 else ()
+        return replace(made(frames, pipelines, settings, prior), warnings=told)
+
+    made = learning.fit
+    monkeypatch.setattr(learning, "fit", collapsing)
+    (first, *others), _ = with_seeds(log(4), frames=2, seed=3, seeds=3)
+    own, of_5 = "filtered: svm has collapsed", "seed 5: filtered: svm has collapsed"
+    assert first.warnings == (own, of_5)
+    assert len(others) == 2
 
 
 def test_frames_right_after_training_can_be_left_out():

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.cli import console
-from roadeval.cli.screens import tables
+from roadeval.cli.screens import seeds, tables
 from roadeval.cli.screens.tables import Row, interval, percent, points
 from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.data.words import defined
@@ -55,10 +55,14 @@ def _show_scores(summary: Mapping[str, Any], out: Console) -> None:
     tables.show(("variant", "stage"), ("frames", *RATES.values()), scores(summary["totals"]), out)
     out.print()
     out.print(best(summary["totals"]))
+    repeats = summary.get("seeds", {})
     if final := summary["difference"].get(FINAL_STAGE):
         out.print(f"{FILTERED} minus {UNFILTERED}, {FINAL_STAGE}, in percentage points:")
-        out.print(differences(final))
+        out.print(differences(final, seeds.differences(repeats)))
     out.print(summary["verdict"])
+    if repeats:
+        out.print()
+        seeds.show(repeats, RATES, out)
 
 
 def _why_nothing(frames: Mapping[str, Any]) -> str:
@@ -95,14 +99,20 @@ def best(totals: Totals) -> str:
     return f"Lowest ERR: {winner}{aside}, {percent(totals[winner][FINAL_STAGE]['ERR'])} %"
 
 
-def differences(final: Mapping[str, Mapping[str, Any]]) -> Table:
-    """Tabulate what the filter changed in the final mask: percentage points, and how sure."""
+def differences(
+    final: Mapping[str, Mapping[str, Any]], by_seed: Mapping[str, str] | None = None
+) -> Table:
+    """Tabulate what the filter changed in the final mask: percentage points, and how sure.
+
+    ``by_seed`` says by rate what further trainings make of it.
+    """
     from rich.table import Column, Table
 
-    table = Table.grid("rate", Column(justify="right"), "interval", padding=(0, 2, 0, 0))
+    table = Table.grid("rate", Column(justify="right"), "interval", "seeds", padding=(0, 2, 0, 0))
     for rate in SHORT:
         if rate in final:
-            table.add_row(f"  {rate}", points(final[rate]["mean"]), _certainty(final[rate]))
+            sure, others = _certainty(final[rate]), (by_seed or {}).get(rate, "")
+            table.add_row(f"  {rate}", points(final[rate]["mean"]), sure, others)
     return table
 
 

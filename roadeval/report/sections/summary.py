@@ -23,10 +23,11 @@ from roadeval.report.blocks import (
 )
 from roadeval.report.findings import Findings
 from roadeval.report.images import jpeg
+from roadeval.report.sections import seeds
 from roadeval.report.sections.common import variant_cell
 
 CROWDED: Final = 7
-"""Variants and warnings together that leave room for all thumbnails."""
+"""Rows of the tables and warnings together that leave room for all thumbnails."""
 LOSSES: Final = 3
 """Losses that are named."""
 PARTIAL: Final = (
@@ -44,10 +45,12 @@ def section(findings: Findings) -> Iterator[Block]:
         yield Text(note, "note")
     if findings.totals:
         yield rates_table(findings)
+        yield from seeds.blocks(findings)
     beware = list(warnings(findings))
     if findings.thumbnails:
         # A crowded page has room for one row of four only.
-        shown = findings.thumbnails[: 4 if len(findings.finals) + len(beware) > CROWDED else None]
+        rows = len(findings.finals) + len(seeds.rows(findings)) + len(beware)
+        shown = findings.thumbnails[: 4 if rows > CROWDED else None]
         yield ImageGrid([(image.title, jpeg(image)) for image in shown], 4)
         yield Text(_legend(findings), "note")
     yield TwoColumns(

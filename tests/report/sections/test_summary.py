@@ -43,6 +43,32 @@ def test_an_undefined_rate_is_never_the_best():
     assert bold(rates_table(findings), "ERR") == ["12.00"]
 
 
+SEEDS = {
+    "seeds": [0, 1, 2],
+    "totals": {
+        name: {"post": {rate: [0.1, 0.3, 0.15] for rate in ("ERR", "FPR", "FNR", "ACC")}}
+        for name in ("filtered", "unfiltered")
+    },
+    "difference": {"post": {"ERR": [0.01, 0.02, 0.03]}},
+}
+
+
+def test_the_spread_over_seeds_stands_below_the_rates_and_in_a_sentence():
+    findings = some_findings()
+    assert len([block for block in section(findings) if isinstance(block, Table)]) == 1
+    findings.summary["seeds"] = SEEDS
+    blocks = list(section(findings))
+    _, table = (block for block in blocks if isinstance(block, Table))
+    assert plain_rows(table) == [
+        ["filtered", *["15.00 (10.00 to 30.00)"] * 4],
+        ["unfiltered", *["15.00 (10.00 to 30.00)"] * 4],
+    ]
+    assert "with seeds 0 to 2 of the training" in table.caption
+    told = blocks[blocks.index(table) + 1]
+    assert told.text.startswith("With seeds 0 to 2 of the training ERR of post is: filtered 10.00")
+    assert told.style == "note"
+
+
 def test_every_final_mask_has_its_row():
     rows = plain_rows(rates_table(some_findings()))
     assert rows[1] == [

@@ -1,0 +1,39 @@
+"""What other seeds come to, on a screen of 80 columns."""
+
+from tests.cli.screens.test_replay import difference, lines, screen, summary
+
+
+def rates(*errors):
+    """A final mask's rates with each seed; all but ERR are undefined."""
+    names = ("ACC", "ERR", "FNR", "FPR", "pooled_ERR")
+    return {"post": dict.fromkeys(names, [None] * len(errors)) | {"ERR": [*errors]}}
+
+
+SEEDS = {
+    "seeds": [0, 1, 2],
+    "totals": {"filtered": rates(0.0912, 0.1, 0.12), "unfiltered": rates(0.0847, 0.08, 0.083)},
+    "difference": {"post": {"ERR": [0.0065, 0.02, 0.037]}},
+}
+SURE = {"post": {"ERR": difference(0.0065, 0.001, 0.012), "FPR": difference(0.01, 0.0, 0.02)}}
+
+
+def test_the_spread_of_the_effect_stands_beside_its_interval():
+    shown = lines(summary(seeds=SEEDS, difference=SURE))
+    sure = "ERR +0.65 95 % interval +0.10 to +1.20 seeds 0 to 2: +0.65 to +3.70"
+    assert sure in shown
+    assert "FPR +1.00 95 % interval 0.00 to +2.00" in shown
+
+
+def test_every_variant_s_final_mask_has_a_row_with_the_middle_and_both_ends():
+    shown = screen(summary(seeds=SEEDS))
+    assert "Final masks with seeds 0 to 2 of the training: the middle (and from the" in shown
+    (filtered,) = (line for line in lines(summary(seeds=SEEDS)) if "10.00 (9.12" in line)
+    assert filtered.split()[:5] == ["filtered", "10.00", "(9.12", "to", "12.00)"]
+    assert "unfiltered 8.30 (8.00 to 8.47)" in " ".join(shown.split())
+    assert "Tables and recording are those of seed 0." in " ".join(shown.split())
+    assert shown.isascii() or not (set(shown) - set("─")) & set("–−")  # noqa: RUF001
+    assert max(map(len, shown.splitlines())) <= 80
+
+
+def test_without_further_seeds_not_a_word_is_said_of_them():
+    assert "seed" not in screen(summary(difference=SURE))
