@@ -10,6 +10,7 @@ from typing import Any, Final
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from roadeval.config.errors import ConfigError
+from roadeval.runtime.text import is_utf8
 
 PLAIN_WORDS: Final[Mapping[str, str]] = {
     "int_": "must be a whole number",
@@ -66,7 +67,7 @@ def override(settings: Any, tables: Mapping[str, Any], table: str, where: str = 
         return settings
     merged = _merged(dataclasses.asdict(settings), values)
     for path, text in _texts(merged):
-        if not _is_utf8(text):
+        if not is_utf8(text):
             raise ConfigError(named(table, path, where) + NOT_UTF8)
     try:
         # As JSON, for then a list is a tuple and a table a dataclass, but true is no number.
@@ -155,11 +156,3 @@ def _texts(
             yield from _texts(value, (*keys, key))
         elif isinstance(value, str):
             yield (*keys, key), value
-
-
-def _is_utf8(text: str) -> bool:
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        return False
-    return True

@@ -110,7 +110,14 @@ class DrivesDiffer:
     other: str
 
 
-Note = FramesLeftOut | SettingsDiffer | TruthDiffers | LogUnknown | DrivesDiffer
+@dataclass(frozen=True, slots=True)
+class EndMissing:
+    """A result whose run was stopped: it holds a part of the drive."""
+
+    result: str
+
+
+Note = FramesLeftOut | SettingsDiffer | TruthDiffers | LogUnknown | DrivesDiffer | EndMissing
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,7 +12,7 @@ from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import analysis, comparison
 from roadeval.evaluation.comparison import Side
-from roadeval.evaluation.comparison_result import Comparison
+from roadeval.evaluation.comparison_result import Comparison, EndMissing
 from roadeval.evaluation.conditions import Condition, Judgement, judge
 from roadeval.jobs.result import Result
 from roadeval.report.comparison import document, markdown
@@ -95,6 +95,7 @@ def compare(
     across = len(opened) == 1
     if across:
         (only,) = opened
+        names = [only.name]
         sides = comparison.variants_as_sides(only.frames, only.name, _digest(only), variants)
     else:
         names = _labels([each.path for each in opened])
@@ -110,6 +111,8 @@ def compare(
         ]
     settings = analysis.settings_of(opened[0].summary)
     found = comparison.compare(sides, settings, across_variants=across)
+    cut = [EndMissing(name) for name, each in zip(names, opened, strict=True) if not each.complete]
+    found = replace(found, notes=(*cut, *found.notes))
     judgements = judge(found, conditions, settings)
     windows = _windows(sides, settings.window) if found.same_drive else sides[0].frames[:0]
     return Compared(found, judgements, windows)

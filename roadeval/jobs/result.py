@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.evaluation import analysis
 from roadeval.evaluation.metrics import COMPARED
-from roadeval.recording import Recording, RecordingError
+from roadeval.recording import DamagedError, Recording, RecordingError
 from roadeval.results.folder import RUN, ResultsFolder
 from roadeval.results.verdict import NOTHING_SCORED, verdict_of
 
@@ -43,6 +43,11 @@ class Result:
     def complete(self) -> bool:
         """Whether the run reached its end."""
         return self.recording is None or self.recording.complete
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader should know first."""
+        return () if self.complete else (f"{self.path}: a partial recording: the end is missing",)
 
     @property
     def name(self) -> str:
@@ -96,6 +101,8 @@ class Result:
         assert self.recording is not None
         try:
             return self.recording.layer(variant, name, frame)
+        except DamagedError:
+            raise
         except RecordingError:
             return None
 

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from roadeval.recording.layout import Layout, RecordingError
+    from roadeval.recording.layout import DamagedError, Layout, RecordingError
     from roadeval.recording.read.recording import Recording
     from roadeval.recording.rule import RecordRule
     from roadeval.recording.write.encoding import EncodedFrame
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from roadeval.recording.write.selective import SelectiveRecorder, recorder_for
 
 __all__ = [
+    "DamagedError",
     "EncodedFrame",
     "Layout",
     "NullRecorder",
@@ -27,6 +28,7 @@ __all__ = [
 ]
 
 _MODULES: Final = {
+    "DamagedError": "layout",
     "EncodedFrame": "write.encoding",
     "Layout": "layout",
     "NullRecorder": "write.recorder",

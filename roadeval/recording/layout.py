@@ -45,6 +45,8 @@ LAYOUT: Final = "/results/layout"
 SUMMARY: Final = "summary"
 OVERVIEW: Final = "overview"
 """Names of two results: the content of ``summary.json``, and the same for people."""
+SUMS: Final = "/timing/sums"
+"""Check sums of all that was written before; they are of bytes, which differ from run to run."""
 SECONDS: Final = "/timing/summary"
 """The seconds of the summary: like all timing, they differ from run to run."""
 PROPERTIES: Final = "/__properties/roadeval"
@@ -58,6 +60,16 @@ MOST_WAITING: Final = 128
 
 class RecordingError(RoadevalError):
     """A recording cannot be written or read: one line that says why."""
+
+
+class DamagedError(RecordingError):
+    """A recording that is damaged inside, so that a part of it is not what was written."""
+
+    def __init__(self, path: object, part: str) -> None:
+        super().__init__(
+            f"{path}: the recording is damaged inside, at {part}; make it anew, or read the "
+            "results folder of its run"
+        )
 
 
 @dataclass(frozen=True, slots=True)

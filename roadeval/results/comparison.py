@@ -11,6 +11,7 @@ from roadeval.data.words import MINUS, defined, percent, points
 from roadeval.evaluation.comparison_result import (
     Comparison,
     DrivesDiffer,
+    EndMissing,
     FramesLeftOut,
     LogUnknown,
     MaskComparison,
@@ -115,6 +116,8 @@ def _note(note: Note) -> str:
             )
         case LogUnknown(result):
             return f"{result} does not say which log it is of: nothing is subtracted"
+        case EndMissing(result):
+            return f"{result} is a partial recording: the end of its drive is missing"
         case DrivesDiffer(result, other):
             return (
                 f"{result} and {other} are of different drives: side by side only, for a "

@@ -40,6 +40,15 @@ def visible_lines(text: str) -> str:
     return "\n".join(map(visible, text.split("\n")))
 
 
+def is_utf8(text: str) -> bool:
+    """Return whether text is Unicode, and not the bytes of a name in another encoding."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def as_markdown(text: str) -> str:
     r"""Return a line of text as Markdown that shows it as it is, whatever it looks like.
 

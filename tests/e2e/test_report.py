@@ -73,6 +73,8 @@ def test_a_killed_run_gives_a_report_of_its_readable_part_marked_on_page_1(tmp_p
     run = here("report", recording, "-o", tmp_path / "report.pdf")
     assert run.returncode == 0, run.stderr
     assert "a partial recording" in run.stderr
+    for command in (("inspect", recording, "--list"), ("compare", recording)):
+        assert "a partial recording" in here(*command).stderr
     pages = [page.extract_text() for page in PdfReader(tmp_path / "report.pdf").pages]
     first = pages[0]
     assert any("Where the final masks go wrong, over all" in page for page in pages)

@@ -151,6 +151,11 @@ def record(path, results, known=None, texts=None):
     return Recording(path)
 
 
+def paths_of(recording):
+    """The paths of all entities that hold something."""
+    return {str(chunk.entity_path) for chunk in RrdFile(recording).stream()}
+
+
 def rerun(*words):
     """Run Rerun's own tool; its exit code."""
     quiet = {**os.environ, "CI": "1"}

@@ -63,6 +63,8 @@ def inspect(
         _draw(opened, _asked_for(opened, frame, worst, variant), variant, screenshot)
     else:
         _open(opened, _asked_for(opened, frame, worst, variant))
+    for warning in opened.warnings:
+        messages.warning(warning)
     return ExitCode.DONE
 
 

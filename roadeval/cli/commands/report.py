@@ -44,8 +44,8 @@ def report(
     path = write_report(read, output, paper=size, commands=_commands(read))
     if not quiet:
         console.emit(str(path))
-    if not read.complete:
-        messages.warning(f"{result}: a partial recording; the report covers what can be read of it")
+    for warning in read.warnings:
+        messages.warning(warning)
     return ExitCode.DONE
 
 

@@ -16,7 +16,7 @@ from roadeval.recording import layout as at
 from roadeval.recording.codecs import codecs_of
 from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.read.payloads import PayloadCache
-from roadeval.recording.read.rrd_file import RrdFile
+from roadeval.recording.read.rrd_file import RrdFile, whole
 from roadeval.results.reading import read_table
 from roadeval.results.summary import parse_summary
 
@@ -59,15 +59,17 @@ class Recording:
     def __init__(self, path: str | PathLike[str]) -> None:
         self.path = Path(path)
         self._file = RrdFile(self.path)
-        # The first format did not state its version.
-        self.format = int(self._file.static(at.PROPERTIES, "format") or 1)
+        with whole(self.path, at.PROPERTIES):
+            # The first format did not state its version.
+            self.format = int(self._file.static(at.PROPERTIES, "format") or 1)
         if self.format > at.FORMAT:
             raise RecordingError(f"{self.path}: made by a later version of roadeval: update it")
         text = self._file.document(at.LAYOUT)
         if text is None:
             raise RecordingError(f"{self.path}: the recording ends before its first frame")
-        self.layout = Layout.from_json(text)
-        self._codecs = codecs_of(self.layout, self.format)
+        with whole(self.path, at.LAYOUT):
+            self.layout = Layout.from_json(text)
+            self._codecs = codecs_of(self.layout, self.format)
         self._payloads = PayloadCache(self._file)
 
     @property
@@ -113,7 +115,8 @@ class Recording:
         """The content of ``summary.json``."""
         text = self.result(at.SUMMARY)
         summary = {} if text is None else parse_summary(text, self.path)
-        seconds = json.loads(self._file.document(at.SECONDS) or "{}")
+        with whole(self.path, at.SECONDS):
+            seconds = json.loads(self._file.document(at.SECONDS) or "{}")
         return summary | ({"seconds": seconds} if seconds else {})
 
     @cached_property
@@ -176,6 +179,8 @@ class Recording:
         ------
         RecordingError
             If there is no such layer, or not on this frame.
+        DamagedError
+            If it is not what was written.
         """
         return self._array(at.layer_path(variant, name), frame)
 
@@ -199,7 +204,8 @@ class Recording:
             known = ", ".join(sorted(self._codecs))
             raise RecordingError(f"{self.path}: there is no {path}; there are {known}")
         codec = self._codecs[path]
-        payload = self._payloads.get(path, codec.component, frame)
-        if payload is None:
-            raise RecordingError(f"{self.path}: {path} has nothing on frame {frame}")
-        return codec.decode(payload)
+        with whole(self.path, f"{path} on frame {frame}"):
+            payload = self._payloads.get(path, codec.component, frame)
+            if payload is None:
+                raise RecordingError(f"{self.path}: {path} has nothing on frame {frame}")
+            return codec.decode(payload)

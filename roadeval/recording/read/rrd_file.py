@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
 import pyarrow as pa
 import pyarrow.compute as pc
-from rerun.chunk import LazyChunkStream, LazyStore, RrdReader, StoreEntry
+from rerun.chunk import Chunk, LazyChunkStream, LazyStore, RrdReader, StoreEntry
 
-from roadeval.recording.layout import APPLICATION, FRAME, RecordingError
+from roadeval.errors import RoadevalError
+from roadeval.recording import checks
+from roadeval.recording import layout as at
+from roadeval.recording.checks import Place
+from roadeval.recording.layout import APPLICATION, FRAME, DamagedError, RecordingError
+from roadeval.runtime.text import is_utf8
 
 _TEXT: Final = "TextDocument:text"
 
@@ -31,8 +37,12 @@ class RrdFile:
     """
 
     def __init__(self, path: Path) -> None:
+        self.path = path
         self._reader, self._entry = _open(path)
         self._store = _store(self._reader, self._entry)
+        with whole(path, "its index"):
+            self._places = {} if self._store is None else _places(self._store)
+        self._sums = self._read_sums()
 
     @property
     def indexed(self) -> bool:
@@ -46,21 +56,28 @@ class RrdFile:
         return self._reader.stream(store=self._entry)
 
     def batches(self, path: str, component: str, *, static: bool) -> Iterator[pa.RecordBatch]:
-        """Yield the rows of an entity that have a value, in as many batches as there are chunks."""
+        """Yield the rows of an entity that have a value, in as many batches as there are chunks.
+
+        Raises
+        ------
+        DamagedError
+            If they are not what was written.
+        """
+        self._check(path)
         chunks = self.stream().filter(content=path, components=component, is_static=static)
-        for chunk in chunks:
-            batch = chunk.to_record_batch()
-            # A row without a value says that from there on nothing is shown.
-            lengths = pc.fill_null(pc.list_value_length(batch.column(component)), 0)
-            filled = pc.greater(lengths, 0)
-            if pc.any(filled).as_py():
-                yield batch if pc.all(filled).as_py() else batch.filter(filled)
+        for chunk in self._all(chunks, path):
+            with whole(self.path, path):
+                batch = _filled(chunk.to_record_batch(), component)
+            if len(batch):
+                yield batch
 
     def rows(self, path: str, component: str) -> Iterator[tuple[int, Any]]:
         """Yield the frame and the value of each row."""
         for batch in self.batches(path, component, static=False):
-            values = batch.column(component).flatten()
-            yield from zip(batch.column(FRAME).to_pylist(), values.to_pylist(), strict=True)
+            with whole(self.path, path):
+                values = batch.column(component).flatten().to_pylist()
+                rows = list(zip(batch.column(FRAME).to_pylist(), values, strict=True))
+            yield from rows
 
     def texts(self, path: str) -> Iterator[str]:
         """Yield the documents that were logged frame by frame."""
@@ -74,8 +91,63 @@ class RrdFile:
     def static(self, path: str, component: str) -> Any:
         """Return the value that was logged once; None if there is none."""
         for batch in self.batches(path, component, static=True):
-            return batch.column(component).flatten()[0].as_py()
+            with whole(self.path, path):
+                return batch.column(component).flatten()[0].as_py()
         return None
+
+    def _read_sums(self) -> dict[int, int]:
+        """Return the sums of the file's messages by their offsets.
+
+        Without any the file is tried out first: it may hold what would end this process.
+        """
+        with whole(self.path, "its index"):
+            self._sums = checks.marked(self._places)
+        if not self._sums:
+            if not checks.can_be_read(self.path):
+                raise DamagedError(self.path, "a place beyond which Rerun cannot read")
+            self._places.clear()
+            return {}
+        with whole(self.path, at.SUMS):
+            return checks.sums_of(self.document(at.SUMS) or "")
+
+    def _check(self, path: str) -> None:
+        """Check the messages of an entity, once."""
+        for place in self._places.get(path, ()):
+            if self._sums.get(place.offset) != checks.sum_at(self.path, place):
+                raise DamagedError(self.path, path)
+        self._places.pop(path, None)
+
+    def _all(self, chunks: LazyChunkStream, path: str) -> Iterator[Chunk]:
+        """Yield chunks; a `DamagedError` where one cannot be unpacked."""
+        with whole(self.path, path):
+            found = iter(chunks)
+        while True:
+            with whole(self.path, path):
+                chunk = next(found, None)
+            if chunk is None:
+                return
+            yield chunk
+
+
+@contextmanager
+def whole(path: Path, part: str) -> Iterator[None]:
+    """Explain, as a `DamagedError`, whatever goes wrong where a part of a file is unpacked.
+
+    Rerun, Arrow, JSON and the decoders of images each have exceptions of their own.
+    """
+    try:
+        yield
+    except (RoadevalError, MemoryError):
+        raise
+    except Exception as error:
+        raise DamagedError(path, part) from error
+
+
+def _filled(batch: pa.RecordBatch, component: str) -> pa.RecordBatch:
+    """Return the rows with a value: one without says that from there on nothing is shown."""
+    lengths = pc.fill_null(pc.list_value_length(batch.column(component)), 0)
+    filled = pc.greater(lengths, 0)
+    return batch if pc.all(filled).as_py() else batch.filter(filled)
 
 
 def indexed_chunks(path: Path) -> int:
@@ -90,6 +162,11 @@ def indexed_chunks(path: Path) -> int:
 def _open(path: Path) -> tuple[RrdReader, StoreEntry]:
     if not path.is_file():
         raise RecordingError(f"{path}: no such recording")
+    if not is_utf8(str(path)):
+        raise RecordingError(
+            f"{path}: Rerun reads no file whose name is not UTF-8: rename it, or set PYTHONUTF8=1 "
+            "where the system speaks another encoding"
+        )
     try:
         with warnings.catch_warnings():
             # That a partial recording has no index is known by `RrdFile.indexed`.
@@ -110,6 +187,17 @@ def _store(reader: RrdReader, entry: StoreEntry) -> LazyStore | None:
         return reader.store(store=entry)
     except RuntimeError:
         return None
+
+
+def _places(store: LazyStore) -> dict[str, list[Place]]:
+    """Return where the messages of every entity lie, by its path, as the index says."""
+    # Rerun has no public name for its index yet; the versions allowed are of one minor version.
+    index = store._chunk_index().to_arrow()
+    columns = (f"chunk_{name}" for name in ("entity_path", "byte_offset", "byte_size"))
+    places: dict[str, list[Place]] = {}
+    for path, offset, size in zip(*(index.column(c).to_pylist() for c in columns), strict=True):
+        places.setdefault(path, []).append(Place(offset, size))
+    return places
 
 
 def _reason(path: Path) -> str:

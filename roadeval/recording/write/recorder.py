@@ -14,6 +14,7 @@ import rerun as rr
 
 from roadeval.data import FrameResult
 from roadeval.recording import layout as at
+from roadeval.recording.checks import MessageSums
 from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.read.rrd_file import indexed_chunks
 from roadeval.recording.screen import blueprint, static
@@ -55,6 +56,7 @@ class Recorder:
         self._begun = self._finished = False
         self._chunks = self._unwritten = 0
         self._states: dict[str, str] = {}
+        self._sums = MessageSums(self.partial)
         self._shown: set[str] = set()
         self._blank: EncodedFrame | None = None
         self._stream: rr.RecordingStream | None = None
@@ -165,6 +167,10 @@ class Recorder:
             If the file did not become what was written to it, as on a full disk.
         """
         self._log_static(static.after_the_last_frame(self._layout, results))
+        self.flush()
+        self._log_static([(at.SUMS, [rr.TextDocument(self._sums.document())])])
+        self._flush_stream()
+        self._log_static([(self._sums.mark(), [rr.TextDocument("")])])
         self._close()
         if indexed_chunks(self.partial) < self._chunks:
             raise self._incomplete()
@@ -197,7 +203,7 @@ class Recorder:
         for name, lines in encoded.tables.items():
             self._rows.add(at.result_path(name), columns.texts, *when, lines)
 
-    def _log_static(self, data: static.StaticData) -> None:
+    def _log_static(self, data: Iterable[tuple[str, list[Any]]]) -> None:
         stream = self._open_stream()
         for path, archetypes in data:
             stream.log(path, *archetypes, static=True, strict=True)
@@ -248,7 +254,8 @@ class Recorder:
         self._unwritten = 0
         try:
             self._open_stream().flush()
-        except RuntimeError as error:
+            self._sums.read_on()
+        except (RuntimeError, OSError) as error:
             raise self._incomplete() from error
 
     def _close(self) -> None:
