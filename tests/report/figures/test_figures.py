@@ -19,7 +19,7 @@ from roadeval.report.figures.fig3a_error_rate import error_rate
 from roadeval.report.figures.fig3b_fp_fn_rate import fp_fn_rate
 from roadeval.report.figures.figure import ExampleFrame, FigureData, figures
 from roadeval.report.figures.files import svg_of, write_figures
-from roadeval.report.figures.rates_over_drive import CROWDED, rates_over_drive
+from roadeval.report.figures.rates_over_drive import CROWDED, MARKED, rates_over_drive
 from roadeval.report.figures.style import looks
 
 NO_WINDOWS = pd.DataFrame()
@@ -203,6 +203,7 @@ def test_a_long_drive_is_drawn_as_means_with_their_range() -> None:
     figure = error_rate(FigureData("drive", table))
     line, band = figure.axes[0].lines[0], figure.axes[0].collections[0]
     assert len(line.get_ydata()) == CROWDED
+    assert CROWDED / line.get_markevery() == MARKED
     first = 100 * table.query("variant == 'filtered' and stage == 'post'")["ERR"].to_numpy()[:24]
     assert line.get_ydata()[0] == pytest.approx(first.mean())
     band_at_first = [y for x, y in band.get_paths()[0].vertices if x == line.get_xdata()[0]]
