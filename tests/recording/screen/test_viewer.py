@@ -6,6 +6,16 @@ from roadeval.recording.layout import RecordingError
 from roadeval.recording.screen import viewer
 
 
+@pytest.fixture
+def fake(tmp_path, monkeypatch):
+    """A viewer that says how it was called and ends at once."""
+    script = tmp_path / "rerun"
+    script.write_text('#!/bin/sh\necho "$@ CI=$CI"\nexit 3\n')
+    script.chmod(0o700)
+    monkeypatch.setenv("VK_ICD_FILENAMES", "/my/driver.json")
+    monkeypatch.setattr(viewer, "_program", lambda: str(script))
+
+
 def test_without_a_driver_the_package_that_brings_one_is_named(tmp_path, monkeypatch):
     monkeypatch.delenv("VK_ICD_FILENAMES", raising=False)
     monkeypatch.setattr(viewer, "DRIVERS", tmp_path)
@@ -19,21 +29,20 @@ def test_a_driver_that_somebody_chose_is_not_questioned(tmp_path, monkeypatch):
     assert viewer._driver() == {}
 
 
-def test_a_viewer_that_does_not_start_is_quoted(tmp_path, monkeypatch):
-    script = tmp_path / "rerun"
-    script.write_text("#!/bin/sh\necho 'no graphics at all'\nexit 3\n")
-    script.chmod(0o700)
-    monkeypatch.setenv("VK_ICD_FILENAMES", "/my/driver.json")
-    monkeypatch.setattr(viewer, "_program", lambda: str(script))
-    with pytest.raises(RecordingError, match="the viewer did not start: no graphics at all"):
+def test_a_viewer_that_does_not_start_is_quoted_and_would_listen_on_this_machine_alone(
+    fake, tmp_path
+):
+    said = r"the viewer did not start: .*--bind 127\.0\.0\.1 --port \d+ .* CI=1"
+    with pytest.raises(RecordingError, match=said):
         viewer.screenshot(tmp_path / "x.rrd", tmp_path / "x.png")
 
 
-def test_the_viewer_listens_on_this_machine_alone_and_counts_nobody(tmp_path, monkeypatch):
-    script = tmp_path / "rerun"
-    script.write_text('#!/bin/sh\necho "$@ CI=$CI"\nexit 3\n')
-    script.chmod(0o700)
-    monkeypatch.setenv("VK_ICD_FILENAMES", "/my/driver.json")
-    monkeypatch.setattr(viewer, "_program", lambda: str(script))
-    with pytest.raises(RecordingError, match=r"--bind 127\.0\.0\.1 --port \d+ .* CI=1"):
-        viewer.screenshot(tmp_path / "x.rrd", tmp_path / "x.png")
+@pytest.mark.parametrize("screen", ["DISPLAY", "WAYLAND_DISPLAY"])
+def test_a_screen_of_either_kind_will_do(screen, fake, tmp_path, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(RecordingError, match="no screen to open a window on"):
+        viewer.show(tmp_path / "x.rrd")
+    monkeypatch.setenv(screen, ":0")
+    with pytest.raises(RecordingError, match="the viewer did not start"):
+        viewer.show(tmp_path / "x.rrd")
