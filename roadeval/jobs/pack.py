@@ -2,39 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Final
+from dataclasses import replace
 
 from roadeval import logs
 from roadeval.jobs.outputs import AnyPath, holding
-
-NAMED: Final = 3
-"""Files that a warning names, at most."""
-
-
-@dataclass(frozen=True, slots=True)
-class PackOutcome:
-    """The log that was written, and what a user should know of it.
-
-    Parameters
-    ----------
-    path
-        The log.
-    images, masks
-        How many of each it holds.
-    stamps
-        Where the stamps come from, in words.
-    warnings
-        Files without a counterpart, and what `roadeval.replay` would have to be told.
-    """
-
-    path: Path
-    images: int
-    masks: int
-    stamps: str
-    warnings: tuple[str, ...]
 
 
 def pack(
@@ -43,7 +14,7 @@ def pack(
     *,
     truth: AnyPath | None = None,
     rate_hz: float | None = None,
-) -> PackOutcome:
+) -> logs.PackResult:
     """Write a folder of images, or a video, as a log that Foxglove and Rerun open too.
 
     Parameters
@@ -73,19 +44,9 @@ def pack(
     "the times in the files' names"
     """
     with holding(output, inputs=(images, truth)):
-        written = logs.pack(images, output, masks=truth, rate_hz=rate_hz)
-    warnings = tuple(_warnings(written)) if truth is not None else ()
-    return PackOutcome(written.path, written.frames, written.labelled, written.stamps, warnings)
-
-
-def _warnings(written: logs.PackResult) -> Iterator[str]:
-    yield from _unpaired("images without a mask", written.without_mask)
-    yield from _unpaired("masks without an image", written.without_image)
-    if problem := logs.describe(written.path).problem:
-        yield f"packed, but replay needs to be told more: {problem}"
-
-
-def _unpaired(what: str, names: Sequence[str]) -> Iterator[str]:
-    if names:
-        some = ", ".join(names[:NAMED]) + (", ..." if len(names) > NAMED else "")
-        yield f"{what}: {some} ({len(names)} in all)"
+        packed = logs.pack(images, output, masks=truth, rate_hz=rate_hz)
+    problem = logs.describe(packed.path).problem if truth is not None else ""
+    if not problem:
+        return packed
+    told = f"packed, but replay needs to be told more: {problem}"
+    return replace(packed, warnings=(*packed.warnings, told))

@@ -46,8 +46,8 @@ def pack(
     for warning in packed.warnings:
         messages.warning(warning)
     if not quiet:
-        masks = f", {packed.masks} with a mask" if truth else ""
-        console.emit(f"{packed.path}: {packed.images} images{masks}; {packed.stamps}")
+        masks = f", {packed.labelled} with a mask" if truth else ""
+        console.emit(f"{packed.path}: {packed.frames} images{masks}; {packed.stamps}")
     return ExitCode.DONE
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -18,6 +18,8 @@ from roadeval.logs.writing.writer import LogWriter
 CAMERA: Final = "/camera/image"
 TRUTH: Final = "/truth/road"
 DEFAULT_RATE_HZ: Final = 10.0
+NAMED: Final = 3
+"""Files that a warning names, at most."""
 LABEL_DELAY_NS: Final = 1
 """A label is logged right after its image."""
 
@@ -33,7 +35,7 @@ _TIME: Final = re.compile(r"(\d{10})(?:[._](\d{1,9}))?|(\d{13})|(\d{16})|(\d{19}
 
 @dataclass(frozen=True, slots=True)
 class PackResult:
-    """What was written to a log, and what was left out.
+    """The log that was written, and what a user should know of it.
 
     Parameters
     ----------
@@ -41,18 +43,17 @@ class PackResult:
         The log.
     frames, labelled
         Images, and how many of them have a mask.
-    without_mask, without_image
-        Names of images without a mask (if there are masks), and of masks without an image.
     stamps
         Source of the stamps, in words.
+    warnings
+        Images without a mask (if there are masks), and masks without an image.
     """
 
     path: Path
     frames: int
-    labelled: int = 0
-    without_mask: tuple[str, ...] = ()
-    without_image: tuple[str, ...] = ()
-    stamps: str = ""
+    labelled: int
+    stamps: str
+    warnings: tuple[str, ...] = ()
 
 
 def pack(
@@ -112,9 +113,18 @@ def _pack_folder(
                 data = _label(by_image[file])
                 log.image(TRUTH, stamp, data, "png", log_time_ns=stamp + LABEL_DELAY_NS)
     used = set(by_image.values())
-    lonely = [file.name for file in labels if file not in used]
-    unlabelled = [file.name for file in files if labels and file not in by_image]
-    return PackResult(output, len(files), len(by_image), tuple(unlabelled), tuple(lonely), words)
+    warnings = (
+        *_unpaired("images without a mask", [f for f in files if labels and f not in by_image]),
+        *_unpaired("masks without an image", [label for label in labels if label not in used]),
+    )
+    return PackResult(output, len(files), len(by_image), words, warnings)
+
+
+def _unpaired(what: str, files: Sequence[Path]) -> Iterator[str]:
+    """Yield a sentence that names some of the files, if there are any."""
+    if files:
+        some = ", ".join(file.name for file in files[:NAMED]) + (", ..." if files[NAMED:] else "")
+        yield f"{what}: {some} ({len(files)} in all)"
 
 
 def _stamps(files: list[Path], rate_hz: float | None) -> tuple[dict[Path, int], str]:
@@ -138,7 +148,7 @@ def _pack_video(video: Path, output: Path, rate_hz: float | None) -> PackResult:
         if not count:
             raise LogError(f"{video}: a video without frames")
     words = "the video's own times" if rate_hz is None else f"{rate_hz:g} images a second"
-    return PackResult(output, count, stamps=words)
+    return PackResult(output, count, 0, words)
 
 
 def _listed(folder: Path) -> list[Path]:
