@@ -192,6 +192,11 @@ def test_an_undefined_rate_leaves_a_gap() -> None:
     assert np.isnan(line.get_ydata()).tolist() == [False, True, False]
 
 
+def test_rates_of_nothing_but_zero_have_an_axis_of_half_a_percent() -> None:
+    (ax,) = error_rate(FigureData("drive", a_table(3).assign(ERR=0.0))).axes
+    assert ax.get_ylim() == (0, 0.5)
+
+
 def test_a_rate_that_is_undefined_everywhere_says_so() -> None:
     table = a_table(3).assign(FNR=np.nan)
     ax = drawn(fp_fn_rate(FigureData("drive", table))).axes[1]
