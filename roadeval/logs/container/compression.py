@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Iterator
+from functools import partial
+from typing import IO, Final, cast
 
 from roadeval.logs.container.readers import Buffer, ByteReader
 from roadeval.logs.container.records import Chunk
@@ -12,6 +13,8 @@ from roadeval.logs.errors import BadRecord
 
 BLOCK: Final = 64 << 10
 """Bytes to take at a time of a chunk that is big, or damaged somewhere ahead."""
+LARGEST_CHUNK: Final = 1 << 30
+"""Most bytes that are uncompressed of a chunk: a few of them can become any number."""
 IN_MEMORY: Final = 16 << 20
 """Uncompressed bytes beyond which a chunk is held in a temporary file."""
 
@@ -75,12 +78,12 @@ class Spool:
         Raises
         ------
         BadRecord
-            If it cannot be uncompressed to its end.
+            If it cannot be uncompressed to its end, or is too large.
         """
-        uncompress = _stepper(chunk.compression)
-        for begin in range(0, chunk.data_size, BLOCK):
-            block = source.read(chunk.data_offset + begin, min(BLOCK, chunk.data_size - begin))
-            self.size += self._file.write(uncompress(bytes(block)))
+        for block in _blocks(chunk.compression, _Stream(source, chunk)):
+            self.size += self._file.write(block)
+            if self.size > LARGEST_CHUNK:
+                raise BadRecord(f"a chunk of more than {LARGEST_CHUNK >> 20} MiB")
 
     def read(self, offset: int, length: int) -> Buffer:
         """Read ``length`` bytes at ``offset``; fewer at the end."""
@@ -90,25 +93,46 @@ class Spool:
     peek = read
 
 
-def _stepper(compression: str) -> Callable[[bytes], bytes]:
-    """Return what uncompresses a stream block by block, each block as far as it goes."""
-    if compression == "":
-        return lambda block: block
-    if compression not in ("zstd", "lz4"):
-        raise BadRecord(f"a chunk compressed by {compression!r}, which is unknown")
-    import lz4.frame
+class _Stream:
+    """A chunk's data as a file that is read from its begin to its end."""
+
+    def __init__(self, source: ByteReader, chunk: Chunk) -> None:
+        self._source = source
+        self._at = chunk.data_offset
+        self._end = chunk.data_offset + chunk.data_size
+
+    def read(self, size: int) -> bytes:
+        """Return the next bytes, none at the end."""
+        data = bytes(self._source.read(self._at, min(size, self._end - self._at)))
+        self._at += len(data)
+        return data
+
+
+def _blocks(compression: str, data: _Stream) -> Iterator[bytes]:
+    """Uncompress a stream into blocks of a bounded size, whatever they were compressed from."""
     import zstandard
 
-    if compression == "zstd":
-        inner = zstandard.ZstdDecompressor().decompressobj().decompress
-    else:
-        inner = lz4.frame.LZ4FrameDecompressor().decompress
+    try:
+        if compression == "zstd":
+            yield from zstandard.ZstdDecompressor().read_to_iter(
+                cast("IO[bytes]", data), BLOCK, BLOCK
+            )
+        elif compression == "lz4":
+            yield from _lz4_blocks(data)
+        elif compression == "":
+            yield from iter(partial(data.read, BLOCK), b"")
+        else:
+            raise BadRecord(f"a chunk compressed by {compression!r}, which is unknown")
+    except (zstandard.ZstdError, RuntimeError) as error:
+        raise BadRecord(f"a chunk that {compression} cannot uncompress") from error
 
-    def step(block: bytes) -> bytes:
-        try:
-            records: bytes = inner(block)
-        except (zstandard.ZstdError, RuntimeError, EOFError) as error:
-            raise BadRecord(f"a chunk that {compression} cannot uncompress") from error
-        return records
 
-    return step
+def _lz4_blocks(data: _Stream) -> Iterator[bytes]:
+    import lz4.frame
+
+    frame = lz4.frame.LZ4FrameDecompressor()
+    while not frame.eof:
+        block = data.read(BLOCK) if frame.needs_input else b""
+        if frame.needs_input and not block:
+            return
+        yield frame.decompress(block, BLOCK)

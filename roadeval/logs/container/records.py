@@ -249,11 +249,14 @@ def place_at(records: ByteReader, offset: int) -> Place:
 
 
 def walk(records: ByteReader) -> Iterator[Place]:
-    """Yield the places of the records in a chunk, as far as they are whole."""
+    """Yield the places of the records in a chunk, as far as they are whole.
+
+    Zeros end them, too: a million would be as many records of no kind and no length.
+    """
     offset = 0
     while offset + HEAD.size <= records.size:
         place = place_at(records, offset)
-        if place.end > records.size:
+        if place.opcode == 0 or place.end > records.size:
             return
         yield place
         offset = place.end

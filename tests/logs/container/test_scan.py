@@ -1,11 +1,17 @@
 """The walk from record to record, over what is damaged."""
 
+import struct
 from pathlib import Path
 
+import lz4.frame
 import pytest
+import zstandard
 
 from roadeval.logs import LogError, TopicSettings, open_log
-from tests.logs.making import CAMERA, FRAMES, small_log
+from roadeval.logs.container.compression import BLOCK, _blocks, _Stream
+from roadeval.logs.container.readers import MemoryReader
+from roadeval.logs.container.records import Chunk
+from tests.logs.making import CAMERA, FRAMES, START, small_log
 
 MESSAGE = b"\x05"
 INDEX = b"\x07"
@@ -152,3 +158,55 @@ def test_a_definition_that_does_not_add_up_costs_what_it_defines(tmp_path: Path)
         log.verify()
         assert any("used all the same" in loss for loss in log.losses)
         assert len(list(log.frames(log.select()))) == FRAMES
+
+
+def with_chunk(path: Path, compression: str, data: bytes, size: int) -> None:
+    """Put a chunk in front of all others of a log, and leave its summary out."""
+    small_log(path, "uncompressed")
+    log = path.read_bytes()
+    end, begin = records(log, DATA_END)[0], 8 + 9 + int.from_bytes(log[9:17], "little")
+    # Its times are those of the log, so that no message lies before what was its first one.
+    head = struct.pack("<QQQII", START, START, size, 0, len(compression)) + compression.encode()
+    chunk = head + struct.pack("<Q", len(data)) + data
+    chunk = b"\x06" + struct.pack("<Q", len(chunk)) + chunk
+    tail = DATA_END + struct.pack("<QI", 4, 0) + b"\x02" + struct.pack("<Q", 20) + bytes(20)
+    path.write_bytes(log[:begin] + chunk + log[begin:end] + tail + log[:8])
+
+
+SIZE = 20 << 20
+COMPRESSED_ZEROS = {
+    "zstd": zstandard.ZstdCompressor(write_content_size=False).compress(bytes(SIZE)),
+    "lz4": lz4.frame.compress(bytes(SIZE), store_size=False),
+}
+
+
+@pytest.mark.parametrize("compression", COMPRESSED_ZEROS)
+def test_zeros_in_place_of_records_are_told_and_not_walked_through(
+    tmp_path: Path, compression: str
+) -> None:
+    path = tmp_path / "log.mcap"
+    with_chunk(path, compression, COMPRESSED_ZEROS[compression], SIZE)
+    assert kept(path) == [*range(FRAMES)]
+    with open_log(path) as log:
+        assert "a chunk whose records do not add up" in log.losses[0]
+
+
+@pytest.mark.parametrize("compression", COMPRESSED_ZEROS)
+def test_a_chunk_that_grows_beyond_all_bounds_is_given_up(
+    tmp_path: Path, compression: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("roadeval.logs.container.compression.LARGEST_CHUNK", 10 << 20)
+    path = tmp_path / "log.mcap"
+    with_chunk(path, compression, COMPRESSED_ZEROS[compression], SIZE)
+    assert kept(path) == [*range(FRAMES)]
+    with open_log(path) as log:
+        assert "a chunk of more than 10 MiB" in log.losses[0]
+
+
+@pytest.mark.parametrize("compression", COMPRESSED_ZEROS)
+def test_a_chunk_is_uncompressed_in_blocks_of_bounded_size(compression: str) -> None:
+    data = COMPRESSED_ZEROS[compression]
+    chunk = Chunk(0, 0, 0, SIZE, 0, compression, 0, len(data))
+    blocks = list(_blocks(compression, _Stream(MemoryReader(data), chunk)))
+    assert max(map(len, blocks)) <= BLOCK
+    assert sum(map(len, blocks)) == SIZE
