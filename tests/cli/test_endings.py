@@ -113,7 +113,7 @@ def test_text_from_elsewhere_cannot_fake_a_line(capsys):
 
 def test_nor_can_it_in_a_traceback(capsys, monkeypatch):
     monkeypatch.setenv("ROADEVAL_DEBUG", "1")
-    explain(KeyError("a\x1b[2K"))
+    explain(RoadevalError("a\x1b[2K"))
     assert "\x1b" not in capsys.readouterr().err
 
 
