@@ -173,7 +173,8 @@ def with_chunk(path: Path, compression: str, data: bytes, size: int) -> None:
     path.write_bytes(log[:begin] + chunk + log[begin:end] + tail + log[:8])
 
 
-SIZE = 20 << 20
+SIZE = 9 * (2 << 20)
+"""A whole number of empty records, so that zeros would add up if they were taken for them."""
 COMPRESSED_ZEROS = {
     "zstd": zstandard.ZstdCompressor(write_content_size=False).compress(bytes(SIZE)),
     "lz4": lz4.frame.compress(bytes(SIZE), store_size=False),
