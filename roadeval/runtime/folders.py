@@ -18,7 +18,7 @@ import os
 import shutil
 import stat
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -148,8 +148,9 @@ def _exchanged(new: Path, target: Path, content: Content) -> bool:
         return False
     linked = []
     try:
-        for other in _of_others(target, content, new):
-            os.link(other, new / other.name, follow_symlinks=False)  # fails for a folder
+        for other in _of_others(target, content):
+            # It fails for a folder, and where the new folder has a file of that name.
+            os.link(other, new / other.name, follow_symlinks=False)
             linked.append(new / other.name)
         _copy_rights(target, new)
         _exchange(new, target)
@@ -244,12 +245,14 @@ def _settle(complete: Path, content: Content) -> None:
     complete.rmdir()
 
 
-def _of_others(folder: Path, content: Content, new: Path | None = None) -> Iterable[Path]:
-    """Yield what belongs neither to a folder's content nor to that of a new one."""
-    own = content.names(folder) | {each.name for each in (new.iterdir() if new else ())}
-    for each in list(folder.iterdir()):
-        if each.name not in own or (each.is_dir() and not each.is_symlink()):
-            yield each
+def _of_others(folder: Path, content: Content) -> list[Path]:
+    """List what does not belong to a folder's content; a folder never does."""
+    own = content.names(folder)
+    return [
+        each
+        for each in folder.iterdir()
+        if each.name not in own or (each.is_dir() and not each.is_symlink())
+    ]
 
 
 def _seal_last(folder: Path, content: Content) -> list[Path]:

@@ -1,4 +1,4 @@
-"""A run that is stopped closes its recording and tells where it is."""
+"""A run that is stopped closes its recording and says where; till then its outputs are its own."""
 
 import re
 import signal
@@ -9,36 +9,44 @@ from pathlib import Path
 import pytest
 
 from roadeval import Recording
-from tests.e2e.commands import DEMO, ROADEVAL
+from tests.e2e.commands import DEMO, ROADEVAL, here
 
 ENOUGH = 1_000_000
 """Bytes of a recording that hold some frames, and far from all."""
 
 
 def stop(folder, number):
-    """Replay the demo drive until some frames are recorded, then send a signal."""
+    """Replay the demo drive until some frames are recorded, then send a signal.
+
+    Before that, a second run asks for the same recording.
+    """
     words = ["replay", DEMO, "--save", folder / "out.rrd", "--reports", folder / "reports"]
     with subprocess.Popen([ROADEVAL, *words], stderr=subprocess.PIPE, text=True) as run:
         while sum(file.stat().st_size for file in folder.glob("*.rrd")) < ENOUGH:
             assert run.poll() is None, run.stderr.read()
             time.sleep(0.05)
+        second = here("replay", DEMO, "--save", folder / "out.rrd", "--reports", folder / "other")
         run.send_signal(number)
         said = run.stderr.read()
-    return run.returncode, said
+    return run.returncode, said, run.pid, second
 
 
 @pytest.fixture(
     scope="module", params=[(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["SIGINT", "SIGTERM"]
 )
 def stopped(request, tmp_path_factory):
-    """A stopped run's folder, its exit code, the one it should have, and what it said."""
+    """A stopped run: its folder, its exit code and the one it should have, what it said.
+
+    And its process, and how a second run ended meanwhile.
+    """
     number, code = request.param
     folder = tmp_path_factory.mktemp("stopped")
-    return folder, *stop(folder, number), code
+    returned, *rest = stop(folder, number)
+    return folder, (returned, code), *rest
 
 
 def test_a_signal_leaves_a_readable_partial_recording_whose_name_is_told(stopped):
-    folder, returned, said, code = stopped
+    folder, (returned, code), said, *_ = stopped
     assert returned == code
     assert "Traceback" not in said
     (path,) = re.findall(r"roadeval: interrupted: .*?(\S+\.rrd)", said)
@@ -53,3 +61,15 @@ def test_a_signal_leaves_no_output_under_its_final_name(stopped):
     assert not (folder / "out.rrd").exists()
     assert not list(folder.rglob("*.csv*"))
     assert not list(folder.rglob("summary.json"))
+    assert not list(folder.rglob(".*"))
+
+
+def test_a_second_run_on_its_recording_is_refused_at_once_and_told_who_writes_it(stopped):
+    folder, *_, process, second = stopped
+    assert second.returncode == 1
+    assert re.fullmatch(
+        rf"roadeval: error: {folder}/out\.rrd: another run is writing it \(process {process} on "
+        r"\S+, since [-\d]+ [:\d]+[-+][:\d]+\); wait until it has ended, or write elsewhere\n",
+        second.stderr,
+    )
+    assert not (folder / "other").exists()

@@ -236,6 +236,17 @@ def test_a_summary_names_no_file_elsewhere_as_a_result(tmp_path: Path, listed: A
     assert names(tmp_path) == {"results", "notes.txt"}
 
 
+def test_a_run_that_fails_after_its_last_file_leaves_the_earlier_results(tmp_path: Path) -> None:
+    write(tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    board = a_board()
+    with suppress(KeyboardInterrupt), ResultsWriter(tmp_path) as writer:
+        writer.append(lines(next(scored(board))))
+        writer.finish(the_rest(board), RUN_TOML)
+        raise KeyboardInterrupt
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
 def test_a_folder_that_was_there_stays(tmp_path: Path) -> None:
     (tmp_path / "old").mkdir()
     with suppress(ResultsError), ResultsWriter(tmp_path / "old"):

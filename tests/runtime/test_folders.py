@@ -160,6 +160,11 @@ def _sticky(folder, _monkeypatch):
     folder.chmod(0o1777)
 
 
+def _no_earlier_content(folder, _monkeypatch):
+    (folder / "seal").unlink()
+    (folder / "only_old").unlink()
+
+
 def _mounted(folder, monkeypatch):
     monkeypatch.setattr(os.path, "ismount", lambda path: Path(path) == folder)
 
@@ -169,7 +174,9 @@ def _parent_not_ours(folder, monkeypatch):
 
 
 @linux
-@pytest.mark.parametrize("situation", [_cwd, _sticky, _mounted, _parent_not_ours])
+@pytest.mark.parametrize(
+    "situation", [_cwd, _sticky, _mounted, _parent_not_ours, _no_earlier_content]
+)
 def test_a_folder_that_must_stay_where_it_is_stays(situation, tmp_path, monkeypatch):
     folder = tmp_path / "folder"
     write(folder, table="old", only_old="old")

@@ -41,6 +41,12 @@ def test_nothing_stands_under_the_final_name_before_the_end(drive, tmp_path):
     assert not recorder.partial.exists()
 
 
+def test_a_recording_without_its_results_does_not_take_its_name(drive, tmp_path):
+    with Recorder(tmp_path / "out.rrd", layout()) as recorder:
+        recorder.write(recorder.encode(drive[0], lines(drive[0])))
+    assert [path.name for path in tmp_path.iterdir()] == [recorder.partial.name]
+
+
 def test_reruns_own_tool_finds_no_fault(recording):
     assert rerun("verify", recording.path) == 0
 
