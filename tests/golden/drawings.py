@@ -55,7 +55,9 @@ def _axes(axes: Axes) -> Iterator[str]:
             yield f"area {_points(*path.vertices.T)}: {to_hex(area.get_facecolor()[0])}"
     yield from _images(axes)
     for text in axes.texts:
-        yield f"text {text.get_text()!r}"
+        box = text.get_bbox_patch()
+        edge = "" if box is None else f" in a box, {_look(box)}, edge {box.get_edgecolor()[3]:.2g}"
+        yield f"text {text.get_text()!r}{edge}"
 
 
 def _images(axes: Axes) -> Iterator[str]:
