@@ -54,7 +54,8 @@ def _text(path: Path) -> str:
     text = Recording(path).result("run")
     if text is None:
         raise ConfigError(
-            f"{path}: holds no configuration: an earlier version made it, or the run was cut"
+            f"{path}: holds no configuration: an earlier version made it, or the run was cut; "
+            "replay the drive once with its options, and that recording holds them"
         )
     return text
 

@@ -1,0 +1,1 @@
+"""Results that earlier versions made, and that every later one reads: see `make`."""

@@ -1,0 +1,183 @@
+"""Damage to an intact log: to the file's bytes, or inside, under checksums that are right again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+from mcap.opcode import Opcode
+
+from tests.fixtures import broken
+from tests.fuzz.choices import Choices
+from tests.fuzz.intact import Intact
+
+MOST: Final = 4
+"""Changes of one case."""
+LENGTHS: Final = (1, 2, 4, 8, 9, 31, 64, 300, 512, 2000, 4096)
+NUMBERS: Final = (0, 1, 8, 0x7F, 0xFF, 0xFFFF, 1 << 31, 1 << 32, 1 << 62, (1 << 64) - 1)
+FOOTER_CRC_FROM_END: Final = len(broken.MAGIC) + 4
+
+
+@dataclass(frozen=True)
+class Damaged:
+    """A damaged log.
+
+    ``reached`` are the log times of the frames whose own messages were changed under checksums that
+    are right: nothing can tell of such a change but the message itself.
+    """
+
+    data: bytes
+    reached: frozenset[int] = frozenset()
+
+
+Change = Callable[[bytes, Choices], bytes]
+
+
+def damaged(intact: Intact, choices: Choices) -> Damaged:
+    """Damage a log as the choices say."""
+    return choices.of((_bytes, _bytes, _records, _summary, _inside, _messages))(intact, choices)
+
+
+def _bytes(intact: Intact, choices: Choices) -> Damaged:
+    """Change the file where a disk, a copy or a program might."""
+    data = intact.data
+    for _ in range(1 + choices.number(MOST)):
+        at = _place(intact, data, choices)
+        data = choices.of(CHANGES)(data, at, choices)
+    return Damaged(data)
+
+
+def _place(intact: Intact, data: bytes, choices: Choices) -> int:
+    """Choose a byte: any, or one of those by which the file is read."""
+    if choices.number(2):
+        return choices.number(max(len(data), 1))
+    _, begin, end = choices.of(intact.records)
+    return min(begin + choices.number(min(end - begin, 80)), max(len(data) - 1, 0))
+
+
+def _flip(data: bytes, at: int, choices: Choices) -> bytes:
+    if at >= len(data):
+        return data
+    return broken.over(data, at, bytes([data[at] ^ 1 << choices.number(8)]))
+
+
+def _overwrite(data: bytes, at: int, choices: Choices) -> bytes:
+    length = min(choices.of(LENGTHS), len(data) - at)
+    filling = choices.of((bytes(length), b"\xff" * length, None))
+    return broken.over(data, at, choices.bytes(length) if filling is None else filling)
+
+
+def _number(data: bytes, at: int, choices: Choices) -> bytes:
+    number, width = choices.of(NUMBERS), choices.of((1, 2, 4, 8))
+    packed = number.to_bytes(8, "little")[: min(width, len(data) - at)]
+    return broken.over(data, at, packed)
+
+
+def _cut(data: bytes, at: int, choices: Choices) -> bytes:
+    return data[:at]
+
+
+def _remove(data: bytes, at: int, choices: Choices) -> bytes:
+    return data[:at] + data[at + choices.of(LENGTHS) :]
+
+
+def _insert(data: bytes, at: int, choices: Choices) -> bytes:
+    length = choices.of(LENGTHS)
+    other = choices.number(max(len(data), 1))
+    filling = choices.of((bytes(length), data[other : other + length], choices.bytes(8)))
+    return data[:at] + filling + data[at:]
+
+
+def _swap(data: bytes, at: int, choices: Choices) -> bytes:
+    """Exchange two blocks, as a file system that was not whole may."""
+    size = choices.of((64, 512, 4096))
+    first, second = sorted((at // size * size, choices.number(max(len(data), 1)) // size * size))
+    left, right = data[first : first + size], data[second : second + size]
+    if first == second or len(right) < size:
+        return data
+    return broken.over(broken.over(data, first, right), second, left)
+
+
+CHANGES: Final = (_flip, _flip, _overwrite, _number, _cut, _remove, _insert, _swap)
+
+
+def _records(intact: Intact, choices: Choices) -> Damaged:
+    """Drop, repeat, move or exchange whole records: every checksum of a chunk stays right."""
+    parts = [intact.data[begin:end] for _, begin, end in intact.records]
+    tail = intact.data[intact.records[-1][2] :]
+    for _ in range(1 + choices.number(2)):
+        one, other = choices.number(len(parts)), choices.number(len(parts))
+        kind = choices.number(4)
+        if kind == 0:
+            del parts[one]
+        elif kind == 1:
+            parts.insert(other, parts[one])
+        elif kind == 2:
+            parts.insert(other, parts.pop(one))
+        else:
+            parts[one], parts[other] = parts[other], parts[one]
+    return Damaged(broken.MAGIC + b"".join(parts) + tail)
+
+
+def _summary(intact: Intact, choices: Choices) -> Damaged:
+    """Let the summary say something else, and its checksum agree."""
+    ends = [begin for opcode, begin, _ in intact.records if opcode == Opcode.DATA_END]
+    if not ends or not intact.finished:
+        return _bytes(intact, choices)
+    data, begin = intact.data, ends[0] + broken.length_of(intact.data, ends[0])
+    end = len(data) - FOOTER_CRC_FROM_END
+    for _ in range(1 + choices.number(MOST)):
+        at = begin + choices.number(end - begin)
+        change = choices.of((_flip, _number, _overwrite))
+        data = change(data[:end], at, choices) + data[end:]
+    return Damaged(broken.mended(data))
+
+
+def _inside(intact: Intact, choices: Choices) -> Damaged:
+    """Change an uncompressed chunk, or messages outside chunks; then mend the checksums."""
+    if intact.written.options.get("compression") and b"zstd" in intact.data[:2000]:
+        return _messages(intact, choices)
+    data = intact.data
+    kinds = (Opcode.CHUNK, Opcode.MESSAGE)
+    places = [(begin, end) for opcode, begin, end in intact.records if opcode in kinds]
+    changed = []
+    for _ in range(1 + choices.number(MOST)):
+        begin, end = choices.of(places)
+        head = 49 if data[begin] == Opcode.CHUNK else broken.HEAD
+        at = begin + min(head + choices.number(end - begin), end - begin - 1)
+        change = choices.of((_flip, _number, _overwrite))
+        new = data[:begin] + change(data[begin:end], at - begin, choices) + data[end:]
+        changed += [i for i in range(begin, end) if new[i] != data[i]]
+        data = new
+    return Damaged(broken.mended(data), _reached(intact, changed))
+
+
+def _reached(intact: Intact, changed: list[int]) -> frozenset[int]:
+    """Return the log times of the frames in whose messages a byte was changed."""
+    data, found = intact.data, set()
+    for opcode, begin, _ in intact.records:
+        places = broken.inside(data, begin) if opcode == Opcode.CHUNK else (begin,)
+        for place in places:
+            end = place + broken.length_of(data, place)
+            if data[place] == Opcode.MESSAGE and any(place <= at < end for at in changed):
+                log_time = int.from_bytes(data[place + broken.HEAD + 6 :][:8], "little")
+                found.add(intact.frame_of(log_time))
+    return frozenset(found)
+
+
+def _messages(intact: Intact, choices: Choices) -> Damaged:
+    """Change messages, and write the log anew around them."""
+    messages = list(intact.written.messages)
+    reached = set()
+    for _ in range(1 + choices.number(MOST)):
+        number = choices.number(len(messages))
+        message = messages[number]
+        reached.add(intact.frame_of(intact.written.messages[number].log_time))
+        data = message.data
+        at = choices.number(max(len(data), 1))
+        if choices.number(3) == 0:
+            at = min(at, choices.number(64))
+        messages[number] = replace(message, data=choices.of(CHANGES)(data, at, choices))
+    changed = replace(intact, written=replace(intact.written, messages=tuple(messages)))
+    return Damaged(changed.data, frozenset(reached))

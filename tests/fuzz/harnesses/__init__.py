@@ -1,0 +1,1 @@
+"""The harnesses, one file each; see `tests.fuzz.harness`."""
