@@ -36,6 +36,8 @@ NOT_UTF8: Final = (
 )
 QUOTED: Final = 60
 """Letters of a wrong value that a message quotes."""
+FORMER: Final = {"effective_frames": "least_frames"}
+"""Settings that an earlier version wrote under another name."""
 
 _JSON: Final = TypeAdapter(dict[str, Any], config=ConfigDict(ser_json_inf_nan="constants"))
 
@@ -65,6 +67,7 @@ def override(settings: Any, tables: Mapping[str, Any], table: str, where: str = 
         raise ConfigError(f"{begin}[{table}] must be a table")
     if not values:
         return settings
+    values = {FORMER.get(key, key): value for key, value in values.items()}
     merged = _merged(dataclasses.asdict(settings), values)
     for path, text in _texts(merged):
         if not is_utf8(text):

@@ -6,18 +6,17 @@ that was killed is understood as well as a complete one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED, Counts
-from roadeval.evaluation import metrics
+from roadeval.data import FILTERED, UNFILTERED, Counts
+from roadeval.evaluation import differences, metrics
 from roadeval.evaluation.frame_counts import FrameCounts, sum_up
 from roadeval.evaluation.regions import partitions
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.uncertainty import Difference, mean_difference
 from roadeval.evaluation.windows import Window, cut
 
 if TYPE_CHECKING:
@@ -40,11 +39,8 @@ def settings_of(summary: Mapping[str, Any]) -> EvaluationSettings:
 
 def final_stages(frames: pd.DataFrame) -> dict[str, str]:
     """Return each variant's final stage: ``post``, or the last that it has."""
-    stages = frames.groupby("variant", sort=False)["stage"].unique()
-    return {
-        str(variant): FINAL_STAGE if FINAL_STAGE in own else str(own[-1])
-        for variant, own in stages.items()
-    }
+    masks = frames[["variant", "stage"]].drop_duplicates()
+    return differences.final_stages(masks.itertuples(index=False))
 
 
 def finals(frames: pd.DataFrame) -> pd.DataFrame:
@@ -70,14 +66,20 @@ def overlap(total: dict[str, Any]) -> dict[str, float]:
     return metrics.overlap(Counts(*(total[name] for name in OUTCOMES)))
 
 
-def windows(frames: pd.DataFrame, size: int) -> Iterator[Window]:
-    """Cut the drive into windows of ``size`` evaluated frames, one mask after the other."""
-    numbers = frames["frame"].unique().tolist()
-    places = {number: place for place, number in enumerate(numbers)}
+def masks(frames: pd.DataFrame) -> Iterator[FrameCounts]:
+    """Yield the counts of each variant's stages, in the table's order."""
+    places = {number: place for place, number in enumerate(frames["frame"].unique().tolist())}
     for (variant, stage), rows in frames.groupby(["variant", "stage"], sort=False):
         positions = rows["frame"].map(places).to_numpy(np.int64)
         counts = rows[[*OUTCOMES]].to_numpy(np.int64)
-        yield from cut(FrameCounts(str(variant), str(stage), positions, counts), numbers, size)
+        yield FrameCounts(str(variant), str(stage), positions, counts)
+
+
+def windows(frames: pd.DataFrame, size: int) -> Iterator[Window]:
+    """Cut the drive into windows of ``size`` evaluated frames, one mask after the other."""
+    numbers = frames["frame"].unique().tolist()
+    for mask in masks(frames):
+        yield from cut(mask, numbers, size)
 
 
 # --- One variant against another ------------------------------------------------------------------
@@ -102,13 +104,6 @@ def pairs(frames: pd.DataFrame, treated: str, control: str) -> pd.DataFrame:
     found["wrong"] = mine[["FP", "FN"]].sum(axis=1) - theirs[["FP", "FN"]].sum(axis=1)
     found.insert(0, "stamp_ns", mine["stamp_ns"])
     return found
-
-
-def differences(
-    paired: pd.DataFrame, settings: EvaluationSettings, names: Sequence[str]
-) -> dict[str, Difference]:
-    """Average paired differences of some rates, with what is known of their uncertainty."""
-    return {name: mean_difference(paired[name].to_numpy(float), settings) for name in names}
 
 
 # --- Where the errors are -------------------------------------------------------------------------

@@ -1,23 +1,31 @@
-"""The standard error of a mean over frames that resemble their neighbours.
+"""The mean of a series whose neighbours resemble each other, and how far off it may lie.
 
-The standard error is that of the Γ-method [1]_: the autocovariances are summed up to a window that
-weighs what is left out against the noise of what is taken in, and corrected for having subtracted
-the sample's own mean. It assumes no shape of the correlation. The effective number of frames is
-estimated by a first-order autoregression as well, which is steadier on a short series; the smaller
-of both, each two standard errors below its estimate, is the cautious number.
+A series is modelled as a slow part, a first-order autoregression, and a part that is new on each
+frame. Which coefficient and which share of the slow part is not known, so a grid of both is tried:
+each is weighted by how well it explains the series, every coefficient from 0 to 1 being as likely
+before. Given both, the error of the mean is Student's; the mean's distribution is the mixture.
+
+What explains a series are its slowest cosine coefficients, as in [1]_: they tell how the mean of
+such a stretch varies, whatever happens from frame to frame. They do not hold the mean, so it need
+not be subtracted, and are all but uncorrelated under every model of the grid.
+
+Skewed series, such as bursts on a few frames, have a skewed mean: a drive that met few bursts has a
+mean that is too low *and* a spread that is too small. The mixture is bent by the transformation of
+[2]_, section 2, with the series' skewness as far as that exceeds its own error.
 
 References
 ----------
-.. [1] U. Wolff, Monte Carlo Errors with Less Errors, Computer Physics Communications 156, 2004,
-   143-153.
-.. [2] M. G. Kendall, Note on Bias in the Estimation of Autocorrelation, Biometrika 41, 1954,
-   403-404.
+.. [1] U. K. Müller, M. W. Watson, Measuring Uncertainty about Long-Run Predictions, Review of
+   Economic Studies 83, 2016, 1711-1740.
+.. [2] P. Hall, On the Removal of Skewness by Transformation, Journal of the Royal Statistical
+   Society B 54, 1992, 221-228.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -25,92 +33,259 @@ import numpy.typing as npt
 
 Series = npt.NDArray[np.float64]
 
-_WINDOW: Final = 1.5
-"""S of [1], section 3.3: the correlation's decay time in units of its integrated time."""
-_CAUTION: Final = 2.0
-"""Standard errors between the best and the cautious number of effective frames."""
+_FEWEST: Final = 90
+_PER_ROOT: Final = 2.5
+"""Cosine coefficients that are looked at: the fewest, and in roots of the series' length."""
+_SHARES: Final = {1.0: 0.5, 0.95: 0.06, 0.75: 0.12, 0.5: 0.12, 0.25: 0.2}
+"""The slow part's shares of the variance that are tried, and their weights beforehand: all of it
+and less of it are as likely, and less is any share as likely as another."""
+_STEPS: Final = 48
+"""Coefficients of the autoregression that are tried."""
+_LONGEST: Final = 10
+"""The longest memory that is tried, in lengths of the series."""
+_SKEWNESS_ERROR: Final = 6.0
+"""Variance of the skewness of n independent normal values, times n."""
 
 
-@dataclass(frozen=True, slots=True)
-class MeanError:
-    """How well a series determines its mean.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Models:
+    """The grid of models for series of a length, and what each expects of them.
 
     Parameters
     ----------
-    standard_error
-        Of the mean, in the series' unit.
-    degrees
-        Degrees of freedom of that standard error, at least 1.
-    frames
-        Effectively independent frames, at most the series' length.
-    frames_low
-        The same, cautiously; at least 1.
+    coefficients, shares
+        ``(g,)``: of the autoregression, and its share of the variance.
+    precisions
+        ``(g, m)``: one over the variances of the cosine coefficients, in the series' variance.
+    log_factor
+        ``(g,)``: the logarithm of the weight before any series is seen, times the factor of the
+        likelihood that depends on the model alone.
+    of_mean
+        ``(g,)``: variance of the mean, in the series' variance.
     """
 
-    standard_error: float
-    degrees: float
+    coefficients: Series
+    shares: Series
+    precisions: Series
+    log_factor: Series
+    of_mean: Series
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeanDistribution:
+    """What a series tells of the mean of the process that it is a stretch of.
+
+    Parameters
+    ----------
+    mean
+        Of the series.
+    errors, weights
+        ``(g,)``: the mean's standard error under each model, and the models' weights; sum 1.
+    degrees
+        Degrees of freedom of Student's distribution.
+    frames
+        Independent values that would determine the mean as well.
+    scale, skewness
+        Standard error and skewness of the mean, for the transformation.
+    """
+
+    mean: float
+    errors: Series
+    weights: Series
+    degrees: int
     frames: float
-    frames_low: float
+    scale: float
+    skewness: float
+
+    def p_value(self, value: float = 0.0) -> float:
+        """Return the two-sided p-value of the hypothesis that the process' mean is ``value``."""
+        straight = _straightened((self.mean - value) / self.scale, self.skewness)
+        return _beyond(abs(straight) * self.scale, self.errors, self.weights, self.degrees)
+
+    def interval(self, confidence: float) -> tuple[float, float]:
+        """Return the ends of the interval: the values whose p-value is ``1 - confidence``."""
+        half = self._half_width(confidence) / self.scale
+        low, high = (_bent(end, self.skewness) for end in (half, -half))
+        return self.mean - self.scale * low, self.mean - self.scale * high
+
+    def _half_width(self, confidence: float) -> float:
+        from scipy.special import stdtrit
+
+        quantile = float(stdtrit(self.degrees, (1 + confidence) / 2))
+        low, high = quantile * float(self.errors.min()), quantile * float(self.errors.max())
+        # By halves: scipy.optimize takes longer to import than a drive's differences to compute.
+        while high - low > 1e-12 * high:
+            middle = (low + high) / 2
+            beyond = _beyond(middle, self.errors, self.weights, self.degrees)
+            low, high = (middle, high) if beyond > 1 - confidence else (low, middle)
+        return high
 
 
-def error_of_mean(series: Series) -> MeanError:
-    """Estimate the standard error of the mean of a stationary series.
+def mean_distribution(series: Series) -> MeanDistribution:
+    """Compute what a stationary series tells of its mean.
 
     Parameters
     ----------
     series
         ``(n,)`` float64, n at least 4, not constant.
     """
-    n = len(series)
-    covariance = autocovariance(series)
-    window = _window(covariance / covariance[0], n)
-    total = _sum(covariance, window)
-    corrected = covariance[: window + 1] + total / n
-    total = max(_sum(corrected, window), float(corrected[0]))
-    time = total / (2 * float(corrected[0]))
-    doubt = 2 * time * math.sqrt(max(window + 0.5 - time, 0.0) / n)
-    by_window = n / (2 * (time + _CAUTION * doubt))
-    return MeanError(
-        standard_error=math.sqrt(total / n),
-        degrees=max(n / (2 * window + 1), 1.0),
-        frames=n / (2 * time),
-        frames_low=max(min(by_window, _cautious_autoregression(covariance, n)), 1.0),
+    models = _models(len(series))
+    spreads, weights, degrees = _explained(series, models)
+    errors = np.sqrt(models.of_mean) * spreads
+    scale = float(weights @ errors**-2) ** -0.5
+    frames = min(float(series.var()) / scale**2, len(series))
+    return MeanDistribution(
+        mean=float(series.mean()),
+        errors=errors,
+        weights=weights,
+        degrees=degrees,
+        frames=frames,
+        scale=scale,
+        skewness=_skewness(series, frames) / math.sqrt(frames),
     )
 
 
-def autocovariance(series: Series) -> Series:
-    """Compute the autocovariances at lags 0 to n-1, each a sum of products over n, not n - lag.
+def frames_for(series: Series, half_width: float, confidence: float, most: int) -> int | None:
+    """Compute how long a series like this must be for an interval of a half-width.
+
+    A longer series is taken to favour the models that this one favours, the more so the longer it
+    is. Skewness is left aside.
+
+    Returns
+    -------
+    int or None
+        Longer than the series, within a hundredth; None above ``most``.
+    """
+    models, n = _models(len(series)), len(series)
+    spreads, weights, degrees = _explained(series, models)
+
+    def enough(length: int) -> bool:
+        errors = np.sqrt(_variance_of_mean(models.coefficients, models.shares, length)) * spreads
+        sharper = (weights / weights.max()) ** (length / n)
+        beyond = _beyond(half_width, errors, sharper / sharper.sum(), degrees)
+        return beyond <= 1 - confidence
+
+    low, high = n, 2 * n
+    while not enough(high):
+        if high > most:
+            return None
+        low, high = high, 2 * high
+    while high - low > max(high // 100, 1):
+        middle = (low + high) // 2
+        low, high = (low, middle) if enough(middle) else (middle, high)
+    return high if high <= most else None
+
+
+def series_for(
+    found: MeanDistribution, half_width: float, confidence: float, most: int
+) -> int | None:
+    """Compute how many series are needed for an interval of a half-width around their common mean.
+
+    Student's interval of the series' own means, which are taken to spread by the error that one has
+    under the model in the middle, by weight.
+
+    Returns
+    -------
+    int or None
+        At least 2, the one at hand included; None above ``most``.
+    """
+    from scipy.special import stdtrit
+
+    order = np.argsort(found.errors)
+    middle = int(np.searchsorted(np.cumsum(found.weights[order]), 0.5))
+    error = float(found.errors[order[middle]])
+    counts = np.arange(2, most + 1)
+    halves = stdtrit(counts - 1, (1 + confidence) / 2) * error / np.sqrt(counts)
+    enough = halves <= half_width
+    return int(counts[np.argmax(enough)]) if enough.any() else None
+
+
+def _explained(series: Series, models: _Models) -> tuple[Series, Series, int]:
+    """Return each model's estimate of the standard deviation, its weight, and their degrees."""
+    n, degrees = len(series), models.precisions.shape[1]
+    numbers = np.arange(1, degrees + 1)
+    spectrum = np.fft.rfft(np.concatenate([series, series[::-1]]))[numbers]
+    squares = (spectrum * np.exp(-0.5j * np.pi * numbers / n)).real ** 2 / (2 * n)
+    variances = models.precisions @ squares / degrees
+    fit = models.log_factor - degrees / 2 * np.log(variances)
+    weights = np.exp(fit - fit.max())
+    return np.sqrt(variances), weights / weights.sum(), degrees
+
+
+@lru_cache(maxsize=8)
+def _models(n: int) -> _Models:
+    """Return the models for series of length ``n``.
+
+    The coefficients lie the closer together, the nearer to 1, where they matter most; the prior
+    weight, in proportion to their distance from 1, makes up for that.
+    """
+    distance = (_LONGEST * n) ** -np.linspace(0, 1, _STEPS)
+    coefficients = np.tile(1 - distance, len(_SHARES))
+    shares = np.repeat(list(_SHARES), _STEPS)
+    numbers = np.arange(1, min(max(_FEWEST, round(_PER_ROOT * math.sqrt(n))), n - 1) + 1)
+    slow = _cosine_variances(coefficients[:, None], numbers, n)
+    variances = shares[:, None] * slow + (1 - shares[:, None])
+    prior = np.outer(list(_SHARES.values()), distance).ravel()
+    return _Models(
+        coefficients=coefficients,
+        shares=shares,
+        precisions=1 / variances,
+        log_factor=np.log(prior) - np.log(variances).sum(axis=1) / 2,
+        of_mean=_variance_of_mean(coefficients, shares, n),
+    )
+
+
+def _cosine_variances(coefficient: Series, numbers: npt.NDArray[np.int64], n: int) -> Series:
+    """Compute variances of the orthonormal cosine coefficients (DCT-II) of an autoregression.
+
+    Exact for a stationary one of variance 1 and length ``n``: its spectrum, less what the two ends
+    cut off.
 
     Parameters
     ----------
-    series
-        ``(n,)`` float64.
+    coefficient
+        ``(g, 1)``, at least 0 and below 1.
+    numbers
+        ``(m,)``: which coefficients, from 1.
     """
-    n = len(series)
-    spectrum = np.fft.rfft(series - series.mean(), 2 * n)
-    return np.fft.irfft(np.abs(spectrum) ** 2)[:n] / n
+    r, angle = coefficient, np.pi * numbers / n
+    gain = 1 - 2 * r * np.cos(angle) + r**2
+    parity = np.where(numbers % 2, -1.0, 1.0)
+    ends = 4 * r / n * ((1 - r) * np.cos(angle / 2)) ** 2 * (1 - parity * r**n)
+    variances: Series = (1 - r**2) / gain - ends / gain**2
+    return variances
 
 
-def _window(correlation: Series, n: int) -> int:
-    """Choose the summation window: the first W where g(W) of [1], eq. 52, is negative."""
-    lags = np.arange(1, max(n // 2, 2))
-    times = np.maximum(0.5 + np.cumsum(correlation[lags]), 0.5 + 1e-12)
-    decay = _WINDOW / np.log((2 * times + 1) / (2 * times - 1))
-    negative = np.exp(-lags / decay) < decay / np.sqrt(lags * n)
-    return int(lags[np.argmax(negative)]) if negative.any() else int(lags[-1])
+def _variance_of_mean(coefficients: Series, shares: Series, n: int) -> Series:
+    """Compute the variance of the mean of ``n`` values, in their own variance, for each model."""
+    r = coefficients
+    slow = (1 + r) / (1 - r) - 2 * r * (1 - r**n) / (n * (1 - r) ** 2)
+    variances: Series = (shares * slow + (1 - shares)) / n
+    return variances
 
 
-def _sum(covariance: Series, window: int) -> float:
-    """Sum the autocovariances from lag ``-window`` to ``window``."""
-    return float(covariance[0] + 2 * covariance[1 : window + 1].sum())
+def _beyond(distance: float, errors: Series, weights: Series, degrees: int) -> float:
+    """Return the probability that the mean is further off than ``distance``, skewness aside."""
+    from scipy.special import stdtr
+
+    return float(2 * weights @ stdtr(degrees, -distance / errors))
 
 
-def _cautious_autoregression(covariance: Series, n: int) -> float:
-    """Compute the effective frames of a first-order autoregression, bias-corrected [2].
+def _skewness(series: Series, frames: float) -> float:
+    """Return a series' skewness, reduced the more, the less it exceeds its own error."""
+    centred = series - series.mean()
+    skewness = float((centred**3).mean() / (centred**2).mean() ** 1.5)
+    noise = _SKEWNESS_ERROR / frames
+    return skewness**3 / (skewness**2 + noise)
 
-    The coefficient is taken two standard errors above its estimate.
-    """
-    coefficient = max(float(covariance[1] / covariance[0]), 0.0)
-    unbiased = min(coefficient + (1 + 3 * coefficient) / n, 1.0)
-    cautious = min(unbiased + _CAUTION * math.sqrt((1 - unbiased**2) / n), 1.0)
-    return n * (1 - cautious) / (1 + cautious)
+
+def _straightened(t: float, skewness: float) -> float:
+    """Transform a studentized mean of a given skewness so that it is symmetric; [2]."""
+    return t + skewness * t**2 / 3 + skewness**2 * t**3 / 27 + skewness / 6
+
+
+def _bent(t: float, skewness: float) -> float:
+    """Return what `_straightened` transforms to ``t``."""
+    if abs(skewness) < 1e-6:
+        return t
+    return 3 / skewness * (math.cbrt(1 + skewness * (t - skewness / 6)) - 1)

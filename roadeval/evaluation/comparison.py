@@ -8,7 +8,7 @@ a difference between them would mix the scene with the method.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
@@ -29,7 +29,7 @@ from roadeval.evaluation.comparison_result import (
 )
 from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.uncertainty import mean_difference
+from roadeval.evaluation.uncertainty import holm, mean_difference
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -129,10 +129,19 @@ def compare(
     return Comparison(
         same_drive=True,
         results=results,
-        changes=tuple(row for pair in pairs for row in pair.changes()),
+        changes=_corrected([row for pair in pairs for row in pair.changes()]),
         levels=tuple(row for side in others for row in _levels(side)),
         moved=tuple(frame for pair in pairs for frame in pair.moved()),
         notes=tuple(note for pair in pairs for note in pair.notes()),
+    )
+
+
+def _corrected(rows: Sequence[MaskComparison]) -> tuple[MaskComparison, ...]:
+    """Correct the changes of ERR, of every variant and stage, for how many they are."""
+    found = holm([row.difference["ERR"] for row in rows])
+    return tuple(
+        replace(row, difference={**row.difference, "ERR": change})
+        for row, change in zip(rows, found, strict=True)
     )
 
 
@@ -169,7 +178,7 @@ class _Pair:
                 new=_rates(after),
                 difference={
                     name: mean_difference(
-                        (after[name] - before[name]).to_numpy(float), self._settings
+                        after[name].to_numpy(float), before[name].to_numpy(float), self._settings
                     )
                     for name in COMPARED
                 },

@@ -25,7 +25,7 @@ that nobody evaluated.
 A condition that cannot be judged is an error, and never taken for one that is kept: where a rate
 is undefined, where a change is asked for between different drives or scales, where certainty is
 asked for and there is no interval, and where too few frames tell. They must be at least as many as
-an interval needs (``evaluation.effective_frames``, 10 by default), and for a change at least half
+an interval needs (``evaluation.least_frames``, 10 by default), and for a change at least half
 of the frames of the shorter result.
 """
 
@@ -189,7 +189,7 @@ def judge(
     judgements = []
     for condition in conditions:
         for mask in _named(condition, comparison):
-            _check_frames(condition, mask, comparison.results, settings.effective_frames)
+            _check_frames(condition, mask, comparison.results, settings.least_frames)
             judgements.append(condition.judge(mask))
     return tuple(judgements)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, Final
 
@@ -20,14 +20,13 @@ from roadeval.data import (
 )
 from roadeval.evaluation import windows
 from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.differences import DriveDifferences, drive_differences
 from roadeval.evaluation.edges_and_flicker import EdgesAndFlicker
-from roadeval.evaluation.frame_counts import FrameCounts, GrowingCounts, paired, sum_up
+from roadeval.evaluation.frame_counts import FrameCounts, GrowingCounts, sum_up
 from roadeval.evaluation.maps import HeatMap, Maps, Name
-from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.repeats import Repeats
 from roadeval.evaluation.score import score_frame
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.uncertainty import Difference, mean_difference
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,20 +130,9 @@ class Scoreboard:
         rows = (windows.cut(mask, self._frames, self._settings.window) for mask in self._masks())
         return heapq.merge(*rows, key=attrgetter("number"))
 
-    def differences(self) -> dict[str, dict[str, Difference]]:
-        """Return the paired difference, filtered minus unfiltered, by stage and rate.
-
-        Empty where one of the two variants is missing. Frames on which the rate is undefined for
-        either are left out.
-        """
-        return {
-            stage: {
-                rate: mean_difference(table[:, column], self._settings)
-                for column, rate in enumerate(METRICS)
-                if rate in COMPARED
-            }
-            for stage, table in paired(self._masks())
-        }
+    def differences(self) -> DriveDifferences:
+        """Return the paired differences of the drive."""
+        return drive_differences(self._masks(), self._settings)
 
     def repeats(self) -> dict[str, Any]:
         """Return the rates with each seed: see `roadeval.evaluation.repeats.Repeats.rates`."""
@@ -156,10 +144,6 @@ class Scoreboard:
             "totals": self.totals(),
             "beyond": self._beyond.totals(),
             "oracles": self.oracles(),
-            "difference": {
-                stage: {rate: asdict(difference) for rate, difference in by_rate.items()}
-                for stage, by_rate in self.differences().items()
-            },
             "windows": -(-len(self._frames) // self._settings.window),
             "health": {name: dict(counted) for name, counted in self._health.items()},
             "seconds": self._mean_seconds(),

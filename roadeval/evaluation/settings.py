@@ -34,9 +34,12 @@ class EvaluationSettings:
         The least change of ERR by the filter, or excess over ``blind``, that is noted.
     confidence
         Of the interval around a difference.
-    effective_frames
-        No interval is given below this many effectively independent frames: there it would be
-        too short more often than its confidence admits (`roadeval.evaluation.uncertainty`).
+    least_frames
+        Frames that an interval needs. Fewer tell next to nothing of how alike neighbours are, so
+        none is given.
+    negligible
+        A change of a drive's mean rate by no more than this matters to nobody: an interval that
+        ends within it is the answer that there is no larger effect.
     """
 
     window: Annotated[int, Field(ge=1, le=1_000_000_000)] = 10
@@ -48,4 +51,5 @@ class EvaluationSettings:
     degraded_margin: Annotated[float, Field(ge=0, le=1)] = 0.02
     noteworthy: Annotated[float, Field(ge=0, le=1)] = 0.05
     confidence: Annotated[float, Field(gt=0.5, lt=1)] = 0.95
-    effective_frames: Annotated[int, Field(ge=2, le=1_000_000_000)] = 10
+    least_frames: Annotated[int, Field(ge=4, le=1_000_000_000)] = 10
+    negligible: Annotated[float, Field(gt=0, le=1)] = 0.01

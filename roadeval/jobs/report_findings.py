@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -11,7 +10,6 @@ import numpy as np
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, TruthBits
 from roadeval.data.packed import Packed
 from roadeval.evaluation import analysis, counts, maps
-from roadeval.evaluation.metrics import COMPARED
 from roadeval.jobs.report_frames import FramePicker, evenly, str_keys, variants_but_baseline
 from roadeval.jobs.result import Result
 from roadeval.report.findings import Commands, ErrorHeatmap, Findings, PairedComparison
@@ -97,19 +95,23 @@ def _paired(
     frames: pd.DataFrame, summary: dict[str, Any], changes: pd.DataFrame
 ) -> Iterator[PairedComparison]:
     """Compare filtered against unfiltered, then every variant with the baseline."""
-    settings, finals = analysis.settings_of(summary), analysis.final_stages(frames)
-    pairs = [(FILTERED, UNFILTERED), *((v, BASELINE) for v in variants_but_baseline(frames))]
-    for treated, control in pairs:
-        if not {treated, control} <= finals.keys():
-            continue
-        paired = analysis.pairs(frames, treated, control)
-        known = summary["difference"].get(finals[treated]) if control == UNFILTERED else None
-        differences = known or {
-            rate: asdict(difference)
-            for rate, difference in analysis.differences(paired, settings, COMPARED).items()
-        }
-        pixels = _changed_pixels(changes, treated, control)
-        yield PairedComparison(treated, control, differences, paired, pixels)
+    finals = analysis.final_stages(frames)
+    if change := summary["difference"].get(finals.get(FILTERED)):
+        yield _pair(frames, FILTERED, UNFILTERED, change, changes)
+    for variant, change in summary["against_blind"].items():
+        yield _pair(frames, variant, BASELINE, change, changes)
+
+
+def _pair(
+    frames: pd.DataFrame,
+    treated: str,
+    control: str,
+    differences: Mapping[str, Mapping[str, Any]],
+    changes: pd.DataFrame,
+) -> PairedComparison:
+    paired = analysis.pairs(frames, treated, control)
+    pixels = _changed_pixels(changes, treated, control)
+    return PairedComparison(treated, control, differences, paired, pixels)
 
 
 def _changed_pixels(

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.evaluation import analysis
-from roadeval.evaluation.metrics import COMPARED
+from roadeval.evaluation.differences import drive_differences
+from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.recording import DamagedError, Recording, RecordingError
 from roadeval.results.folder import RUN, ResultsFolder
-from roadeval.results.verdict import NOTHING_SCORED, verdict_of
+from roadeval.results.verdict import verdict_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -65,9 +64,13 @@ class Result:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """As ``summary.json``; of an incomplete run, what its tables give."""
-        if self.complete:
-            return self._tables.summary
-        return self._summary_of_part()
+        if not self.complete:
+            return self._summary_of_part()
+        summary = self._tables.summary
+        if "difference" in summary:
+            return summary
+        # An earlier version found the differences in another way.
+        return summary | _found(self.frames, analysis.settings_of(summary))
 
     @cached_property
     def frames(self) -> pd.DataFrame:
@@ -138,16 +141,14 @@ class Result:
     def _summary_of_part(self) -> dict[str, Any]:
         """Make the summary that a killed run did not get to write, of what it had scored."""
         assert self.recording is not None
-        layout, scored = self.recording.layout, len(self.frames) > 0
-        facts: dict[str, Any] = {"verdict": NOTHING_SCORED, "totals": {}}
+        layout = self.recording.layout
         return {
             "drive": {"name": layout.drive, "width": layout.width, "height": layout.height},
             "frames": {
                 "with_pictures": len(self.pictured),
                 "trained_on": layout.properties.get("training_frames", 0),
-                "evaluated": self.frames["frame"].nunique() if scored else 0,
+                "evaluated": self.frames["frame"].nunique() if len(self.frames) else 0,
             },
-            "difference": {},
             "warnings": [],
             "losses": [],
             "run": {},
@@ -155,21 +156,13 @@ class Result:
             "versions": {},
             "seconds": {},
             "training": {"source": layout.properties.get("trained_on")},
-        } | (_facts(self.frames) if scored else facts)
+        } | _found(self.frames, EvaluationSettings())
 
 
-def _facts(frames: pd.DataFrame) -> dict[str, Any]:
+def _found(frames: pd.DataFrame, settings: EvaluationSettings) -> dict[str, Any]:
     """Compute what a summary states of the frames that were scored."""
-    settings, totals = analysis.settings_of({}), analysis.totals(frames)
-    differences = {}
-    if {FILTERED, UNFILTERED} <= totals.keys():
-        paired = analysis.pairs(frames, FILTERED, UNFILTERED)
-        differences[FINAL_STAGE] = analysis.differences(paired, settings, COMPARED)
-    return {
-        "verdict": verdict_of(totals, differences),
-        "totals": totals,
-        "difference": {
-            stage: {name: asdict(each) for name, each in found.items()}
-            for stage, found in differences.items()
-        },
-    }
+    masks = list(analysis.masks(frames)) if len(frames) else []
+    totals = analysis.totals(frames) if len(frames) else {}
+    differences = drive_differences(masks, settings)
+    verdict = verdict_of(totals, differences, settings)
+    return {"verdict": verdict, "totals": totals, **differences.as_dict()}

@@ -25,11 +25,12 @@ FLATTERED: Final = "look alike, which flatters the result: use a model of other 
 
 def of(run: Run) -> dict[str, Any]:
     """Return the content of ``summary.json``, but for its format, of a run at its end."""
-    found = run.board.summary()
+    found, differences = run.board.summary(), run.board.differences()
     repeats = run.board.repeats()
     seeds = {"seeds": [run.config.training.seed, *run.repeats], **repeats} if repeats else None
     return found | {
-        "verdict": verdict_of(found["totals"], run.board.differences()),
+        "verdict": verdict_of(found["totals"], differences, run.config.evaluation),
+        **differences.as_dict(),
         **({"seeds": seeds} if seeds else {}),
         "drive": _drive(run),
         "frames": _accounting(run),

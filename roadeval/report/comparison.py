@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
@@ -10,12 +11,14 @@ from roadeval.data.words import interval, listing, number, percent, points, time
 from roadeval.evaluation.comparison_result import Comparison, MaskComparison, MovedFrame
 from roadeval.evaluation.conditions import Judgement
 from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
+from roadeval.evaluation.uncertainty import Difference
 from roadeval.report.blocks import Block, BulletList, Cell, Document, Figure, Heading, Table, Text
 from roadeval.report.figures.charts import forest, levels
 from roadeval.report.figures.fig3a_error_rate import FIGURE
 from roadeval.report.figures.figure import FigureData
 from roadeval.report.figures.files import svg, svg_of
 from roadeval.report.markdown import table as markdown_table
+from roadeval.results.certainty import MARK, correction, stands, too_few
 from roadeval.results.comparison import judged, verdict, warnings
 from roadeval.runtime.text import as_markdown
 
@@ -62,6 +65,7 @@ def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
         for each in judgements
     ]
     lines += ["", *markdown_table(_rates_table(comparison)), ""]
+    lines += [line for legend in _legend(comparison) for line in (as_markdown(legend), "")]
     if comparison.moved:
         lines += ["Frames that changed most:", "", *markdown_table(_moved_table(comparison)), ""]
     lines += [f"- {as_markdown(warning)}" for warning in warnings(comparison)]
@@ -77,6 +81,7 @@ def _blocks(
     yield from _limits(judgements)
     yield _rates_table(comparison)
     yield Text(_unit(comparison), "note")
+    yield from (Text(legend, "note") for legend in _legend(comparison))
     yield from _why_no_interval(comparison.changes)
     if comparison.notes:
         yield BulletList("Beware", warnings(comparison), "warning")
@@ -94,6 +99,13 @@ def _blocks(
     if comparison.moved:
         yield Heading("Frames that changed most", 2)
         yield _moved_table(comparison)
+
+
+def _legend(comparison: Comparison) -> Iterator[str]:
+    """Yield what the mark in the table means, where something was corrected."""
+    changes = [row.difference["ERR"] for row in comparison.changes if row.difference]
+    if legend := correction(map(asdict, changes)):
+        yield legend
 
 
 def _limits(judgements: Sequence[Judgement]) -> Iterator[Block]:
@@ -134,7 +146,7 @@ def _changes_table(rows: Sequence[MaskComparison]) -> Table:
                 percent(row.base["ERR"]),
                 percent(row.new["ERR"]),
                 Cell(points(row.difference["ERR"].mean), bold=row.final),
-                interval(row.difference["ERR"].low, row.difference["ERR"].high),
+                _interval(row.difference["ERR"]),
                 *(points(row.new[rate] - row.base[rate]) for rate in OTHERS),
             ]
             for row in rows
@@ -209,11 +221,17 @@ def _breaks(rows: Rows) -> list[int]:
 def _why_no_interval(rows: Sequence[MaskComparison]) -> Iterator[Text]:
     """Yield the reason why there is no interval, once for each result and variant."""
     reasons = [
-        f"{_name(row)}: no interval for ERR, because {change.reason}."
+        f"{_name(row)}: no interval for ERR, because {too_few(change.frames)}."
         for row in rows
         if row.final and (change := row.difference.get("ERR")) and change.low is None
     ]
     yield from (Text(reason, "note") for reason in dict.fromkeys(reasons))
+
+
+def _interval(change: Difference) -> str:
+    """Return an interval, with a mark where the change stands after correction."""
+    mark = f" {MARK}" if stands(change.p_holm, change.confidence) else ""
+    return interval(change.low, change.high) + mark
 
 
 def _name(row: MaskComparison) -> str:

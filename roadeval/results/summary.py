@@ -11,11 +11,11 @@ from typing import Any, Final
 from roadeval.results.reading import ResultsError
 from roadeval.runtime.text import visible_lines
 
-FORMAT: Final = {"name": "roadeval-summary", "version": 2}
+FORMAT: Final = {"name": "roadeval-summary", "version": 3}
 SUMMARY: Final = "summary.json"
 PARTS: Final = (
-    *("format", "verdict", "drive", "frames", "totals", "beyond", "difference", "seeds"),
-    *("oracles", "windows", "health", "training", "seconds", "warnings", "losses"),
+    *("format", "verdict", "drive", "frames", "totals", "beyond", "difference", "against_blind"),
+    *("seeds", "oracles", "windows", "health", "training", "seconds", "warnings", "losses"),
     *("run", "settings", "versions", "log", "tables", "files"),
 )
 """The parts of the summary, in the file's order."""
@@ -84,7 +84,7 @@ def read_summary(path: Path) -> dict[str, Any]:
 
 
 def parse_summary(text: str, where: object) -> dict[str, Any]:
-    """Read the text of a summary; one of version 1 takes the shape of today's.
+    """Read the text of a summary; one of an earlier version takes the shape of today's.
 
     Raises
     ------
@@ -97,7 +97,9 @@ def parse_summary(text: str, where: object) -> dict[str, Any]:
         raise ResultsError(f"{where}: not a summary ({error}); make it anew") from error
     form = summary.get("format") if isinstance(summary, dict) else None
     if form == {**FORMAT, "version": 1}:
-        summary, form = _of_version_1(summary), FORMAT
+        summary, form = _of_version_1(summary), {**FORMAT, "version": 2}
+    if form == {**FORMAT, "version": 2}:
+        summary, form = _of_version_2(summary), FORMAT
     if form != FORMAT:
         raise ResultsError(
             f"{where}: not a summary of format {FORMAT['name']} {FORMAT['version']}; "
@@ -107,7 +109,7 @@ def parse_summary(text: str, where: object) -> dict[str, Any]:
 
 
 def _of_version_1(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Bring a summary of version 1 to today's shape.
+    """Bring a summary of version 1 to the shape of version 2.
 
     There every variant carried the run's training and evaluation among its settings, and what was
     asked of the log stood under ``selection``; summaries made before that have no such part.
@@ -124,7 +126,17 @@ def _of_version_1(summary: Mapping[str, Any]) -> dict[str, Any]:
         settings[variant] = {key: value for key, value in own.items() if key not in shared}
         run.setdefault("preset", own.get("preset"))
     rest = {key: value for key, value in summary.items() if key != "selection"}
-    return {**rest, "format": FORMAT, "run": run, "settings": settings}
+    return {**rest, "run": run, "settings": settings}
+
+
+def _of_version_2(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Bring a summary of version 2 to today's shape.
+
+    Its differences had other intervals, or none, and a reason; they and the verdict on them are
+    left out, for the tables have all that it takes to compute them.
+    """
+    kept = {key: value for key, value in summary.items() if key not in ("difference", "verdict")}
+    return {**kept, "format": FORMAT}
 
 
 def json_text(value: Any) -> str:

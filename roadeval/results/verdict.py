@@ -1,65 +1,122 @@
-"""The verdict: a sentence that answers whether the filter helps on this drive."""
+"""The verdict: what a drive tells of the filter, and of looking at the image at all."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, Final
 
-from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
+from roadeval.data import BASELINE, FILTERED
+from roadeval.data.words import in_percent
+from roadeval.evaluation.differences import DriveDifferences, final_stages
+from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference
+from roadeval.results.certainty import Degree, degree_of, what_would_tell
 
+RATE: Final = "ERR"
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
-NO_PAIR: Final = f"No verdict on a filter: {FILTERED} and {UNFILTERED} were not both run."
+_BLIND: Final = f"{BASELINE}, which never looks at the image"
 
 
 def verdict_of(
-    totals: Mapping[str, Any], differences: Mapping[str, Mapping[str, Difference]]
+    totals: Mapping[str, Mapping[str, Any]],
+    differences: DriveDifferences,
+    settings: EvaluationSettings,
 ) -> str:
     """Return the verdict on a drive.
+
+    Of a filter: what it changes, and whether the filtered variant beats the baseline. Where there
+    is no pair to tell that from: whether the variant with the lowest error rate does.
 
     Parameters
     ----------
     totals
-        By variant; empty where nothing was scored.
+        By variant and stage; empty where nothing was scored.
     differences
-        Filtered minus unfiltered, by stage and rate.
+        See `roadeval.evaluation.differences`.
+    settings
+        What is negligible.
     """
     if not totals:
         return NOTHING_SCORED
-    if FINAL_STAGE not in differences:
-        return NO_PAIR
-    return verdict(differences[FINAL_STAGE]["ERR"], "ERR", FINAL_STAGE)
+    stages = final_stages((variant, stage) for variant, own in totals.items() for stage in own)
+    pair = differences.filter.get(stages.get(FILTERED, ""))
+    sentences = [on_filter(pair[RATE], stages[FILTERED], settings)] if pair else []
+    if differences.blind:
+        name = FILTERED if pair else _lowest(differences)
+        sentences.append(on_blind(differences.blind[name][RATE], name, settings))
+    return " ".join(sentences) or _alone(totals, stages)
 
 
-def verdict(difference: Difference, rate: str, stage: str) -> str:
-    """Return what a difference, filtered minus unfiltered, of an error rate means.
+def on_filter(found: Difference, stage: str, settings: EvaluationSettings) -> str:
+    """Return what the filter does to the error rate of a stage; ``found`` is with minus without."""
+    what, here = f"{RATE} of {stage}", "On this drive the filter"
+    verb, told = "raises" if found.mean > 0 else "lowers", _Told(found)
+    sentences = {
+        Degree.UNDEFINED: f"Nothing to compare: {what} is undefined on every frame.",
+        Degree.FEW: f"Too few frames to tell whether the filter helps: {what} {told.few}.",
+        Degree.SAME: f"{here} leaves {what} of every frame as it is.",
+        Degree.SURE: f"{here} {verb} {what} by {told.size} {told.sizes}.",
+        Degree.LITTLE: f"{here} has no effect on {what} larger than {told.bound}.",
+        Degree.PROBABLE: f"{here} probably {verb} {what}, by {told.size} ({told.ends}).",
+        Degree.UNKNOWN: f"Cannot tell whether the filter helps here: {what} {told.unknown}.",
+    }
+    return sentences[degree_of(found, settings)]
 
-    Parameters
-    ----------
-    difference
-        Of a rate that is better when lower.
-    rate, stage
-        What it is the difference of, as ``ERR`` and ``post``.
-    """
-    what, mean = f"{rate} of {stage}", 100 * difference.mean
-    if difference.frames == 0:
-        return f"Nothing to compare: {what} is undefined on every frame."
-    if difference.low is None or difference.high is None:
-        moved = f"rose by {mean:.1f} pp" if mean > 0 else f"fell by {-mean:.1f} pp"
-        return (
-            f"Cannot tell whether the filter helps on this drive: {what} "
-            f"{moved if mean else 'did not change'} on average, but {difference.reason}."
-        )
-    if difference.low == difference.high == 0:
-        return f"On this drive the filter leaves {what} of every frame as it is."
-    low, high = 100 * difference.low, 100 * difference.high
-    if low > 0:
-        return f"On this drive the filter raises {what} by {mean:.1f} pp [{low:.1f}, {high:.1f}]."
-    if high < 0:
-        return (
-            f"On this drive the filter lowers {what} by {-mean:.1f} pp [{-high:.1f}, {-low:.1f}]."
-        )
-    return (
-        f"On this drive the filter has no clear effect on {what}: "
-        f"{mean:+.1f} pp [{low:+.1f}, {high:+.1f}]."
+
+def on_blind(found: Difference, variant: str, settings: EvaluationSettings) -> str:
+    """Return how a variant does against the baseline; ``found`` is the variant minus that."""
+    better, relation = ("worse", "higher") if found.mean > 0 else ("better", "lower")
+    told, than = _Told(found), f"{_BLIND}: its {RATE} is"
+    sentences = {
+        Degree.UNDEFINED: f"{RATE} of {variant} is undefined on every frame.",
+        Degree.FEW: f"Too few frames to tell whether {variant} beats {_BLIND}: {RATE} {told.few}.",
+        Degree.SAME: f"{variant} has the same {RATE} as {_BLIND}, on every frame.",
+        Degree.SURE: f"{variant} is {better} than {than} {told.size} {relation} {told.sizes}.",
+        Degree.LITTLE: f"{variant} is as good as {than} the same to within {told.bound}.",
+        Degree.PROBABLE: (
+            f"{variant} is probably {better} than {than} {told.size} {relation} ({told.ends})."
+        ),
+        Degree.UNKNOWN: f"Cannot tell whether {variant} beats {_BLIND}: {RATE} {told.unknown}.",
+    }
+    return sentences[degree_of(found, settings)]
+
+
+class _Told:
+    """The numbers of a difference as sentences need them, in percentage points."""
+
+    def __init__(self, found: Difference) -> None:
+        low, high = found.low or 0.0, found.high or 0.0
+        self._digits = 1 if max(abs(found.mean), -low, high) >= 0.01 else 2
+        self.size = f"{self._number(abs(found.mean))} pp"
+        self.bound = f"{self._number(max(-low, high))} pp"
+        ends = (low, high) if found.mean > 0 else (-high, -low)
+        self.sizes = f"[{', '.join(map(self._number, ends))}]"
+        self.ends = f"between {self._signed(low)} and {self._signed(high)} pp"
+        here = f"{self._signed(found.mean)} on these {found.frames} frames"
+        ways = what_would_tell(found)
+        end = f". To tell takes {ways}" if ways else ""
+        self.unknown = f"changes by {self.ends} ({here}){end}"
+        self.few = f"changes by {self._signed(found.mean)} pp on these {found.frames}"
+
+    def _number(self, fraction: float) -> str:
+        return f"{in_percent(fraction):.{self._digits}f}"
+
+    def _signed(self, fraction: float) -> str:
+        text = f"{in_percent(fraction):+.{self._digits}f}"
+        return text if float(text) else text[1:]
+
+
+def _alone(totals: Mapping[str, Mapping[str, Any]], stages: Mapping[str, str]) -> str:
+    """Return the error rates where nothing is there to compare them with."""
+    rates = ", ".join(
+        f"{in_percent(totals[variant][stage][RATE]):.1f} % with {variant}"
+        for variant, stage in stages.items()
     )
+    return f"{RATE} is {rates}; no frame with truth was trained on, so {BASELINE} is unknown."
+
+
+def _lowest(differences: DriveDifferences) -> str:
+    """Return the variant with the lowest error rate; one that is undefined comes last."""
+    means = {name: rates[RATE].mean for name, rates in differences.blind.items()}
+    return min(means, key=lambda name: (math.isnan(means[name]), means[name]))

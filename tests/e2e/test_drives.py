@@ -72,7 +72,7 @@ def test_the_unfiltered_pipeline_does_what_a_prototype_did(real):
 def test_where_the_filter_harms_the_tables_say_so(street):
     assert pooled_error(street, "filtered") > pooled_error(street, "unfiltered")
     assert street.summary["difference"]["post"]["ERR"]["mean"] > 0
-    assert "  ERR  +" in street.run.stdout
+    assert "On this drive the filter raises ERR of post by " in street.run.stdout
 
 
 def test_the_filter_harms_on_a_real_street(real):

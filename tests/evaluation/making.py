@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
+from scipy import signal
 
 from roadeval.data import Counts, Frame, Mask, Output, StageResult, Tally, Truth, VariantResult
 from roadeval.data.arrays import Bits
@@ -76,3 +77,10 @@ def a_table(errors: Mapping[tuple[str, str], Sequence[int]], hertz: float = 10) 
                     }
                 )
     return pd.DataFrame(rows)
+
+
+def autoregression(rng: np.random.Generator, frames: int, rho: float) -> npt.NDArray[np.float64]:
+    """A drive of differences with mean 0, variance 1 and lag-1 correlation ``rho``."""
+    noise = rng.standard_normal(frames + 500)
+    series: npt.NDArray[np.float64] = signal.lfilter([1], [1, -rho], noise)[500:]
+    return series * np.sqrt(1 - rho**2)

@@ -1,50 +1,106 @@
-"""What neighbouring frames are worth."""
+"""The mean of a series whose neighbours resemble each other."""
 
 import numpy as np
 import pytest
 from scipy import stats
-from statsmodels.tsa.stattools import acovf
+from scipy.fft import dct
+from scipy.linalg import toeplitz
 
-from roadeval.evaluation.autocorrelation import autocovariance, error_of_mean
-from tests.evaluation.coverage import autoregression
+from roadeval.evaluation import autocorrelation
+from roadeval.evaluation.autocorrelation import frames_for, mean_distribution, series_for
+from tests.evaluation.making import autoregression
 
-RNG = np.random.default_rng(1)
-INDEPENDENT = RNG.standard_normal(400)
-
-
-@pytest.mark.parametrize("length", [4, 91, 100])
-def test_autocovariances_equal_statsmodels(length: int) -> None:
-    series = INDEPENDENT[:length]
-    expected = acovf(series, adjusted=False, fft=False)
-    assert autocovariance(series) == pytest.approx(expected, abs=1e-12)
+INDEPENDENT = np.random.default_rng(1).standard_normal(400)
+CONFIDENCE = 0.95
 
 
-def test_independent_frames_count_in_full() -> None:
-    error = error_of_mean(INDEPENDENT)
-    assert error.frames == pytest.approx(400, rel=0.05)
-    assert error.standard_error == pytest.approx(stats.sem(INDEPENDENT), rel=0.05)
+def width(series: np.ndarray) -> float:
+    low, high = mean_distribution(series).interval(CONFIDENCE)
+    return high - low
 
 
-def test_frames_that_repeat_their_neighbour_count_once() -> None:
-    rng = np.random.default_rng(2)
-    errors = [error_of_mean(np.repeat(rng.standard_normal(400), 5)) for _ in range(40)]
-    assert np.mean([error.frames for error in errors]) == pytest.approx(400, rel=0.1)
-    assert np.mean([error.standard_error for error in errors]) == pytest.approx(1 / 20, rel=0.05)
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.95, 0.999])
+@pytest.mark.parametrize("n", [12, 61])
+def test_variances_of_cosine_coefficients_and_of_the_mean_are_exact(rho: float, n: int) -> None:
+    cosines = dct(np.eye(n), axis=0, norm="ortho")
+    exact = np.diag(cosines @ toeplitz(rho ** np.arange(n)) @ cosines.T)
+    numbers, coefficient = np.arange(1, n), np.array([rho])
+    found = autocorrelation._cosine_variances(coefficient[:, None], numbers, n)[0]
+    of_mean = autocorrelation._variance_of_mean(coefficient, np.array([1.0]), n)
+    assert found == pytest.approx(exact[1:], rel=1e-9)
+    assert of_mean[0] == pytest.approx(exact[0] / n, rel=1e-9)
+
+
+def test_independent_frames_are_worth_about_as_many_and_give_students_interval() -> None:
+    found = mean_distribution(INDEPENDENT)
+    low, high = stats.t.interval(0.95, 399, INDEPENDENT.mean(), stats.sem(INDEPENDENT))
+    assert 250 < found.frames <= 400
+    assert found.interval(CONFIDENCE) == pytest.approx((low, high), abs=0.15 * (high - low))
 
 
 @pytest.mark.parametrize("rho", [0.5, 0.9])
 def test_a_first_order_autoregression_is_worth_its_known_number_of_frames(rho: float) -> None:
     series = autoregression(np.random.default_rng(2), 20_000, rho)
-    error = error_of_mean(series)
-    assert error.frames == pytest.approx(20_000 * (1 - rho) / (1 + rho), rel=0.15)
-    assert error.standard_error == pytest.approx(error.frames**-0.5, rel=0.1)
+    worth = 20_000 * (1 - rho) / (1 + rho)
+    assert mean_distribution(series).frames == pytest.approx(worth, rel=0.3)
+
+
+def test_frames_that_repeat_their_neighbour_tell_no_more_than_once() -> None:
+    assert width(np.repeat(INDEPENDENT, 5)) == pytest.approx(width(INDEPENDENT), rel=0.2)
+
+
+def test_a_slow_drift_below_noise_widens_the_interval() -> None:
+    rng = np.random.default_rng(3)
+    slow = autoregression(rng, 600, 0.98) + rng.standard_normal(600)
+    assert width(slow) > 2 * width(rng.permutation(slow))
 
 
 @pytest.mark.parametrize("series", [INDEPENDENT, np.tile([1.0, -1.0], 50), np.arange(50.0)])
 def test_no_series_is_worth_more_than_its_frames(series: np.ndarray) -> None:
-    error = error_of_mean(series)
-    assert 0 < error.frames_low <= error.frames <= len(series)
+    assert 0 < mean_distribution(series).frames <= len(series)
 
 
-def test_a_drift_is_worth_next_to_nothing() -> None:
-    assert error_of_mean(np.arange(91.0)).frames_low == 1
+def test_a_steady_climb_is_worth_next_to_nothing() -> None:
+    assert mean_distribution(np.arange(91.0)).frames < 3
+
+
+@pytest.mark.parametrize("series", [INDEPENDENT, np.maximum(INDEPENDENT - 1, 0)])
+def test_the_ends_of_an_interval_are_the_means_that_the_p_value_just_allows(
+    series: np.ndarray,
+) -> None:
+    found = mean_distribution(series)
+    for end in found.interval(CONFIDENCE):
+        assert found.p_value(end) == pytest.approx(0.05, rel=1e-6)
+    assert found.p_value(found.mean) > 0.9
+
+
+def test_bursts_lengthen_the_interval_on_their_side() -> None:
+    found = mean_distribution(np.maximum(INDEPENDENT - 1, 0))
+    low, high = found.interval(CONFIDENCE)
+    assert high - found.mean > 1.2 * (found.mean - low)
+    mirrored = mean_distribution(-np.maximum(INDEPENDENT - 1, 0)).interval(CONFIDENCE)
+    assert mirrored == pytest.approx((-high, -low))
+
+
+def test_the_unit_does_not_matter() -> None:
+    low, high = mean_distribution(INDEPENDENT).interval(CONFIDENCE)
+    found = mean_distribution(3 + 1e-3 * INDEPENDENT).interval(CONFIDENCE)
+    assert found == pytest.approx((3 + 1e-3 * low, 3 + 1e-3 * high), rel=1e-9)
+
+
+def test_a_narrower_interval_takes_more_frames_by_the_square() -> None:
+    half = width(INDEPENDENT) / 2
+    once, twice = (
+        frames_for(INDEPENDENT, half / ratio, CONFIDENCE, 10**6) for ratio in (1.01, 2.02)
+    )
+    assert 400 < once < 440
+    assert twice == pytest.approx(4 * once, rel=0.2)
+    assert frames_for(INDEPENDENT, half / 1000, CONFIDENCE, 10**6) is None
+
+
+def test_series_needed_are_those_of_students_interval_of_their_means() -> None:
+    found = mean_distribution(INDEPENDENT)
+    # t(0.975, n - 1) / sqrt(n) is 1.24 for 5 and 0.92 for 7.
+    assert series_for(found, 1.1 * found.scale, CONFIDENCE, 1000) in (5, 6, 7)
+    assert series_for(found, 100.0, CONFIDENCE, 1000) == 2
+    assert series_for(found, 1e-6, CONFIDENCE, 1000) is None

@@ -104,7 +104,7 @@ def test_totals_and_windows_follow_the_order_of_the_variants() -> None:
 
 
 def test_the_difference_is_filtered_minus_unfiltered_by_stage() -> None:
-    differences = a_drive(12, a_board()).differences()
+    differences = a_drive(12, a_board()).differences().filter
     assert list(differences) == ["svm", "post"]
     assert list(differences["post"]) == ["ACC", "ERR", "FNR", "FPR"]
     assert differences["post"]["ERR"].mean == pytest.approx(1 / 7)
@@ -116,13 +116,21 @@ def test_only_frames_that_both_variants_have_are_compared() -> None:
     board = a_board()
     for number, variants in enumerate([(FILTERED, UNFILTERED), (FILTERED,), (UNFILTERED,)]):
         board.add(board.score(a_frame(TRUTH, number), Role.EVALUATED, variants))
-    assert board.differences()["post"]["ERR"].frames == 1
+    assert board.differences().filter["post"]["ERR"].frames == 1
 
 
 def test_without_the_pair_there_is_no_difference() -> None:
     board = a_board()
     board.add(board.score(a_frame(TRUTH), Role.EVALUATED, (FILTERED,)))
-    assert board.differences() == {}
+    assert board.differences().filter == board.differences().blind == {}
+
+
+def test_every_final_mask_is_compared_with_the_baseline() -> None:
+    prior = BlindPrior.of_truths([1 - TRUTH])
+    differences = a_drive(12, a_board(prior)).differences().blind
+    assert list(differences) == ["filtered", "unfiltered"]
+    assert differences["unfiltered"]["ERR"].mean == pytest.approx(-1)
+    assert differences["filtered"]["ERR"].mean == pytest.approx(1 / 7 - 1)
 
 
 def test_a_variant_may_not_be_called_blind() -> None:

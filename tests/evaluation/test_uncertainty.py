@@ -1,104 +1,131 @@
-"""Differences between variants, and how sure they are."""
+"""Differences between masks, and how sure they are."""
 
 import math
 
 import numpy as np
 import pytest
 from scipy import stats
+from statsmodels.stats.multitest import multipletests
 
-from roadeval.evaluation.autocorrelation import error_of_mean
+from roadeval.evaluation.autocorrelation import mean_distribution
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.uncertainty import interval, mean_difference
-from tests.evaluation.coverage import autoregression, simulate
+from roadeval.evaluation.uncertainty import Difference, holm, mean_difference
+from tests.evaluation.making import autoregression
 
 SETTINGS = EvaluationSettings()
 INDEPENDENT = np.random.default_rng(3).normal(0.01, 0.02, 200)
 
 
+def of(differences: np.ndarray, settings: EvaluationSettings = SETTINGS) -> Difference:
+    """The mean of differences from a rate of 30 %."""
+    base = np.full(len(differences), 0.3)
+    return mean_difference(base + differences, base, settings)
+
+
 def test_the_mean_is_that_of_the_frames_that_have_a_difference() -> None:
-    found = mean_difference(np.array([0.25, np.nan, 0.75]), SETTINGS)
+    found = mean_difference(np.array([0.25, np.nan, 0.75]), np.array([0.0, 0.5, 0.0]), SETTINGS)
     assert (found.mean, found.frames) == (0.5, 2)
 
 
-def test_independent_frames_give_students_interval() -> None:
-    found = mean_difference(INDEPENDENT, SETTINGS)
+def test_independent_frames_give_about_students_interval() -> None:
+    found = of(INDEPENDENT)
     low, high = stats.t.interval(0.95, 199, INDEPENDENT.mean(), stats.sem(INDEPENDENT))
-    assert found.low == pytest.approx(low, abs=0.05 * (high - low))
-    assert found.high == pytest.approx(high, abs=0.05 * (high - low))
-    assert found.reason is None
+    assert (found.low, found.high) == pytest.approx((low, high), abs=0.1 * (high - low))
 
 
 def test_more_confidence_needs_a_wider_interval() -> None:
-    usual = mean_difference(INDEPENDENT, SETTINGS)
-    surer = mean_difference(INDEPENDENT, EvaluationSettings(confidence=0.99))
+    usual, surer = of(INDEPENDENT), of(INDEPENDENT, EvaluationSettings(confidence=0.99))
     assert surer.low < usual.low < usual.high < surer.high
 
 
-def test_neighbours_that_resemble_each_other_widen_the_interval() -> None:
-    once, thrice = (mean_difference(np.repeat(INDEPENDENT, k), SETTINGS) for k in (1, 3))
-    assert thrice.mean == pytest.approx(once.mean)
-    assert thrice.high - thrice.low == pytest.approx(once.high - once.low, rel=0.2)
+def test_an_interval_and_its_p_value_are_those_of_the_mean_s_distribution() -> None:
+    found, known = of(INDEPENDENT), mean_distribution(INDEPENDENT)
+    assert (found.low, found.high) == pytest.approx(known.interval(0.95), rel=1e-6)
+    assert found.p == pytest.approx(known.p_value(), rel=1e-6)
+    assert found.effective_frames == pytest.approx(known.frames)
 
 
-def test_the_interval_is_students_of_the_error_and_its_degrees_of_freedom() -> None:
-    error, found = error_of_mean(INDEPENDENT), interval(INDEPENDENT, SETTINGS)
-    ends = stats.t.interval(0.95, error.degrees, INDEPENDENT.mean(), error.standard_error)
-    assert (found.low, found.high) == pytest.approx(ends, rel=1e-12)
+@pytest.mark.parametrize("shift", [0.0, 0.002, 0.005, 0.02])
+def test_an_interval_leaves_out_zero_where_the_p_value_is_small(shift: float) -> None:
+    found = of(INDEPENDENT - 0.01 + shift)
+    assert (found.low > 0 or found.high < 0) == (found.p < 0.05)
 
 
 def test_a_handful_of_frames_gives_no_interval() -> None:
-    found = mean_difference(INDEPENDENT[:9], SETTINGS)
-    assert found.low is found.high is None
-    assert found.reason == "there are 9 frames, and an interval needs 10"
+    found = of(INDEPENDENT[:9])
+    assert found.low is found.high is found.p is found.effective_frames is None
+    assert of(INDEPENDENT[:10]).low is not None
+    assert of(INDEPENDENT[:10], EvaluationSettings(least_frames=11)).low is None
 
 
-def test_many_frames_that_are_worth_few_give_no_interval_either() -> None:
-    found = mean_difference(autoregression(np.random.default_rng(4), 91, 0.95), SETTINGS)
-    assert found.low is found.high is None
-    assert found.effective_frames_low < 10
-    assert found.reason.startswith("91 frames are worth about")
+def test_frames_that_are_all_alike_have_an_interval_of_everything_that_can_be() -> None:
+    found = of(0.1 * np.random.default_rng(5).standard_normal(91).cumsum())
+    assert (found.low, found.high) == (-0.3, 0.7)
+    assert found.p > 0.05
+    assert found.effective_frames < 3
 
 
 def test_no_frame_at_all_has_no_mean() -> None:
-    found = mean_difference(np.array([np.nan, np.nan]), SETTINGS)
+    found = of(np.array([np.nan, np.nan]))
     assert math.isnan(found.mean)
     assert found.frames == 0
     assert found.low is None
 
 
-@pytest.mark.parametrize("everywhere", [0.0, 0.25])
+@pytest.mark.parametrize(("everywhere", "p"), [(0.0, 1.0), (0.25, 0.0)])
 def test_the_same_difference_on_ten_frames_has_an_interval_without_width(
-    everywhere: float,
+    everywhere: float, p: float
 ) -> None:
-    found = mean_difference(np.full(10, everywhere), SETTINGS)
-    assert (found.mean, found.low, found.high) == (everywhere,) * 3
-    assert found.reason == "the same on every frame"
-
-
-@pytest.mark.parametrize("everywhere", [0.0, 0.25])
-def test_the_same_difference_on_a_handful_of_frames_has_no_interval(everywhere: float) -> None:
-    found = mean_difference(np.full(9, everywhere), SETTINGS)
-    assert (found.mean, found.low, found.high) == (everywhere, None, None)
-    assert found.reason == "there are 9 frames, and an interval needs 10"
+    base = np.full(10, 0.5)
+    found = mean_difference(base + everywhere, base, SETTINGS)
+    assert (found.mean, found.low, found.high, found.p) == (everywhere,) * 3 + (p,)
 
 
 def test_frames_mostly_without_a_difference_have_an_interval_all_the_same() -> None:
-    found = mean_difference(np.r_[np.zeros(60), 0.1, np.zeros(30)], SETTINGS)
+    found = of(np.r_[np.zeros(60), 0.1, np.zeros(30)])
     assert found.low < found.mean < found.high
 
 
-@pytest.mark.parametrize(("rho", "frames"), [(0.5, 91), (0.5, 500), (0.9, 500), (0.9, 2000)])
-def test_given_intervals_hold_about_as_often_as_they_claim(rho: float, frames: int) -> None:
-    found = simulate(rho, frames, 150, SETTINGS)
-    assert found.withheld < 0.25
-    assert abs(found.given - 0.95) < 0.08
+def test_what_would_tell_is_given_where_an_interval_does_not() -> None:
+    unsure = of(10 * (INDEPENDENT - INDEPENDENT.mean()) + 0.01)
+    assert unsure.low < 0 < unsure.high
+    assert unsure.frames_needed > 200
+    assert unsure.drives_needed >= 2
+    assert of(INDEPENDENT).frames_needed is of(INDEPENDENT).drives_needed is None
 
 
-def test_on_a_short_drive_of_like_frames_intervals_are_withheld() -> None:
-    found = simulate(0.9, 91, 300, SETTINGS)
-    assert found.withheld > 0.98
-    assert found.naive < 0.5
+def test_an_effect_that_is_negligible_anyway_needs_nothing_more() -> None:
+    small = of((INDEPENDENT - INDEPENDENT.mean()) / 10)
+    assert small.low < 0 < small.high
+    assert small.frames_needed is None
+    strict = of((INDEPENDENT - INDEPENDENT.mean()) / 10, EvaluationSettings(negligible=1e-5))
+    assert strict.frames_needed > 200
 
 
-def test_the_naive_interval_does_not_hold_on_autocorrelated_frames() -> None:
-    assert simulate(0.9, 500, 150, SETTINGS).naive < 0.87
+@pytest.mark.parametrize(("rho", "frames"), [(0.5, 91), (0.9, 60), (0.9, 91), (0.95, 190)])
+def test_intervals_hold_about_as_often_as_they_claim(rho: float, frames: int) -> None:
+    rng = np.random.default_rng(7)
+    drives = [mean_distribution(autoregression(rng, frames, rho)) for _ in range(150)]
+    held = np.mean([drive.p_value() >= 0.05 for drive in drives])
+    assert 0.9 <= held <= 0.99
+
+
+def with_p(p: float | None) -> Difference:
+    return Difference(0.1, 0.0, 0.2, 0.95, p, 91, 20.0)
+
+
+def test_holm_s_correction_is_that_of_statsmodels() -> None:
+    values = [0.03, 0.001, 0.2, 0.04, 0.011]
+    found = holm([with_p(p) for p in values])
+    assert [each.p_holm for each in found] == pytest.approx(
+        multipletests(values, method="holm")[1].tolist()
+    )
+    assert {each.comparisons for each in found} == {5}
+    assert [each.p for each in found] == values
+
+
+def test_what_was_not_tested_is_not_counted() -> None:
+    same = Difference(0.0, 0.0, 0.0, 0.95, 1.0, 91, 91.0)
+    found = holm([with_p(0.01), with_p(None), same, with_p(0.02)])
+    assert [each.p_holm for each in found] == [0.02, None, None, 0.02]
+    assert [each.comparisons for each in found] == [2, None, None, 2]

@@ -4,7 +4,7 @@ import pandas as pd
 
 from roadeval.report.blocks import Heading
 from roadeval.report.drive import document
-from tests.report.making import some_findings
+from tests.report.making import a_pair, some_findings
 
 
 def sections(findings):
@@ -26,8 +26,8 @@ def test_with_truth_the_sections_go_from_the_verdict_to_the_settings():
         finals={"filtered": "post"},
         regions=pd.DataFrame([row]),
         error_parts={"filtered": {"svm": 0.2, "post": -0.1}},
+        paired=[a_pair([-0.1], [-1])],
     )
-    findings.summary["totals"] = {"filtered": findings.totals["filtered"]}
     assert sections(findings) == [
         "Summary",
         "Over the drive: the paper's tables and figures",

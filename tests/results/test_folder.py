@@ -360,7 +360,7 @@ def test_a_folder_without_results_says_how_to_make_some(tmp_path: Path) -> None:
         ResultsFolder(tmp_path)
 
 
-SHORT = '{"format": {"name": "roadeval-summary", "version": 2}}'
+SHORT = '{"format": {"name": "roadeval-summary", "version": 3}}'
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"format": {"name": "roadeval-summary"}}', SHORT])
@@ -374,7 +374,7 @@ def test_the_summary_writes_undefined_as_null_and_keeps_its_order() -> None:
     document = json.loads(summary_text(the_rest(a_board()) | {"totals": {"ERR": math.nan}}))
     assert tuple(document) == tuple(part for part in PARTS if part not in LATER)
     assert document["totals"] == {"ERR": None}
-    assert document["format"] == {"name": "roadeval-summary", "version": 2}
+    assert document["format"] == {"name": "roadeval-summary", "version": 3}
 
 
 def test_a_summary_with_a_part_too_few_or_too_many_is_refused() -> None:

@@ -31,7 +31,15 @@ def test_a_summary_of_version_1_takes_todays_shape():
     }
 
 
-@pytest.mark.parametrize("version", [0, 3, None])
+def test_what_version_2_said_of_differences_is_left_out_for_the_tables_tell():
+    old = {"format": {**FORMAT, "version": 2}, "verdict": "Cannot tell.", "difference": {}}
+    assert parse_summary(json.dumps(old | {"totals": {}}), "old.rrd") == {
+        "format": FORMAT,
+        "totals": {},
+    }
+
+
+@pytest.mark.parametrize("version", [0, 4, None])
 def test_another_version_is_refused_where_it_lies(version):
     text = json.dumps({"format": {**FORMAT, "version": version}})
     with pytest.raises(ResultsError, match=r"^new\.rrd: not a summary of format"):

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.cli.screens import tables
-from roadeval.cli.screens.tables import Row, interval, percent, points
+from roadeval.cli.screens.tables import Row, marked, percent, points
 from roadeval.data.words import defined
 from roadeval.evaluation.metrics import SHORT
+from roadeval.results.certainty import correction, too_few
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -31,6 +32,8 @@ def show(content: Mapping[str, Any], out: Console) -> None:
         else:
             out.print(title, soft_wrap=True)
             tables.show(("variant", "stage"), LEVEL, list(_levels(rows)), out)
+        if legend := correction(change["difference"].get("ERR", {}) for change in rows):
+            out.print(legend)
         for change in rows:
             told = change["difference"].get("ERR")
             if change["final"] and told and told["low"] is None:
@@ -65,7 +68,7 @@ def _changes(changes: Sequence[Change]) -> Iterator[Row]:
                     percent(change["base"][rate]),
                     percent(change["new"][rate]),
                     points(told[rate]["mean"]),
-                    interval(told[rate]["low"], told[rate]["high"]),
+                    marked(told[rate]),
                 ],
                 bold=change["final"] and first,
                 ends=change["final"] and rate == rates[-1],
@@ -93,4 +96,4 @@ def _unsure(told: Mapping[str, Any]) -> str:
     """Return why there is no interval."""
     if not defined(told["mean"]):
         return "ERR is undefined on every frame"
-    return f"no interval, {told['reason']}"
+    return f"no interval: {too_few(told['frames'])}"

@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.cli import console
 from roadeval.cli.screens import seeds, tables
-from roadeval.cli.screens.tables import Row, interval, percent, points
+from roadeval.cli.screens.tables import Row, marked, percent, points
 from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.data.words import defined
+from roadeval.evaluation.differences import final_stages
 from roadeval.evaluation.metrics import FULL, SHORT
+from roadeval.results.certainty import correction
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
     from roadeval.jobs.replay import Outcome
 
 RATES: Final = {"ERR": "ERR %", "pooled_ERR": "pooled ERR %"} | {n: f"{n} %" for n in FULL}
 """The rates of every stage, with the titles of their columns."""
+OTHERS: Final = tuple(rate for rate in SHORT if rate != "ERR")
+"""The rates whose differences stand beside that of ERR."""
 
 Totals = Mapping[str, Mapping[str, Mapping[str, Any]]]
 """Counts and rates by variant and stage, as ``totals`` in ``summary.json``."""
+ByRate = Mapping[str, Mapping[str, Any]]
+"""Differences of two masks, as in ``summary.json``."""
 
 
 def show(outcome: Outcome, out: Console) -> None:
@@ -33,6 +38,8 @@ def show(outcome: Outcome, out: Console) -> None:
     out.print(f"{summary['drive']['name']}: {accounting(summary)}")
     out.print()
     if summary["totals"]:
+        out.print(summary["verdict"])
+        out.print()
         _show_scores(summary, out)
     else:
         out.print(f"Nothing to score: {_why_nothing(summary['frames'])}.")
@@ -56,10 +63,14 @@ def _show_scores(summary: Mapping[str, Any], out: Console) -> None:
     out.print()
     out.print(best(summary["totals"]))
     repeats = summary.get("seeds", {})
-    if final := summary["difference"].get(FINAL_STAGE):
-        out.print(f"{FILTERED} minus {UNFILTERED}, {FINAL_STAGE}, in percentage points:")
-        out.print(differences(final, seeds.differences(repeats)))
-    out.print(summary["verdict"])
+    if pairs := dict(_pairs(summary)):
+        out.print()
+        confidence = percent(next(iter(pairs.values()))["ERR"]["confidence"], 0)
+        titles = ("ERR, pp", f"{confidence} % interval", *(f"{rate}, pp" for rate in OTHERS))
+        tables.show(("final masks",), titles, differences(pairs), out)
+        out.print(correction(by_rate["ERR"] for by_rate in pairs.values()))
+        for rate, told in seeds.differences(repeats).items():
+            out.print(f"{FILTERED} - {UNFILTERED}, {rate}, pp, {told}")
     if repeats:
         out.print()
         seeds.show(repeats, RATES, out)
@@ -99,21 +110,28 @@ def best(totals: Totals) -> str:
     return f"Lowest ERR: {winner}{aside}, {percent(totals[winner][FINAL_STAGE]['ERR'])} %"
 
 
-def differences(
-    final: Mapping[str, Mapping[str, Any]], by_seed: Mapping[str, str] | None = None
-) -> Table:
-    """Tabulate what the filter changed in the final mask: percentage points, and how sure.
+def _pairs(summary: Mapping[str, Any]) -> Iterator[tuple[str, ByRate]]:
+    """Yield what is subtracted from what, of final masks, and the differences."""
+    stages = final_stages((name, stage) for name, own in summary["totals"].items() for stage in own)
+    if changed := summary["difference"].get(stages.get(FILTERED)):
+        yield f"{FILTERED} - {UNFILTERED}", changed
+    for variant, difference in summary["against_blind"].items():
+        yield f"{variant} - {BASELINE}", difference
 
-    ``by_seed`` says by rate what further trainings make of it.
-    """
-    from rich.table import Column, Table
 
-    table = Table.grid("rate", Column(justify="right"), "interval", "seeds", padding=(0, 2, 0, 0))
-    for rate in SHORT:
-        if rate in final:
-            sure, others = _certainty(final[rate]), (by_seed or {}).get(rate, "")
-            table.add_row(f"  {rate}", points(final[rate]["mean"]), sure, others)
-    return table
+def differences(pairs: Mapping[str, ByRate]) -> list[Row]:
+    """Return a row for each pair: the difference of ERR with its interval, and those of others."""
+    return [
+        Row(
+            [
+                name,
+                points(by_rate["ERR"]["mean"]),
+                marked(by_rate["ERR"]),
+                *(points(by_rate[rate]["mean"]) for rate in OTHERS),
+            ]
+        )
+        for name, by_rate in pairs.items()
+    ]
 
 
 def _show_files(outcome: Outcome, out: Console) -> None:
@@ -130,13 +148,6 @@ def size(file: Path) -> str:
     """Write a file's size for a person."""
     bytes_ = file.stat().st_size
     return f"{bytes_ / 1e6:.1f} MB" if bytes_ >= 1e6 else f"{max(bytes_ / 1e3, 0.1):.1f} kB"
-
-
-def _certainty(difference: Mapping[str, Any]) -> str:
-    if not defined(difference["low"]):
-        return f"no interval: {difference['reason']}"
-    confidence = percent(difference["confidence"], 0)
-    return f"{confidence} % interval {interval(difference['low'], difference['high'])}"
 
 
 def _lowest(totals: Totals) -> str | None:

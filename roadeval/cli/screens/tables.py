@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data import words
+from roadeval.results.certainty import MARK, stands
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -70,6 +71,12 @@ def points(difference: float | None, digits: int = 2) -> str:
 def interval(low: float | None, high: float | None) -> str:
     """Return an interval of a difference in percentage points."""
     return _ascii(words.interval(low, high))
+
+
+def marked(difference: Mapping[str, Any]) -> str:
+    """Return the interval of a difference, with a mark where it stands after correction."""
+    stands_out = stands(difference["p_holm"], difference["confidence"])
+    return f"{interval(difference['low'], difference['high'])} {MARK if stands_out else ' '}"
 
 
 def _ascii(text: str) -> str:

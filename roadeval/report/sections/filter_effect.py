@@ -12,27 +12,28 @@ from roadeval.report.figures.charts import difference
 from roadeval.report.figures.files import svg
 from roadeval.report.findings import Findings, PairedComparison
 from roadeval.report.sections.common import sampled_frames, variant_cell
+from roadeval.results.certainty import MARK, correction, stands, too_few
 
 
 def section(findings: Findings) -> Iterator[Block]:
     """Yield what the filter changed, how much masks flicker, and who beats the baseline."""
     filters = [each for each in findings.paired if each.control != BASELINE]
     blind = [each for each in findings.paired if each.control == BASELINE]
-    yield Heading("Filtered against unfiltered")
     for each in filters:
+        yield Heading("Filtered against unfiltered")
         yield from _paired(findings, each)
-    if not filters:
-        yield Text("The two were not both run, so there is nothing to compare.")
-    yield from _flicker(findings)
     if blind:
-        yield Heading("Against a guess that never looks at the image", 2)
+        yield Heading("Against a guess that never looks at the image", 2 if filters else 1)
         yield _against_baseline(findings, blind)
         yield Text(
             f"{BASELINE}: the training frames' mean truth, thresholded at one half. A variant that "
             "does not beat it has learnt nothing from the pixels. Differences are the variant "
-            "minus the guess; intervals as above.",
+            "minus the guess, with intervals that allow for neighbouring frames' likeness.",
             "note",
         )
+    if legend := correction(pair.differences["ERR"] for pair in findings.paired):
+        yield Text(legend, "note")
+    yield from _flicker(findings)
 
 
 def _paired(findings: Findings, pair: PairedComparison) -> Iterator[Block]:
@@ -61,7 +62,7 @@ def _differences(findings: Findings, pair: PairedComparison) -> Table:
                 rate,
                 *(percent(findings.total(name)[rate]) for name in names),
                 Cell(points(change["mean"]), bold=True),
-                interval(change["low"], change["high"]),
+                _interval(change),
                 number(change["frames"]),
                 DASH if (worth := change["effective_frames"]) is None else f"{worth:.0f}",
             ]
@@ -74,16 +75,19 @@ def _differences(findings: Findings, pair: PairedComparison) -> Table:
     )
 
 
+def _interval(change: Mapping[str, Any]) -> str:
+    """Return an interval, with a mark where the difference stands after correction."""
+    mark = f" {MARK}" if stands(change["p_holm"], change["confidence"]) else ""
+    return interval(change["low"], change["high"]) + mark
+
+
 def _method(change: Mapping[str, Any]) -> str:
     if change["low"] is None:
-        return (
-            f"No interval for ERR: {change['reason']}. It would claim more than these frames know."
-        )
-    how = change.get("method") or change.get("reason")
+        return f"No interval for ERR: {too_few(change['frames'])}."
     return (
-        f"{100 * change['confidence']:.0f} % intervals ({how}). Neighbouring frames resemble each "
-        "other; effective says how many independent ones they are worth. All of this concerns "
-        "this drive only."
+        f"{100 * change['confidence']:.0f} % intervals. Neighbouring frames resemble each other, "
+        "and the intervals are the wider for it; effective says how many independent frames would "
+        "tell as much. All of this concerns this drive only."
     )
 
 
@@ -149,7 +153,7 @@ def _against_baseline(findings: Findings, blind: Sequence[PairedComparison]) -> 
                 variant_cell(pair.treated, [*findings.finals]),
                 percent(findings.total(pair.treated)["ERR"]),
                 Cell(points((change := pair.differences["ERR"])["mean"]), bold=True),
-                interval(change["low"], change["high"]),
+                _interval(change),
                 number(int((pair.frames["ERR"] < 0).sum())),
                 number(int((pair.frames["ERR"] > 0).sum())),
             ]

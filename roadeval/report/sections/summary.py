@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
+from roadeval.data import BASELINE
 from roadeval.data.words import defined, listing, number, percent
 from roadeval.evaluation.metrics import FULL, METRICS, OVERLAP
 from roadeval.report.blocks import (
@@ -163,13 +163,13 @@ def _undefined(findings: Findings) -> Iterator[str]:
 
 
 def _how_sure(findings: Findings) -> str:
-    change = findings.summary.get("difference", {}).get(FINAL_STAGE, {}).get("ERR")
-    if not change or change["low"] is None:
+    changes = [pair.differences["ERR"] for pair in findings.paired]
+    if not any(defined(change["low"]) for change in changes):
         return "The verdict concerns this drive only." if findings.totals else ""
     return (
-        f"{FILTERED} minus {UNFILTERED}, {100 * change['confidence']:.0f} % interval over "
-        f"{change['frames']} frames that are worth about {change['effective_frames']:.0f} "
-        "independent ones. The verdict concerns this drive only."
+        f"In brackets: {100 * changes[0]['confidence']:.0f} % intervals, which allow for "
+        "neighbouring frames that resemble each other. Probably: by chance alone, one drive in ten "
+        "would show as much in that direction. The verdict concerns this drive only."
     )
 
 

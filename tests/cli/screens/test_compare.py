@@ -9,7 +9,14 @@ from roadeval.cli.screens import compare as changes
 
 def row(result, variant):
     """A final mask's change, without an interval."""
-    unsure = {"mean": 0.01, "low": None, "high": None, "reason": "there are 4 frames"}
+    unsure = {
+        "mean": 0.01,
+        "low": None,
+        "high": None,
+        "frames": 4,
+        "confidence": 0.95,
+        "p_holm": None,
+    }
     rates = {"ERR": 0.1, "FPR": 0.1, "FNR": 0.1}
     names = {"result": result, "variant": variant, "stage": "post", "final": True, "frames": 4}
     return {**names, "base": rates, "new": rates, "difference": dict.fromkeys(rates, unsure)}
@@ -33,7 +40,7 @@ def test_each_result_has_a_table_even_where_one_is_called_like_a_variant():
 def test_the_variants_of_a_single_result_stand_together():
     told = shown([row("filtered", "filtered"), row("wide", "wide")])
     assert told.count("against base") == 1
-    assert told.count("no interval, there are 4 frames") == 2
+    assert told.count("no interval: 4 frames are too few") == 2
 
 
 def test_the_screen_ends_with_the_verdict():

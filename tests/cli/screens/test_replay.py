@@ -27,8 +27,13 @@ TOTALS = {
 }
 
 
-def difference(mean, low, high, reason=None):
-    return {"mean": mean, "low": low, "high": high, "confidence": 0.95, "reason": reason}
+def difference(mean, low=None, high=None, p_holm=None):
+    told = {"mean": mean, "low": low, "high": high, "confidence": 0.95}
+    return told | {"p_holm": p_holm, "comparisons": 2 if p_holm else None}
+
+
+def by_rate(err):
+    return {"ERR": err, "FPR": difference(0.001), "FNR": difference(-0.002)}
 
 
 def summary(**changed):
@@ -37,7 +42,8 @@ def summary(**changed):
         "frames": {"in_log": 101, "read": 101, "evaluated": 91, "skipped": {"trained on": 10}},
         "windows": 10,
         "totals": TOTALS,
-        "difference": {"post": {"ERR": difference(0.0065, 0.001, 0.012)}},
+        "difference": {"post": by_rate(difference(0.0065, 0.001, 0.012, 0.02))},
+        "against_blind": {},
         "verdict": "On this drive the filter harms.",
     } | changed
 
@@ -79,13 +85,26 @@ def test_an_undefined_rate_wins_nothing_and_is_a_dash():
 
 
 def test_a_difference_is_told_in_points_with_its_interval():
-    assert "ERR +0.65 95 % interval +0.10 to +1.20" in lines(summary())
+    shown = lines(summary())
+    assert "final masks ERR, pp 95 % interval FPR, pp FNR, pp" in shown
+    assert "filtered - unfiltered +0.65 +0.10 to +1.20 * +0.10 -0.20" in shown
 
 
-def test_a_difference_without_an_interval_is_told_with_the_reason():
-    final = {"ERR": difference(-0.002, None, None, reason="5 frames, and an interval needs 10")}
-    shown = lines(summary(difference={"post": final}))
-    assert "ERR -0.20 no interval: 5 frames, and an interval needs 10" in shown
+def test_a_difference_that_does_not_stand_bears_no_mark():
+    unsure = {"filtered": by_rate(difference(0.0065, -0.001, 0.012, 0.08))}
+    shown = lines(summary(against_blind=unsure))
+    assert "filtered - blind +0.65 -0.10 to +1.20 +0.10 -0.20" in shown
+    assert "stands after Holm's correction for the 2 differences of ERR" in " ".join(shown)
+
+
+def test_the_verdict_comes_before_the_tables():
+    shown = lines(summary())
+    assert shown[2] == "On this drive the filter harms."
+
+
+def test_a_difference_without_an_interval_has_none():
+    shown = lines(summary(difference={"post": by_rate(difference(-0.002))}))
+    assert "filtered - unfiltered -0.20 none given +0.10 -0.20" in shown
 
 
 def test_the_frames_are_accounted_for():

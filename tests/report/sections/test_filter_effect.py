@@ -42,7 +42,7 @@ def test_the_table_has_both_rates_their_difference_and_how_sure_it_is():
     )
     assert table.columns[1:3] == ["filtered", "unfiltered"]
     assert plain_rows(table)[0] == [
-        *("ERR", "10.00", "15.00", f"{MINUS}2.00", f"{MINUS}3.00 to {MINUS}1.00", "1,200", "40")
+        *("ERR", "10.00", "15.00", f"{MINUS}2.00", f"{MINUS}3.00 to {MINUS}1.00 *", "1,200", "40")
     ]
 
 
@@ -50,7 +50,7 @@ def test_where_there_is_no_interval_the_reason_is_given():
     pair = a_pair([-0.1], [-1])
     pair.differences["ERR"].update(a_difference(-0.02))
     assert any(
-        text.startswith("No interval for ERR: too few frames.")
+        text.startswith("No interval for ERR: 1200 frames are too few")
         for text in texts(some_findings(paired=[pair]))
     )
 
@@ -58,7 +58,7 @@ def test_where_there_is_no_interval_the_reason_is_given():
 def test_where_err_is_undefined_nothing_is_said_about_frames():
     pair = a_pair([math.nan], [0])
     pair.differences["ERR"]["mean"] = None
-    (text,) = texts(some_findings(paired=[pair]))
+    text, *_ = texts(some_findings(paired=[pair]))
     assert text.startswith("ERR is undefined on every frame")
 
 

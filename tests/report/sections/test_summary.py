@@ -6,7 +6,7 @@ import pytest
 
 from roadeval.report.blocks import BulletList, Table, Text
 from roadeval.report.sections.summary import rates_table, section, warnings
-from tests.report.making import a_difference, column, plain_rows, some_findings
+from tests.report.making import a_pair, column, plain_rows, some_findings
 
 
 def bold(table, title):
@@ -111,14 +111,11 @@ def test_a_drive_that_trained_itself_says_so():
 
 
 def test_the_page_has_the_verdict_how_sure_it_is_and_every_count():
-    findings = some_findings()
-    findings.summary["difference"] = {"post": {"ERR": a_difference(-0.02, -0.03, -0.01)}}
+    findings = some_findings(paired=[a_pair([-0.1], [-1])])
     blocks = list(section(findings))
     texts = [block.text for block in blocks if isinstance(block, Text)]
     assert texts[0] == "It helps."
-    assert texts[1].startswith(
-        "filtered minus unfiltered, 95 % interval over 1200 frames that are worth about 40 "
-    )
+    assert texts[1].startswith("In brackets: 95 % intervals, which allow for neighbouring frames")
     (counts,) = (block.left[0] for block in blocks if hasattr(block, "left"))
     assert isinstance(counts, Table)
     assert plain_rows(counts) == [
