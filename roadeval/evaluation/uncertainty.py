@@ -40,10 +40,24 @@ AR 0.8, t3            600     49    97  100/100    93   99/100   0.48
 slow 0.95 + noise      91     34    81    70/99    82    64/97   1.37
 slow 0.95 + noise     190     34    86   81/100    89    72/99   1.30
 slow 0.95 + noise     600     32    92   98/100    94   99/100   0.73
+slow 0.95 + noise    3000     33    95  100/100    94  100/100   0.32
+slow 0.98 + noise     190     21    75    72/98    81    64/95   1.55
+slow 0.98 + noise     600     23    88   83/100    90    75/99   1.19
+slow 0.98 + noise    3000     22    93  100/100    94  100/100   0.52
+two memories          190     26    80    74/99    74    81/99   0.89
+two memories          600     24    87   90/100    85   86/100   0.96
+bursts                 91     36    78    73/89    88    85/98   2.23
+bursts                190     36    86    91/99    96   99/100   1.72
+bursts                600     38    93  100/100    96  100/100   0.70
+bursts               3000     39    96  100/100    93  100/100   0.26
+bursts, reversed       91     34    77    66/84    88    36/58   2.13
+bursts, reversed      190     37    87    77/97    95    38/68   1.69
 =================  ======  =====  ====  =======  ====  =======  =====
 
 What cannot be seen is not allowed for: a drift that noise hides on a short drive, or one that takes
-longer than the drive. There four of five intervals hold rather than nineteen of twenty.
+longer than the drive. There three or four of five intervals hold rather than nineteen of twenty.
+The model's settings were chosen with drives of these kinds in sight, so that others may hold a
+little less often.
 """
 
 from __future__ import annotations
