@@ -68,9 +68,9 @@ def test_replay_and_train_compile_before_all_else(tmp_path, monkeypatch):
 
     folder = {"save": tmp_path / "out.rrd", "reports": tmp_path / "reports"}
     roadeval.replay(drive, **folder, on_progress=note)
-    assert seen() == ["compiling", "training", "replaying", "writing"]
+    assert seen() == ["compiling", "training", "hashing", "replaying", "writing"]
     roadeval.train([drive], tmp_path / "x.model", on_progress=note)
     assert seen() == ["compiling", "training"]
     learnt = settings(model=tmp_path / "x.model", record="none")
     roadeval.replay(drive, learnt, **folder, on_progress=note)
-    assert seen() == ["compiling", "replaying", "writing"]
+    assert seen() == ["compiling", "hashing", "replaying", "writing"]

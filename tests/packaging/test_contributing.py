@@ -179,7 +179,7 @@ def test_the_metric_is_on_the_screen_of_replay(workshop):
     assert first.startswith("    stage       frames  ERR %  pooled ERR %  FPR %  FNR %   ACC %\n")
     assert second.startswith("    stage       BACC %\n")
     assert max(map(len, workshop.screen.splitlines())) <= 80
-    assert re.search(r"\n  BACC +[+-]?\d+\.\d\d  ", workshop.screen)
+    assert re.search(r"\nfinal masks .* BACC, pp\n", workshop.screen)
 
 
 def test_the_metric_is_on_the_screen_of_compare(workshop):

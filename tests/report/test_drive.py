@@ -4,7 +4,7 @@ import pandas as pd
 
 from roadeval.report.blocks import Heading
 from roadeval.report.drive import document
-from tests.report.making import a_pair, some_findings
+from tests.report.making import VARIANTS, a_pair, some_findings
 
 
 def sections(findings):
@@ -23,8 +23,7 @@ def test_without_truth_there_are_masks_in_place_of_rates():
 def test_with_truth_the_sections_go_from_the_verdict_to_the_settings():
     row = {"variant": "filtered", "region": "lit", "pixels": 1.0, "ERR": 0.1, "errors": 1.0}
     findings = some_findings(
-        finals={"filtered": "post"},
-        regions=pd.DataFrame([row]),
+        regions=pd.DataFrame([row | {"variant": name} for name in VARIANTS]),
         error_parts={"filtered": {"svm": 0.2, "post": -0.1}},
         paired=[a_pair([-0.1], [-1])],
     )
