@@ -124,7 +124,7 @@ def compare(
     base, *others = sides
     if base.digest is None or len({side.digest for side in sides}) > 1:
         levels = tuple(row for side in sides for row in _levels(side))
-        return Comparison(False, results, levels, levels, (), (_why_apart(sides),))
+        return Comparison(False, results, levels, levels, (), (_why_apart(sides),), settings)
     pairs = [_Pair(base, new, settings, across_variants=across_variants) for new in others]
     return Comparison(
         same_drive=True,
@@ -133,6 +133,7 @@ def compare(
         levels=tuple(row for side in others for row in _levels(side)),
         moved=tuple(frame for pair in pairs for frame in pair.moved()),
         notes=tuple(note for pair in pairs for note in pair.notes()),
+        settings=settings,
     )
 
 

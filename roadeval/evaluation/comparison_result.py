@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference
 
 
@@ -139,6 +140,8 @@ class Comparison:
         The frames that changed most.
     notes
         What was left out, and what makes the results less comparable than they look.
+    settings
+        The confidence of the intervals, and what is negligible.
     """
 
     same_drive: bool
@@ -147,3 +150,4 @@ class Comparison:
     levels: tuple[MaskComparison, ...]
     moved: tuple[MovedFrame, ...]
     notes: tuple[Note, ...]
+    settings: EvaluationSettings

@@ -17,7 +17,7 @@ needs no base: between different drives it is judged on every result. Nothing is
 ``post.filtered.ERR > +0.5pp surely`` holds where the whole interval of the change lies beyond the
 limit. The interval is in doubt about frames, not about what the training's seed draws, so the limit
 must leave room for that: of 20 ordered pairs of five seeds on a drive of CamVid (0006R0) two trip
-+0.5 pp, and none trips it surely; without room, at +0 pp, five still do. Only the
++0.5 pp, and none trips it surely; without room, at +0 pp, seven still do. Only the
 change of a mean of the frames' rates has an interval: of ACC, ERR, FNR and FPR, and not of what
 mirrors them. A level is that of these very frames, and an interval around it would tell of frames
 that nobody evaluated.

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from roadeval.data import BASELINE
-from roadeval.data.words import MINUS, defined, percent, points
+from roadeval.data.words import MINUS, percent, points
 from roadeval.evaluation.comparison_result import (
     Comparison,
     DrivesDiffer,
@@ -20,6 +20,8 @@ from roadeval.evaluation.comparison_result import (
     TruthDiffers,
 )
 from roadeval.evaluation.conditions import Judgement
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.results.certainty import Degree, degree_of, too_few, what_would_tell
 
 FORMAT: Final = {"name": "roadeval-comparison", "version": 1}
 
@@ -48,9 +50,9 @@ def verdict(comparison: Comparison) -> str:
     finals = [row for row in comparison.changes if row.final]
     # The baseline never looks at the image: its change tells nothing of a method.
     told = [row for row in finals if row.variant != BASELINE] or finals
-    base, confidence = comparison.results[0].label, told[0].difference["ERR"].confidence
-    changes = "; ".join(map(_change, told))
-    return f"Against {base}: {changes} ({percent(confidence, 0)} % intervals)."
+    base, settings = comparison.results[0].label, comparison.settings
+    changes = "; ".join(_change(row, settings) for row in told)
+    return f"Against {base}: {changes} ({percent(settings.confidence, 0)} % intervals)."
 
 
 def warnings(comparison: Comparison) -> list[str]:
@@ -79,20 +81,25 @@ def _condition(judgement: Judgement) -> dict[str, Any]:
     return {**facts.pop("condition"), **facts, "sentence": judged(judgement)}
 
 
-def _change(row: MaskComparison) -> str:
-    """Return in a clause what happened to the ERR of a mask."""
+def _change(row: MaskComparison, settings: EvaluationSettings) -> str:
+    """Return in a clause what happened to the ERR of a mask, and how sure that is."""
     change = row.difference["ERR"]
     name = row.result if row.result == row.variant else f"{row.variant} of {row.result}"
-    if not defined(change.mean):
-        return f"{name}: ERR is undefined on every frame"
+    better = "worse" if change.mean > 0 else "better"
     mean = f"ERR {_points(change.mean)} pp"
-    if change.low is None or change.high is None:
-        return f"{name}: cannot tell, {mean}, no interval"
-    if change.low == change.high == 0:
-        return f"{name} has the same ERR on every frame"
-    grade = "is worse" if change.low > 0 else "is better" if change.high < 0 else "cannot tell"
-    where = f"[{_points(change.low)}, {_points(change.high)}]"
-    return f"{name}{':' if grade == 'cannot tell' else ''} {grade}, {mean} {where}"
+    sure = f"{mean} [{_points(change.low)}, {_points(change.high)}]"
+    most = percent(max(-(change.low or 0), change.high or 0))
+    ways = what_would_tell(change)
+    clauses = {
+        Degree.UNDEFINED: f"{name}: ERR is undefined on every frame",
+        Degree.FEW: f"{name}: {too_few(change.frames)}, {mean}",
+        Degree.SAME: f"{name} has the same ERR on every frame",
+        Degree.SURE: f"{name} is {better}, {sure}",
+        Degree.LITTLE: f"{name} is neither better nor worse by more than {most} pp, {sure}",
+        Degree.PROBABLE: f"{name} is probably {better}, {sure}",
+        Degree.UNKNOWN: f"{name}: cannot tell, {sure}{f'; to tell takes {ways}' if ways else ''}",
+    }
+    return clauses[degree_of(change, settings)]
 
 
 def _note(note: Note) -> str:

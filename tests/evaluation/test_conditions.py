@@ -24,7 +24,7 @@ MASK = MaskComparison(
 def a_mask(low, high):
     """A mask whose ERR rose by 0.6 points, with this interval in points."""
     ends = (None, None) if low is None else (low / 100, high / 100)
-    change = Difference(0.006, *ends, 0.95, None, 12, None, None, None)
+    change = Difference(0.006, *ends, 0.95, None, 12, None)
     return replace(MASK, difference={"ERR": change})
 
 

@@ -13,6 +13,7 @@ from roadeval.evaluation.comparison_result import (
     MovedFrame,
 )
 from roadeval.evaluation.conditions import Condition
+from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference
 from roadeval.report.blocks import BulletList, Table
 from roadeval.report.comparison import document, markdown
@@ -22,7 +23,7 @@ from tests.report.making import text
 
 
 def change_of(mean, low=None, high=None):
-    return Difference(mean, low, high, 0.95, None, 12, None, None, "12 frames, and it needs 40")
+    return Difference(mean, low, high, 0.95, None if low is None else 0.01, 12, None)
 
 
 RATES = {"ERR": 0.10, "FPR": 0.20, "FNR": 0.30, "IoU": 0.8}
@@ -53,6 +54,7 @@ def a_comparison(change=CHANGE, **changes):
         "levels": (),
         "moved": (MovedFrame("new|er", "filtered", 7, 0, 0.1, 0.4, 0.3),),
         "notes": (LogUnknown("the <gap>"),),
+        "settings": EvaluationSettings(),
     }
     return Comparison(**plain | changes)
 

@@ -15,21 +15,25 @@ from roadeval.evaluation.comparison_result import (
     TruthDiffers,
 )
 from roadeval.evaluation.conditions import Condition
+from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference
 from roadeval.results.comparison import as_dict, judged, verdict, warnings
 
 
-def a_change(mean, low=None, high=None, *, variant="filtered", result="new", final=True):
+def a_change(
+    mean, low=None, high=None, p=0.001, *, variant="filtered", result="new", final=True, **known
+):
     """The change of a mask's ERR, in percentage points."""
     ends = [None if end is None else end / 100 for end in (low, high)]
-    change = Difference(mean / 100, *ends, 0.95, None, 12, None, None, None)
+    known = {"frames": 0 if math.isnan(mean) else 12, "effective_frames": None} | known
+    change = Difference(mean / 100, *ends, 0.95, p, **known)
     rates = {"ERR": 0.1}, {"ERR": 0.1 + mean / 100}
     return MaskComparison(result, variant, "post", final, 12, *rates, {"ERR": change})
 
 
 def a_comparison(*changes, notes=(), same_drive=True):
     results = tuple(ComparedResult(name, "street", "d", 12, None) for name in ("base", "new"))
-    return Comparison(same_drive, results, changes, changes, (), notes)
+    return Comparison(same_drive, results, changes, changes, (), notes, EvaluationSettings())
 
 
 @pytest.mark.parametrize(
@@ -37,8 +41,29 @@ def a_comparison(*changes, notes=(), same_drive=True):
     [
         (a_change(1.2, 0.5, 2), "filtered of new is worse, ERR +1.20 pp [+0.50, +2.00]"),
         (a_change(-1.2, -2, -0.5), "filtered of new is better, ERR -1.20 pp [-2.00, -0.50]"),
-        (a_change(1.2, -0.5, 3), "filtered of new: cannot tell, ERR +1.20 pp [-0.50, +3.00]"),
-        (a_change(1.2), "filtered of new: cannot tell, ERR +1.20 pp, no interval"),
+        (
+            a_change(1.2, 0.5, 2, p_holm=0.1, comparisons=9),
+            "filtered of new is probably worse, ERR +1.20 pp [+0.50, +2.00]",
+        ),
+        (
+            a_change(-1.2, -3, 0.5, p=0.1),
+            "filtered of new is probably better, ERR -1.20 pp [-3.00, +0.50]",
+        ),
+        (
+            a_change(1.2, -0.5, 3, p=0.4),
+            "filtered of new: cannot tell, ERR +1.20 pp [-0.50, +3.00]",
+        ),
+        (
+            a_change(1.2, -0.5, 3, p=0.4, frames_needed=414),
+            "filtered of new: cannot tell, ERR +1.20 pp [-0.50, +3.00]; to tell takes about 410 "
+            "frames like these",
+        ),
+        (
+            a_change(0.1, -0.5, 0.6, p=0.4),
+            "filtered of new is neither better nor worse by more than 0.60 pp, ERR +0.10 pp "
+            "[-0.50, +0.60]",
+        ),
+        (a_change(1.2), "filtered of new: 12 frames are too few for an interval, ERR +1.20 pp"),
         (a_change(0, 0, 0), "filtered of new has the same ERR on every frame"),
         (a_change(math.nan), "filtered of new: ERR is undefined on every frame"),
         (a_change(1, 0.5, 2, result="filtered"), "filtered is worse, ERR +1.00 pp [+0.50, +2.00]"),

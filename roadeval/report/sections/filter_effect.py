@@ -85,7 +85,7 @@ def _method(change: Mapping[str, Any]) -> str:
     if change["low"] is None:
         return f"No interval for ERR: {too_few(change['frames'])}."
     return (
-        f"{100 * change['confidence']:.0f} % intervals. Neighbouring frames resemble each other, "
+        f"{percent(change['confidence'], 0)} % intervals. Neighbouring frames resemble each other, "
         "and the intervals are the wider for it; effective says how many independent frames would "
         "tell as much. All of this concerns this drive only."
     )
@@ -98,9 +98,9 @@ def frames_changed(pair: PairedComparison) -> str:
     same = len(change) - better - worse
     count = max(len(change), 1)
     parts = [
-        f"lowers ERR on {better} frames ({100 * better / count:.0f} %)",
-        f"raises it on {worse} ({100 * worse / count:.0f} %)",
-        *([f"leaves it on {same} ({100 * same / count:.0f} %)"] if same else []),
+        f"lowers ERR on {better} frames ({percent(better / count, 0)} %)",
+        f"raises it on {worse} ({percent(worse / count, 0)} %)",
+        *([f"leaves it on {same} ({percent(same / count, 0)} %)"] if same else []),
     ]
     return f"Of {len(change)} frames the filter {listing(parts)}."
 

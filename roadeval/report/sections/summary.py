@@ -167,7 +167,7 @@ def _how_sure(findings: Findings) -> str:
     if not any(defined(change["low"]) for change in changes):
         return "The verdict concerns this drive only." if findings.totals else ""
     return (
-        f"In brackets: {100 * changes[0]['confidence']:.0f} % intervals, which allow for "
+        f"In brackets: {percent(changes[0]['confidence'], 0)} % intervals, which allow for "
         "neighbouring frames that resemble each other. Probably: by chance alone, one drive in ten "
         "would show as much in that direction. The verdict concerns this drive only."
     )

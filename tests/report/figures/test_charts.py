@@ -90,7 +90,7 @@ def test_the_covered_share_is_in_percent():
 
 
 def test_a_comparison_shows_changes_with_their_intervals_and_levels_without():
-    change = Difference(0.01, -0.02, 0.04, 0.95, None, 12, None, None, None)
+    change = Difference(0.01, -0.02, 0.04, 0.95, 0.5, 12, None)
     unsure = replace(change, low=None, high=None)
     new = {"ERR": 0.1, "FPR": 0.2, "FNR": 0.3}
     changes = {"ERR": change, "FPR": unsure, "FNR": change}
