@@ -8,9 +8,9 @@ import pytest
 from PIL import Image
 
 from roadeval.data import ERRORS, TRUTH, LayerKind, LayerSpec
-from roadeval.recording.codecs import codec
-from roadeval.recording.layout import SHADOW_TRUTH
-from tests.recording.making import NDI, POST, RINGS
+from roadeval.recording.codecs import codec, codecs_of
+from roadeval.recording.layout import CAMERA, SHADOW_TRUTH
+from tests.recording.making import NDI, POST, RINGS, layout
 
 HEIGHT, WIDTH = 9, 13
 DRAW = np.random.default_rng(0)
@@ -95,3 +95,20 @@ def test_a_damaged_picture_is_refused(spec):
     payload[len(payload) // 2] ^= 1
     with pytest.raises(ValueError, match="a damaged PNG"):
         chosen.decode(bytes(payload))
+
+
+def test_the_camera_is_drawn_below_every_layer():
+    def order(codec):
+        orders = [
+            batch.as_arrow_array().to_pylist()[0]
+            for style in codec.style()
+            for batch in style.as_component_batches()
+            if batch.component_descriptor().component.endswith(":draw_order")
+        ]
+        return orders[0] if orders else None
+
+    codecs = codecs_of(layout())
+    camera = order(codecs.pop(CAMERA))
+    orders = {path: order(codec) for path, codec in codecs.items()}
+    assert all(above > camera for above in orders.values() if above is not None)
+    assert None not in (orders["/filtered/post"], orders["/truth"])
