@@ -1,4 +1,4 @@
-"""A shadow filter that does no harm: section 3.2's candidates, components, rings, with gates.
+"""A shadow filter with gates: section 3.2's candidates, components and rings, each questioned.
 
 The paper's filter (`shadow`) takes whatever has a high NDI for shadow. This one keeps its four
 steps and asks at each whether what it sees can be a shadow on the road:
