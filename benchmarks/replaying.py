@@ -74,9 +74,9 @@ def hold(drive: Path, config: RunConfig) -> Held:
         return Held(files, results, run.layout(), float(np.mean(sizes)))
 
 
-def _files(logged: Any) -> tuple[bytes, ...]:
-    pictures = [logged._picture, *(label.picture for label in logged._labels.values())]
-    return tuple(bytes(picture.data) for picture in pictures)
+def _files(logged: logs.LoggedFrame) -> tuple[bytes, ...]:
+    pictures = [logged.picture, *(label.picture for label in logged.labels.values())]
+    return tuple(bytes(each.data) for each in pictures if not isinstance(each, Exception))
 
 
 def _layer_bytes(payloads: dict[str, bytes]) -> int:
