@@ -71,9 +71,7 @@ def warnings(run: Run) -> tuple[str, ...]:
 
 def losses(run: Run) -> tuple[str, ...]:
     """List the parts of the log that were lost."""
-    seen = run.frames.accounting
-    frames = sorted((seen.undecodable | seen.damaged).items())
-    return (*run.log.losses, *(f"frame {number}: {reason}" for number, reason in frames))
+    return (*run.log.losses, *run.frames.accounting.losses)
 
 
 def _sizes(run: Run) -> tuple[str, ...]:

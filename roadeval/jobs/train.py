@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from roadeval import logs
@@ -12,7 +12,7 @@ from roadeval.data import Frame
 from roadeval.jobs.outputs import AnyPath, holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.kernels import prepare
-from roadeval.training import Model, TrainingError, TrainingSettings, learning, save_model
+from roadeval.training import Model, TrainingError, learning, save_model
 from roadeval.training.held import HeldFrames
 
 
@@ -29,6 +29,7 @@ def train(
     selected range. Frames without truth are taken where ``training.source`` is ``patch``, or
     ``auto`` and no drive has truth. Labels that are given hold for every drive that has none of
     its own (`RunConfig.drives`); where they do not occur, a 0/255 mask is understood by itself.
+    Frames that cannot be decoded are left out, and `Model.losses` tells of them.
 
     Raises
     ------
@@ -42,6 +43,15 @@ def train(
         return model
 
 
+@dataclass(frozen=True, slots=True)
+class _Drawn:
+    """The training frames of a drive, what to know of them, and what of the drive was lost."""
+
+    frames: Sequence[Frame]
+    told: tuple[str, ...]
+    losses: tuple[str, ...]
+
+
 def _learnt(drives: Sequence[AnyPath], config: RunConfig, on_progress: OnProgress) -> Model:
     """Train on frames of all drives."""
     settings = config.training
@@ -52,8 +62,11 @@ def _learnt(drives: Sequence[AnyPath], config: RunConfig, on_progress: OnProgres
         )
     total = settings.frames * len(drives)
     held = HeldFrames()
-    frames: dict[Path, list[Frame]] = {}
-    readings: list[str] = []
+
+    def show(stage: str) -> None:
+        on_progress(Progress(len(held.frames), total, stage))
+
+    drawn: dict[Path, _Drawn] = {}
     for drive in drives:
         own = config.for_drive(drive)
         several = len(drives) > 1 and own.labels == config.labels
@@ -61,26 +74,58 @@ def _learnt(drives: Sequence[AnyPath], config: RunConfig, on_progress: OnProgres
             drive, keep_corrupt=own.frames.keep_corrupt, max_pixels=own.frames.max_pixels
         ) as log:
             selection = log.select(own.topics, own.labels, scale=own.frames.scale, several=several)
-            readings += _understood(log, selection, own)
-            there = partial(log.frames, selection, logs.Span.of(own.frames))
-            prepare(lambda: on_progress(Progress(0, total, "compiling")))
-            frames[log.path] = []
-            for frame in _held(there, settings, held):
-                frames[log.path].append(frame)
-                on_progress(Progress(len(held.frames), total, "training"))
-    return learning.from_drives(frames, config.pipelines(), settings, readings)
+            prepare(lambda: show("compiling"))
+            drawn[log.path] = _draw(log, selection, own, held, show)
+    frames = {path: each.frames for path, each in drawn.items()}
+    told = [sentence for each in drawn.values() for sentence in each.told]
+    model = learning.from_drives(frames, config.pipelines(), settings, told)
+    return replace(model, losses=tuple(_lost(drawn)))
 
 
-def _held(
-    frames: Callable[[], logs.FrameStream], settings: TrainingSettings, held: HeldFrames
-) -> Iterator[Frame]:
-    """Decode the training frames of a drive and hold them; a `TrainingError` if they do not fit."""
-    for frame in learning.spread(frames, settings.frames, labelled=settings.source != "patch"):
+def _draw(
+    log: logs.Log,
+    selection: logs.Selection,
+    own: RunConfig,
+    held: HeldFrames,
+    show: Callable[[str], None],
+) -> _Drawn:
+    """Decode the training frames of a drive and hold them."""
+    settings = own.training
+    frames: list[Frame] = []
+    streams: list[logs.FrameStream] = []
+
+    def begin() -> logs.FrameStream:
+        streams.append(log.frames(selection, logs.Span.of(own.frames)))
+        return streams[-1]
+
+    labelled = settings.source != "patch"
+    for frame in learning.spread(begin, settings.frames, labelled=labelled):
         if not held.add(frame):
             raise TrainingError(
                 f"{held.full()}; lower `training.frames`, or reduce them with `frames.scale`"
             )
-        yield frame
+        frames.append(frame)
+        show("training")
+    losses = (*log.losses, *_left_out(streams[-1], frames))
+    if losses and not frames:
+        raise TrainingError(f"{log.path.name}: no training frame could be decoded: {losses[0]}")
+    told = (*_understood(selection, own), *streams[-1].fringes)
+    return _Drawn(frames, tuple(f"{log.name}: {each}" for each in told), losses)
+
+
+def _left_out(stream: logs.FrameStream, frames: Sequence[Frame]) -> Iterator[str]:
+    """Name and count the training frames that are damaged."""
+    yield from stream.accounting.losses
+    if missing := len(stream.accounting.undecodable):
+        yield f"{missing} of {missing + len(frames)} training frames could not be decoded"
+
+
+def _lost(drawn: Mapping[Path, _Drawn]) -> Iterator[str]:
+    """Yield what was lost; of several drives, with the drive's name before it."""
+    for path, each in drawn.items():
+        for sentence in each.losses:
+            names_it = len(drawn) == 1 or sentence.startswith(f"{path.name}: ")
+            yield sentence if names_it else f"{path.name}: {sentence}"
 
 
 def _require_a_drive_for_each(config: RunConfig, drives: Sequence[AnyPath]) -> None:
@@ -91,10 +136,10 @@ def _require_a_drive_for_each(config: RunConfig, drives: Sequence[AnyPath]) -> N
             raise ConfigError(f"`drives` {each.path}: is none of the drives {names}")
 
 
-def _understood(log: logs.Log, selection: logs.Selection, own: RunConfig) -> Iterator[str]:
+def _understood(selection: logs.Selection, own: RunConfig) -> Iterator[str]:
     """Tell of a mask that was understood by itself although labels were given for all drives."""
     if selection.truth and own.labels.road and selection.truth.labels.by_itself:
         yield (
-            f"{log.name}: none of the given labels occurs in {selection.truth.topic.name}, which "
+            f"none of the given labels occurs in {selection.truth.topic.name}, which "
             f"was read as {selection.truth.labels.words}"
         )

@@ -45,3 +45,9 @@ class Accounting:
     fringes: dict[tuple[int, str], tuple[int, int]] = field(default_factory=dict)
     truth_in_log: int = 0
     truth_unused: int = 0
+
+    @property
+    def losses(self) -> tuple[str, ...]:
+        """The frames that could not be decoded, or only in part: a sentence each."""
+        frames = sorted((self.undecodable | self.damaged).items())
+        return tuple(f"frame {number}: {reason}" for number, reason in frames)

@@ -60,6 +60,8 @@ class Model:
     fingerprints
         ``(n, SIDE * SIDE)`` float16: the pictures of the training frames, see
         `roadeval.training.likeness`; None in files of version 2.
+    losses
+        What of the drives was lost when it was trained; a file does not keep it.
     """
 
     parameters: Mapping[str, Mapping[str, Any]]
@@ -70,6 +72,7 @@ class Model:
     prior: npt.NDArray[np.float32] | None = None
     warnings: tuple[str, ...] = field(default=())
     fingerprints: npt.NDArray[np.float16] | None = None
+    losses: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.fingerprints is not None:

@@ -48,6 +48,16 @@ def test_what_holds_for_one_drive_is_read_from_its_file(tmp_path, monkeypatch, c
     assert "error: --drive other.mcap: is none of the drives" in capsys.readouterr().err
 
 
+def test_what_was_left_out_is_told_and_decides_the_exit_code(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write_log(tmp_path / "broken.mcap", broken=8)
+    assert main(["train", "broken.mcap", "-o", "m.model", "--train-frames", "3", "-q"]) == 3
+    told = capsys.readouterr().err
+    assert "roadeval: lost: frame 8: 8 bytes that are no image" in told
+    assert "roadeval: lost: 1 of 3 training frames could not be decoded" in told
+    assert (tmp_path / "m.model").exists()
+
+
 @pytest.mark.parametrize("value", ["ids.mcap", "=ids.toml", "ids.mcap="])
 def test_a_drive_needs_a_file(value, capsys):
     assert main(["train", "a.mcap", "-o", "m.model", "--drive", value]) == 2

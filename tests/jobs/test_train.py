@@ -3,11 +3,14 @@
 import re
 from importlib import import_module
 
+import cv2
 import pytest
 
 import roadeval
 from roadeval import RoadevalError
-from tests.jobs.making import settings, write_log
+from roadeval.logs import LogWriter
+from tests.jobs.making import NS, settings, write_log
+from tests.training.making import frame
 
 CODES = {"road": [3], "ignore": []}
 
@@ -73,6 +76,48 @@ def test_a_drive_may_have_a_range_of_its_own(drives, tmp_path):
 def test_a_model_file_holds_one_training(drives, tmp_path):
     with pytest.raises(RoadevalError, match=r"`training.seeds`: a model file holds one training"):
         train(drives[:1], tmp_path, seeds=2)
+
+
+def test_frames_that_cannot_be_decoded_are_named_and_counted(drives, tmp_path):
+    broken = write_log(tmp_path / "broken.mcap", broken=8)  # frames 0, 8 and 16 train
+    model = train([broken], tmp_path)
+    assert len(model.digests) == 2
+    named, counted = model.losses
+    assert named.startswith("frame 8: 8 bytes that are no image")
+    assert counted == "1 of 3 training frames could not be decoded"
+    several = train([drives[0], broken], tmp_path).losses
+    assert several == (f"broken.mcap: {named}", f"broken.mcap: {counted}")
+
+
+def test_what_is_lost_of_a_log_is_told(tmp_path):
+    split = tmp_path / "split"
+    split.mkdir()
+    write_log(split / "split_0.mcap")
+    (split / "split_1.mcap").write_bytes(b"no log")
+    losses = train([split], tmp_path).losses
+    assert [loss.partition(": ")[0] for loss in losses] == [
+        "split_1.mcap",
+        "/camera/image",
+        "/truth/road",
+    ]
+
+
+def test_a_drive_of_which_no_training_frame_can_be_decoded_is_refused(tmp_path):
+    broken = write_log(tmp_path / "broken.mcap", broken=0)
+    with pytest.raises(RoadevalError, match=r"broken.mcap: no training frame .*: frame 0: 8 bytes"):
+        train([broken], tmp_path, max_frames=1)
+
+
+def test_labels_that_are_ignored_are_told(tmp_path):
+    path = tmp_path / "blurred.mcap"
+    with LogWriter(path) as log:
+        for number in range(4):
+            made, stamp = frame(number), (number + 1) * NS
+            for topic, image in (("/camera", made.image), ("/truth/road", made.truth * 255)):
+                _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 10])
+                log.image(topic, stamp, data.tobytes(), "jpeg")
+    (told,) = train([path], tmp_path, tolerance=4).warnings
+    assert re.match(r"blurred: /truth/road: .* % of the pixels of 3 label images are ignored", told)
 
 
 def test_a_replay_takes_what_is_asked_of_its_drive(drives, tmp_path, monkeypatch):

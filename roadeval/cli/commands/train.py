@@ -8,7 +8,6 @@ from typing import Annotated, Final
 import typer
 
 from roadeval.cli import arguments, console, messages, progress
-from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import Given, takes
 
 
@@ -47,7 +46,7 @@ def train(
             f"{output}: {', '.join(model.parameters)}; trained on {len(model.digests)} frames, "
             f"{model.pixels} pixels, by the {model.source}"
         )
-    return ExitCode.DONE
+    return messages.losses(model.losses)
 
 
 COMMAND: Final = train
