@@ -15,7 +15,7 @@ from roadeval.evaluation.comparison_result import (
 from roadeval.evaluation.conditions import Condition
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference
-from roadeval.report.blocks import BulletList, Table
+from roadeval.report.blocks import BulletList, Table, Text
 from roadeval.report.comparison import document, markdown
 from roadeval.report.pdf.typeset import pdf
 from roadeval.results.comparison import judged
@@ -103,6 +103,14 @@ def test_a_rule_stands_where_another_result_begins_and_its_name_only_where_it_is
     assert table.columns[:3] == ["result", "variant", "stage"]
     table, _ = blocks(Table, a_comparison(replace(CHANGE, result="filtered")))
     assert table.columns[:2] == ["variant", "stage"]
+
+
+def test_a_missing_interval_is_explained_by_the_result_and_its_variant():
+    few = replace(CHANGE, difference=dict.fromkeys(("ERR", "FPR", "FNR"), change_of(0.012)))
+    why = "no interval for ERR, because 12 frames are too few for an interval."
+    for variant, name in (("filtered", "new|er, filtered"), ("new|er", "new|er")):
+        notes = blocks(Text, a_comparison(replace(few, variant=variant)))
+        assert f"{name}: {why}" in [note.text for note in notes]
 
 
 def test_different_drives_are_laid_side_by_side():
