@@ -36,10 +36,10 @@ _y: Plane = np.arange(HEIGHT)[:, None] + np.zeros((1, WIDTH), int)
 _x: Plane = np.arange(WIDTH)[None] + np.zeros((HEIGHT, 1), int)
 
 
-def write(path: Path, *, truths: bool = True) -> Path:
-    """Write the drive as a log, or the camera's images alone."""
+def write(path: Path, *, frames: int = FRAMES, truths: bool = True) -> Path:
+    """Write the drive's first frames as a log, or the camera's images alone."""
     with LogWriter(path) as log:
-        for number in range(FRAMES):
+        for number in range(frames):
             stamp = START_NS + number * PERIOD_NS
             _, png = cv2.imencode(".png", image(number)[..., ::-1])
             data = b"no image" if number == BROKEN else png.tobytes()

@@ -30,27 +30,49 @@ PERIOD_NS = 100_000_000
 FRAMES = 22
 
 
+COMMANDS = {
+    "replay": "replay drive.mcap --variant bright=bright.toml --save out.rrd --reports reports",
+    "report": "report out.rrd -o report.pdf",
+    "config": "config --variant bright=bright.toml",
+    "compare": "compare out.rrd",
+    "compared": "compare out.rrd -o compared.pdf --json",
+    "fail": "compare out.rrd --fail-if post.bright.BACC>0%",
+    "inspect": "inspect out.rrd --list --worst 1",
+    "info": "info drive.mcap --json",
+    "worst": "worst out.rrd",
+    "help": "--help",
+}
+"""By name, in the order in which they run."""
+RUN = """
+import io, json, sys
+from contextlib import redirect_stderr, redirect_stdout
+from roadeval.cli.app import main
+
+def run(words):
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        code = main(words)
+    return code, out.getvalue(), err.getvalue()
+
+done = {name: run(line.split()) for name, line in json.loads(sys.argv[1]).items()}
+print(json.dumps(done))
+"""
+"""Runs commands of the copy, all in one process."""
+
+
 @dataclass(frozen=True)
 class Workshop:
-    """A copy of the package with the page's files in it, and the results of a replay by it."""
+    """A copy of the package with the page's files in it, and what its commands did."""
 
     folder: Path
-    screen: str
-    """What the replay printed."""
+    runs: dict[str, tuple[int, str, str]]
+    """Exit code, stdout and stderr of each command."""
 
-    def roadeval(self, *words: str) -> subprocess.CompletedProcess[str]:
-        """Run a command of the copy."""
-        command = [sys.executable, "-P", "-m", "roadeval", *words]
-        environment = os.environ | {"PYTHONPATH": str(self.folder)}
-        return subprocess.run(
-            command, cwd=self.folder, env=environment, capture_output=True, text=True, check=False
-        )
-
-    def done(self, *words: str) -> str:
-        """Run a command that must succeed, and return what it printed."""
-        run = self.roadeval(*words)
-        assert run.returncode == 0, run.stderr
-        return run.stdout
+    def done(self, name: str) -> str:
+        """Return what a command printed, which must have succeeded."""
+        code, out, err = self.runs[name]
+        assert code == 0, err
+        return out
 
     def table(self, name: str) -> pd.DataFrame:
         return pd.read_csv(self.folder / "reports" / f"{name}.csv")
@@ -91,8 +113,16 @@ def workshop(tmp_path_factory) -> Workshop:
         assert place.parent.is_dir(), f"{path} has no folder to lie in"
         place.write_text(text)
     write_drive(folder / "drive.mcap")
-    words = ("--variant", "bright=bright.toml", "--save", "out.rrd", "--reports", "reports")
-    return Workshop(folder, Workshop(folder, "").done("replay", "drive.mcap", *words))
+    process = subprocess.run(
+        [sys.executable, "-P", "-c", RUN, json.dumps(COMMANDS)],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(folder)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert process.returncode == 0, process.stderr
+    return Workshop(folder, json.loads(process.stdout))
 
 
 def words_of(path: Path) -> str:
@@ -104,7 +134,7 @@ def words_of(path: Path) -> str:
 @pytest.fixture(scope="module")
 def report(workshop) -> str:
     """The words of the drive's PDF."""
-    workshop.done("report", "out.rrd", "-o", "report.pdf")
+    workshop.done("report")
     return words_of(workshop.folder / "report.pdf")
 
 
@@ -143,8 +173,7 @@ def test_the_stage_is_in_the_report(report):
 
 
 def test_the_stage_has_documented_settings(workshop):
-    settings = workshop.done("config", "--variant", "bright=bright.toml")
-    assert "tolerance = 50" in settings
+    assert "tolerance = 50" in workshop.done("config")
 
 
 def test_the_metric_is_a_column_of_frames(workshop):
@@ -175,22 +204,22 @@ def test_the_metric_is_in_the_recording(recording, workshop):
 
 def test_the_metric_is_on_the_screen_of_replay(workshop):
     # There is no room for it beside the others.
-    first, second = workshop.screen.split("\n\nvariant ")[1:]
+    first, second = workshop.done("replay").split("\n\nvariant ")[1:]
     assert first.startswith("    stage       frames  ERR %  pooled ERR %  FPR %  FNR %   ACC %\n")
     assert second.startswith("    stage       BACC %\n")
-    assert max(map(len, workshop.screen.splitlines())) <= 80
-    assert re.search(r"\nfinal masks .* BACC, pp\n", workshop.screen)
+    assert max(map(len, workshop.done("replay").splitlines())) <= 80
+    assert re.search(r"\nfinal masks .* BACC, pp\n", workshop.done("replay"))
 
 
 def test_the_metric_is_on_the_screen_of_compare(workshop):
-    screen = workshop.done("compare", "out.rrd")
+    screen = workshop.done("compare")
     rates = re.findall(r" (ERR|FPR|FNR|BACC) +\d+\.\d\d +\d+\.\d\d ", screen)
     # Unfiltered against filtered, of three stages, and against bright, of their last.
     assert Counter(rates) == {"ERR": 4, "FPR": 2, "FNR": 2, "BACC": 2}
 
 
 def test_the_metric_is_in_the_list_of_the_worst_frames(workshop):
-    screen = workshop.done("inspect", "out.rrd", "--list", "--worst", "1")
+    screen = workshop.done("inspect")
     head = next(line for line in screen.splitlines() if line.split()[:1] == ["frame"])
     assert re.split("  +", head.strip()) == [*("frame", "ERR %", "FPR %", "FNR %", "BACC %", "why")]
 
@@ -222,14 +251,13 @@ def test_the_metric_has_a_figure_over_the_drive(workshop, ending):
 
 
 def test_the_metric_is_compared_by_its_direction(workshop):
-    written = ("-o", "compared.pdf", "--json")
-    compared = json.loads(workshop.done("compare", "out.rrd", *written))
+    compared = json.loads(workshop.done("compared"))
     final = [change for change in compared["changes"] if change["final"]]
     assert final
     assert all("BACC" in change["difference"] for change in final)
     assert "BACC, pp" in words_of(workshop.folder / "compared.pdf")
-    worse = workshop.roadeval("compare", "out.rrd", "--fail-if", "post.bright.BACC > 0%")
-    assert worse.returncode == 4, worse.stderr
+    code, _, said = workshop.runs["fail"]
+    assert code == 4, said
 
 
 def test_the_region_is_counted(workshop):
@@ -244,7 +272,7 @@ def test_the_region_is_in_the_report_by_its_title(report):
 
 
 def test_the_encoding_is_described(workshop):
-    found = json.loads(workshop.done("info", "drive.mcap", "--json"))
+    found = json.loads(workshop.done("info"))
     assert {topic["name"]: topic["count"] for topic in found["topics"]} == {
         "/camera": FRAMES,
         "/truth": FRAMES,
@@ -263,7 +291,7 @@ def test_the_figure_is_written(workshop, ending):
 
 
 def test_the_command_runs(workshop):
-    number = int(workshop.done("worst", "out.rrd"))
+    number = int(workshop.done("worst"))
     final = workshop.table("frames").query("variant == 'filtered' and stage == 'post'")
     assert final.set_index("frame")["ERR"][number] == final["ERR"].max()
-    assert "worst" in workshop.done("--help")
+    assert "worst" in workshop.done("help")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import roadeval
-from roadeval.synth import RenderSettings, write_drive
+from tests.golden import drive
 
 HOME = Path(roadeval.__file__).parent
 SOURCES = {path: path.read_text() for path in sorted(HOME.rglob("*.py"))}
@@ -26,7 +26,7 @@ MODULES = [name_of(path) for path, text in SOURCES.items() if ">>> " in text]
 def folder(tmp_path_factory) -> Path:
     """A folder with the files that examples speak of: a drive, its recording and a model."""
     folder = tmp_path_factory.mktemp("examples")
-    write_drive(folder / "drive.mcap", RenderSettings(frames=14, width=64, height=48))
+    drive.write(folder / "drive.mcap", frames=14)
     reports = folder / "reports"
     roadeval.replay(folder / "drive.mcap", save=folder / "out.rrd", reports=reports)
     roadeval.train([folder / "drive.mcap"], folder / "city.model")

@@ -6,7 +6,7 @@ import threading
 
 import roadeval
 from roadeval.cli.app import main
-from roadeval.synth import RenderSettings, write_drive
+from tests.jobs.making import write_log
 
 IMPORTS = """
 import builtins, os, signal, sys
@@ -69,9 +69,8 @@ def test_a_command_runs_in_a_thread_that_may_not_handle_signals(capsys):
 
 def test_a_run_finds_its_workers_where_the_number_of_processors_is_unknown(monkeypatch, tmp_path):
     monkeypatch.setattr("os.cpu_count", lambda: None)
-    write_drive(tmp_path / "drive.mcap", RenderSettings(frames=12, width=64, height=48))
     outcome = roadeval.replay(
-        tmp_path / "drive.mcap",
+        write_log(tmp_path / "drive.mcap", numbers=range(12)),
         roadeval.configure({"output": {"record": "none"}}),
         save=tmp_path / "out.rrd",
         reports=tmp_path / "reports",

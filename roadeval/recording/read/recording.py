@@ -51,7 +51,7 @@ class Recording:
     --------
     >>> recording = Recording("out.rrd")
     >>> round(float(recording.frames.query("stage == 'post'").ERR.mean()), 2)
-    0.05
+    0.04
     >>> recording.layer("filtered", "post", frame=12).shape
     (48, 64)
     """
