@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from operator import attrgetter
 from typing import Any, Final
 
@@ -20,6 +20,7 @@ from roadeval.data import (
 )
 from roadeval.evaluation import windows
 from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.claims import evidence
 from roadeval.evaluation.differences import DriveDifferences, drive_differences
 from roadeval.evaluation.edges_and_flicker import EdgesAndFlicker
 from roadeval.evaluation.frame_counts import FrameCounts, GrowingCounts, sum_up
@@ -145,9 +146,14 @@ class Scoreboard:
             "beyond": self._beyond.totals(),
             "oracles": self.oracles(),
             "windows": -(-len(self._frames) // self._settings.window),
+            "claims": self._claims(),
             "health": {name: dict(counted) for name, counted in self._health.items()},
             "seconds": self._mean_seconds(),
         }
+
+    def _claims(self) -> dict[str, dict[str, int]]:
+        found = evidence(self.windows(), self._settings.window)
+        return {name: asdict(each) for name, each in found.items()}
 
     def _masks(self) -> list[FrameCounts]:
         """Return the counts by variant in the tables' order, then by stage as they ran."""

@@ -15,11 +15,11 @@ FORMAT: Final = {"name": "roadeval-summary", "version": 3}
 SUMMARY: Final = "summary.json"
 PARTS: Final = (
     *("format", "verdict", "drive", "frames", "totals", "beyond", "difference", "against_blind"),
-    *("seeds", "oracles", "windows", "health", "training", "seconds", "warnings", "losses"),
-    *("run", "settings", "versions", "log", "tables", "files"),
+    *("seeds", "oracles", "windows", "claims", "health", "training", "seconds", "warnings"),
+    *("losses", "run", "settings", "versions", "log", "tables", "files"),
 )
 """The parts of the summary, in the file's order."""
-LATER: Final = frozenset({"seeds", "tables", "files"})
+LATER: Final = frozenset({"seeds", "claims", "tables", "files"})
 """Parts that not every summary has, so that readers must do without them: earlier versions did not
 write them, a recording has no files, and most runs train with one seed."""
 _SELECTION: Final[Mapping[str, Mapping[str, str]]] = {

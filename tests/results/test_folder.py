@@ -372,7 +372,7 @@ def test_a_file_that_is_no_summary_is_refused(tmp_path: Path, text: str) -> None
 
 def test_the_summary_writes_undefined_as_null_and_keeps_its_order() -> None:
     document = json.loads(summary_text(the_rest(a_board()) | {"totals": {"ERR": math.nan}}))
-    assert tuple(document) == tuple(part for part in PARTS if part not in LATER)
+    assert tuple(document) == tuple(part for part in PARTS if part not in LATER - {"claims"})
     assert document["totals"] == {"ERR": None}
     assert document["format"] == {"name": "roadeval-summary", "version": 3}
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 CROWDED: Final = 150
 """More windows than this are drawn as means of several, with their range as a band."""
+PALE: Final = 0.4
+"""Opacity of a last row that holds fewer frames than the others, and of the line to it."""
 MARKED: Final = 25
 """Up to this many points each has its marker; beyond, about as many do."""
 PER_LINE: Final = 3
@@ -48,13 +50,20 @@ def rates_over_drive(
     final = finals(windows)
     rows = final.drop_duplicates("window").sort_values("window")
     group = -(-len(rows) // CROWDED)
+    size, rest = rows["frames"].max(), rows["frames"].iloc[-1]
+    last, short = rows["window"].iloc[-1], ""
+    if rest < size and group > 1:
+        final, rows = final[final["window"] < last], rows[:-1]
+        short = f"; a last row of {rest} is left out"
+    elif rest < size:
+        short = f"; the last row, drawn pale, holds {rest}"
     figure = Figure(figsize=(8, height))
     heading(figure, title, _subtitle(final, rows, group, rates))
     axes = figure.subplots(len(rates), 1, sharex=True, squeeze=False)[:, 0]
     for ax, (rate, name) in zip(axes, rates.items(), strict=True):
-        _draw(ax, final, rate, group)
+        _draw(ax, final, rate, group, pale=last if short else None)
         ax.set_ylabel(name)
-    _label_rows(axes[-1], rows)
+    _label_rows(axes[-1], rows, short)
     lines = _legend(figure, axes[0])
     top = 1 - (0.66 + 0.2 * lines) / height
     figure.subplots_adjust(left=0.11, right=0.985, bottom=0.55 / height, top=top, hspace=0.13)
@@ -79,12 +88,12 @@ def _direction(rates: Collection[str]) -> str:
     return f"higher is better for {listing(rising)}, lower for the others"
 
 
-def _draw(ax: Axes, final: pd.DataFrame, rate: str, group: int) -> None:
+def _draw(ax: Axes, final: pd.DataFrame, rate: str, group: int, pale: int | None) -> None:
     from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
     for name, look in looks(list(dict.fromkeys(final["variant"]))).items():
         own = final[final["variant"] == name].sort_values("window")
-        _line(ax, own["window"], 100 * own[rate], look, group)
+        _line(ax, own["window"], 100 * own[rate], look, group, pale=pale)
     values = 100 * final[rate].to_numpy(float)
     if np.isnan(values).all():
         ax.text(0.5, 0.5, "undefined on every frame", transform=ax.transAxes, ha="center")
@@ -94,28 +103,31 @@ def _draw(ax: Axes, final: pd.DataFrame, rate: str, group: int) -> None:
     ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g} %"))
 
 
-def _line(ax: Axes, x: pd.Series[float], y: pd.Series[float], look: Look, group: int) -> None:
-    """Draw a variant's series; with too many rows to tell apart, their mean and range."""
+def _line(
+    ax: Axes, x: pd.Series[float], y: pd.Series[float], look: Look, group: int, *, pale: int | None
+) -> None:
+    """Draw a variant's series; with too many rows to tell apart, their mean and range.
+
+    ``pale`` is the number of a last row that does not count as much as the others.
+    """
     if group > 1:
         rows = np.arange(len(x)) // group
         low, high = y.groupby(rows).min(), y.groupby(rows).max()
         x, y = x.groupby(rows).mean(), y.groupby(rows).mean()
         ax.fill_between(x, low, high, color=look.colour, alpha=0.15, linewidth=0)
-    ax.plot(
-        x,
-        y,
-        **look.line,
-        **look.mark,
-        label=look.label,
-        markersize=5,
-        markevery=-(-len(x) // MARKED),
-        zorder=look.order,
-        clip_on=False,
-    )
+    drawn: dict[str, Any] = {**look.line, **look.mark, "markersize": 5, "clip_on": False}
+    every = -(-len(x) // MARKED)
+    if len(x) > 1 and x.iloc[-1] == pale:
+        ax.plot(x[-2:], y[-2:], **drawn, alpha=PALE, markevery=[1], zorder=look.order - 1)
+        x, y = x[:-1], y[:-1]
+    ax.plot(x, y, **drawn, label=look.label, markevery=every, zorder=look.order)
 
 
-def _label_rows(ax: Axes, rows: pd.DataFrame) -> None:
-    """Write each row's frames below it; where there is no room, the first frame of some."""
+def _label_rows(ax: Axes, rows: pd.DataFrame, short: str) -> None:
+    """Write each row's frames below it; where there is no room, the first frame of some.
+
+    ``short`` says what became of a last row of fewer frames.
+    """
     first, last = rows["first_frame"].astype(str), rows["last_frame"].astype(str)
     spans = first.where(first == last, first + "\N{EN DASH}" + last)
     roomy = _step(spans) == 1
@@ -125,9 +137,8 @@ def _label_rows(ax: Axes, rows: pd.DataFrame) -> None:
     ax.set_xticks(numbers[::every], labels.tolist()[::every])
     margin = 0.5 if len(rows) < CROWDED else 0.005 * len(rows)
     ax.set_xlim(numbers[0] - margin, numbers[-1] + margin)
-    size, rest = rows["frames"].max(), rows["frames"].iloc[-1]
+    size = rows["frames"].max()
     what = f"Evaluated frames, {size} a row" if roomy else f"First frame of each row of {size}"
-    short = f"; the last row holds {rest}" if rest != size else ""
     ax.set_xlabel(what + short)
 
 

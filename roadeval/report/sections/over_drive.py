@@ -6,12 +6,14 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from roadeval.data.words import DASH, percent
+from roadeval.evaluation import analysis
 from roadeval.evaluation.metrics import FULL
 from roadeval.report.blocks import Block, Cell, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.figures.figure import figures
 from roadeval.report.figures.files import svg_of
 from roadeval.report.findings import Findings
 from roadeval.report.sections.common import SIDE_BY_SIDE, example_pictures
+from roadeval.results.claims import NO_NUMBERS, claim_rows
 
 PAPER_WINDOW: Final = 10
 """Frames in a row of the paper's figures (section 5)."""
@@ -31,6 +33,25 @@ def section(findings: Findings) -> Iterator[Block]:
     for figure in figures():
         if figure.in_report and (picture := svg_of(figure, findings.figure_data)):
             yield Figure(picture, figure.caption)
+    yield from _claims(findings)
+
+
+def _claims(findings: Findings) -> Iterator[Block]:
+    """Tabulate in how many windows the paper's claims are borne out; earlier runs counted none."""
+    found = findings.summary.get("claims", {})
+    rows = list(claim_rows(found))
+    if not rows:
+        return
+    size = analysis.settings_of(findings.summary).window
+    short = any(each["short"] for each in found.values())
+    yield Heading("What the paper claims", 2)
+    yield Text(NO_NUMBERS)
+    yield Table(
+        ["claim", "borne out by", *(["shorter, at the end"] if short else [])],
+        [row[: 3 if short else 2] for row in map(list, rows)],
+        caption=f"Windows of {size} frames that bear it out, of those in which both rates are "
+        "defined. Equal rates do not.",
+    )
 
 
 def _tables(findings: Findings) -> Iterator[Block]:
@@ -41,8 +62,10 @@ def _tables(findings: Findings) -> Iterator[Block]:
         yield _table(findings, names[place : place + together])
     size = findings.window_size
     long = "" if size == PAPER_WINDOW else f" The paper's rows are of {PAPER_WINDOW}."
+    rest = findings.windows.sort_values("window")["frames"].iloc[-1]
+    short = f" The last row holds {rest}." if rest < size else ""
     yield Text(
-        f"Rows of {size} evaluated frames: the mean of the frames' rates in percent.{long} "
+        f"Rows of {size} evaluated frames: the mean of the frames' rates in percent.{long}{short} "
         "The last line is the mean over all evaluated frames.",
         "note",
     )

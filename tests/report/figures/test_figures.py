@@ -146,7 +146,27 @@ def test_the_subtitle_says_which_direction_is_better(rates: list[str], direction
 def test_rows_are_named_by_their_frames() -> None:
     (ax,) = error_rate(FigureData("drive", a_table(3, last=1))).axes
     assert [label.get_text() for label in ax.get_xticklabels()] == ["0–9", "10–19", "20"]  # noqa: RUF001
-    assert ax.get_xlabel() == "Evaluated frames, 10 a row; the last row holds 1"
+    assert ax.get_xlabel() == "Evaluated frames, 10 a row; the last row, drawn pale, holds 1"
+
+
+def test_a_short_last_row_is_drawn_pale() -> None:
+    table = a_table(3, ("filtered",), last=1)
+    (ax,) = error_rate(FigureData("drive", table)).axes
+    pale, line = ax.lines
+    err = 100 * table[table["stage"] == "post"]["ERR"].to_numpy()
+    assert line.get_ydata() == pytest.approx(err[:2])
+    assert line.get_alpha() is None
+    assert pale.get_ydata() == pytest.approx(err[1:])
+    assert pale.get_alpha() < 0.5
+    assert pale.get_markevery() == [1]
+
+
+def test_a_short_last_row_is_no_part_of_a_mean_of_rows() -> None:
+    table = a_table(CROWDED + 1, ("filtered",), last=1)
+    (ax,) = error_rate(FigureData("drive", table)).axes
+    (line,) = ax.lines
+    assert line.get_xdata().max() < CROWDED
+    assert ax.get_xlabel().endswith("; a last row of 1 is left out")
 
 
 @pytest.mark.parametrize("rows", [1, 2, 10, 12, 40, 400, 3600])

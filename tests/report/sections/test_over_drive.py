@@ -4,7 +4,7 @@ import pandas as pd
 
 from roadeval.report.blocks import Figure, Table, Text
 from roadeval.report.sections.over_drive import section
-from tests.report.making import plain_rows, rates, some_findings
+from tests.report.making import plain_rows, rates, some_findings, the
 
 
 def windows():
@@ -54,6 +54,34 @@ def test_rows_of_another_length_than_the_papers_are_told():
     (note,) = (block.text for block in section(findings) if isinstance(block, Text))
     assert "Rows of 20 evaluated frames" in note
     assert "The paper's rows are of 10." in note
+
+
+def test_a_short_last_row_is_told():
+    table = windows()
+    table.loc[table["window"] == 1, "frames"] = 1
+    (note,) = (b.text for b in section(some_findings(windows=table)) if isinstance(b, Text))
+    assert "The last row holds 1." in note
+
+
+def test_the_paper_s_claims_stand_with_the_windows_that_bear_them_out():
+    findings = some_findings()
+    findings.summary["claims"] = {
+        "filter_ERR": {"held": 2, "windows": 9, "short_held": 1, "short": 1},
+        "post_ERR": {"held": 9, "windows": 9, "short_held": 0, "short": 1},
+    }
+    table = the(Table, section(findings))
+    assert table.columns == ["claim", "borne out by", "shorter, at the end"]
+    assert [row[1:] for row in plain_rows(table)] == [["2 of 9", "1 of 1"], ["9 of 9", "0 of 1"]]
+    words = " ".join(b.text for b in section(findings) if isinstance(b, Text))
+    assert "gives no number for its figures 3a and 3b" in words
+
+
+def test_no_column_for_shorter_windows_where_there_are_none():
+    findings = some_findings()
+    findings.summary["claims"] = {
+        "filter_ERR": {"held": 2, "windows": 9, "short_held": 0, "short": 0}
+    }
+    assert the(Table, section(findings)).columns == ["claim", "borne out by"]
 
 
 def test_the_figures_of_rates_follow_and_none_without_rates():
