@@ -25,6 +25,7 @@ from roadeval.images.errors import DamagedImageError, ImageError
 from roadeval.images.formats import ImageFormat, format_of
 from roadeval.images.limits import Limits
 from roadeval.images.samples import eight_bits
+from roadeval.images.scans import check_scans
 
 Array = npt.NDArray[Any]
 File = bytes | memoryview
@@ -142,6 +143,7 @@ def _jpeg(data: File, limits: Limits) -> Rgb:
     import simplejpeg
 
     limits.check(*_jpeg_size(data))
+    check_scans(data)
     try:
         pixels: Rgb = simplejpeg.decode_jpeg(data, "RGB", strict=not limits.keep_damaged)
     except ValueError as error:

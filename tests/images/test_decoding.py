@@ -164,6 +164,33 @@ def test_what_is_no_image_is_refused(data: bytes) -> None:
             read(data, KEEP)
 
 
+def of_scans(data: bytes, count: int) -> bytes:
+    """Return a JPEG with as many more scans, each of a few bytes: luma is refined by nothing."""
+    scan = bytes([0xFF, 0xDA, 0, 8, 1, 1, 0, 1, 63, 0, 0])
+    return data[:-2] + count * scan + data[-2:]
+
+
+PROGRESSIVE = file("JPEG", progressive=True)
+
+
+@pytest.mark.parametrize("limits", [LIMITS, KEEP])
+def test_a_jpeg_of_very_many_scans_is_refused_before_it_is_decoded(limits: Limits) -> None:
+    for read in (images.to_rgb, images.to_labels, images.to_png):
+        with pytest.raises(ImageError, match="a JPEG of more than 100 scans") as refused:
+            read(memoryview(of_scans(PROGRESSIVE, 100)), limits)
+        assert not isinstance(refused.value, DamagedImageError)
+
+
+def test_a_jpeg_of_many_scans_is_decoded() -> None:
+    assert images.to_rgb(of_scans(PROGRESSIVE, 80), KEEP).shape == (HEIGHT, WIDTH, 3)
+
+
+def test_what_looks_like_scans_in_a_comment_or_behind_the_image_is_none() -> None:
+    comment = b"\xff\xfe" + (402).to_bytes(2, "big") + 200 * b"\xff\xda"
+    for data in (JPEG[:2] + comment + JPEG[2:], JPEG + 200 * b"\xff\xda"):
+        np.testing.assert_array_equal(images.to_rgb(data, LIMITS), images.to_rgb(JPEG, LIMITS))
+
+
 @pytest.mark.parametrize("data", [jpeg_of_size(30_000, 30_000), png_of_size(30_000, 30_000)])
 def test_a_size_is_refused_before_anything_is_decoded(data: bytes) -> None:
     for read in (images.to_rgb, images.to_labels):
