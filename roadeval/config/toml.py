@@ -9,6 +9,7 @@ from typing import Any
 
 from roadeval.config.errors import ConfigError
 from roadeval.config.run import RunConfig, configure
+from roadeval.runtime.files import check_input
 from roadeval.runtime.text import visible, visible_lines
 
 
@@ -40,13 +41,16 @@ def read_tables(path: str | Path) -> dict[str, Any]:
         return tomllib.loads(_text(Path(path)))
     except FileNotFoundError as error:
         raise ConfigError(f"{path}: there is no such configuration file") from error
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: not valid TOML: {error}") from error
 
 
 def _text(path: Path) -> str:
+    check_input(path)
     if path.suffix != ".rrd":
         return path.read_text(encoding="utf-8")
     from roadeval.recording import Recording

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-import stat
 from pathlib import Path
 from typing import Final
 
 from roadeval.logs.container.damage import Damage
 from roadeval.logs.container.records import MAGIC
 from roadeval.logs.errors import LogError
+from roadeval.runtime.files import check_input
 
 _HEAD: Final = 64
 """Bytes by which a file is recognised."""
@@ -34,10 +34,6 @@ _OTHERS: Final = (
     (0, b"RIFF", "a video or image: roadeval pack {path} -o {stem}.mcap"),
 )
 """How many bytes to skip, the bytes that follow, what the file is and how it becomes a log."""
-
-
-_KINDS: Final = {stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
-"""What a path can be that is neither file nor folder; else it is a device."""
 
 
 def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
@@ -74,13 +70,7 @@ def natural(path: Path) -> list[tuple[int, str]]:
 
 def _check(path: Path) -> None:
     try:
-        kind = stat.S_IFMT(path.stat().st_mode)
-        if kind != stat.S_IFREG:
-            what = _KINDS.get(kind, "a device")
-            raise LogError(
-                f"{path}: {what}, and a log is read back and forth: write it to a file first, as "
-                "cat > drive.mcap does"
-            )
+        check_input(path)
         with path.open("rb") as file:
             head = file.read(_HEAD)
             file.seek(max(path.stat().st_size - len(MAGIC), 0))

@@ -12,6 +12,7 @@ from roadeval.data import is_plain
 from roadeval.errors import RoadevalError
 from roadeval.results.lines import Row
 from roadeval.results.schema import TABLES, Kind, TableSchema
+from roadeval.runtime.files import check_input
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,9 +65,11 @@ def read_table(
     table = TABLES[name]
     where = source if isinstance(source, Path) else f"the recording's table {name}"
     try:
-        content = source.encode() if isinstance(source, str) else source.read_bytes()
+        content = source.encode() if isinstance(source, str) else _content(source)
     except FileNotFoundError:
         content = b""
+    except OSError as error:
+        raise ResultsError(f"{where}: {error.strerror}") from error
     if summary and "tables" in summary:
         _check(where, content, summary["tables"].get(name))
     if not content:
@@ -94,6 +97,11 @@ def fingerprint(content: bytes) -> dict[str, Any]:
     """Return what a summary states of a table: ``rows`` and ``sha256`` of its text."""
     rows = max(content.count(b"\n") - 1, 0)
     return {"rows": rows, "sha256": hashlib.sha256(content).hexdigest()}
+
+
+def _content(path: Path) -> bytes:
+    check_input(path)
+    return path.read_bytes()
 
 
 def _check(where: Path | str, content: bytes, stated: Mapping[str, Any] | None) -> None:

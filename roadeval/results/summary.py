@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from roadeval.results.reading import ResultsError
+from roadeval.runtime.files import check_input
 from roadeval.runtime.text import visible_lines
 
 FORMAT: Final = {"name": "roadeval-summary", "version": 3}
@@ -69,6 +70,7 @@ def read_summary(path: Path) -> dict[str, Any]:
         If there is none, or it is damaged or of another format.
     """
     try:
+        check_input(path)
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise ResultsError(

@@ -18,7 +18,7 @@ from pydantic.dataclasses import dataclass as validated
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import STAGES, Pipeline
 from roadeval.pipeline.parameters import check_arrays, check_range
-from roadeval.runtime.files import put
+from roadeval.runtime.files import check_input, put
 from roadeval.training.likeness import SIDE
 
 FORMAT: Final = "roadeval-model"
@@ -176,6 +176,7 @@ def load_model(path: Path) -> Model:
 
 def _content(path: Path) -> tuple[Any, dict[str, npt.NDArray[Any]]]:
     try:
+        check_input(path)
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         # What does not begin as an array does comes out of the archive as bytes.
@@ -184,9 +185,9 @@ def _content(path: Path) -> tuple[Any, dict[str, npt.NDArray[Any]]]:
         return json.loads(arrays.pop("header").tobytes()), arrays
     except FileNotFoundError as error:
         raise ModelError(f"{path}: there is no such model file") from error
-    except (IsADirectoryError, PermissionError) as error:
-        raise ModelError(f"{path}: cannot read the model: {error.strerror}") from error
     except Exception as error:  # archives are read by four libraries, each with errors of its own
+        if isinstance(error, OSError) and error.strerror:
+            raise ModelError(f"{path}: cannot read the model: {error.strerror}") from error
         raise ModelError(
             f"{path}: not a model file, or a damaged one; make one with 'roadeval train'"
         ) from error

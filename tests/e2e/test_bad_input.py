@@ -1,6 +1,8 @@
 """Bad input is one line on stderr that says what, where and what to do, and exit code 1."""
 
+import os
 import shutil
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -133,3 +135,40 @@ def test_a_table_cut_at_the_end_of_a_line_gives_one_line_and_no_numbers(words, s
         "roadeval: error: cut/frames.csv: does not agree with its summary (133 of 140 rows); "
         "make the results anew with roadeval replay\n"
     )
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize(
+    "words",
+    [
+        "replay pipe",
+        "info pipe",
+        "train pipe -o m.model",
+        "train drive.mcap -o m.model --drive drive.mcap=pipe",
+        "replay drive.mcap --model pipe",
+        "replay drive.mcap --config pipe",
+        "replay drive.mcap --variant other=pipe",
+        "config --config pipe",
+        "report pipe -o out.pdf",
+        "report folder -o out.pdf",
+        "inspect pipe --list",
+        "compare pipe pipe",
+        "pack images -o new.mcap",
+    ],
+)
+def test_a_pipe_is_refused_and_never_waited_for(words, write, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write("/camera")
+    for folder in ("folder", "images"):
+        Path(folder).mkdir()
+    for pipe in ("pipe", "folder/summary.json", "images/0.png"):
+        os.mkfifo(pipe)
+    assert main(words.split()) == 1
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "is a pipe, not a file" in said
+
+
+def test_a_device_is_refused_before_it_is_read(refused, write):
+    line = refused(write("/camera"), "--config", "/dev/null")
+    assert "/dev/null: cannot be read: is a device" in line

@@ -209,5 +209,5 @@ def test_a_file_in_the_place_of_a_folder_is_one_line(model, path):
 
 
 def test_a_folder_is_no_model(tmp_path):
-    with pytest.raises(RoadevalError, match="cannot read the model: Is a directory"):
+    with pytest.raises(RoadevalError, match="cannot read the model: is a folder"):
         load_model(tmp_path)

@@ -14,6 +14,7 @@ from roadeval.logs.files import natural
 from roadeval.logs.times import NS
 from roadeval.logs.writing.pack_video import VIDEO_SUFFIXES, frames_of
 from roadeval.logs.writing.writer import LogWriter
+from roadeval.runtime.files import check_input
 
 CAMERA: Final = "/camera/image"
 TRUTH: Final = "/truth/road"
@@ -184,6 +185,7 @@ def _label(file: Path) -> bytes:
 
 def _read(file: Path) -> bytes:
     try:
+        check_input(file)
         return file.read_bytes()
     except OSError as error:
         raise LogError(f"{file}: {error.strerror}") from error

@@ -17,6 +17,7 @@ from roadeval.recording import checks
 from roadeval.recording import layout as at
 from roadeval.recording.checks import Place
 from roadeval.recording.layout import APPLICATION, FRAME, DamagedError, RecordingError
+from roadeval.runtime.files import check_input
 from roadeval.runtime.text import is_utf8
 
 _TEXT: Final = "TextDocument:text"
@@ -160,8 +161,12 @@ def indexed_chunks(path: Path) -> int:
 
 
 def _open(path: Path) -> tuple[RrdReader, StoreEntry]:
-    if not path.is_file():
-        raise RecordingError(f"{path}: no such recording")
+    try:
+        check_input(path)
+    except FileNotFoundError as error:
+        raise RecordingError(f"{path}: no such recording") from error
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror}") from error
     if not is_utf8(str(path)):
         raise RecordingError(
             f"{path}: Rerun reads no file whose name is not UTF-8: rename it, or set PYTHONUTF8=1 "
