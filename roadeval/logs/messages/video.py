@@ -9,6 +9,7 @@ from typing import Any, Final, Protocol
 from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages.pictures import CompressedPicture, DecodedPicture, Picture, codec_of
+from roadeval.logs.messages.video_size import size_in
 
 PATIENCE: Final = 16
 """Packets to feed beyond a frame before it counts as not decodable."""
@@ -167,7 +168,7 @@ class Video:
         try:
             frames = self._decoder.decode(unit)
         except self._av.FFmpegError as error:
-            raise BadMessage(self._reason(error)) from error
+            raise BadMessage(self._reason(error, unit)) from error
         for frame in frames:
             damage = self._damage_of(frame)
             packet = self._waiting.pop(frame.pts, None)
@@ -176,11 +177,15 @@ class Video:
                 found = DecodedPicture(packet.stamp_ns, packet.data, pixels, damage)
                 self._ready[frame.pts] = found
 
-    def _reason(self, error: Any) -> str:
-        """Return why a packet cannot be decoded: its size, where the decoder tells that."""
-        if self._decoder.width and self._decoder.height:
+    def _reason(self, error: Any, unit: Any) -> str:
+        """Return why a packet cannot be decoded: its size, if that is it."""
+        size = self._decoder.width, self._decoder.height
+        if not all(size):
+            data = b"" if unit is None else bytes(unit)
+            size = size_in(self._av, self._decoder.codec.canonical_name, data) or (0, 0)
+        if all(size):
             try:
-                self._limits.check(self._decoder.width, self._decoder.height)
+                self._limits.check(*size)
             except ImageError as too_large:
                 return str(too_large)
         return f"its video cannot be decoded: {error.strerror}"

@@ -13,6 +13,7 @@ from roadeval.logs.errors import DamagedMessage
 from roadeval.logs.messages.pictures import CompressedPicture, Picture
 from roadeval.logs.messages.pixels import to_rgb
 from roadeval.logs.messages.video import Video, is_keyframe
+from roadeval.logs.messages.video_size import size_in
 from tests.fixtures.flavours import ENCODERS, VIDEO_FRAMES, bar
 from tests.fixtures.make import make
 from tests.fixtures.shared import both
@@ -161,7 +162,25 @@ def test_a_damaged_frame_and_those_that_build_upon_it_are_told(log: Path) -> Non
     assert to_rgb(found[2], Limits(keep_damaged=True)) is found[2].pixels
 
 
-@pytest.mark.parametrize("log", both("flavours", H264), indirect=True)
-def test_a_video_of_too_many_pixels_is_not_decoded(log: Path) -> None:
-    with pytest.raises(FrameError, match=r"an image of \d+x\d+, more than the 1000 pixels"):
-        Video(Packets(log, set()), Limits(max_pixels=1000)).picture(0)
+@pytest.mark.parametrize("log", CODECS, indirect=True)
+def test_a_video_of_too_many_pixels_is_not_decoded_and_its_size_told(log: Path) -> None:
+    too_large = r"an image of 128x96, more than the 1000 pixels"
+    with open_log(log, max_pixels=1000) as opened, pytest.raises(FrameError, match=too_large):
+        next(opened.frames(opened.select())).decode()
+
+
+def test_the_size_of_vp9_is_read_in_every_profile() -> None:
+    size = f"{320 - 1:016b}{240 - 1:016b}"
+    sync = f"{0x498342:024b}"
+    for head in (
+        "10000010" + sync + "0010",
+        "10100010" + sync + "0010" + "100",
+        "10100010" + sync + "111" + "0",
+        "10010010" + sync + "1" + "0010",
+        "10110" + "0010" + sync + "1" + "0010" + "100",
+    ):
+        bits = (head + size).ljust(128, "0")
+        data = int(bits, 2).to_bytes(16, "big")
+        assert size_in(None, "vp9", data) == (320, 240)
+    assert size_in(None, "vp9", b"no video") is None
+    assert size_in(None, "vp9", b"") is None
