@@ -6,7 +6,8 @@ import os
 import sys
 import traceback
 from collections.abc import Callable, Sequence
-from typing import Annotated
+from functools import wraps
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -20,6 +21,8 @@ from roadeval.runtime.text import visible_lines
 
 FIRST = ("replay", "report", "inspect", "compare", "info", "train", "config", "pack", "demo")
 """The order of the commands in the help; others follow by their names."""
+LIGHT: Final = frozenset({"info", "config", "pack"})
+"""Commands that load neither Rerun nor Arrow, and live with half a gigabyte of addresses."""
 
 app = typer.Typer(
     add_completion=False,
@@ -35,8 +38,20 @@ def _place(command: Callable[..., int]) -> int:
     return FIRST.index(name) if name in FIRST else len(FIRST)
 
 
+def _with_room(command: Callable[..., int]) -> Callable[..., int]:
+    """Return a command that first asks for the addresses that its libraries reserve."""
+
+    @wraps(command)
+    def run(*args: Any, **values: Any) -> int:
+        if problem := memory.too_few_addresses():
+            raise RoadevalError(problem)
+        return command(*args, **values)
+
+    return run
+
+
 for _command in sorted(found_in(commands, "COMMAND"), key=_place):
-    app.command()(_command)
+    app.command()(_command if _command.__name__ in LIGHT else _with_room(_command))
 
 
 def _show_version(wanted: bool) -> None:
@@ -63,8 +78,6 @@ def _root(
     if context.invoked_subcommand is None:
         typer.echo(context.get_help(), err=True)
         raise typer.Exit(ExitCode.USAGE)
-    if problem := memory.too_few_addresses():
-        raise RoadevalError(problem)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
