@@ -31,6 +31,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from roadeval.runtime.extensions import special
+
 Series = npt.NDArray[np.float64]
 
 _FEWEST: Final = 90
@@ -109,9 +111,7 @@ class MeanDistribution:
         return self.mean - self.scale * low, self.mean - self.scale * high
 
     def _half_width(self, confidence: float) -> float:
-        from scipy.special import stdtrit
-
-        quantile = float(stdtrit(self.degrees, (1 + confidence) / 2))
+        quantile = float(special("stdtrit")(self.degrees, (1 + confidence) / 2))
         low, high = quantile * float(self.errors.min()), quantile * float(self.errors.max())
         # By halves: scipy.optimize takes longer to import than a drive's differences to compute.
         while high - low > 1e-12 * high:
@@ -189,13 +189,11 @@ def series_for(
     int or None
         At least 2, the one at hand included; None above ``most``.
     """
-    from scipy.special import stdtrit
-
     order = np.argsort(found.errors)
     middle = int(np.searchsorted(np.cumsum(found.weights[order]), 0.5))
     error = float(found.errors[order[middle]])
     counts = np.arange(2, most + 1)
-    halves = stdtrit(counts - 1, (1 + confidence) / 2) * error / np.sqrt(counts)
+    halves = special("stdtrit")(counts - 1, (1 + confidence) / 2) * error / np.sqrt(counts)
     enough = halves <= half_width
     return int(counts[np.argmax(enough)]) if enough.any() else None
 
@@ -266,9 +264,7 @@ def _variance_of_mean(coefficients: Series, shares: Series, n: int) -> Series:
 
 def _beyond(distance: float, errors: Series, weights: Series, degrees: int) -> float:
     """Return the probability that the mean is further off than ``distance``, skewness aside."""
-    from scipy.special import stdtr
-
-    return float(2 * weights @ stdtr(degrees, -distance / errors))
+    return float(2 * weights @ special("stdtr")(degrees, -distance / errors))
 
 
 def _skewness(series: Series, frames: float) -> float:

@@ -16,6 +16,7 @@ from roadeval.data.packed import Packed
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.parameters import check_arrays, check_covariance, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
+from roadeval.runtime.extensions import special
 
 SIMILARITY: Final = mask_spec("similarity", "Similar to road (Eq. 2)")
 
@@ -63,9 +64,7 @@ def fit(sample: TrainingSet, _settings: SimilaritySettings) -> RoadColour:
 def limit(quantile: float) -> float:
     """Return the greatest ``d^2`` of a road pixel: ``chi2.ppf(quantile, 3)``."""
     # The same number as scipy.stats.chi2.ppf, whose import takes a second.
-    from scipy.special import chdtri
-
-    return float(chdtri(3, 1.0 - quantile))
+    return float(special("chdtri")(3, 1.0 - quantile))
 
 
 def whitening(covariance: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

@@ -19,14 +19,15 @@ from roadeval.pipeline import colour_cube as cube
 from roadeval.pipeline.colour_table import ColourTable
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask
+from roadeval.runtime.extensions import extension
 
 SVM: Final = mask_spec("svm", "SVM: road (Eq. 16)")
 
 Penalty = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
 """C of a soft margin. It bounds the machine's weights, which are to stay far below `GREATEST`."""
 
-_BLOCK: Final = 1 << 20
-"""Kernel values computed at once: 8 MB of float64, which stays in the cache."""
+_BLOCK: Final = 1 << 17
+"""Kernel values computed at once: 1 MB of float64, of which a few stay in the cache."""
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
@@ -93,14 +94,53 @@ def fit(sample: TrainingSet, settings: SvmSettings) -> SupportVectors:
     if settings.standardise:
         mean, scale = colours.mean(axis=0), colours.std(axis=0)
         scale = np.where(scale > 0, scale, 1.0)
+    features = (colours - mean) / scale
+    try:
+        solution = _by_libsvm(features, sample.road, settings)
+    except (ImportError, AttributeError, TypeError, ValueError):
+        solution = _by_svc(features, sample.road, settings)
+    return SupportVectors(mean, scale, *solution)
+
+
+def _by_libsvm(
+    features: Floats, road: npt.NDArray[np.bool_], settings: SvmSettings
+) -> tuple[Floats, Floats, float]:
+    """Return what `_by_svc` does, bit for bit, by calling libsvm as it does.
+
+    That alone saves a second of computing, in which scikit-learn is imported. But the function
+    is not a public one: any of `ImportError`, `AttributeError`, `TypeError` and `ValueError` says
+    that another version of scikit-learn has it elsewhere, or with other arguments or results, or
+    that the numbers are not to be solved for.
+    """
+    libsvm = extension(
+        "sklearn.svm._libsvm",
+        *("sklearn", "sklearn.svm", "sklearn.utils"),
+        "scipy.linalg",  # of its BLAS, which libsvm calls, the compiled part is enough
+    )
+    _, vectors, _, (weights,), (offset,), *_ = libsvm.fit(
+        features,
+        road.astype(np.float64),
+        kernel=settings.kernel,
+        C=settings.c,
+        gamma=settings.gamma,
+        class_weight=np.ones(2),
+        cache_size=200.0,
+    )
+    if not (np.isfinite(weights).all() and np.isfinite(offset)):
+        raise ValueError("no finite solution")
+    # libsvm counts the first class, non-road, as positive.
+    return vectors, -weights, -float(offset)
+
+
+def _by_svc(
+    features: Floats, road: npt.NDArray[np.bool_], settings: SvmSettings
+) -> tuple[Floats, Floats, float]:
+    """Solve the dual; return the support vectors, their weights and the offset."""
     # Only here: the import takes a second and 40 MiB, and a model from a file needs neither.
     from sklearn.svm import SVC
 
-    machine = SVC(C=settings.c, kernel=settings.kernel, gamma=settings.gamma)
-    machine.fit((colours - mean) / scale, sample.road)
-    return SupportVectors(
-        mean,
-        scale,
+    machine = SVC(C=settings.c, kernel=settings.kernel, gamma=settings.gamma).fit(features, road)
+    return (
         np.ascontiguousarray(machine.support_vectors_),
         np.ascontiguousarray(machine.dual_coef_[0]),
         float(machine.intercept_[0]),
@@ -121,13 +161,15 @@ def decision(
         terms = features * (machine.weights @ machine.vectors)
         plane: Floats = terms.sum(axis=1) + machine.offset
         return plane
-    from scipy.spatial.distance import cdist
-
     result = np.empty(len(features))
     rows = max(1, _BLOCK // max(1, len(machine.vectors)))
     for start in range(0, len(features), rows):
         block = slice(start, start + rows)
-        squared = cdist(features[block], machine.vectors, "sqeuclidean")
+        first, second, third = (
+            (features[block, channel, None] - machine.vectors[:, channel]) ** 2
+            for channel in range(3)
+        )
+        squared = first + second + third
         # Row by row: a matrix product would round a row depending on the other rows.
         terms = np.exp(-settings.gamma * squared) * machine.weights
         result[block] = terms.sum(axis=1) + machine.offset

@@ -1,0 +1,85 @@
+"""Compiled modules of a library without the library: each case in a process of its own."""
+
+import subprocess
+import sys
+
+import pytest
+
+from roadeval.runtime.extensions import extension, special
+
+LIBSVM = """
+import sys
+from roadeval.runtime.extensions import extension
+def libsvm():
+    return extension(
+        "sklearn.svm._libsvm", "sklearn", "sklearn.svm", "sklearn.utils", "scipy.linalg"
+    )
+"""
+LIBRARY = """
+import sklearn, sklearn.linear_model, scipy.linalg, scipy.special
+assert sklearn.svm._libsvm is module, sklearn.svm._libsvm
+assert sklearn.__version__ and sklearn.svm.SVC().fit([[0], [1]], [0, 1]).predict([[1]]) == [1]
+assert scipy.linalg.cython_blas and scipy.linalg.inv([[2]]) == 0.5
+"""
+"""The whole of the library, with the module in its place."""
+
+
+def run(code: str) -> str:
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert not done.returncode, done.stderr
+    return done.stdout.strip()
+
+
+def test_neither_the_library_nor_the_empty_packages_remain():
+    left = "[name for name in sys.modules if name.startswith(('sklearn', 'scipy.linalg'))]"
+    assert run(f"{LIBSVM}\nprint(libsvm().fit.__name__, {left})") == "fit []"
+
+
+def test_who_imports_the_library_later_gets_all_of_it():
+    run(f"{LIBSVM}\nmodule = libsvm()\n{LIBRARY}")
+
+
+def test_a_library_that_was_there_before_stays_as_it_was():
+    run(
+        f"import sklearn.svm, sklearn\nbefore = sklearn\n{LIBSVM}\nmodule = libsvm()\n{LIBRARY}"
+        "assert before is sys.modules['sklearn']"
+    )
+
+
+def test_a_part_of_the_library_that_was_there_before_stays_as_it_was():
+    run(
+        f"import scipy.linalg as before\n{LIBSVM}\nmodule = libsvm()\n{LIBRARY}"
+        "assert before is sys.modules['scipy.linalg']"
+    )
+
+
+NEEDS_MORE = """
+import importlib.abc
+class OnlyAfter(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == "sklearn.svm._libsvm" and "sklearn.base" not in sys.modules:
+            raise ImportError("this version of it needs the rest")
+sys.meta_path.insert(0, OnlyAfter())
+"""
+
+
+def test_where_the_module_cannot_be_had_alone_the_library_is_imported_with_it():
+    run(f"{LIBSVM}{NEEDS_MORE}\nmodule = libsvm()\n{LIBRARY}")
+
+
+def test_what_is_not_there_is_told():
+    with pytest.raises(ModuleNotFoundError, match="no_such"):
+        extension("sklearn.svm.no_such", "sklearn", "sklearn.svm")
+
+
+@pytest.mark.parametrize("name", ["chdtri", "stdtr", "stdtrit"])
+def test_special_functions_are_scipys_own(name):
+    import scipy.special
+
+    assert special(name) is getattr(scipy.special, name)
+
+
+def test_a_special_function_that_is_not_compiled_is_found_too():
+    import scipy.special
+
+    assert special("logsumexp") is scipy.special.logsumexp
