@@ -117,6 +117,7 @@ def _by_libsvm(
         *("sklearn", "sklearn.svm", "sklearn.utils"),
         "scipy.linalg",  # of its BLAS, which libsvm calls, the compiled part is enough
     )
+    libsvm.set_verbosity_wrap(0)  # or it prints what it did
     _, vectors, _, (weights,), (offset,), *_ = libsvm.fit(
         features,
         road.astype(np.float64),

@@ -1,5 +1,7 @@
 """Eq. 12-16 against scikit-learn, and the table of all colours against the definition."""
 
+import subprocess
+import sys
 from dataclasses import astuple, replace
 
 import numpy as np
@@ -127,6 +129,13 @@ def test_by_default_scikit_learn_is_not_asked(monkeypatch):
     monkeypatch.setattr(svm, "_by_svc", asked := Asked(svm._by_svc))
     svm.fit(sample(), SvmSettings())
     assert not asked.times
+
+
+def test_nothing_is_printed():
+    # A process of its own: a library in C keeps its lines back until the end.
+    code = "from tests.pipeline.paper.test_svm import *; svm.fit(sample(), SvmSettings())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
 @pytest.mark.parametrize("kernel", ["rbf", "linear"])
