@@ -11,6 +11,9 @@ True
 ['blind', 'filtered', 'unfiltered']
 >>> recording.layer("filtered", "ndi", frame=12).shape
 (48, 64)
+
+Nothing here touches the process's own streams: what a C library of a codec writes to standard error
+by itself stays there, while the command line drops it.
 """
 
 from importlib import import_module

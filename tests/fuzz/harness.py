@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
+import stat
+import sys
 import tempfile
 import traceback
 from collections.abc import Callable, Sequence
@@ -76,7 +79,7 @@ def run_case(harness: Harness, data: bytes) -> Outcome:
     """Try one case."""
     from roadeval.errors import RoadevalError
 
-    before = _memory(forget=True)
+    before, said = _memory(forget=True), _said()
     begin = monotonic()
     kind, where = "", ""
     try:
@@ -93,6 +96,8 @@ def run_case(harness: Harness, data: bytes) -> Outcome:
         kind, where = "slow", f"{seconds:.0f} s"
     if not kind and memory > BIG:
         kind, where = "big", f"{memory / 1e9:.1f} GB"
+    if not kind and _said() > said:
+        kind, where = "printed", _text(said)
     return Outcome(kind, where, seconds, memory)
 
 
@@ -118,6 +123,22 @@ def _memory(*, forget: bool = False) -> int:
         return int(re.search(r"VmHWM:\s*(\d+) kB", (PROC / "status").read_text())[1]) * 1024
     except (OSError, TypeError):
         return 0
+
+
+def _said() -> int:
+    """Return how many bytes standard error holds, which a C library may have written.
+
+    0 where it is no file: in a worker and in the tests it is one.
+    """
+    status = os.fstat(2)
+    return status.st_size if stat.S_ISREG(status.st_mode) else 0
+
+
+def _text(begin: int) -> str:
+    """Return the begin of what was written to standard error after so many bytes."""
+    sys.stderr.flush()
+    written = (PROC / "fd/2").read_bytes()[begin:] if PROC.exists() else b""
+    return " ".join(written.decode(errors="replace").split())[:120]
 
 
 def _place(error: BaseException) -> str:

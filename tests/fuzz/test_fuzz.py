@@ -73,6 +73,11 @@ def test_a_case_that_takes_long_or_much_is_one(monkeypatch):
     assert outcome_of(lambda data: bytearray(8 << 20)).kind == "big"
 
 
+def test_what_a_library_writes_to_standard_error_is_one(capfd):
+    found = outcome_of(lambda data: os.write(2, b"libpng error: bad\n"))
+    assert (found.kind, found.where) == ("printed", "libpng error: bad")
+
+
 def test_choices_go_on_with_the_first_after_their_bytes_end():
     choices = Choices(bytes([3, 0]))
     assert choices.number(5) == 3

@@ -8,11 +8,13 @@ lies in its folder. It is started by `tests.fuzz.campaign`, as
 from __future__ import annotations
 
 import json
+import logging
 import mmap
 import os
 import random
 import struct
 import sys
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
@@ -111,6 +113,9 @@ def note(job: Job, outcome: Outcome, data: bytes) -> None:
 def main(text: str) -> None:
     """Do a job, described in JSON."""
     job = Job(**json.loads(text))
+    # As in a program that wants neither: only what no switch of Python's stops is a finding.
+    logging.disable()
+    warnings.simplefilter("ignore")
     if job.guided:
         _guided(job)
     else:
