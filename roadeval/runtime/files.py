@@ -37,13 +37,13 @@ def check_file(path: Path) -> None:
         raise OSError(errno.ENOTSUP, f"is {kind}, not a file; name another", str(path))
 
 
-def check_input(path: Path) -> None:
+def check_input(path: str | Path) -> None:
     """Raise an OSError if a path leads to no file that can be read from its begin to its end.
 
     A pipe may never give anything, and a device never end, so what is read as a whole is asked
     this before it is opened.
     """
-    mode = path.stat().st_mode
+    mode = Path(path).stat().st_mode
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, "is a folder, not a file", str(path))
     if not stat.S_ISREG(mode):
