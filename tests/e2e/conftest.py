@@ -11,7 +11,7 @@ import cv2
 import pytest
 
 from roadeval.logs import LogWriter
-from tests.e2e.commands import CLASSES, DEMO, Replayed, Run, replay, roadeval
+from tests.e2e.commands import CLASSES, DEMO, Replayed, Run, here, replay, roadeval
 from tests.fixtures.make import make
 from tests.training.making import frame
 
@@ -42,9 +42,13 @@ def demo(once) -> Replayed:
 
 @pytest.fixture(scope="session")
 def at_home(once):
-    """A replay of 20 frames without a word about outputs, and the folder it ran in."""
-    words = ("--max-frames", 20, "--jobs", 2, "--json")
-    done = once("home", lambda folder: roadeval("replay", DEMO, *words, cwd=folder))
+    """A replay by two workers without a word about outputs, and the folder it ran in."""
+
+    def do(folder: Path) -> Run:
+        drive = make("drives/street.mcap", folder)
+        return here("replay", drive, *CLASSES, "--jobs", 2, "--json", cwd=folder)
+
+    done = once("home", do)
     return done.run, done.folder
 
 

@@ -3,27 +3,28 @@
 import json
 
 from tests.e2e.commands import DEMO, here, roadeval
+from tests.fixtures.make import make
 
 
 def test_outputs_land_in_recordings_and_reports_of_the_current_folder(at_home):
     run, folder = at_home
     assert run.returncode == 0, run.stderr
-    assert (folder / "recordings" / "demo.rrd").is_file()
-    assert (folder / "reports" / "demo" / "summary.json").is_file()
+    assert (folder / "recordings" / "street.rrd").is_file()
+    assert (folder / "reports" / "street" / "summary.json").is_file()
 
 
 def test_json_prints_the_summary_and_nothing_else(at_home):
     run, folder = at_home
-    assert run.stdout == (folder / "reports" / "demo" / "summary.json").read_text()
-    assert json.loads(run.stdout)["frames"]["evaluated"] == 10
+    assert run.stdout == (folder / "reports" / "street" / "summary.json").read_text()
+    assert json.loads(run.stdout)["frames"]["evaluated"] == 20
 
 
 def test_a_model_is_never_evaluated_on_the_frames_that_trained_it(tmp_path):
-    model, first = tmp_path / "demo.model", ("--end", 1)
-    trained = roadeval("train", DEMO, "-o", model, "--train-frames", 4, *first)
+    drive, model, first = make("drives/car_park.mcap", tmp_path), tmp_path / "x.model", ("--end", 1)
+    trained = roadeval("train", drive, "-o", model, "--train-frames", 4, *first)
     assert trained.returncode == 0, trained.stderr
     assert f"{model}: filtered, unfiltered; trained on 4 frames" in trained.stdout
-    run = here("replay", DEMO, "--model", model, "--record", "none", *first, cwd=tmp_path)
+    run = here("replay", drive, "--model", model, "--record", "none", *first, cwd=tmp_path)
     assert run.returncode == 0, run.stderr
     assert "4 trained on, 6 evaluated" in run.stdout
     assert not list(tmp_path.rglob("*.rrd"))

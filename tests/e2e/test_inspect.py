@@ -12,7 +12,8 @@ from roadeval.errors import RoadevalError
 from roadeval.jobs import inspect as inspecting
 from roadeval.jobs.result import Result
 from roadeval.recording.screen import viewer
-from tests.e2e.commands import DEMO, here, replay, roadeval
+from tests.e2e.commands import CLASSES, here, replay, roadeval
+from tests.fixtures.make import make
 
 DRIVER = Path("/usr/share/vulkan/icd.d")
 drawable = pytest.mark.skipif(
@@ -99,7 +100,8 @@ def test_the_window_opens_at_the_first_evaluated_frame_that_has_pictures(
         "roadeval.recording.screen.viewer.show", lambda path, frame: shown.append(frame)
     )
     if rule == "worst":
-        sparse = replay(tmp_path, DEMO, "--max-frames", 24, "--record", "worst:3")
+        drive = make("drives/street.mcap", tmp_path)
+        sparse = replay(tmp_path, drive, *CLASSES, "--record", "worst:3")
     assert main(["inspect", str(sparse.recording)]) == 0
     opened = Result(sparse.recording)
     assert opened.recording.layout.first_frame not in opened.pictured

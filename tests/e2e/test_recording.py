@@ -12,7 +12,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from roadeval import Recording
-from tests.e2e.commands import DEMO, replay
+from tests.e2e.commands import CLASSES, replay
 from tests.fixtures.make import make
 from tests.recording.making import paths_of
 
@@ -66,11 +66,12 @@ def test_rerun_finds_no_fault_with_the_file(drive, request):
 
 @pytest.fixture(scope="module")
 def twice(at_home, tmp_path_factory):
-    """The recordings and the tables of 20 frames, replayed by two workers and by one."""
+    """The recordings and the tables of one drive, replayed by two workers and by one."""
     _, home = at_home
-    alone = replay(tmp_path_factory.mktemp("alone"), DEMO, "--max-frames", 20, "--jobs", 1)
+    folder = tmp_path_factory.mktemp("alone")
+    alone = replay(folder, home / "drives" / "street.mcap", *CLASSES, "--jobs", 1)
     return [
-        (home / "recordings" / "demo.rrd", home / "reports" / "demo"),
+        (home / "recordings" / "street.rrd", home / "reports" / "street"),
         (alone.recording, alone.reports),
     ]
 

@@ -57,7 +57,8 @@ def _axes(axes: Axes) -> Iterator[str]:
     for text in axes.texts:
         box = text.get_bbox_patch()
         edge = "" if box is None else f" in a box, {_look(box)}, edge {box.get_edgecolor()[3]:.2g}"
-        yield f"text {text.get_text()!r}{edge}"
+        place = " ".join(f"{each:.4g}" for each in text.get_position())
+        yield f"text {text.get_text()!r} at {place}, size {text.get_size():.3g}{edge}"
 
 
 def _images(axes: Axes) -> Iterator[str]:

@@ -5,6 +5,7 @@ from io import BytesIO
 
 import numpy as np
 import pytest
+import rerun as rr
 from PIL import Image
 
 from roadeval.data import ERRORS, TRUTH, LayerKind, LayerSpec
@@ -95,6 +96,22 @@ def test_a_damaged_picture_is_refused(spec):
     payload[len(payload) // 2] ^= 1
     with pytest.raises(ValueError, match="a damaged PNG"):
         chosen.decode(bytes(payload))
+
+
+def test_labels_are_logged_as_one_byte_a_pixel_and_hide_what_lies_below():
+    told = {
+        batch.component_descriptor().component: batch.as_arrow_array().to_pylist()[0]
+        for style in codec(RINGS, WIDTH, HEIGHT).style()
+        for batch in style.as_component_batches()
+    }
+    assert told["SegmentationImage:opacity"] == 1
+    assert told["SegmentationImage:format"] == {
+        "width": WIDTH,
+        "height": HEIGHT,
+        "pixel_format": None,
+        "color_model": rr.ColorModel.L.value,
+        "channel_datatype": rr.ChannelDatatype.U8.value,
+    }
 
 
 def test_the_camera_is_drawn_below_every_layer():

@@ -116,6 +116,18 @@ def test_a_missing_interval_is_explained_by_the_result_and_its_variant():
 def test_different_drives_are_laid_side_by_side():
     change = replace(CHANGE, base={}, difference={})
     comparison = a_comparison(change, same_drive=False, moved=())
+    (table,) = blocks(Table, comparison)
+    assert dict(zip(table.columns, *table.rows, strict=True)) == {
+        "result": "new|er",
+        "variant": "filtered",
+        "stage": "post",
+        "frames": "12",
+        "ERR": "11.20",
+        "FPR": "21.00",
+        "FNR": "28.00",
+        "IoU": "80.00",
+    }
+    assert table.text_columns == range(3)
     words = text(pdf(document(comparison, (), pd.DataFrame())))
     assert "Different drives, side by side: no difference is given." in words
     assert "11.20" in words

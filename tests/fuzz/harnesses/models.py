@@ -78,4 +78,4 @@ def seeds() -> list[bytes]:
     ]
 
 
-HARNESS = Harness(check, seeds, quick=60)
+HARNESS = Harness(check, seeds, quick=15)
