@@ -1,11 +1,9 @@
-"""What every room's tests share: compiled kernels, and examples without a deadline."""
+"""What every room's tests share: examples without a deadline."""
 
 import pytest
 from hypothesis import settings
 
-from roadeval.kernels import prepare
-
-# A compiled kernel takes seconds where it is compiled: no deadline for a single example.
+# The machine may be busy with something else.
 settings.register_profile("roadeval", deadline=None)
 settings.load_profile("roadeval")
 
@@ -16,8 +14,3 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="Write the golden files anew instead of comparing with them.",
     )
-
-
-def pytest_sessionstart() -> None:
-    """Have everything compiled before several processes want to at once."""
-    prepare(lambda: None)

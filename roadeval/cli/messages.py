@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from typing import Final
 
+from roadeval import kernels
 from roadeval.cli import console
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import with_flags
@@ -32,6 +33,15 @@ def losses(sentences: Sequence[str]) -> ExitCode:
     for sentence in sentences:
         _write("lost", "bold yellow", with_flags(sentence))
     return ExitCode.LOSS if sentences else ExitCode.DONE
+
+
+def loops_missing() -> None:
+    """Warn if frames take long because the package was installed without its compiled loops."""
+    if kernels.missing():
+        warning(
+            "the compiled loops are missing, and a frame takes several times as long: there was "
+            "no C compiler when roadeval was installed"
+        )
 
 
 def interrupted(sentence: object) -> None:

@@ -1,7 +1,4 @@
-"""The kinds of arrays that the kernels take and return, and the outcomes that some hold.
-
-The kernels are compiled for these names, see `roadeval.kernels.compiler`.
-"""
+"""The kinds of arrays that the kernels take and return, and the outcomes that some hold."""
 
 from __future__ import annotations
 
@@ -18,21 +15,13 @@ Planes = tuple[Plane, Plane, Plane]
 """Red, green and blue."""
 CodeTable = npt.NDArray[np.uint8]
 """``(n, m)``: a code for each pair of numbers."""
-Levels = npt.NDArray[np.uint8]
-"""``(n,)``: what becomes of each grey level."""
 Labels = npt.NDArray[np.int32]
 """``(H, W)``: a component's number at each of its pixels, 0 outside."""
 Runs = npt.NDArray[np.int32]
 """``(n, 4)``: row, first column, column after the last, and label, row after row and from left to
 right in each."""
-Columns = npt.NDArray[np.int32]
-"""``(n,)``: first columns of runs, or those after their last."""
-Places = npt.NDArray[np.int64]
-"""``(n,)``: indices of something."""
 Flags = npt.NDArray[np.bool_]
 """``(n,)``: whether something holds of each of something."""
-Parents = npt.NDArray[np.uintp]
-"""``(n,)``: of each run itself, or one before it that it is connected with."""
 Sums = npt.NDArray[np.int64]
 """``(n, ...)``: whole numbers by label or kind."""
 Values = npt.NDArray[np.float32]
@@ -57,5 +46,5 @@ TP: Final = 1
 FP: Final = 2
 FN: Final = 3
 IGNORED: Final = 4
-"""How a pixel came out, where a plane holds that of each. These stand in recordings and in the
-cached code of loops, and do not change."""
+"""How a pixel came out, where a plane holds that of each. These stand in recordings, and do not
+change."""

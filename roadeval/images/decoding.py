@@ -53,7 +53,6 @@ def to_rgb(data: File, limits: Limits) -> Rgb:
     image = _loaded(data, format_, limits)
     if image.mode in _SAMPLES:
         return np.repeat(eight_bits(_samples(image))[..., None], 3, axis=2)
-    # An array of its own, which may be written to: a loop is compiled anew for one that may not.
     return np.array(image.convert("RGB"))
 
 

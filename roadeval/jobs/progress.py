@@ -10,8 +10,8 @@ from dataclasses import dataclass
 class Progress:
     """How far a job is: ``done`` of ``total`` frames of ``stage``.
 
-    ``stage`` is ``compiling`` (the first time on a machine), ``training``, ``hashing``,
-    ``replaying``, ``writing`` or ``rendering``; ``total`` is None where it is not known.
+    ``stage`` is ``training``, ``hashing``, ``replaying``, ``writing`` or ``rendering``; ``total``
+    is None where it is not known.
     """
 
     done: int

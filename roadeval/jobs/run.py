@@ -17,7 +17,6 @@ from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.jobs import frame
 from roadeval.jobs.identity import identity
 from roadeval.jobs.progress import OnProgress, Progress
-from roadeval.kernels import prepare as load_kernels
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import MisfitError
 from roadeval.recording import Layout
@@ -148,12 +147,9 @@ def _learn(
     labelled: bool,
 ) -> tuple[tuple[Model, ...], Schedule]:
     pipelines = {variant.name: variant.pipeline for variant in variants}
-    compiling = Progress(0, None, "compiling")
     if settings.model is not None:
         model, schedule = learning.from_file(Path(settings.model), pipelines)
-        load_kernels(lambda: on_progress(compiling))  # a wrong file is told before that
         return (model,), schedule
-    load_kernels(lambda: on_progress(compiling))
     total = min(settings.frames, len(frames()))
     return learning.from_log(
         frames,

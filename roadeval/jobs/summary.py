@@ -15,7 +15,7 @@ from roadeval.version import VERSION
 
 PACKAGES: Final = (
     *("mcap", "numpy", "opencv-python-headless", "pillow", "scikit-learn", "scipy"),
-    *("simplejpeg", "numba", "rerun-sdk", "pandas", "matplotlib"),
+    *("simplejpeg", "rerun-sdk", "pandas", "matplotlib"),
 )
 """The packages whose version can change a number or a file."""
 JOURNEY: Final = 3

@@ -11,7 +11,6 @@ from roadeval.config import ConfigError, RunConfig
 from roadeval.data import Frame
 from roadeval.jobs.outputs import AnyPath, holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
-from roadeval.kernels import prepare
 from roadeval.training import Model, TrainingError, learning, save_model
 from roadeval.training.held import HeldFrames
 
@@ -63,8 +62,8 @@ def _learnt(drives: Sequence[AnyPath], config: RunConfig, on_progress: OnProgres
     total = settings.frames * len(drives)
     held = HeldFrames()
 
-    def show(stage: str) -> None:
-        on_progress(Progress(len(held.frames), total, stage))
+    def show() -> None:
+        on_progress(Progress(len(held.frames), total, "training"))
 
     drawn: dict[Path, _Drawn] = {}
     for drive in drives:
@@ -74,7 +73,6 @@ def _learnt(drives: Sequence[AnyPath], config: RunConfig, on_progress: OnProgres
             drive, keep_corrupt=own.frames.keep_corrupt, max_pixels=own.frames.max_pixels
         ) as log:
             selection = log.select(own.topics, own.labels, scale=own.frames.scale, several=several)
-            prepare(lambda: show("compiling"))
             drawn[log.path] = _draw(log, selection, own, held, show)
     frames = {path: each.frames for path, each in drawn.items()}
     told = [sentence for each in drawn.values() for sentence in each.told]
@@ -87,7 +85,7 @@ def _draw(
     selection: logs.Selection,
     own: RunConfig,
     held: HeldFrames,
-    show: Callable[[str], None],
+    show: Callable[[], None],
 ) -> _Drawn:
     """Decode the training frames of a drive and hold them."""
     settings = own.training
@@ -105,7 +103,7 @@ def _draw(
                 f"{held.full()}; lower `training.frames`, or reduce them with `frames.scale`"
             )
         frames.append(frame)
-        show("training")
+        show()
     losses = (*log.losses, *_left_out(streams[-1], frames))
     if losses and not frames:
         raise TrainingError(f"{log.path.name}: no training frame could be decoded: {losses[0]}")

@@ -1,16 +1,14 @@
 """Loops over every pixel that no library offers in one pass.
 
-Each is there twice: compiled (`bits`, `colours`, `compensation`, `rectified`, `runs`), and as the
-NumPy or OpenCV expression that defines it (`plain`). Both return the same bits. `KERNELS` are the
-compiled ones where compilation works and the others where it does not (no compiler support, nowhere
-to keep the cache), so results never depend on the machine. The choice is made when the first kernel
-is asked for, so that commands that only read results do not import a compiler.
+Each is there twice: in C (`compiled`), and as the NumPy or OpenCV expression that defines it
+(`plain`). Both return the same bits. `KERNELS` are the compiled ones where the library was built
+when the package was installed, and the others elsewhere, so results never depend on the machine.
+The choice is made when the first kernel is asked for.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -22,40 +20,15 @@ def pick() -> ModuleType:
     if os.environ.get("ROADEVAL_PLAIN") == "1":
         return plain
     try:
-        from numba import config
-
         from roadeval.kernels import compiled
-    except Exception:  # whatever keeps a compiler from working, the twins give the same numbers
+    except (ImportError, OSError, AttributeError):  # not built, or of another version
         return plain
-    return plain if config.DISABLE_JIT else compiled
+    return compiled
 
 
-def prepare(on_compile: Callable[[], None]) -> None:
-    """Load the kernels, which compiles them the first time on a machine.
-
-    Parameters
-    ----------
-    on_compile
-        Called before the first one is compiled: it takes some ten seconds for all.
-    """
-    if os.environ.get("ROADEVAL_PLAIN") == "1":
-        return
-    try:
-        from numba.core.event import Listener, install_listener
-    except Exception:  # see `pick`
-        return
-    waiting = [on_compile]
-
-    class Watch(Listener):  # type: ignore[misc]
-        def on_start(self, _event: Any) -> None:
-            if waiting:
-                waiting.pop()()
-
-        def on_end(self, _event: Any) -> None:
-            """Events come in pairs."""
-
-    with install_listener("numba:compile", Watch()):
-        pick()
+def missing() -> bool:
+    """Return whether the twins are used although nobody asked for them."""
+    return os.environ.get("ROADEVAL_PLAIN") != "1" and not pick().__name__.endswith(".compiled")
 
 
 class _Kernels:

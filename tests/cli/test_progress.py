@@ -43,8 +43,8 @@ def test_the_first_step_of_a_stage_is_a_line(monkeypatch):
 
 
 def test_before_the_first_frame_there_are_no_frames_to_tell_of(monkeypatch):
-    steps = [(0, step(0, 10, "compiling")), (1, step(1, 10, "training"))]
-    assert lines_of(steps, monkeypatch) == ["compiling", "training: 1 of 10 frames"]
+    steps = [(0, step(0, 10, "training")), (1, step(1, 10, "replaying"))]
+    assert lines_of(steps, monkeypatch) == ["training", "replaying: 1 of 10 frames"]
 
 
 def test_a_line_comes_now_and_then_with_rate_and_time_left(monkeypatch):
@@ -93,7 +93,7 @@ def test_the_bar_has_no_end_before_the_first_frame(monkeypatch):
     screen = Console(file=io.StringIO(), force_terminal=True, width=80)
     monkeypatch.setattr(console, "diagnostics", lambda: screen)
     with progress.watched() as watch:
-        watch(step(0, 100, "compiling"))
+        watch(step(0, 100, "training"))
     shown = screen.file.getvalue()
-    assert "compiling" in shown
+    assert "training" in shown
     assert "0/100" not in shown

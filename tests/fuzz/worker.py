@@ -37,7 +37,7 @@ INSTRUMENTED: Final = (
     *("roadeval.training.model", "roadeval.config", "mcap", "mcap_ros1", "mcap_ros2"),
     *("mcap_protobuf", "zipfile", "tomllib"),
 )
-"""Modules whose branches guide Atheris. Kernels are not among them: Numba cannot compile those."""
+"""Modules whose branches guide Atheris."""
 
 
 class Status(NamedTuple):

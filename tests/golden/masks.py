@@ -18,7 +18,6 @@ PACKAGES: Final = (
     "opencv-python-headless",
     "scikit-learn",
     "scipy",
-    "numba",
     "rerun-sdk",
     "pandas",
     "matplotlib",
@@ -37,7 +36,7 @@ RULES: Final[Mapping[str, tuple[str, str | Callable[[re.Match[str]], str]]]] = {
         lambda found: re.sub(r"\d+\.\d\d\n", "<ms>\n", found[0]),
     ),
     # How often progress is told depends on the machine's speed; each step's first line stays.
-    "progress, later lines": (r"(?m)^(compiling|(training|replaying): (?!1 of).*)\n", ""),
+    "progress, later lines": (r"(?m)^(training|replaying): (?!1 of).*\n", ""),
     "progress, the pace": (r", \d+\.\d frames/s(, \d+ s left)?", ""),
     # These belong to no machine, but would hide from the eye what is bold.
     "bold that goes on": (r"\x1b\[0m( *)\x1b\[1m(?=.)", r"\1"),

@@ -42,7 +42,7 @@ def components_and_seconds(shape, runs):
 
 @pytest.fixture(scope="module")
 def measured():
-    components_and_seconds(SMALL, 1)  # compiles
+    components_and_seconds(SMALL, 1)  # warms up
     return {shape: components_and_seconds(shape, 5) for shape in (SMALL, LARGE)}
 
 

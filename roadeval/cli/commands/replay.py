@@ -35,6 +35,7 @@ def replay(
         console.emit(summary_text(found.summary).rstrip())
     elif not quiet:
         screen.show(found, console.results())
+    messages.loops_missing()
     for warning in found.warnings:
         messages.warning(warning)
     return messages.losses(found.losses)

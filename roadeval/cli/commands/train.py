@@ -39,6 +39,7 @@ def train(
 
     with progress.watched(quiet) as watch:
         model = run(paths, output, config, on_progress=watch)
+    messages.loops_missing()
     for warning in model.warnings:
         messages.warning(warning)
     if not quiet:

@@ -137,7 +137,7 @@ def raw_to_rgb(picture: RawPicture, limits: Limits) -> Rgb:
     format_ = format_of(picture)
     samples = eight_bits(rows_of(picture, format_, limits))
     if format_.code is None:
-        # A loop is compiled anew for parts of a message: they may not be written to.
+        # An array of its own: a part of a message may not be written to.
         return np.require(samples, requirements=["C", "W"])
     try:
         rgb = cv2.cvtColor(samples, getattr(cv2, format_.code))

@@ -58,7 +58,7 @@ class ContextSettings:
     windows
         Sides of the squares over which texture is averaged, in its pixels. Gravel and leaves show
         in a small one; what a larger one tells of a facade, the columns below it tell as well.
-        At most 8: the machine's sum is compiled for each number of features.
+        At most 8: for each number of features there is a loop of its own.
     planes
         Planes of the feature map. What a decision costs grows with them.
     spare
@@ -217,7 +217,7 @@ def threshold(values: Values, road: npt.NDArray[np.bool_]) -> float:
 def check_fit(machine: RectifiedMachine, settings: ContextSettings) -> None:
     """Raise a `MisfitError` if the machine is for other features than the settings'.
 
-    The compiled sum checks no index: with too few columns it would read beyond the array.
+    Such a model is damaged, or was trained with other settings.
     """
     given, wanted = machine.planes.shape[1], BARE_FEATURES + 2 * len(settings.windows)
     if given != wanted:

@@ -62,7 +62,6 @@ def test_floats_count_from_zero_to_one_and_nan_is_black() -> None:
 )
 @pytest.mark.parametrize("padding", [0, 2])
 def test_an_image_is_an_array_of_its_own(encoding: str, pixel: int, padding: int) -> None:
-    """Else every loop would be compiled again, for arrays of another kind."""
     step = 2 * pixel + padding
     image = to_rgb(picture(bytes(2 * step), encoding, 2, 2, step=step), LIMITS)
     assert image.flags.c_contiguous

@@ -1,0 +1,162 @@
+/* Loops over the pixels of components and their rings: what Eq. 10 and 11 need.
+ *
+ * A component's pixels are given by its runs, in the order of the rows, see runs.c. */
+
+#include <math.h>
+#include <string.h>
+
+#include "loops.h"
+
+/* Pixels from which on a table of what becomes of each level is faster than computing it. */
+#define TABLED 256
+
+/* `sums`: seven for each label, cleared: pixels, R, G, B, and their squares. */
+LOOP void run_sums(
+    const uint8_t *restrict red, const uint8_t *restrict green, const uint8_t *restrict blue,
+    int64_t width, const run_t *restrict runs, int64_t count, int64_t *restrict sums)
+{
+    for (const run_t *run = runs; run < runs + count; run++) {
+        int64_t row = run->row * width, *sum = sums + 7 * (int64_t)run->label;
+        int64_t r1 = 0, g1 = 0, b1 = 0, r2 = 0, g2 = 0, b2 = 0;
+        for (int64_t at = row + run->start; at < row + run->end; at++) {
+            int32_t r = red[at], g = green[at], b = blue[at];
+            r1 += r, g1 += g, b1 += b;
+            r2 += r * r, g2 += g * g, b2 += b * b;
+        }
+        sum[0] += run->end - run->start;
+        sum[1] += r1, sum[2] += g1, sum[3] += b1;
+        sum[4] += r2, sum[5] += g2, sum[6] += b2;
+    }
+}
+
+/* `labels`: an image of `width` pixels a row, cleared. */
+LOOP void paint(
+    const run_t *restrict runs, int64_t count, int64_t width, int32_t *restrict labels)
+{
+    for (const run_t *run = runs; run < runs + count; run++)
+        for (int64_t x = run->start; x < run->end; x++)
+            labels[run->row * width + x] = run->label;
+}
+
+/* --- Rings ------------------------------------------------------------------------------------ */
+
+/* Add the ring's pixels in a stretch of a row to a component. */
+PART void add(
+    int64_t *restrict sum, const planes_t *planes, const uint64_t *ring,
+    int64_t row, int64_t start, int64_t end)
+{
+    uint64_t part = ~(uint64_t)0 << start % 64;
+    int64_t pixels = 0, r1 = 0, g1 = 0, b1 = 0, r2 = 0, g2 = 0, b2 = 0;
+    for (int64_t word = start / 64, last = (end - 1) / 64; word <= last; word++) {
+        uint64_t rest = ring[word] & part;
+        part = ~(uint64_t)0;
+        if (word == last)
+            rest &= part >> (63 - (end - 1) % 64);
+        for (; rest; rest &= rest - 1) {
+            int64_t at = row + 64 * word + lowest(rest);
+            int64_t r = planes->red[at], g = planes->green[at], b = planes->blue[at];
+            pixels++;
+            r1 += r, g1 += g, b1 += b;
+            r2 += r * r, g2 += g * g, b2 += b * b;
+        }
+    }
+    sum[0] += pixels;
+    sum[1] += r1, sum[2] += g1, sum[3] += b1;
+    sum[4] += r2, sum[5] += g2, sum[6] += b2;
+}
+
+/* The ring pixels of row y that belong to a component are those within `reach` columns of one of
+ * its runs in the rows y - reach to y + reach. With a reach of 1 and one component:
+ *
+ *     row y - 1      . . . # # # . . . . .
+ *     row y          . o o o o o o o o o .     o: columns 1 to 9
+ *     row y + 1      . . # # . . # # # . .
+ *
+ * The widened runs overlap, and a pixel must count once. So the runs of all these rows are merged
+ * from left to right by their first columns (`upcoming` is the next one of each row), and
+ * `reached` is the invariant: all of the component's pixels in row y left of that column have been
+ * counted. A widened run adds what lies right of it, and moves it to its own end. It is kept as
+ * y * width + column, so that what is left from an earlier row needs no clearing.
+ *
+ * `first`: each row's first run, with `reach` empty rows above and below the image, and one more;
+ * `sums`: seven for each label, `reached`: one, all cleared; `merge`: three times 2 reach + 1. */
+LOOP void ring_sums(
+    const uint8_t *red, const uint8_t *green, const uint8_t *blue,
+    int64_t height, int64_t width, const run_t *runs, const int64_t *first,
+    const uint64_t *ring, int64_t words, int64_t reach,
+    int64_t *restrict sums, int64_t *restrict reached, int64_t *restrict merge)
+{
+    const planes_t planes = {red, green, blue};
+    const int64_t rows = 2 * reach + 1;
+    /* For each row within reach: its next run, where that starts, and the run after its last. */
+    int64_t *upcoming = merge, *starts = merge + rows, *ends = merge + 2 * rows;
+    for (int64_t y = 0; y < height; y++) {
+        for (int64_t each = 0; each < rows; each++) {
+            upcoming[each] = first[y + each], ends[each] = first[y + each + 1];
+            starts[each] = upcoming[each] < ends[each] ? runs[upcoming[each]].start : width;
+        }
+        for (;;) {
+            int64_t row = 0, leftmost = starts[0];
+            for (int64_t each = 1; each < rows; each++) {
+                row = starts[each] < leftmost ? each : row;
+                leftmost = least(leftmost, starts[each]);
+            }
+            if (leftmost == width)
+                break;
+            const run_t *run = runs + upcoming[row]++;
+            starts[row] = upcoming[row] < ends[row] ? runs[upcoming[row]].start : width;
+            int64_t *until = reached + run->label;
+            int64_t start = most(most(run->start - reach, 0), *until - y * width);
+            int64_t end = least(run->end + reach, width);
+            if (start < end) {
+                *until = y * width + end;
+                add(sums + 7 * (int64_t)run->label, &planes, ring + y * words, y * width, start, end);
+            }
+        }
+    }
+}
+
+/* --- Transfer --------------------------------------------------------------------------------- */
+
+PART uint8_t moved(double level, double source, double target, double gain)
+{
+    double value = rint(target + (level - source) * gain);
+    return (uint8_t)(value > 0 ? (value < 255 ? value : 255) : 0);
+}
+
+/* `image`: changed in place. `source`, `target`, `gain`: three for each of `count` labels.
+ * `pixels`: of each label, cleared. `tables`: 768 for each label with more than TABLED pixels. */
+LOOP void transfer(
+    uint8_t *restrict image, int64_t width, const run_t *restrict runs, int64_t run_count,
+    const double *restrict source, const double *restrict target, const double *restrict gain,
+    int64_t count, int64_t *restrict pixels, uint8_t *restrict tables)
+{
+    for (const run_t *run = runs; run < runs + run_count; run++)
+        pixels[run->label] += run->end - run->start;
+    /* From here on `pixels` is the place of a label's table, or -1. */
+    int64_t place = 0;
+    for (int64_t k = 0; k < count; k++) {
+        if (pixels[k] <= TABLED) {
+            pixels[k] = -1;
+            continue;
+        }
+        uint8_t *table = tables + 768 * place;
+        for (int c = 0; c < 3; c++)
+            for (int level = 0; level < 256; level++)
+                *table++ = moved(level, source[3 * k + c], target[3 * k + c], gain[3 * k + c]);
+        pixels[k] = place++;
+    }
+    for (const run_t *run = runs; run < runs + run_count; run++) {
+        int64_t k = run->label;
+        uint8_t *at = image + 3 * (run->row * width + run->start);
+        uint8_t *end = image + 3 * (run->row * width + run->end);
+        const uint8_t *table = tables + 768 * pixels[k];
+        if (pixels[k] < 0)
+            for (; at < end; at += 3)
+                for (int c = 0; c < 3; c++)
+                    at[c] = moved(at[c], source[3 * k + c], target[3 * k + c], gain[3 * k + c]);
+        else
+            for (; at < end; at += 3)
+                at[0] = table[at[0]], at[1] = table[256 + at[1]], at[2] = table[512 + at[2]];
+    }
+}

@@ -1,0 +1,76 @@
+"""The compiled kernels are there, and replaced by their twins where they are not."""
+
+import shutil
+import subprocess
+import sys
+import types
+
+import pytest
+
+from roadeval import kernels
+from roadeval.cli.app import main
+from roadeval.kernels import pick, plain
+from tests.jobs.making import write_log
+
+
+@pytest.fixture
+def unbuilt(monkeypatch):
+    """As if no compiler had been there when the package was installed."""
+    monkeypatch.delenv("ROADEVAL_PLAIN", raising=False)
+    monkeypatch.delitem(sys.modules, "roadeval.kernels.compiled", raising=False)
+    monkeypatch.delattr(kernels, "compiled", raising=False)
+    monkeypatch.delattr(kernels, "_loops", raising=False)
+    monkeypatch.setitem(sys.modules, "roadeval.kernels._loops", None)
+    chosen = vars(kernels.KERNELS)
+    before = dict(chosen)
+    chosen.clear()
+    yield
+    chosen.clear()
+    chosen.update(before)
+
+
+@pytest.mark.skipif(not shutil.which("cc"), reason="there is no C compiler")
+def test_where_there_is_a_compiler_the_library_was_built(monkeypatch):
+    monkeypatch.delenv("ROADEVAL_PLAIN", raising=False)
+    assert pick().__name__ == "roadeval.kernels.compiled"
+    assert not kernels.missing()
+
+
+def test_without_the_library_the_twins_are_used(unbuilt):
+    assert pick() is plain
+    assert kernels.missing()
+
+
+@pytest.mark.parametrize("error", [OSError("wrong ELF class"), AttributeError("grow")])
+def test_a_library_that_does_not_fit_is_not_used(unbuilt, monkeypatch, error):
+    def refuse(_path):
+        raise error
+
+    loops = types.SimpleNamespace(__file__="loops.so")
+    monkeypatch.setitem(sys.modules, "roadeval.kernels._loops", loops)
+    monkeypatch.setattr("ctypes.CDLL", refuse)
+    assert pick() is plain
+
+
+def test_twins_that_were_asked_for_are_not_missed(unbuilt, monkeypatch):
+    monkeypatch.setenv("ROADEVAL_PLAIN", "1")
+    assert pick() is plain
+    assert not kernels.missing()
+
+
+def test_a_run_without_the_library_says_what_it_costs(unbuilt, tmp_path, capsys):
+    drive = write_log(tmp_path / "drive.mcap")
+    outputs = ["--record", "none", "--reports", str(tmp_path / "reports")]
+    main(["replay", str(drive), *outputs])
+    assert "roadeval: warning: the compiled loops are missing" in capsys.readouterr().err
+    main(["train", str(drive), "-o", str(tmp_path / "x.model")])
+    assert "roadeval: warning: the compiled loops are missing" in capsys.readouterr().err
+
+
+def test_whoever_only_reads_results_loads_no_kernel():
+    code = (
+        "import sys, roadeval.jobs.compare, roadeval.jobs.report; "
+        "print('roadeval.kernels.compiled' in sys.modules)"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "False"
