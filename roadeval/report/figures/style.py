@@ -32,13 +32,12 @@ RC: Final[dict[str, Any]] = {
     "ytick.labelsize": 8,
     "legend.frameon": False,
     "legend.fontsize": 9,
-    "pdf.fonttype": 42,
     "svg.fonttype": "none",
     "svg.hashsalt": "roadeval",
     "text.parse_math": False,  # a dollar in a name is no formula
     "savefig.facecolor": "white",
 }
-"""Matplotlib's settings for every figure; fonts go into a PDF as TrueType."""
+"""Matplotlib's settings for every figure; in an SVG, and so in a PDF, text stays text."""
 INK: Final = "#222222"
 FAINT: Final = "#666666"
 PALE: Final = "#E3E3E3"

@@ -10,7 +10,9 @@ become markup, and nothing is fetched from anywhere.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from enum import StrEnum
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -23,6 +25,11 @@ from roadeval.runtime.files import put
 from roadeval.runtime.text import visible
 
 _TEMPLATE: Final = "document.typ"
+_FIGURE: Final = b"""
+#set document(author: "roadeval", date: none)
+#set page(width: auto, height: auto, margin: 0pt)
+#image("figure.svg")
+"""
 
 
 class Paper(StrEnum):
@@ -49,25 +56,15 @@ def pdf(document: Document, paper: Paper = Paper.A4) -> bytes:
     Fonts are Typst's own and, for the figures, Matplotlib's; never the machine's, so that a
     document looks the same everywhere.
     """
-    import typst
-
     page = {"paper": _TYPST_NAMES[paper], "colours": _COLOURS}
     data = _visible(document.as_json() | page)
-    sources = {
-        _TEMPLATE: files("roadeval.report.pdf").joinpath(_TEMPLATE).read_bytes(),
-        "document.json": json.dumps(data).encode(),
-        **document.files(),
-    }
-    with TemporaryDirectory(prefix="roadeval-") as folder:
-        for name, content in sources.items():
-            Path(folder, name).write_bytes(content)
-        compiled: bytes = typst.compile(
-            Path(folder, _TEMPLATE),
-            root=Path(folder),
-            format="pdf",
-            font_paths=typst.Fonts(include_system_fonts=False, font_paths=[_font_folder()]),
-        )
-    return compiled
+    template = files("roadeval.report.pdf").joinpath(_TEMPLATE).read_bytes()
+    return _compiled(template, {"document.json": json.dumps(data).encode(), **document.files()})
+
+
+def page_of(svg: bytes) -> bytes:
+    """Return a figure, given as SVG, as a PDF of one page of its size."""
+    return _compiled(_FIGURE, {"figure.svg": svg})
 
 
 def write_file(path: Path, content: bytes) -> Path:
@@ -87,11 +84,27 @@ def write_file(path: Path, content: bytes) -> Path:
     return path
 
 
-def _font_folder() -> str:
-    """Return the folder of the fonts that Matplotlib brings."""
+def _compiled(template: bytes, sources: Mapping[str, bytes]) -> bytes:
+    """Return what Typst makes of a template and the files that it reads."""
+    import typst
+
+    with TemporaryDirectory(prefix="roadeval-") as folder:
+        for name, content in {_TEMPLATE: template, **sources}.items():
+            Path(folder, name).write_bytes(content)
+        compiled: bytes = typst.compile(
+            Path(folder, _TEMPLATE), root=Path(folder), format="pdf", font_paths=_fonts()
+        )
+    return compiled
+
+
+@cache
+def _fonts() -> Any:
+    """Return Typst's own fonts and those that Matplotlib brings."""
+    import typst
     from matplotlib import get_data_path
 
-    return str(Path(get_data_path(), "fonts", "ttf"))
+    folder = Path(get_data_path(), "fonts", "ttf")
+    return typst.Fonts(include_system_fonts=False, font_paths=[str(folder)])
 
 
 def _visible(value: Any) -> Any:
