@@ -82,7 +82,7 @@ class GatedSettings:
     max_texture
         Greatest root mean square of the log brightness about its 5x5 mean, in the core. Shade
         leaves a road's texture as it is, and roads are smooth; leaves, cars and house fronts are
-        not. This is the gate that keeps the filter from harm.
+        not.
     min_share
         Share of the frame that all components which pass the other gates must cover together.
         Under a clouded sky it is still dark beneath cars, and nowhere else.

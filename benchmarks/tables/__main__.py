@@ -1,0 +1,118 @@
+"""The tables of README.md and benchmarks/PRESETS.md, and whether they say what was measured.
+
+python -m benchmarks.tables             checks both texts against benchmarks/tables/numbers.json
+python -m benchmarks.tables --write     writes the tables of both anew
+python -m benchmarks.tables --measure   replays the drives and writes the numbers
+
+A drive comes from the folder named for it; see PRESETS.md for where to get them. ``--measure NAME``
+measures one drive, or ``idd``, and leaves the other numbers as they are.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from benchmarks.tables import idd
+from benchmarks.tables.drives import DRIVES, SEGNET, MissingSourceError, Sources
+from benchmarks.tables.measure import (
+    REPLAYS,
+    SEEDS,
+    STRANGERS,
+    replayed,
+    rounded,
+    trained_elsewhere,
+)
+from benchmarks.tables.text import DOCUMENTS, NUMBERS, faults, load, written
+from roadeval.version import VERSION
+
+IDD, ELSEWHERE = "idd", "elsewhere"
+
+
+def main() -> int:
+    """Check, write or measure; return the exit code."""
+    options = _arguments()
+    if options.measure is not None:
+        with tempfile.TemporaryDirectory() as made:
+            _measure(options, Path(options.work or made))
+        if not options.write:
+            return 0
+    numbers = load()
+    if options.write:
+        for path in DOCUMENTS:
+            path.write_text(written(path.read_text(), numbers))
+    found = [
+        f"{path.name}: {fault}" for path in DOCUMENTS for fault in faults(path.read_text(), numbers)
+    ]
+    for each in found:
+        print(each, file=sys.stderr)
+    return 1 if found else 0
+
+
+def _measure(options: argparse.Namespace, work: Path) -> None:
+    """Measure what was named, or everything; every result is kept at once."""
+    work.mkdir(parents=True, exist_ok=True)
+    sources = Sources(work, options.logs, options.camvid, options.comma10k)
+    names = options.measure or [*DRIVES, *([] if options.replays else [IDD, ELSEWHERE])]
+    for name in names:
+        if name == IDD:
+            if options.idd is None:
+                sys.exit(f"idd: name the folder idd20k_lite of {idd.SOURCE} (--idd)")
+            _keep(rounded(idd.measured(options.idd, SEEDS)), IDD)
+            continue
+        if name == ELSEWHERE:
+            for stranger in STRANGERS.values():
+                _keep(trained_elsewhere(stranger, sources), ELSEWHERE, stranger.name)
+            continue
+        for key, replay in REPLAYS.items():
+            if name in replay.drives and key in (options.replays or REPLAYS):
+                begin = time.monotonic()
+                try:
+                    found = replayed(key, DRIVES[name], sources)
+                except MissingSourceError as error:
+                    sys.exit(str(error))
+                _keep(found, "drives", name, key)
+                print(f"{name} {key}: {time.monotonic() - begin:.0f} s", flush=True)
+
+
+def _keep(found: Any, *place: str) -> None:
+    """Put numbers in their place in the file."""
+    numbers = load() if NUMBERS.exists() else {}
+    numbers |= {"roadeval": VERSION, "seeds": SEEDS}
+    here = numbers
+    for name in place[:-1]:
+        here = here.setdefault(name, {})
+    here[place[-1]] = found
+    NUMBERS.write_text(json.dumps(numbers, indent=1, sort_keys=True) + "\n")
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.tables",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--write", action="store_true", help="write the tables of both texts")
+    parser.add_argument(
+        "--measure",
+        nargs="*",
+        choices=(names := [*DRIVES, IDD, ELSEWHERE]),
+        metavar="NAME",
+        help=f"all by default, or some of {', '.join(names)}",
+    )
+    parser.add_argument("--replays", nargs="+", choices=REPLAYS, help="of each drive")
+    parser.add_argument("--work", type=Path, help="keep the logs and results made here")
+    parser.add_argument("--logs", type=Path, help="the folder of the two CamVid logs")
+    parser.add_argument("--camvid", type=Path, help=f"the folder CamVid of {SEGNET}")
+    parser.add_argument("--comma10k", type=Path, help="a folder with its imgs and masks")
+    parser.add_argument("--idd", type=Path, help=f"the folder idd20k_lite of {idd.SOURCE}")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,363 @@
+"""What stands between the marks: tables and sentences, each made of the numbers."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Any, Final
+
+from benchmarks.tables import idd
+from benchmarks.tables.drives import DRIVES, Drive
+from benchmarks.tables.measure import GATES, STRANGERS, TEACHER, command
+from roadeval.results.claims import WORDS
+
+Numbers = Mapping[str, Any]
+SURE: Final = 0.05
+"""The p-value below which a difference stands, as in roadeval's own verdicts."""
+MARK: Final = "\\*"
+GATE_WORDS: Final = {
+    "texture": "texture (`max_texture`)",
+    "horizon": "horizon",
+    "reach": "reach",
+    "green": "excess green (`max_green`)",
+    "colour": "colour under skylight (`colour_distance`)",
+    "share": "share of the frame (`min_share`)",
+    "penumbra": "penumbra (`gap`)",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A table or some sentences, and the commands that make their numbers again."""
+
+    body: Callable[[Numbers], str]
+    commands: tuple[str, ...]
+
+
+def _err(numbers: Numbers, drive: str, replay: str, variant: str) -> list[float]:
+    """Return ERR with each seed."""
+    found: list[float] = numbers["drives"][drive][replay]["variants"][variant]["ERR"]
+    return found
+
+
+def _blind(numbers: Numbers, drive: str) -> float:
+    found: float = numbers["drives"][drive]["paper"]["blind"]["ERR"]
+    return found
+
+
+def _percent(fraction: float) -> str:
+    return f"{100 * fraction:.1f}"
+
+
+def _points(fraction: float) -> str:
+    return f"{round(100 * fraction, 1) + 0.0:+.1f}"  # no "-0.0"
+
+
+def _spread(values: Sequence[float], show: Callable[[float], str] = _percent) -> str:
+    return f"{show(median(values))} ({show(min(values))} to {show(max(values))})"
+
+
+def _interval(change: Mapping[str, float]) -> str:
+    sure = change.get("p_holm")
+    mark = f" {MARK}" if sure is not None and sure < SURE else ""
+    return f"{_points(change['mean'])} [{_points(change['low'])}, {_points(change['high'])}]{mark}"
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _bold(texts: Sequence[str]) -> list[str]:
+    """Return texts of numbers with the least in bold."""
+    least = min(texts, key=float)
+    return [f"**{text}**" if text == least else text for text in texts]
+
+
+def _and(texts: Sequence[str]) -> str:
+    *first, last = texts
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def _untouched() -> list[Drive]:
+    """Return the real drives that were not used to choose anything."""
+    return [d for d in DRIVES.values() if not d.tuned and not d.name.startswith("synthetic")]
+
+
+# --- README.md ------------------------------------------------------------------------------------
+
+
+def drives(numbers: Numbers) -> str:
+    """Return ERR of every preset on every drive, and what became of the filters."""
+    head = ["ERR, %", "`blind`", "no filter", "`paper`", "`gated`", "`robust`"]
+    rows = [
+        [drive.title + (" ¹" if drive.tuned else ""), *_bold(_five(numbers, drive.name))]
+        for drive in DRIVES.values()
+    ]
+    lite = numbers["idd"]
+    own = [_percent(median(lite["variants"][name]["ERR"])) for name in idd.VARIANTS]
+    rows.append(
+        [f"IDD Lite, {lite['labelled']} drives ¹", *_bold([_percent(lite["blind"]["ERR"]), *own])]
+    )
+    return "\n".join((_table(head, rows), "", *_on_filters(numbers)))
+
+
+def _five(numbers: Numbers, drive: str) -> list[str]:
+    columns = (
+        ("paper", "unfiltered"),
+        ("paper", "filtered"),
+        ("gated", "filtered"),
+        ("robust", "unfiltered"),
+    )
+    errs = [_percent(median(_err(numbers, drive, *column))) for column in columns]
+    return [_percent(_blind(numbers, drive)), *errs]
+
+
+def _on_filters(numbers: Numbers) -> Iterator[str]:
+    """Yield what became of each filter, and of `robust`, on all drives together."""
+    for replay in ("paper", "gated"):
+        changes = {name: numbers["drives"][name][replay]["filter"]["ERR"] for name in DRIVES}
+        middles = {name: round(100 * median(each["seeds"]), 1) for name, each in changes.items()}
+        up = [changes[name] for name, middle in middles.items() if middle > 0]
+        down = [changes[name] for name, middle in middles.items() if middle < 0]
+        yield _item(
+            f"The filter of `{replay}` raises ERR on {len(up)} of the {len(DRIVES)} drives, by up "
+            f"to {max(middles.values()):.1f} points, surely on {_sure(up)}; it lowers ERR on "
+            f"{len(down)}, by up to {-min(middles.values()):.1f}, surely on {_sure(down)}."
+        )
+    yield _item(" ".join(_on_robust(numbers)))
+
+
+def _on_robust(numbers: Numbers) -> Iterator[str]:
+    margins = {name: _margins(numbers, name) for name in DRIVES}
+    below = sum(median(each) < 0 for each in margins.values())
+    yield f"`robust` is below `blind` on {below} of the {len(DRIVES)} drives"
+    close = [DRIVES[name].title for name, each in margins.items() if max(each) >= 0]
+    yield f"(not with every seed on {_and(close)});" if close else "with every seed;"
+    lite = numbers["idd"]
+    lost = lite["variants"]["robust"]["not_below_blind"]
+    yield f"it is not on {min(lost)} to {max(lost)} of IDD's {lite['labelled']}."
+    found = {name: numbers["elsewhere"][name] for name in STRANGERS}
+    beaten = [
+        f"{STRANGERS[name].title} ({_percent(median(each['ERR']))} against "
+        f"{_percent(each['blind'])} %)"
+        for name, each in found.items()
+        if median(each["ERR"]) >= each["blind"]
+    ]
+    teacher = DRIVES[TEACHER].title
+    where = f" loses on {_and(beaten)}" if beaten else " is below `blind` on every other drive"
+    yield f"Trained on {teacher} alone it{where}."
+
+
+def _item(words: str) -> str:
+    return textwrap.fill(words, 100, initial_indent="- ", subsequent_indent="  ")
+
+
+def _sure(changes: Sequence[Mapping[str, float]]) -> str:
+    return str(sum(each["p_holm"] < SURE for each in changes) or "none")
+
+
+def _margins(numbers: Numbers, drive: str) -> list[float]:
+    """Return ERR of `robust` minus that of `blind`, with each seed."""
+    blind = _blind(numbers, drive)
+    return [each - blind for each in _err(numbers, drive, "robust", "unfiltered")]
+
+
+def claims(numbers: Numbers) -> str:
+    """Return the paper's claims with the windows of all drives that bear them out."""
+    rows = []
+    for name, words in WORDS.items():
+        found = [numbers["drives"][drive]["paper"]["claims"][name] for drive in DRIVES]
+        held, windows = (sum(each[key] for each in found) for key in ("held", "windows"))
+        every = sum(each["held"] == each["windows"] for each in found)
+        rows.append([words, f"{held} of {windows}", f"{every} of {len(DRIVES)}"])
+    return _table(["claim", "windows that bear it out", "drives where every window does"], rows)
+
+
+def order(numbers: Numbers) -> str:
+    """Return ERR of `paper` with one thing as printed, on drives that it was not chosen on."""
+    others = [*_untouched(), *_synthetic()]
+    variants = {"`paper`": "filtered", "`printed_order`": "printed_order", "`hsi`": "hsi"}
+    return _table(
+        ["ERR of the filtered mask, %", *(drive.title for drive in others)],
+        (
+            [
+                title,
+                *(_percent(median(_err(numbers, d.name, "paper", variant))) for d in others),
+            ]
+            for title, variant in variants.items()
+        ),
+    )
+
+
+def _synthetic() -> list[Drive]:
+    return [drive for drive in DRIVES.values() if drive.name.startswith("synthetic")]
+
+
+# --- PRESETS.md -----------------------------------------------------------------------------------
+
+
+def spreads(numbers: Numbers) -> str:
+    """Return ERR of every preset on every drive, with the spread of the seeds."""
+    columns = {
+        "no filter": ("paper", "unfiltered"),
+        "`paper`": ("paper", "filtered"),
+        "`printed_order`": ("paper", "printed_order"),
+        "`hsi`": ("paper", "hsi"),
+        "`gated`": ("gated", "filtered"),
+        "`robust`": ("robust", "unfiltered"),
+    }
+    return _table(
+        ["ERR, %", "frames", "`blind`", *columns],
+        (
+            [
+                drive.title,
+                str(numbers["drives"][drive.name]["paper"]["frames"]),
+                _percent(_blind(numbers, drive.name)),
+                *(_spread(_err(numbers, drive.name, *column)) for column in columns.values()),
+            ]
+            for drive in DRIVES.values()
+        ),
+    )
+
+
+def filters(numbers: Numbers) -> str:
+    """Return what each filter does to ERR, with its interval and the spread of the seeds."""
+    rows = []
+    for drive in DRIVES.values():
+        row = [drive.title]
+        for replay in ("paper", "gated"):
+            change = numbers["drives"][drive.name][replay]["filter"]["ERR"]
+            row += [_spread(change["seeds"], _points), _interval(change)]
+        rows.append(row)
+    seeds, first = "seeds", "first seed [interval]"
+    head = ["filter's effect, points", f"`paper`: {seeds}", first, f"`gated`: {seeds}", first]
+    return _table(head, rows)
+
+
+def against_blind(numbers: Numbers) -> str:
+    """Return every preset's ERR minus that of the baseline."""
+    columns = {
+        "no filter": ("paper", "unfiltered"),
+        "`paper`": ("paper", "filtered"),
+        "`gated`": ("gated", "filtered"),
+        "`robust`": ("robust", "unfiltered"),
+    }
+    rows = []
+    for drive in DRIVES.values():
+        row = [drive.title]
+        for replay, variant in columns.values():
+            change = numbers["drives"][drive.name][replay]["against_blind"][variant]
+            row.append(_interval(change))
+        margins = _margins(numbers, drive.name)
+        rows.append([*row, _spread(margins, _points)])
+    return _table(["ERR minus `blind`, points", *columns, "`robust`: seeds"], rows)
+
+
+def claims_by_drive(numbers: Numbers) -> str:
+    """Return the windows of each drive that bear out each claim."""
+    head = ["claim", *(drive.title for drive in DRIVES.values())]
+    return _table(
+        head,
+        (
+            [words, *(_held(numbers["drives"][drive]["paper"]["claims"][name]) for drive in DRIVES)]
+            for name, words in WORDS.items()
+        ),
+    )
+
+
+def _held(found: Mapping[str, int]) -> str:
+    short = f" + {found['short_held']}/{found['short']}" if found["short"] else ""
+    return f"{found['held']}/{found['windows']}{short}"
+
+
+def idd_lite(numbers: Numbers) -> str:
+    """Return the rates on IDD Lite, with the drives where `blind` is not beaten."""
+    lite = numbers["idd"]
+    blind = lite["blind"]
+    rows = [["`blind`", _percent(blind["ERR"]), _percent(blind["dark_missed"]), "", "", ""]]
+    for name in idd.VARIANTS:
+        found = lite["variants"][name]
+        own, lost = found.get("against_unfiltered"), found["not_below_blind"]
+        rows.append(
+            [
+                "no filter" if name == "unfiltered" else f"`{name}`",
+                _spread(found["ERR"]),
+                _spread(found["dark_missed"]),
+                f"{median(lost)} ({min(lost)} to {max(lost)}) of {lite['labelled']}",
+                _interval(found["against_blind"]),
+                _interval(own) if own else "",
+            ]
+        )
+    return _table(
+        [
+            *("IDD Lite", "ERR, %", "dark road missed, %", "drives not below `blind`"),
+            *("minus `blind`, points", "minus no filter, points"),
+        ],
+        rows,
+    )
+
+
+def gates(numbers: Numbers) -> str:
+    """Return ERR with each gate taken away."""
+    names = [name for name in DRIVES if "gates" in numbers["drives"].get(name, {})]
+    variants = {"none": "filtered"} | {GATE_WORDS[gate]: f"no_{gate}" for gate in GATES}
+    variants["all: no filter"] = "unfiltered"
+    return _table(
+        ["gate taken away: ERR, %", *(DRIVES[name].title for name in names)],
+        (
+            [words, *(_spread(_err(numbers, name, "gates", variant)) for name in names)]
+            for words, variant in variants.items()
+        ),
+    )
+
+
+def elsewhere(numbers: Numbers) -> str:
+    """Return ERR of `robust` where it was trained on another drive."""
+    return _table(
+        ["trained on CamVid 0006R0: ERR, %", "`blind`", "`robust`", "minus `blind`, points"],
+        (
+            [
+                STRANGERS[name].title,
+                _percent(found["blind"]),
+                _spread(found["ERR"]),
+                _interval(found["against_blind"]),
+            ]
+            for name, found in ((name, numbers["elsewhere"][name]) for name in STRANGERS)
+        ),
+    )
+
+
+def flicker(numbers: Numbers) -> str:
+    """Return how much of each mask changes from frame to frame."""
+    drive = "camvid_0016E5_15hz"
+    found = numbers["drives"][drive]
+    paper, robust = (found[replay]["variants"] for replay in ("paper", "robust"))
+    shares = {
+        "in the truth": found["paper"]["truth_flicker"],
+        "with `robust`": robust["unfiltered"]["flicker"],
+        "with `paper`": paper["filtered"]["flicker"],
+        "with colours and no filter": paper["unfiltered"]["flicker"],
+    }
+    words = ", ".join(f"{_percent(share)} % {where}" for where, share in shares.items())
+    return f"Pixels that change from one frame of {DRIVES[drive].title} to the next: {words}."
+
+
+MEASURE: Final = "python -m benchmarks.tables --measure"
+PAPER, GATED, ROBUST = map(command, ("paper", "gated", "robust"))
+BLOCKS: Final = {
+    "drives": Block(drives, (MEASURE,)),
+    "claims": Block(claims, (PAPER,)),
+    "order": Block(order, (PAPER,)),
+    "spreads": Block(spreads, (PAPER, GATED, ROBUST)),
+    "filters": Block(filters, (PAPER, GATED)),
+    "against_blind": Block(against_blind, (PAPER, GATED, ROBUST)),
+    "claims_by_drive": Block(claims_by_drive, (PAPER,)),
+    "idd": Block(idd_lite, (f"{MEASURE} idd",)),
+    "gates": Block(gates, (f"{MEASURE} --replays gates",)),
+    "elsewhere": Block(elsewhere, (f"{MEASURE} elsewhere",)),
+    "flicker": Block(flicker, (PAPER, ROBUST)),
+}
+"""By the names in the marks."""

@@ -1,0 +1,183 @@
+"""The presets on drives that they were not trained on: IDD Lite, split by drive.
+
+Half of the drives of its *train* part learn, the other half is scored, then the other way round;
+two frames of each drive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from roadeval.config import RunConfig, configure
+from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame
+from roadeval.evaluation.baselines import BlindPrior
+from roadeval.pipeline.chain import Chain
+from roadeval.pipeline.stage import View
+from roadeval.training import fit
+
+SOURCE: Final = "https://github.com/Siya26/Semantic-Segmentation-on-IDD_Lite"
+FRAMES: Final = 2
+"""Of each drive, evenly spread."""
+DRAWS: Final = 1000
+"""Of the bootstrap over drives."""
+VARIANTS: Final = ("unfiltered", "paper", "gated", "robust")
+TP, TN, FP, FN, DARK, DARK_MISSED = range(6)
+
+Counted = NDArray[np.int64]
+"""Outcomes of a variant on each drive, ``(drives, 6)``."""
+Drives = Mapping[str, Sequence[Frame]]
+
+
+def measured(folder: Path, seeds: int) -> dict[str, Any]:
+    """Run both folds with each seed; rates are pooled over all pixels, as fractions.
+
+    Parameters
+    ----------
+    folder
+        ``idd20k_lite`` as downloaded.
+    seeds
+        Of the training: 0 and those after it.
+    """
+    halves: list[dict[str, list[Frame]]] = [{}, {}]
+    for name, frames in read_drives(folder).items():
+        halves[blake2b(name.encode()).digest()[0] % 2][name] = frames
+    folds = (halves, halves[::-1])
+    blind = np.concatenate([count_blind(*fold) for fold in folds])
+    trained = {
+        name: [
+            np.concatenate([score(config, seed, *fold) for fold in folds]) for seed in range(seeds)
+        ]
+        for name, config in variants()
+    }
+    return {
+        "drives": len(blind),
+        "labelled": int(blind[:, :DARK].any(axis=1).sum()),
+        "blind": {"ERR": err(blind.sum(axis=0)), "dark_missed": missed(blind.sum(axis=0))},
+        "variants": {name: told(found, blind, trained) for name, found in trained.items()},
+    }
+
+
+def told(
+    found: list[Counted], blind: Counted, trained: Mapping[str, list[Counted]]
+) -> dict[str, Any]:
+    """Return a variant's rates with each seed, and its differences with intervals of the first."""
+    base = trained["unfiltered"]
+    numbers: dict[str, Any] = {
+        "ERR": [err(each.sum(axis=0)) for each in found],
+        "dark_missed": [missed(each.sum(axis=0)) for each in found],
+        "not_below_blind": [not_below(each, blind) for each in found],
+        "against_blind": difference(err, found[0], blind),
+    }
+    if found is not base:
+        numbers["against_unfiltered"] = {
+            **difference(err, found[0], base[0]),
+            "seeds": [
+                err(a.sum(axis=0)) - err(b.sum(axis=0)) for a, b in zip(found, base, strict=True)
+            ],
+        }
+    return numbers
+
+
+def read_drives(folder: Path) -> dict[str, list[Frame]]:
+    """Read some frames of each drive, evenly spread."""
+    found = {}
+    for drive in sorted((folder / "leftImg8bit" / "train").iterdir()):
+        paths = sorted(drive.glob("*_image.jpg"))
+        count = min(FRAMES, len(paths))
+        chosen = [paths[i * len(paths) // count] for i in range(count)]
+        found[drive.name] = [read(path, folder) for path in chosen]
+    return found
+
+
+def read(path: Path, folder: Path) -> Frame:
+    """Read a frame; label 0 is road, 255 is ignored."""
+    label = path.name.replace("_image.jpg", "_label.png")
+    classes = cv2.imread(str(folder / "gtFine" / "train" / path.parent.name / label), 0)
+    truth = np.select([classes == 0, classes == 255], [ROAD, IGNORE], NON_ROAD).astype(np.uint8)
+    image = np.ascontiguousarray(cv2.imread(str(path))[..., ::-1])
+    return Frame(0, 0, 0, image, path.read_bytes(), truth=truth)
+
+
+def dark_road(frame: Frame) -> NDArray[np.bool_]:
+    """Road darker than half of the 85th percentile of the frame's road."""
+    grey, road = frame.image.mean(axis=2), frame.truth == ROAD
+    return road & (grey < 0.5 * np.percentile(grey[road], 85)) if road.any() else road
+
+
+def counts(mask: NDArray[np.uint8], frame: Frame) -> NDArray[np.int64]:
+    """Count a mask's outcomes on a frame, and on its dark road."""
+    road, other, dark = frame.truth == ROAD, frame.truth == NON_ROAD, dark_road(frame)
+    found = mask > 0
+    sets = [road & found, other & ~found, other & found, road & ~found, dark, dark & ~found]
+    return np.array([part.sum() for part in sets])
+
+
+def variants() -> Iterator[tuple[str, RunConfig]]:
+    """Yield what is compared: colours without a filter, and presets."""
+    paper = configure()
+    yield VARIANTS[0], replace(paper, pipeline=paper.pipeline.without_filter())
+    for name in VARIANTS[1:]:
+        yield name, configure({"preset": name})
+
+
+def count_blind(train: Drives, test: Drives) -> Counted:
+    """Count the outcomes of the mean truth of ``train``."""
+    prior = BlindPrior.of_truths([frame.truth for frame in _all(train)])
+    return np.array(
+        [
+            sum(counts(prior.mask(f.image.shape[:2]).pixels(), f) for f in frames)
+            for frames in test.values()
+        ]
+    )
+
+
+def score(config: RunConfig, seed: int, train: Drives, test: Drives) -> Counted:
+    """Train a variant and count its outcomes on each drive."""
+    model = fit(_all(train), {"it": config.pipeline}, replace(config.training, seed=seed))
+    chain: Chain = config.pipeline.bind(model.parameters["it"])
+    return np.array([sum(counts(last(chain, f), f) for f in frames) for frames in test.values()])
+
+
+def last(chain: Chain, frame: Frame) -> NDArray[np.uint8]:
+    """Return the chain's final mask."""
+    *_, (_, output) = chain.run(View.of(frame.image))
+    return output.mask.pixels()
+
+
+def err(total: Counted) -> Any:
+    """Return the pooled ERR of one drive, or of each of several."""
+    return (total[..., FP] + total[..., FN]) / total[..., :DARK].sum(axis=-1)
+
+
+def missed(total: Counted) -> float:
+    """Return the share of dark road that is missed."""
+    return total[DARK_MISSED] / total[DARK]
+
+
+def not_below(rows: Counted, blind: Counted) -> int:
+    """Return on how many of the drives that have an ERR it is not below that of ``blind``."""
+    labelled = blind[:, :DARK].any(axis=1)
+    return int((err(rows[labelled]) >= err(blind[labelled])).sum())
+
+
+def difference(rate: Any, new: Counted, base: Counted) -> dict[str, float]:
+    """Return a rate's difference, with its 95 % interval of a bootstrap over drives."""
+
+    def of(a: Counted, b: Counted) -> float:
+        return float(rate(a.sum(axis=0)) - rate(b.sum(axis=0)))
+
+    draws = np.random.default_rng(0).integers(len(new), size=(DRAWS, len(new)))
+    low, high = np.percentile([of(new[drawn], base[drawn]) for drawn in draws], [2.5, 97.5])
+    return {"mean": of(new, base), "low": float(low), "high": float(high)}
+
+
+def _all(drives: Drives) -> list[Frame]:
+    return [frame for frames in drives.values() for frame in frames]

@@ -1,0 +1,167 @@
+"""Replays of the drives, and the numbers of their summaries that tables show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import roadeval
+from benchmarks.tables.drives import COMMA10K, DRIVES, Drive, Sources
+from roadeval.data import FINAL_STAGE
+
+SEEDS: Final = 5
+RATES: Final = ("ERR", "FPR", "FNR")
+KEPT: Final = ("mean", "low", "high", "p", "p_holm", "comparisons", "frames")
+
+
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """One replay of a drive.
+
+    Parameters
+    ----------
+    tables
+        Its configuration, without what the drive's truth needs.
+    options
+        The same for the terminal; empty where that takes files, too.
+    drives
+        Those that it is made of; all by default.
+    """
+
+    tables: Mapping[str, Any]
+    options: str = ""
+    drives: tuple[str, ...] = tuple(DRIVES)
+
+
+GATES: Final = {
+    "texture": {"max_texture": 99.0},
+    "horizon": {"horizon": 0.0},
+    "reach": {"reach": 0.0},
+    "green": {"max_green": 99.0},
+    "colour": {"colour_distance": 1e9},
+    "share": {"min_share": 0.0},
+    "penumbra": {"gap": 0},
+}
+"""What takes each gate of `gated` away."""
+
+TEACHER: Final = "camvid_0006R0_1hz"
+"""The drive that a model for others is trained on."""
+STRANGERS: Final = {
+    **{
+        name: DRIVES[name]
+        for name in ("synthetic_0", "camvid_0016E5_1hz", "camvid_Seq05VD", "camvid_0001TP")
+    },
+    COMMA10K.name: COMMA10K,
+}
+"""Those others: other cameras, and other journeys of the same one."""
+
+REPLAYS: Final[Mapping[str, Replay]] = {
+    "paper": Replay(
+        {"variants": {name: {"preset": name} for name in ("printed_order", "hsi")}},
+        "--variant printed_order --variant hsi",
+    ),
+    "gated": Replay({"preset": "gated"}, "--preset gated"),
+    "robust": Replay({"preset": "robust"}, "--preset robust"),
+    "gates": Replay(
+        {
+            "preset": "gated",
+            "variants": {
+                f"no_{gate}": {"preset": "gated", "gated": off} for gate, off in GATES.items()
+            },
+        },
+        drives=tuple(name for name in DRIVES if name.startswith("camvid")),
+    ),
+}
+
+
+def command(replay: str) -> str:
+    """Return the command that makes a replay's numbers of a drive again."""
+    return f"roadeval replay DRIVE {REPLAYS[replay].options} --seeds {SEEDS}"
+
+
+def replayed(replay: str, drive: Drive, sources: Sources) -> dict[str, Any]:
+    """Replay a drive; return what is kept of its summary."""
+    tables = {
+        **REPLAYS[replay].tables,
+        "labels": drive.labels,
+        "training": {"seeds": SEEDS},
+        "output": {"record": "none"},
+    }
+    outcome = roadeval.replay(
+        drive.find(sources, drive.name),
+        roadeval.configure(tables),
+        reports=sources.work / f"{drive.name}.{replay}",
+    )
+    return kept(outcome.summary)
+
+
+def trained_elsewhere(drive: Drive, sources: Sources) -> dict[str, Any]:
+    """Train `robust` on another drive with each seed; return its ERR on this one.
+
+    The differences from the baseline, which is that other drive's mean truth, are of the first
+    seed.
+    """
+    teacher = DRIVES[TEACHER]
+    found = []
+    for seed in range(SEEDS):
+        tables = {"preset": "robust", "labels": teacher.labels, "training": {"seed": seed}}
+        model = sources.work / f"{TEACHER}.{seed}.model"
+        if not model.exists():
+            roadeval.train([teacher.find(sources, TEACHER)], model, roadeval.configure(tables))
+        tables |= {"labels": drive.labels, "training": {"model": str(model)}}
+        outcome = roadeval.replay(
+            drive.find(sources, drive.name),
+            roadeval.configure(tables | {"output": {"record": "none"}}),
+            reports=sources.work / f"{drive.name}.elsewhere",
+        )
+        found.append(outcome.summary)
+    first = found[0]
+    (variant,) = first["against_blind"]
+    return {
+        "ERR": [rounded(each["totals"][variant][FINAL_STAGE]["ERR"]) for each in found],
+        "blind": rounded(first["totals"]["blind"][FINAL_STAGE]["ERR"]),
+        "against_blind": _change(first["against_blind"][variant]["ERR"]),
+    }
+
+
+def kept(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the numbers of a summary that tables show; all of the final mask, as fractions."""
+    seeds = summary["seeds"]
+    variants = {
+        variant: {
+            **{rate: rounded(stages[FINAL_STAGE][rate]) for rate in RATES},
+            "flicker": rounded(summary["beyond"][variant]["flicker"]),
+        }
+        for variant, stages in seeds["totals"].items()
+    }
+    found: dict[str, Any] = {
+        "frames": summary["frames"]["evaluated"],
+        "seeds": seeds["seeds"],
+        "variants": variants,
+        "blind": {rate: rounded(summary["totals"]["blind"][FINAL_STAGE][rate]) for rate in RATES},
+        "against_blind": {
+            variant: _change(rates["ERR"]) for variant, rates in summary["against_blind"].items()
+        },
+        "claims": summary["claims"],
+        "truth_flicker": rounded(summary["beyond"][next(iter(variants))]["truth_flicker"]),
+    }
+    if own := summary["difference"].get(FINAL_STAGE):
+        found["filter"] = {
+            rate: {**_change(own[rate]), "seeds": rounded(seeds["difference"][FINAL_STAGE][rate])}
+            for rate in RATES
+        }
+    return found
+
+
+def _change(change: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: rounded(change[name]) for name in KEPT}
+
+
+def rounded(value: Any) -> Any:
+    """Round what is kept to six digits; tables show less."""
+    if isinstance(value, dict):
+        return {key: rounded(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [rounded(each) for each in value]
+    return float(f"{value:.6g}") if isinstance(value, float) else value

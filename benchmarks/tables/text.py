@@ -1,0 +1,87 @@
+"""The tables in the texts: between marks, made of the numbers, and held against them."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from benchmarks.tables.blocks import BLOCKS
+
+ROOT: Final = Path(__file__).resolve().parents[2]
+NUMBERS: Final = Path(__file__).with_name("numbers.json")
+DOCUMENTS: Final = (ROOT / "README.md", ROOT / "benchmarks" / "PRESETS.md")
+
+END: Final = "<!-- end -->"
+_BLOCK: Final = re.compile(
+    rf"^<!-- table (?P<name>\w+)[^\n]*-->\n(?P<body>.*?)^{END}$", re.DOTALL | re.MULTILINE
+)
+_CODE: Final = re.compile(r"^```.*?^```$|`[^`\n]*`", re.DOTALL | re.MULTILINE)
+_MEASURED: Final = re.compile(
+    r"(?<![\w.])[-+]?\d[\d,]*(?:\.\d+)?\s?(?:%|pp\b|points?\b|ms\b|[kMG]i?B\b)|\d+\.\d+"
+)
+"""A number with a unit of what is measured here, or one with decimals."""
+NOT_MEASURED: Final = (
+    "Python 3.11",
+    "95 % interval",
+    "section 4.4\n",
+    "section 4.2 compensates",
+    "| 4.4, order",
+    "| 4.2, step 5",
+    "(section 4.4)",
+    "(section 4.2, step 5)",
+    "1.5 GB for a small file",  # a promise, which `python -m tests.fuzz` tests
+)
+"""What looks like a measured number in the texts and is none."""
+SPEED: Final = re.compile(r"^## How fast$.*?(?=^## )", re.DOTALL | re.MULTILINE)
+"""The times of one machine, which `python -m benchmarks` measures."""
+
+
+def load() -> dict[str, Any]:
+    """Return the numbers that were measured last."""
+    numbers: dict[str, Any] = json.loads(NUMBERS.read_text())
+    return numbers
+
+
+def written(text: str, numbers: Mapping[str, Any]) -> str:
+    """Return a text with every table between marks made anew; unknown names stay as they are."""
+
+    def anew(match: re.Match[str]) -> str:
+        block = BLOCKS.get(match["name"])
+        return match[0] if block is None else between_marks(match["name"], numbers)
+
+    return _BLOCK.sub(anew, text)
+
+
+def between_marks(name: str, numbers: Mapping[str, Any]) -> str:
+    """Return a block with its marks, the first of which names the commands behind it."""
+    block = BLOCKS[name]
+    head = f"<!-- table {name}: {'; '.join(block.commands)} -->"
+    commands = ", ".join(f"`{command}`" for command in block.commands)
+    return f"{head}\n{block.body(numbers)}\n\nMade by {commands}\n{END}"
+
+
+def faults(text: str, numbers: Mapping[str, Any]) -> Iterator[str]:
+    """Yield, a line each, where a text says something else than the numbers, or without them."""
+    marks = text.count("<!-- table ")
+    found = [*_BLOCK.finditer(text)]
+    if marks != len(found):
+        yield f"{marks} tables begin, and {len(found)} are whole: each ends with a line {END}"
+    for match in found:
+        if match["name"] not in BLOCKS:
+            yield f"table {match['name']}: unknown, one of {', '.join(BLOCKS)}"
+        elif match[0] != between_marks(match["name"], numbers):
+            yield f"table {match['name']}: not what numbers.json gives; run with --write"
+    for number in loose(text):
+        yield f"{number!r}: a measured number outside a table; put it into one, or leave it out"
+
+
+def loose(text: str) -> list[str]:
+    """Return what looks like measured numbers outside tables between marks and outside code."""
+    for part in (_BLOCK, SPEED, _CODE):
+        text = part.sub("", text)
+    for known in NOT_MEASURED:
+        text = text.replace(known, "")
+    return [match[0] for match in _MEASURED.finditer(text)]
