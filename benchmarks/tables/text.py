@@ -26,12 +26,10 @@ _MEASURED: Final = re.compile(
 NOT_MEASURED: Final = (
     "Python 3.11",
     "95 % interval",
-    "section 4.4\n",
-    "section 4.2 compensates",
-    "| 4.4, order",
+    "section 4.2",
+    "section 4.4",
     "| 4.2, step 5",
-    "(section 4.4)",
-    "(section 4.2, step 5)",
+    "| 4.4, order",
     "1.5 GB for a small file",  # a promise, which `python -m tests.fuzz` tests
 )
 """What looks like a measured number in the texts and is none."""
