@@ -67,6 +67,7 @@ def damage_of(container: Container) -> tuple[Damage, ...]:
         *_gaps(container),
         *_bad_chunks(container),
         *_wrong_indexes(container),
+        *_redefined(container),
         *_missing(container),
         *_unnamed(container),
         *_wrong_sums(container),
@@ -102,6 +103,12 @@ def _wrong_indexes(container: Container) -> Iterator[Damage]:
     for number in container.misled:
         reason = "the message index of a chunk is wrong"
         yield Damage(container.path, container.chunks[number].offset, reason, lossy=False)
+
+
+def _redefined(container: Container) -> Iterator[Damage]:
+    for offset in container.redefined:
+        reason = "the summary describes topics in another way than the data, which is believed"
+        yield Damage(container.path, offset, reason, lossy=False)
 
 
 def _missing(container: Container) -> Iterator[Damage]:

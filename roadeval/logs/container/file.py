@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import zlib
 from array import array
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from roadeval.logs.container.chunks import ChunkReader
-from roadeval.logs.container.readers import Buffer, FileReader
+from roadeval.logs.container.chunks import BIG, ChunkReader
+from roadeval.logs.container.readers import Buffer, ByteReader, FileReader
 from roadeval.logs.container.records import (
     MESSAGE_HEAD,
     Chunk,
@@ -85,6 +85,8 @@ class Container:
         The summary at the file's end, what the walk found, and the reader of the chunks.
     misled
         Chunks whose message indexes were found to be wrong.
+    redefined
+        Offsets of the chunks that define schemas or channels in another way than the summary.
     saved_ns
         Log time of the last message saved from a chunk that is cut off.
     data_is_right
@@ -112,6 +114,7 @@ class Container:
         self.data_is_right: bool | None = None
         self.saved_ns: int | None = None
         self.misled: set[int] = set()
+        self.redefined: set[int] = set()
         self.logs = self._collect()
 
     @property
@@ -192,7 +195,26 @@ class Container:
         counts = {channel_id: log.count for channel_id, log in logs.items()}
         if counted and counts != {key: count for key, count in self.expected.items() if count}:
             logs = self._file_all(look=True)
-        return logs
+        return self._file_all(look=not counted) if self._redefine(logs) else logs
+
+    def _redefine(self, logs: Mapping[int, ChannelLog]) -> bool:
+        """Take definitions from the data where the summary has others; return whether it has.
+
+        Messages were written by those in the data, which stand in the first chunk or in that of a
+        channel's first message. Only a chunk with a checksum is believed more than the summary.
+        """
+        first = {0} | {log.blocks[0][0] for log in logs.values() if log.blocks}
+        for number in sorted(first - {OUTSIDE}):
+            chunk = self.chunks[number] if self.chunks else None
+            if chunk is None or chunk.cut or not chunk.crc or chunk.size > BIG:
+                continue
+            with suppress(BadRecord):
+                for record in _definitions(self.reader.read(chunk)):
+                    known = self.schemas if isinstance(record, Schema) else self.channels
+                    if known.get(record.id, record) != record:
+                        known[record.id] = record
+                        self.redefined.add(chunk.offset)
+        return bool(self.redefined)
 
     def _file_all(self, *, look: bool) -> dict[int, ChannelLog]:
         logs: dict[int, ChannelLog] = {}
@@ -250,6 +272,14 @@ class Container:
             schema = self.schemas.get(channel.schema_id) if channel else None
             logs[channel_id] = ChannelLog(bool(channel and self._wanted(channel, schema)))
         return logs[channel_id]
+
+
+def _definitions(records: ByteReader) -> Iterator[Any]:
+    """Yield the schemas and channels of a chunk."""
+    for place in walk(records):
+        if place.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            with suppress(BadRecord):
+                yield parse(place.opcode, records.read(place.body, place.end - place.body))
 
 
 def _entries(values: array[int]) -> Entries:

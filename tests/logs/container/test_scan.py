@@ -11,6 +11,7 @@ from roadeval.logs import LogError, TopicSettings, open_log
 from roadeval.logs.container.compression import BLOCK, _blocks, _Stream
 from roadeval.logs.container.readers import MemoryReader
 from roadeval.logs.container.records import Chunk
+from tests.fixtures.broken import mended
 from tests.logs.making import CAMERA, FRAMES, START, small_log
 
 MESSAGE = b"\x05"
@@ -211,3 +212,17 @@ def test_a_chunk_is_uncompressed_in_blocks_of_bounded_size(compression: str) -> 
     blocks = list(_blocks(compression, _Stream(MemoryReader(data), chunk)))
     assert max(map(len, blocks)) <= BLOCK
     assert sum(map(len, blocks)) == SIZE
+
+
+def test_topics_are_read_as_the_data_describes_them(chunked: Path) -> None:
+    """The summary's copy of a definition may say something else under a checksum that is right."""
+    whole = chunked.read_bytes()
+    wrong = whole.replace(b"string format\nuint8[] data", b"string format\nuint8[] dota")
+    assert wrong != whole
+    chunked.write_bytes(mended(wrong))
+    assert kept(chunked) == list(range(FRAMES))
+    with open_log(chunked) as log:
+        (told,) = map(str, log.damage)
+        assert log.losses == ()
+    assert "the summary describes topics in another way than the data" in told
+    assert told.endswith("; no message is lost")
