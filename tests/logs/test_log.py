@@ -291,10 +291,10 @@ def test_a_pipe_is_no_log_and_never_waited_for(tmp_path: Path) -> None:
     pipe = tmp_path / "drive.mcap"
     os.mkfifo(pipe)
     for path in (pipe, tmp_path):
-        with pytest.raises(LogError, match=r"a pipe, .*write it to a file first"):
+        with pytest.raises(LogError, match=r"is a pipe, .*write what it gives to a file first"):
             open_log(path)
 
 
 def test_a_device_is_no_log() -> None:
-    with pytest.raises(LogError, match="/dev/null: a device"):
+    with pytest.raises(LogError, match="/dev/null: is a device"):
         open_log("/dev/null")
