@@ -11,7 +11,7 @@ from roadeval.logs import FrameError, LogError, TopicSettings, open_log
 from roadeval.logs.container.file import OUTSIDE, Container
 from tests.logs.making import CAMERA, CONTAINERS, small_log
 
-CASES = 500
+CASES = 250
 """Random cases for each container of a finished log, and half as many for an unfinished one."""
 
 RECORD_HEADS = 31

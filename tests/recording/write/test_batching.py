@@ -43,6 +43,11 @@ def test_every_row_comes_once_and_in_order_and_waits_no_longer_than_it_may():
         assert after - rows[0] + 1 == WAIT.after(after + 1)
 
 
+def test_rows_are_due_with_the_first_frame_by_which_they_have_waited_an_eighth_of_all():
+    ended = run(35, lambda frame: [("/a", scalars, frame)], WaitLimits(2, 64))
+    assert [after + 1 for after, *_ in ended][-4:] == [25, 28, 31, 35]
+
+
 def test_entities_are_due_together_whenever_they_began():
     ended = list(run(40, lambda frame: [("/a", states, "on")] if frame in (0, 9, 11) else []))
     assert ended == [(7, "/a", [0]), (15, "/a", [9, 11])]
