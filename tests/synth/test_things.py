@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from roadeval.synth.cars import LENGTH, WIDTH, Car, paint
+from roadeval.synth.grass import grass_strip
 from roadeval.synth.houses import House
 from roadeval.synth.light import Sun
 from roadeval.synth.plants import BUSH, grow, light_left
@@ -18,6 +19,12 @@ UP = np.array([0.0, 1.0, 0.0])
 def test_each_leaf_takes_its_share_from_those_below_it() -> None:
     leaves = np.array([[0.1, 1.0, 0.1], [0.1, 3.0, 0.1], [0.1, 2.0, 0.1], [5.0, 0.5, 5.0]])
     assert light_left(leaves, UP, 0.5).tolist() == [0.25, 1.0, 0.5, 1.0]
+
+
+def test_blades_of_grass_are_thin_and_opaque() -> None:
+    opacity = grass_strip(SUN, np.random.default_rng(2)).picture.sun[0][..., 3]
+    assert set(np.unique(opacity)) == {0, 1}
+    assert opacity.mean() == pytest.approx(0.425, rel=0.02)
 
 
 def test_a_plant_is_brighter_on_the_side_of_the_sun() -> None:
