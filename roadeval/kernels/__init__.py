@@ -21,7 +21,7 @@ def pick() -> ModuleType:
         return plain
     try:
         from roadeval.kernels import compiled
-    except (ImportError, OSError, AttributeError):  # not built, or of another version
+    except ImportError:  # not built, or of another version
         return plain
     return compiled
 

@@ -1,1 +1,5 @@
-"""The library of the loops in ``c``, an empty module; see `roadeval.kernels.compiled`."""
+"""The loops in ``c``; ``c/module.c`` says what each takes."""
+
+from typing import Any
+
+def __getattr__(name: str) -> Any: ...

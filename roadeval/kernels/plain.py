@@ -195,15 +195,13 @@ def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
     return found
 
 
-def rectified_sum(
-    features: tuple[Values, ...], planes: Values, bias: Values, weights: Values
-) -> Values:
+def rectified_sum(features: Values, planes: Values, bias: Values, weights: Values) -> Values:
     """Sum ``sum_k weights[k] max(planes[k] . x + bias[k], 0)`` of every pixel's features x.
 
     Parameters
     ----------
     features
-        F arrays ``(n,)`` float32: one for each feature, with its value at every pixel.
+        ``(F, n)`` float32: of each feature its value at every pixel.
     planes, bias, weights
         ``(K, F)``, ``(K,)`` and ``(K,)`` float32.
 
@@ -212,7 +210,7 @@ def rectified_sum(
     numpy.ndarray
         ``(n,)`` float32, added up in the order of the planes.
     """
-    result = np.zeros_like(features[0])
+    result: Values = np.zeros_like(features[0])
     for plane, start, weight in zip(planes, bias, weights, strict=True):
         side = np.full_like(result, start)
         for feature, slope in zip(features, plane, strict=True):

@@ -3,7 +3,6 @@
 import shutil
 import subprocess
 import sys
-import types
 
 import pytest
 
@@ -39,17 +38,6 @@ def test_where_there_is_a_compiler_the_library_was_built(monkeypatch):
 def test_without_the_library_the_twins_are_used(unbuilt):
     assert pick() is plain
     assert kernels.missing()
-
-
-@pytest.mark.parametrize("error", [OSError("wrong ELF class"), AttributeError("grow")])
-def test_a_library_that_does_not_fit_is_not_used(unbuilt, monkeypatch, error):
-    def refuse(_path):
-        raise error
-
-    loops = types.SimpleNamespace(__file__="loops.so")
-    monkeypatch.setitem(sys.modules, "roadeval.kernels._loops", loops)
-    monkeypatch.setattr("ctypes.CDLL", refuse)
-    assert pick() is plain
 
 
 def test_twins_that_were_asked_for_are_not_missed(unbuilt, monkeypatch):

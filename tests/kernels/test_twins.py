@@ -94,7 +94,7 @@ def test_arrays_may_be_read_only():
     ids=["type", "dimensions", "order"],
 )
 def test_an_array_of_another_kind_is_refused(bits):
-    with pytest.raises(TypeError, match="is needed"):
+    with pytest.raises(TypeError, match="argument 0 "):
         fast.paint(bits, 4, 4)
 
 
@@ -117,7 +117,9 @@ def test_arrays_that_do_not_fit_together_are_refused():
             np.zeros((1, 3)),
             np.ones((2, 3)),
         ),
-        lambda: fast.rectified_sum((value, value), np.zeros((1, 3), np.float32), value[:1], value),
+        lambda: fast.rectified_sum(
+            whole.view(np.float32), np.zeros((1, 3), np.float32), value[:1], value
+        ),
     ]
     for call in refused:
         with pytest.raises(ValueError, match=r"shape|words"):

@@ -42,8 +42,7 @@ LOOP void paint(
 
 /* Add the ring's pixels in a stretch of a row to a component. */
 PART void add(
-    int64_t *restrict sum, const planes_t *planes, const uint64_t *ring,
-    int64_t row, int64_t start, int64_t end)
+    int64_t *restrict sum, RGB, const uint64_t *ring, int64_t row, int64_t start, int64_t end)
 {
     uint64_t part = ~(uint64_t)0 << start % 64;
     int64_t pixels = 0, r1 = 0, g1 = 0, b1 = 0, r2 = 0, g2 = 0, b2 = 0;
@@ -54,7 +53,7 @@ PART void add(
             rest &= part >> (63 - (end - 1) % 64);
         for (; rest; rest &= rest - 1) {
             int64_t at = row + 64 * word + lowest(rest);
-            int64_t r = planes->red[at], g = planes->green[at], b = planes->blue[at];
+            int64_t r = red[at], g = green[at], b = blue[at];
             pixels++;
             r1 += r, g1 += g, b1 += b;
             r2 += r * r, g2 += g * g, b2 += b * b;
@@ -86,7 +85,6 @@ LOOP void ring_sums(
     const uint64_t *ring, int64_t words, int64_t reach,
     int64_t *restrict sums, int64_t *restrict reached, int64_t *restrict merge)
 {
-    const planes_t planes = {red, green, blue};
     const int64_t rows = 2 * reach + 1;
     /* For each row within reach: its next run, where that starts, and the run after its last. */
     int64_t *upcoming = merge, *starts = merge + rows, *ends = merge + 2 * rows;
@@ -110,7 +108,9 @@ LOOP void ring_sums(
             int64_t end = least(run->end + reach, width);
             if (start < end) {
                 *until = y * width + end;
-                add(sums + 7 * (int64_t)run->label, &planes, ring + y * words, y * width, start, end);
+                const uint64_t *in_row = ring + y * words;
+                int64_t *sum = sums + 7 * (int64_t)run->label;
+                add(sum, red, green, blue, in_row, y * width, start, end);
             }
         }
     }

@@ -1,21 +1,18 @@
-/* What all loops share.
+/* What all loops share, and what they are called with.
  *
- * The functions are called by roadeval/kernels/compiled.py, which states what each takes, checks
- * every array, and allocates what they write: nothing here allocates, fails or keeps anything, so
- * that any number of threads may run them. Their definition is the function of the same name in
- * roadeval/kernels/plain.py, bit for bit. Arrays are C-contiguous; sizes are in elements.
- */
+ * A loop's definition is the function of the same name in roadeval/kernels/plain.py, bit for bit.
+ * module.c checks its arrays, and roadeval/kernels/compiled.py allocates what it writes: no loop
+ * allocates, fails or keeps anything, so that any number of threads may run them. Arrays are
+ * C-contiguous; sizes are in elements. */
 #ifndef ROADEVAL_LOOPS_H
 #define ROADEVAL_LOOPS_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/* A loop that the library exports. Where it can choose at run time, the compiler makes several of
- * it, with the vector instructions of newer processors and without. */
-#if defined(_WIN32)
-#define LOOP __declspec(dllexport)
-#elif defined(__GLIBC__) && defined(__x86_64__) && defined(__GNUC__) && __GNUC__ >= 12
+/* A loop. Where it can choose at run time, the compiler makes several of it, with the vector
+ * instructions of newer processors and without. */
+#if defined(__GLIBC__) && defined(__x86_64__) && defined(__GNUC__) && __GNUC__ >= 12
 #define LOOP __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
 #elif defined(__GLIBC__) && defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define LOOP __attribute__((target_clones("avx2", "default")))
@@ -34,14 +31,52 @@
 #define restrict __restrict
 #endif
 
-typedef struct {
-    const uint8_t *red, *green, *blue;
-} planes_t;
-
 /* A run is a stretch of a row, [start, end), with its label: see `components` in plain.py. */
 typedef struct {
     int32_t row, start, end, label;
 } run_t;
+
+/* What each parameter is stands where the loop is defined. */
+#define RGB const uint8_t *red, const uint8_t *green, const uint8_t *blue
+
+void look_up_sum_min(
+    RGB, int64_t height, int64_t width, const uint8_t *table, uint8_t *codes, int64_t *histogram,
+    int32_t *row);
+void mahalanobis(
+    RGB, int64_t height, int64_t width, const double *mean, const double *whitening,
+    double greatest, float *distance, uint8_t *near);
+void look_up_colours(
+    RGB, int64_t height, int64_t width, const uint64_t *road, const uint64_t *left,
+    uint8_t *result, int32_t *words, uint8_t *bits);
+void run_sums(RGB, int64_t width, const run_t *runs, int64_t count, int64_t *sums);
+void ring_sums(
+    RGB, int64_t height, int64_t width, const run_t *runs, const int64_t *first,
+    const uint64_t *ring, int64_t words, int64_t reach, int64_t *sums, int64_t *reached,
+    int64_t *merge);
+void transfer(
+    uint8_t *image, int64_t width, const run_t *runs, int64_t run_count, const double *source,
+    const double *target, const double *gain, int64_t count, int64_t *pixels, uint8_t *tables);
+void paint(const run_t *runs, int64_t count, int64_t width, int32_t *labels);
+int64_t label_runs(const int32_t *labels, int64_t height, int64_t width, run_t *runs);
+int64_t components(
+    const uint64_t *bits, int64_t height, int64_t width, int corner, int64_t *rows,
+    int32_t *starts, int32_t *ends, int64_t *parents, run_t *runs);
+void keep_region(
+    const uint64_t *bits, int64_t height, int64_t width, const uint8_t *patch, int64_t *rows,
+    int32_t *starts, int32_t *ends, int64_t *parents, int64_t *votes, uint64_t *kept);
+void fill_holes(
+    const uint64_t *bits, int64_t height, int64_t width, int64_t *rows, int32_t *starts,
+    int32_t *ends, int64_t *parents, uint8_t *outside, uint64_t *filled);
+void count_bits(
+    const uint64_t *masks, int64_t mask_count, const uint64_t *classes, int64_t class_count,
+    const uint64_t *regions, int64_t region_count, int64_t words, int64_t *counts,
+    uint64_t *both);
+void grow(
+    const uint64_t *bits, int64_t height, int64_t width, const int64_t *reach, int64_t reaches,
+    int outside, uint64_t *wide, uint64_t *spare, uint64_t *grown, uint64_t *result);
+void rectified_sum(
+    const float *features, int64_t count, int64_t pixels, const float *planes, const float *bias,
+    const float *weights, int64_t plane_count, float *block, float *result);
 
 PART int64_t least(int64_t a, int64_t b) { return a < b ? a : b; }
 PART int64_t most(int64_t a, int64_t b) { return a > b ? a : b; }

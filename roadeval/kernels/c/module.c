@@ -1,12 +1,187 @@
-/* An empty Python module, so that the library is installed and found as one. */
+/* The Python module of the loops: what each takes, and the call itself.
+ *
+ * An array is taken by the buffer protocol and never copied. Its element type, dimensions and order
+ * are checked; that shapes fit together is checked by roadeval/kernels/compiled.py. While a loop
+ * runs the interpreter lock is released. */
 
 #define Py_LIMITED_API 0x030b0000
 #include <Python.h>
 
+#include "loops.h"
+
+/* More than any loop takes. */
+#define MOST 16
+
+typedef struct {
+    union {
+        void *array;
+        int64_t size;
+        double number;
+    } given[MOST];
+    Py_buffer views[MOST];
+    int held;
+} taken_t;
+
+static void release(taken_t *taken)
+{
+    while (taken->held > 0)
+        PyBuffer_Release(&taken->views[--taken->held]);
+}
+
+/* Return whether a buffer's elements are of a type: NumPy has two letters for 64 bits. */
+static bool is_of(const Py_buffer *view, char type)
+{
+    const char *format = view->format ? view->format : "B";
+    if (format[0] == '\0' || format[1] != '\0')
+        return false;
+    if (type == 'q')
+        return view->itemsize == 8 && (format[0] == 'q' || format[0] == 'l');
+    if (type == 'Q')
+        return view->itemsize == 8 && (format[0] == 'Q' || format[0] == 'L');
+    if (type == 'i')
+        return view->itemsize == 4 && (format[0] == 'i' || format[0] == 'l');
+    return format[0] == type;
+}
+
+/* Take arguments as `kinds` has them, and return whether they are of these kinds.
+ *
+ * A kind is n, a size or a flag; d, a number; or an array: the type of its elements by the letter
+ * of Python's module `struct`, and how many dimensions it has. Before that a > stands where the
+ * loop writes, a ? where None may be given. */
+static bool take(
+    taken_t *taken, const char *kinds, PyObject *const *arguments, Py_ssize_t count)
+{
+    taken->held = 0;
+    Py_ssize_t place = 0;
+    for (const char *kind = kinds; *kind; kind++) {
+        if (*kind == ' ')
+            continue;
+        if (place == count) {
+            place = -1;
+            break;
+        }
+        PyObject *argument = arguments[place];
+        if (*kind == 'n') {
+            taken->given[place++].size = PyLong_AsLongLong(argument);
+        } else if (*kind == 'd' && (kind[1] == ' ' || kind[1] == '\0')) {
+            taken->given[place++].number = PyFloat_AsDouble(argument);
+        } else {
+            bool optional = *kind == '?', written = *kind == '>';
+            kind += optional || written;
+            char type = *kind++;
+            if (optional && argument == Py_None) {
+                taken->given[place++].array = NULL;
+                continue;
+            }
+            Py_buffer *view = &taken->views[taken->held];
+            int flags = PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | (written ? PyBUF_WRITABLE : 0);
+            if (PyObject_GetBuffer(argument, view, flags) < 0) {
+                PyErr_Format(PyExc_TypeError, "argument %zd is no C-contiguous array", place);
+                break;
+            }
+            taken->held++;
+            if (!is_of(view, type) || view->ndim != *kind - '0') {
+                PyErr_Format(
+                    PyExc_TypeError, "argument %zd has %d dimensions of type %s, not %c of %c",
+                    place, view->ndim, view->format ? view->format : "B", *kind, type);
+                break;
+            }
+            taken->given[place++].array = view->buf;
+        }
+        if (PyErr_Occurred())
+            break;
+    }
+    if (!PyErr_Occurred() && place == count)
+        return true;
+    if (!PyErr_Occurred())
+        PyErr_Format(PyExc_TypeError, "%zd arguments, where \"%s\" are taken", count, kinds);
+    release(taken);
+    return false;
+}
+
+#define ARRAY(place) taken.given[place].array
+#define SIZE(place) taken.given[place].size
+#define NUMBER(place) taken.given[place].number
+#define PLANES ARRAY(0), ARRAY(1), ARRAY(2), SIZE(3), SIZE(4)
+
+/* A function of the module: its name, the kinds that it takes, and the call that it makes. */
+#define FUNCTION(name, kinds, call) \
+    static PyObject *call_##name( \
+        PyObject *Py_UNUSED(self), PyObject *const *arguments, Py_ssize_t count) \
+    { \
+        taken_t taken; \
+        int64_t found = 0; \
+        if (!take(&taken, kinds, arguments, count)) \
+            return NULL; \
+        Py_BEGIN_ALLOW_THREADS \
+        call; \
+        Py_END_ALLOW_THREADS \
+        release(&taken); \
+        return PyLong_FromLongLong(found); \
+    }
+
+FUNCTION(look_up_sum_min, "B2 B2 B2 n n B2 >B2 >q1 >i1",
+    look_up_sum_min(PLANES, ARRAY(5), ARRAY(6), ARRAY(7), ARRAY(8)))
+
+FUNCTION(mahalanobis, "B2 B2 B2 n n d1 d2 d >f2 >B2",
+    mahalanobis(PLANES, ARRAY(5), ARRAY(6), NUMBER(7), ARRAY(8), ARRAY(9)))
+
+FUNCTION(look_up_colours, "B2 B2 B2 n n Q1 ?Q1 >B2 >i1 >B1",
+    look_up_colours(PLANES, ARRAY(5), ARRAY(6), ARRAY(7), ARRAY(8), ARRAY(9)))
+
+FUNCTION(run_sums, "B2 B2 B2 n i2 n >q2",
+    run_sums(ARRAY(0), ARRAY(1), ARRAY(2), SIZE(3), ARRAY(4), SIZE(5), ARRAY(6)))
+
+FUNCTION(ring_sums, "B2 B2 B2 n n i2 q1 Q2 n n >q2 >q1 >q1",
+    ring_sums(PLANES, ARRAY(5), ARRAY(6), ARRAY(7), SIZE(8), SIZE(9), ARRAY(10), ARRAY(11),
+        ARRAY(12)))
+
+FUNCTION(transfer, ">B3 n i2 n d2 d2 d2 n >q1 >B1",
+    transfer(ARRAY(0), SIZE(1), ARRAY(2), SIZE(3), ARRAY(4), ARRAY(5), ARRAY(6), SIZE(7),
+        ARRAY(8), ARRAY(9)))
+
+FUNCTION(paint, "i2 n n >i2", paint(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3)))
+
+FUNCTION(label_runs, "i2 n n >i2", found = label_runs(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3)))
+
+FUNCTION(components, "Q2 n n n >q1 >i1 >i1 >q1 >i2",
+    found = components(ARRAY(0), SIZE(1), SIZE(2), (int)SIZE(3), ARRAY(4), ARRAY(5), ARRAY(6),
+        ARRAY(7), ARRAY(8)))
+
+FUNCTION(keep_region, "Q2 n n ?B2 >q1 >i1 >i1 >q1 >q1 >Q2",
+    keep_region(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3), ARRAY(4), ARRAY(5), ARRAY(6), ARRAY(7),
+        ARRAY(8), ARRAY(9)))
+
+FUNCTION(fill_holes, "Q2 n n >q1 >i1 >i1 >q1 >B1 >Q2",
+    fill_holes(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3), ARRAY(4), ARRAY(5), ARRAY(6), ARRAY(7),
+        ARRAY(8)))
+
+FUNCTION(count_bits, "Q2 n Q2 n Q2 n n >q3 >Q1",
+    count_bits(ARRAY(0), SIZE(1), ARRAY(2), SIZE(3), ARRAY(4), SIZE(5), SIZE(6), ARRAY(7),
+        ARRAY(8)))
+
+FUNCTION(grow, "Q2 n n q1 n n >Q1 >Q1 >Q1 >Q2",
+    grow(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3), SIZE(4), (int)SIZE(5), ARRAY(6), ARRAY(7),
+        ARRAY(8), ARRAY(9)))
+
+FUNCTION(rectified_sum, "f2 n n f2 f1 f1 n >f1 >f1",
+    rectified_sum(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3), ARRAY(4), ARRAY(5), SIZE(6), ARRAY(7),
+        ARRAY(8)))
+
+#define METHOD(name) {#name, (PyCFunction)(void (*)(void))call_##name, METH_FASTCALL, NULL}
+
+static PyMethodDef methods[] = {
+    METHOD(look_up_sum_min), METHOD(mahalanobis), METHOD(look_up_colours), METHOD(run_sums),
+    METHOD(ring_sums), METHOD(transfer), METHOD(paint), METHOD(label_runs), METHOD(components),
+    METHOD(keep_region), METHOD(fill_holes), METHOD(count_bits), METHOD(grow),
+    METHOD(rectified_sum), {NULL, NULL, 0, NULL},
+};
+
 static struct PyModuleDef module = {
     .m_base = PyModuleDef_HEAD_INIT,
     .m_name = "_loops",
-    .m_doc = "Compiled loops: see roadeval.kernels.compiled.",
+    .m_doc = "Loops in C: see roadeval.kernels.compiled.",
+    .m_methods = methods,
 };
 
 PyMODINIT_FUNC PyInit__loops(void)

@@ -27,7 +27,7 @@ PART void add_planes(
 }
 
 PART void sum_planes(
-    const float *const *features, const int count, int64_t pixels, const float *planes,
+    const float *features, const int count, int64_t pixels, const float *planes,
     const float *bias, const float *weights, int64_t plane_count, float *restrict block,
     float *restrict result)
 {
@@ -38,17 +38,17 @@ PART void sum_planes(
         memset(block, 0, sizeof(float) * BLOCK * count);
         memset(total, 0, sizeof total);
         for (int each = 0; each < count; each++)
-            memcpy(block + each * BLOCK, features[each] + start, size);
+            memcpy(block + each * BLOCK, features + each * pixels + start, size);
         for (int64_t plane = 0; plane < plane_count; plane += 2)
             add_planes(block, count, planes + plane * count, bias + plane, weights + plane, total);
         memcpy(result + start, total, size);
     }
 }
 
-/* `features`: an array of `pixels` for each of `count`; `planes`: `count` for each of
+/* `features`: `pixels` for each of `count`; `planes`: `count` for each of
  * `plane_count`, an even number; `block`: BLOCK for each of `count`, to work in. */
 LOOP void rectified_sum(
-    const float *const *features, int64_t count, int64_t pixels, const float *planes,
+    const float *features, int64_t count, int64_t pixels, const float *planes,
     const float *bias, const float *weights, int64_t plane_count, float *restrict block,
     float *restrict result)
 {

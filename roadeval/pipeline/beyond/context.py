@@ -235,7 +235,7 @@ def decision(image: Rgb, machine: RectifiedMachine, settings: ContextSettings) -
     check_fit(machine, settings)
     planes = features(image, settings.windows)
     values = KERNELS.rectified_sum(
-        tuple(planes.reshape(len(planes), -1)), machine.planes, machine.bias, machine.weights
+        planes.reshape(len(planes), -1), machine.planes, machine.bias, machine.weights
     )
     side = (settings.smoothing, settings.smoothing)
     smooth: Values = cv2.blur(values.reshape(planes.shape[1:]) + np.float32(machine.offset), side)

@@ -287,14 +287,14 @@ def test_the_compiled_kernel_equals_its_plain_twin(pixels, count):
         rng.normal(size=shape).astype(np.float32) for shape in ((count, pixels), (9, count), 9, 9)
     )
     np.testing.assert_array_equal(
-        compiled.rectified_sum(tuple(features), planes, bias, weights),
-        plain.rectified_sum(tuple(features), planes, bias, weights),
+        compiled.rectified_sum(features, planes, bias, weights),
+        plain.rectified_sum(features, planes, bias, weights),
     )
 
 
 @pytest.mark.parametrize("module", [compiled, plain])
 def test_the_kernel_is_the_sum_over_rectified_planes(module):
-    features = np.array([1, 2], np.float32), np.array([10, 20], np.float32)
+    features = np.array([[1, 2], [10, 20]], np.float32)
     planes = np.array([[2, 0], [1, -1], [0, 1]], np.float32)
     bias, weights = np.array([1, 5, -15], np.float32), np.array([1, 100, -2], np.float32)
     found = module.rectified_sum(features, planes, bias, weights)
