@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import struct
+import sys
 from collections.abc import Callable, Iterator
 from typing import Any, Final, NamedTuple
 
@@ -111,6 +112,8 @@ class _Strict(ReadDataStream):
     """The library's stream, that refuses a read across the record's end."""
 
     def read(self, length: int) -> bytes:
+        if length > sys.maxsize:
+            raise EndOfFile
         data: bytes = super().read(length)
         if len(data) != length:
             raise EndOfFile

@@ -6,11 +6,13 @@ from pathlib import Path
 import lz4.frame
 import pytest
 import zstandard
+from mcap.opcode import Opcode
 
 from roadeval.logs import LogError, TopicSettings, open_log
 from roadeval.logs.container.compression import BLOCK, _blocks, _Stream
 from roadeval.logs.container.readers import MemoryReader
-from roadeval.logs.container.records import Chunk
+from roadeval.logs.container.records import Chunk, parse
+from roadeval.logs.errors import BadRecord
 from tests.fixtures.broken import mended
 from tests.logs.making import CAMERA, FRAMES, START, small_log
 
@@ -226,3 +228,9 @@ def test_topics_are_read_as_the_data_describes_them(chunked: Path) -> None:
         assert log.losses == ()
     assert "the summary describes topics in another way than the data" in told
     assert told.endswith("; no message is lost")
+
+
+def test_a_record_with_an_absurd_length_inside_is_damaged() -> None:
+    attachment = bytes(16) + bytes(4) + bytes(4) + b"\xff" * 8 + bytes(4)
+    with pytest.raises(BadRecord):
+        parse(Opcode.ATTACHMENT, attachment)
