@@ -107,7 +107,7 @@ def _draw(
     losses = (*log.losses, *_left_out(streams[-1], frames))
     if losses and not frames:
         raise TrainingError(f"{log.path.name}: no training frame could be decoded: {losses[0]}")
-    told = (*_understood(selection, own), *streams[-1].fringes)
+    told = (*_understood(selection, own), *streams[-1].oddities)
     return _Drawn(frames, tuple(f"{log.name}: {each}" for each in told), losses)
 
 

@@ -76,13 +76,8 @@ class FrameStream:
         return (
             *tell_sizes(self.accounting.sizes, read, size),
             *tell_repeats(repeated, read),
-            *self.fringes,
+            *tell_fringes(self.accounting.fringes),
         )
-
-    @property
-    def fringes(self) -> tuple[str, ...]:
-        """How much of the labels that were decoded is ignored, a sentence for each topic."""
-        return tell_fringes(self.accounting.fringes)
 
     @property
     def _taken(self) -> range:

@@ -120,6 +120,18 @@ def test_labels_that_are_ignored_are_told(tmp_path):
     assert re.match(r"blurred: /truth/road: .* % of the pixels of 3 label images are ignored", told)
 
 
+def test_images_of_several_sizes_are_told(tmp_path):
+    path = tmp_path / "mixed.mcap"
+    with LogWriter(path) as log:
+        for number in range(4):
+            made, stamp, size = frame(number), (number + 1) * NS, 1 + number // 2
+            for topic, image in (("/camera", made.image), ("/truth/road", made.truth * 255)):
+                _, data = cv2.imencode(".png", image[::size, ::size])
+                log.image(topic, stamp, data.tobytes(), "png")
+    (told,) = train([path], tmp_path).warnings
+    assert told.startswith("mixed: not all of the ")
+
+
 def test_a_replay_takes_what_is_asked_of_its_drive(drives, tmp_path, monkeypatch):
     monkeypatch.setattr(import_module("roadeval.jobs.replay"), "write_figures", lambda *given: [])
     asked = [{"path": "ids.mcap", "labels": CODES}, {"path": "mask.mcap", "labels": {"road": [9]}}]

@@ -220,7 +220,11 @@ class Scan:
         if not self._finder.begins(place.end):
             raise BadRecord("a definition of the wrong length")
         known = self.schemas if isinstance(record, Schema) else self.channels
-        known.setdefault(record.id, record)
+        if known.setdefault(record.id, record) != record:
+            # Outside chunks no checksum tells which of the two is right.
+            self._gap(
+                place.offset, place.end, "a topic is described here in another way than before"
+            )
 
     def _data_end(self, place: Place) -> None:
         after = place.end < self._source.size and place_at(self._source, place.end).opcode

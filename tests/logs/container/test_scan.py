@@ -216,6 +216,18 @@ def test_a_chunk_is_uncompressed_in_blocks_of_bounded_size(compression: str) -> 
     assert sum(map(len, blocks)) == SIZE
 
 
+def test_two_descriptions_of_a_topic_outside_chunks_are_told(unchunked: Path) -> None:
+    """Which is right nothing tells: the summary has a checksum, the data was what messages met."""
+    whole = unchunked.read_bytes()
+    name = b"sensor_msgs/msg/CompressedImage"
+    last = whole.rindex(name)
+    wrong = whole[:last] + name.replace(b"sensor", b"tensor") + whole[last + len(name) :]
+    unchunked.write_bytes(mended(wrong))
+    with open_log(unchunked) as log:
+        told, *_ = log.losses
+    assert "a topic is described here in another way" in told
+
+
 def test_topics_are_read_as_the_data_describes_them(chunked: Path) -> None:
     """The summary's copy of a definition may say something else under a checksum that is right."""
     whole = chunked.read_bytes()
