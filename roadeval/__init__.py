@@ -16,9 +16,9 @@ Nothing here touches the process's own streams: what a C library of a codec writ
 by itself stays there, while the command line drops it.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
+from roadeval.runtime.on_demand import on_demand
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
@@ -75,11 +75,8 @@ _HOMES: Final = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used, so that importing the package costs nothing."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'roadeval' has no attribute {name!r}")
-    return getattr(import_module(f"roadeval.{_HOMES[name]}"), name)
+if not TYPE_CHECKING:  # there every name is known
+    __getattr__ = on_demand(__name__, _HOMES)
 
 
 def __dir__() -> list[str]:

@@ -1,12 +1,20 @@
-"""Configurations: a run's and its variants', presets, and TOML both ways."""
+"""Configurations: a run's and its variants', presets, and TOML both ways.
 
-from roadeval.config.drives import DriveSettings
-from roadeval.config.errors import ConfigError
-from roadeval.config.presets import PRESETS
-from roadeval.config.run import RunConfig, configure
-from roadeval.config.settings import ExecutionSettings, OutputSettings
-from roadeval.config.toml import load_config, read_tables
-from roadeval.config.variants import Variant, check_variant_name
+Names are imported when they are first used: a command that reads settings needs little else.
+"""
+
+from typing import TYPE_CHECKING, Final
+
+from roadeval.runtime.on_demand import on_demand
+
+if TYPE_CHECKING:
+    from roadeval.config.drives import DriveSettings
+    from roadeval.config.errors import ConfigError
+    from roadeval.config.presets import PRESETS
+    from roadeval.config.run import RunConfig, configure
+    from roadeval.config.settings import ExecutionSettings, OutputSettings
+    from roadeval.config.toml import load_config, read_tables
+    from roadeval.config.variants import Variant, check_variant_name
 
 __all__ = [
     "PRESETS",
@@ -21,3 +29,20 @@ __all__ = [
     "load_config",
     "read_tables",
 ]
+
+_MODULES: Final = {
+    "PRESETS": "presets",
+    "ConfigError": "errors",
+    "DriveSettings": "drives",
+    "ExecutionSettings": "settings",
+    "OutputSettings": "settings",
+    "RunConfig": "run",
+    "Variant": "variants",
+    "check_variant_name": "variants",
+    "configure": "run",
+    "load_config": "toml",
+    "read_tables": "toml",
+}
+
+if not TYPE_CHECKING:  # there every name is known
+    __getattr__ = on_demand(__name__, _MODULES)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from roadeval import logs
 from roadeval.config import RunConfig
-from roadeval.jobs.outputs import AnyPath
 
 
-def info(drive: AnyPath, config: RunConfig | None = None) -> logs.LogDescription:
+def info(drive: str | Path, config: RunConfig | None = None) -> logs.LogDescription:
     """Describe a log: topics, rates, gaps, damage, and what a replay would pick and why.
 
     Raises

@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING, Any
 from roadeval.evaluation import analysis
 from roadeval.evaluation.differences import drive_differences
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.recording import DamagedError, Recording, RecordingError
+from roadeval.recording.layout import DamagedError, RecordingError
 from roadeval.results.folder import RUN, ResultsFolder
 from roadeval.results.verdict import verdict_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import pandas as pd
+
+    from roadeval.recording import Recording
 
 
 class Result:
@@ -35,7 +37,7 @@ class Result:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self.recording = None if self.path.is_dir() else Recording(self.path)
+        self.recording = None if self.path.is_dir() else _recording(self.path)
         self._tables: ResultsFolder | Recording = self.recording or ResultsFolder(self.path)
 
     @property
@@ -157,6 +159,13 @@ class Result:
             "seconds": {},
             "training": {"source": layout.properties.get("trained_on")},
         } | _found(self.frames, EvaluationSettings())
+
+
+def _recording(path: Path) -> Recording:
+    # Only here: Rerun takes a third of a second, and a folder is read without it.
+    from roadeval.recording import Recording
+
+    return Recording(path)
 
 
 def _found(frames: pd.DataFrame, settings: EvaluationSettings) -> dict[str, Any]:

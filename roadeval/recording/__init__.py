@@ -3,8 +3,9 @@
 Names are imported when they are first used: Rerun takes a second, and a `RecordRule` needs none.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
+
+from roadeval.runtime.on_demand import on_demand
 
 if TYPE_CHECKING:
     from roadeval.recording.layout import DamagedError, Layout, RecordingError
@@ -41,8 +42,5 @@ _MODULES: Final = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used."""
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
+if not TYPE_CHECKING:  # there every name is known
+    __getattr__ = on_demand(__name__, _MODULES)

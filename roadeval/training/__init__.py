@@ -1,8 +1,16 @@
-"""How a pipeline learns: which frames, which pixels, what is fitted, and the model file."""
+"""How a pipeline learns: which frames, which pixels, what is fitted, and the model file.
 
-from roadeval.training.fitting import TrainingError, fit
-from roadeval.training.model import Model, load_model, save_model
-from roadeval.training.settings import TrainingSettings
+Names are imported when they are first used: a command that reads settings needs little else.
+"""
+
+from typing import TYPE_CHECKING, Final
+
+from roadeval.runtime.on_demand import on_demand
+
+if TYPE_CHECKING:
+    from roadeval.training.fitting import TrainingError, fit
+    from roadeval.training.model import Model, load_model, save_model
+    from roadeval.training.settings import TrainingSettings
 
 __all__ = [
     "Model",
@@ -12,3 +20,15 @@ __all__ = [
     "load_model",
     "save_model",
 ]
+
+_MODULES: Final = {
+    "Model": "model",
+    "TrainingError": "fitting",
+    "TrainingSettings": "settings",
+    "fit": "fitting",
+    "load_model": "model",
+    "save_model": "model",
+}
+
+if not TYPE_CHECKING:  # there every name is known
+    __getattr__ = on_demand(__name__, _MODULES)
