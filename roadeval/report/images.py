@@ -17,6 +17,8 @@ QUALITY: Final = 85
 DARKEN: Final = 0.75
 """Share of the camera's brightness that stays below an overlay."""
 
+_LEVELS: Final = np.arange(256, dtype=np.uint8)[:, None]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LayerImage:
@@ -75,13 +77,18 @@ def _coloured(spec: LayerSpec, values: npt.NDArray[Any]) -> Rgb:
 
 def _overlaid(image: Rgb, spec: LayerSpec, labels: npt.NDArray[Any]) -> Rgb:
     """Draw the classes' colours over the darkened image."""
-    table = np.zeros((256, 4), np.float32)
-    for label in spec.classes:
-        table[label.value] = label.rgba
-    colours = table[labels]
-    opacity = colours[..., 3:] / 255
-    mixed = image * DARKEN * (1 - opacity) + colours[..., :3] * opacity
-    overlaid: Rgb = np.rint(mixed).astype(np.uint8)
+    import cv2
+
+    colours = np.zeros((256, 4), np.float32)
+    for known in spec.classes:
+        colours[known.value] = known.rgba
+    overlaid: Rgb = np.empty_like(image)
+    # A pixel's colour follows from its label and its own: a table of 256 for each label.
+    for label in np.flatnonzero(np.bincount(labels.ravel(), minlength=256)):
+        opacity = colours[label, 3:] / 255
+        mixed = _LEVELS * DARKEN * (1 - opacity) + colours[label, :3] * opacity
+        tinted = cv2.LUT(image, np.rint(mixed).astype(np.uint8)[None])
+        np.copyto(overlaid, tinted, where=(labels == label)[..., None])
     return overlaid
 
 
