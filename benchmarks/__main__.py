@@ -79,6 +79,7 @@ def _at_size(
         found["reading and decoding alone, ms a frame"] = _reading(frames, size, folder)
     if "process" in options.parts:
         found["processes"] = _process(frames, size, folder, options)
+        found["commands"] = _commands(frames, size, folder)
     return found
 
 
@@ -199,26 +200,30 @@ def _process(
     frames: list[Frame], size: tuple[int, int], folder: Path, options: argparse.Namespace
 ) -> Rows:
     short = drives.write(folder / "short.mcap", frames, size, options.memory_frames)
-    with tempfile.TemporaryDirectory(dir=folder) as nothing:
-        first_of_all = processes.seconds(short, folder, compiled=Path(nothing))
-    runs = {
-        "first run of all": first_of_all,
-        "later run": processes.seconds(short, folder),
-    }
+    first, end = processes.seconds(short, folder)
     rows: Rows = [
-        {"what": "--help, CPU s", "value": Spread.of([processes.help_cpu() for _ in range(5)])},
+        {"what": "first recorded frame after, s", "value": f"{first:.3g}"},
+        {"what": f"{options.memory_frames} frames, s", "value": f"{end:.3g}"},
     ]
-    for name, (first, end) in runs.items():
-        rows += [
-            {"what": f"{name}: first recorded frame after, s", "value": f"{first:.3g}"},
-            {"what": f"{name}: {options.memory_frames} frames, s", "value": f"{end:.3g}"},
-        ]
     for times in (1, 10):
         count = times * options.memory_frames
         drive = drives.write(folder / "long.mcap", frames, size, count)
         peak = processes.peak_mib(drive, folder)
         rows.append({"what": f"peak memory, {count} frames, MiB", "value": f"{peak:.0f}"})
     return rows
+
+
+def _commands(frames: list[Frame], size: tuple[int, int], folder: Path) -> Rows:
+    short = drives.write(folder / "eleven.mcap", frames, size, 11)
+    drive = drives.write(folder / "whole.mcap", frames, size)
+    return [
+        {
+            "command": name,
+            "wall, s": Spread.of([each.wall for each in costs]),
+            "CPU, s": Spread.of([each.cpu for each in costs]),
+        }
+        for name, costs in processes.costs(short, drive, folder).items()
+    ]
 
 
 def _machine() -> dict[str, Any]:

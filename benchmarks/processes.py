@@ -1,4 +1,4 @@
-"""What only a process of its own shows: peak memory, the start, the first run of all."""
+"""What only a process of its own shows: peak memory, the start, and what a command costs in all."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+
+from benchmarks.timing import Cost
 
 ROADEVAL = Path(sys.executable).with_name("roadeval")
 
@@ -32,26 +33,35 @@ def peak_mib(drive: Path, folder: Path, *words: str) -> float:
     return int(run.stdout) / 1024
 
 
-def help_cpu() -> float:
-    """CPU seconds of ``roadeval --help``."""
-    used = _run(str(ROADEVAL), "--help")
-    return used.ru_utime + used.ru_stime
+def costs(short: Path, drive: Path, folder: Path, runs: int = 5) -> dict[str, list[Cost]]:
+    """Return what each command costs, again and again, by what it does.
 
-
-def seconds(drive: Path, folder: Path, *, compiled: Path | None = None) -> tuple[float, float]:
-    """Seconds from the start of a replay to its first recorded frame, and to its end.
-
-    With an empty folder for ``compiled`` code, it is the first replay on a machine.
+    CPU is that of all its processes. A round before all warms the disk's cache, and leaves the
+    recordings that the others read.
     """
+    replays = {log: _replay(log, folder / log.stem) for log in (short, drive)}
+    result = str(folder / drive.stem / "out.rrd")
+    commands = {
+        "--help": ["--help"],
+        "info": ["info", str(drive)],
+        "replay, short": [*replays[short], "--quiet"],
+        "replay": [*replays[drive], "--quiet"],
+        "report": ["report", result, "-o", str(folder / "report.pdf")],
+        "compare of two": ["compare", result, result],
+        "compare of two folders": ["compare", *2 * [str(folder / drive.stem / "reports")]],
+        "inspect --list": ["inspect", "--list", result],
+    }
+    for command in commands.values():
+        _cost(*command)
+    return {name: [_cost(*each) for _ in range(runs)] for name, each in commands.items()}
+
+
+def seconds(drive: Path, folder: Path) -> tuple[float, float]:
+    """Seconds from the start of a replay to its first recorded frame, and to its end."""
     start, first = perf_counter(), None
     command = [str(ROADEVAL), *_replay(drive, folder)]
-    given = {} if compiled is None else {"NUMBA_CACHE_DIR": str(compiled)}
     with subprocess.Popen(
-        command,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ | given,
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     ) as process:
         assert process.stderr is not None
         for line in process.stderr:
@@ -67,10 +77,12 @@ def _replay(drive: Path, folder: Path) -> list[str]:
     return [str(word) for word in ("replay", drive, *outputs)]
 
 
-def _run(*command: str) -> Any:
-    quiet = [(os.POSIX_SPAWN_OPEN, 1, os.devnull, os.O_WRONLY, 0)]
+def _cost(*words: str) -> Cost:
+    """Run a command; what it prints goes nowhere."""
+    command, start = [str(ROADEVAL), *words], perf_counter()
+    quiet = [(os.POSIX_SPAWN_OPEN, stream, os.devnull, os.O_WRONLY, 0) for stream in (1, 2)]
     pid = os.posix_spawn(command[0], command, os.environ, file_actions=quiet)
     _, status, used = os.wait4(pid, 0)
     if os.waitstatus_to_exitcode(status):
         raise RuntimeError(f"{command} failed")
-    return used
+    return Cost(perf_counter() - start, used.ru_utime + used.ru_stime)
