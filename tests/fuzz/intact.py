@@ -97,9 +97,21 @@ class Intact:
         """Return the number of the frame of this log time."""
         return list(self.frames).index(time)
 
+    @cached_property
+    def descriptions(self) -> list[tuple[int, int]]:
+        """Begin and end of what tells how messages are to be read: the first chunk, the summary."""
+        chunks = [(begin, end) for opcode, begin, end in self.records if opcode == Opcode.CHUNK]
+        return [*chunks[:1], (broken.data_end(self.data), len(self.data))]
+
     def is_whole(self, time: int, data: bytes) -> bool:
-        """Whether all of a frame's bytes, and their checksums, are in a damaged file."""
-        return all(self.data[begin:end] in data for begin, end in self.blocks[time])
+        """Whether all of a frame's bytes, their checksums and a description are in a damaged file.
+
+        A topic whose description lies in a damaged chunk may be read by what is left of it.
+        """
+        described = any(self.data[begin:end] in data for begin, end in self.descriptions)
+        return (described or not self.by_chunk) and all(
+            self.data[begin:end] in data for begin, end in self.blocks[time]
+        )
 
 
 def times_in(opcode: int, record: bytes) -> list[int]:
