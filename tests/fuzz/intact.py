@@ -101,7 +101,8 @@ class Intact:
     def descriptions(self) -> list[tuple[int, int]]:
         """Begin and end of what tells how messages are to be read: the first chunk, the summary."""
         chunks = [(begin, end) for opcode, begin, end in self.records if opcode == Opcode.CHUNK]
-        return [*chunks[:1], (broken.data_end(self.data), len(self.data))]
+        summaries = [(broken.data_end(self.data), len(self.data))] if self.finished else []
+        return chunks[:1] + summaries
 
     def is_whole(self, time: int, data: bytes) -> bool:
         """Whether all of a frame's bytes, their checksums and a description are in a damaged file.

@@ -108,7 +108,7 @@ def _wrong_indexes(container: Container) -> Iterator[Damage]:
 def _redefined(container: Container) -> Iterator[Damage]:
     for offset in container.redefined:
         reason = "the summary describes topics in another way than the data, which is believed"
-        yield Damage(container.path, offset, reason, lossy=False)
+        yield Damage(container.path, offset, f"{reason}; either may be wrong")
 
 
 def _missing(container: Container) -> Iterator[Damage]:
