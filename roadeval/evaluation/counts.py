@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from roadeval.data import ERRORS, Layer, Mask, Truth, TruthBits
-from roadeval.data.arrays import IGNORED, Bits, Sums
+from roadeval.data.arrays import Bits, Sums
 from roadeval.data.packed import everywhere
 from roadeval.evaluation.bits import flat
 from roadeval.kernels import KERNELS
@@ -47,6 +47,4 @@ def error_map(mask: Mask, truth: Truth) -> Layer:
     truth
         ``(H, W)`` uint8: 0, 1, or 255 for ignored.
     """
-    # TN 0 and TP 1 where the two agree, FP 2 and FN 3 where not; beyond 4 what is ignored.
-    outcome = truth + 2 * (truth ^ mask)
-    return Layer(ERRORS, np.minimum(outcome, np.uint8(IGNORED)))
+    return Layer(ERRORS, KERNELS.outcomes(mask, truth))

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Change, Layer, Transition, TruthBits
-from roadeval.data.arrays import FN, FP, IGNORED, Bits
+from roadeval.data.arrays import Bits
 from roadeval.data.packed import everywhere, ones
 from roadeval.evaluation.bits import flat
 from roadeval.kernels import KERNELS
@@ -51,9 +51,7 @@ class HeatMap:
         if self.frames and self.frames % PENDING == 0:
             self._carry()
         self.frames += 1
-        counted = errors != IGNORED, errors == FP, errors == FN
-        for total, found in zip(self._bytes, counted, strict=True):
-            np.add(total, found, out=total)
+        KERNELS.add_outcomes(errors, self._bytes)
 
     def cells(self) -> tuple[int, Sums]:
         """Return the sums.

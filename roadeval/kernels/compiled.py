@@ -30,6 +30,7 @@ from roadeval.data.arrays import (
 from roadeval.kernels import _loops
 
 __all__ = [
+    "add_outcomes",
     "components",
     "count_bits",
     "fill_holes",
@@ -39,6 +40,7 @@ __all__ = [
     "look_up_colours",
     "look_up_sum_min",
     "mahalanobis",
+    "outcomes",
     "paint",
     "rectified_sum",
     "ring_sums",
@@ -209,6 +211,24 @@ def grow(bits: Bits, reach: Reach, width: int, outside: bool) -> Bits:
     result = np.empty((height, words), np.uint64)
     _loops.grow(bits, height, width, reach, len(reach), outside, *room, result)
     return result
+
+
+# --- Outcomes -------------------------------------------------------------------------------------
+
+
+def outcomes(mask: Plane, truth: Plane) -> Plane:
+    """See `plain.outcomes`."""
+    shape = _shape(mask, truth)
+    errors = np.empty(shape, np.uint8)
+    _loops.outcomes(mask, truth, errors.size, errors)
+    return errors
+
+
+def add_outcomes(errors: Plane, totals: Image) -> None:
+    """See `plain.add_outcomes`."""
+    if totals.shape != (3, *errors.shape):
+        raise ValueError(f"totals of shape {totals.shape} for errors of {errors.shape}")
+    _loops.add_outcomes(errors, errors.size, totals)
 
 
 # --- Decision -------------------------------------------------------------------------------------

@@ -278,6 +278,32 @@ def test_bits_grow_by_the_element():
     ]
 
 
+@given(masks(), st.integers(0, 10**6))
+def test_outcomes_are_told_and_added_up_alike(mask, seed):
+    rng = np.random.default_rng(seed)
+    truth = rng.choice(np.array([0, 1, 255], np.uint8), mask.shape)
+    errors = fast.outcomes(mask, truth)
+    assert_same(errors, plain.outcomes(mask, truth))
+    mine = rng.integers(0, 250, (3, *mask.shape), np.uint8)
+    its = mine.copy()
+    fast.add_outcomes(errors, mine)
+    plain.add_outcomes(errors, its)
+    assert_same(mine, its)
+
+
+def test_each_pair_of_values_has_its_outcome():
+    mask, truth = (
+        np.array([[0, 1, 1, 0, 0, 1]], np.uint8),
+        np.array([[0, 1, 0, 1, 255, 255]], np.uint8),
+    )
+    totals = np.zeros((3, 1, 6), np.uint8)
+    for module in (fast, plain):
+        errors = module.outcomes(mask, truth)
+        assert errors.tolist() == [[0, 1, 2, 3, 4, 4]]
+        module.add_outcomes(errors, totals)
+    assert totals[:, 0].tolist() == [[2, 2, 2, 2, 0, 0], [0, 0, 2, 0, 0, 0], [0, 0, 0, 2, 0, 0]]
+
+
 @given(st.integers(0, 3), st.integers(1, 3), st.integers(1, 4), st.integers(1, 200))
 def test_bits_are_counted_alike(count, classes, regions, words):
     rng = np.random.default_rng(words)
