@@ -40,6 +40,10 @@ def test_many_frames_are_drawn_as_means_of_neighbours():
     figure = charts.difference(frames, "filtered", "unfiltered", mean)
     # The last patch is the interval.
     assert bars(figure)[:-1] == [(20.0, UNFILTERED)] * charts.BARS
+    # A bar of four frames stands over the middle of them.
+    first, last = figure.axes[0].patches[0], figure.axes[0].patches[-2]
+    middles = [bar.get_x() + bar.get_width() / 2 for bar in (first, last)]
+    assert middles == pytest.approx([1.5, len(frames) - 2.5])
 
 
 def test_a_region_has_its_error_rate_left_and_its_share_of_the_errors_right():

@@ -121,6 +121,17 @@ def test_the_title_names_the_drive() -> None:
         assert "my_drive" in texts(figure)
 
 
+def test_the_masks_stand_below_the_title_and_within_the_figure() -> None:
+    figure = drawn(masks_of([an_example()]))
+    title = min(text.get_window_extent().y0 for text in figure.texts)
+    for ax in figure.axes:
+        box = ax.get_window_extent()
+        assert box.x0 >= 0
+        assert box.y0 >= 0
+        assert box.x1 <= figure.bbox.x1
+        assert box.y1 < title
+
+
 def test_rates_are_in_percent_from_zero() -> None:
     (ax,) = drawn(error_rate(FigureData("drive", a_table(4)))).axes
     labels = [label.get_text() for label in ax.get_yticklabels()]
