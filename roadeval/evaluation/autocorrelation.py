@@ -75,7 +75,7 @@ class _Models:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeanDistribution:
-    """What a series tells of the mean of the process that it is a stretch of.
+    """Distribution of the mean of a process, given a series that is a stretch of it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the paper says of its figures and phases, counted in a drive's windows.
+"""The paper's claims on its figures and phases, counted in a drive's windows.
 
 Its text gives no number for figures 3a and 3b, and their curves are lost. What is left are claims
 that one mask is wrong less often than another; each window of ten frames bears one out or does not.

@@ -1,8 +1,9 @@
 """The compiled kernels, by the names of their twins in `plain`.
 
 The loops are in C, in the folder ``c``, and built when the package is installed. Here what they
-write is allocated, and shapes are checked; an array of another type, dimension or order than a loop
-takes is a `TypeError`.
+write is allocated, and shapes are checked, a `ValueError` if they do not fit together; an array of
+another type, dimension or order than a loop takes is a `TypeError`. Rows, columns and labels in
+runs are trusted: they are those of `components` or `label_runs`, of an image of that size.
 """
 
 from __future__ import annotations
@@ -51,6 +52,9 @@ __all__ = [
 TABLED: Final = 256
 """As in ``c/compensation.c``: components of more pixels have a table of levels."""
 
+COLOUR_WORDS: Final = 1 << 18
+"""Of 64 colours each."""
+
 BLOCK: Final = 512
 """As in ``c/rectified.c``: pixels at a time."""
 
@@ -63,11 +67,18 @@ def _shape(*arrays: npt.NDArray[Any]) -> tuple[int, ...]:
     return shape
 
 
+def _require(array: npt.NDArray[Any], *shape: int) -> None:
+    """Refuse an array of another shape than a loop walks; a `ValueError`."""
+    if array.shape != shape:
+        raise ValueError(f"an array of shape {array.shape}, not {shape}")
+
+
 # --- Colours --------------------------------------------------------------------------------------
 
 
 def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
     """See `plain.look_up_sum_min`."""
+    _require(table, 766, 256)
     height, width = _shape(*planes)
     codes, histogram = np.empty((height, width), np.uint8), np.empty(256, np.int64)
     row = np.empty(width, np.int32)
@@ -79,6 +90,8 @@ def mahalanobis(
     planes: Planes, mean: Vector, whitening: Matrix, greatest: float
 ) -> tuple[Values, Plane]:
     """See `plain.mahalanobis`."""
+    _require(mean, 3)
+    _require(whitening, 3, 3)
     shape = _shape(*planes)
     distance, near = np.empty(shape, np.float32), np.empty(shape, np.uint8)
     _loops.mahalanobis(*planes, *shape, mean, whitening, greatest, distance, near)
@@ -91,6 +104,8 @@ def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
     result = np.empty((height, width), np.uint8)
     room = np.empty(width, np.int32), np.empty(width, np.uint8)
     tables = road, left if len(left) else None
+    _require(road, COLOUR_WORDS)
+    _require(left if len(left) else road, COLOUR_WORDS)
     _loops.look_up_colours(*planes, height, width, *tables, result, *room)
     return result
 
@@ -100,6 +115,7 @@ def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
 
 def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
     """See `plain.run_sums`."""
+    _require(runs, len(runs), 4)
     _, width = _shape(*planes)
     sums = np.zeros((count, 7), np.int64)
     _loops.run_sums(*planes, width, runs, len(runs), sums)
@@ -108,8 +124,9 @@ def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
 
 def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
     """See `plain.ring_sums`."""
+    _require(runs, len(runs), 4)
     height, columns = _shape(*planes)
-    _require_width(ring, columns)
+    _require(ring, height, -(-columns // 64))
     sums, reached = np.zeros((count, 7), np.int64), np.zeros(count, np.int64)
     first = np.full(height + 2 * width + 1, len(runs))
     first[: width + 1] = 0
@@ -122,7 +139,10 @@ def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) ->
 
 def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> Image:
     """See `plain.transfer`."""
-    count, _ = _shape(source, target, gain)
+    _require(runs, len(runs), 4)
+    count = len(gain)
+    _require(gain, count, 3)
+    _shape(source, target, gain)
     height, width, _ = image.shape
     result = image.copy()
     pixels = np.zeros(count, np.int64)
@@ -134,6 +154,7 @@ def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Mat
 
 def paint(runs: Runs, height: int, width: int) -> Labels:
     """See `plain.paint`."""
+    _require(runs, len(runs), 4)
     labels = np.zeros((height, width), np.int32)
     _loops.paint(runs, len(runs), width, labels)
     return labels
@@ -159,8 +180,8 @@ def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
 
 def keep_region(bits: Bits, width: int, patch: Plane) -> Bits:
     """See `plain.keep_region`."""
-    if patch.size and patch.shape != (len(bits), width):
-        raise ValueError(f"a patch of shape {patch.shape} for a mask of {(len(bits), width)}")
+    if patch.size:
+        _require(patch, len(bits), width)
     room, kept = _room_for_runs(bits, width), np.zeros_like(bits)
     votes = np.empty_like(room[3])
     wanted = patch if patch.size else None
@@ -178,7 +199,7 @@ def fill_holes(bits: Bits, width: int) -> Bits:
 
 def _room_for_runs(bits: Bits, width: int) -> tuple[npt.NDArray[Any], ...]:
     """Return arrays for as many runs as a mask can have: see ``c/runs.c``."""
-    _require_width(bits, width)
+    _require(bits, len(bits), -(-width // 64))
     most = len(bits) * (width // 2 + 1)
     return (
         np.empty(len(bits) + 1, np.int64),
@@ -186,11 +207,6 @@ def _room_for_runs(bits: Bits, width: int) -> tuple[npt.NDArray[Any], ...]:
         np.empty(most, np.int32),
         np.empty(most, np.int64),
     )
-
-
-def _require_width(bits: Bits, width: int) -> None:
-    if bits.shape[1] != -(-width // 64):
-        raise ValueError(f"{bits.shape[1]} words a row for a width of {width}")
 
 
 def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
@@ -204,7 +220,7 @@ def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
 
 def grow(bits: Bits, reach: Reach, width: int, outside: bool) -> Bits:
     """See `plain.grow`."""
-    _require_width(bits, width)
+    _require(bits, len(bits), -(-width // 64))
     height, words = bits.shape
     size = 1 + height * (words + 1)
     room = np.empty(size, np.uint64), np.empty(size, np.uint64), np.zeros(size, np.uint64)
@@ -226,8 +242,7 @@ def outcomes(mask: Plane, truth: Plane) -> Plane:
 
 def add_outcomes(errors: Plane, totals: Image) -> None:
     """See `plain.add_outcomes`."""
-    if totals.shape != (3, *errors.shape):
-        raise ValueError(f"totals of shape {totals.shape} for errors of {errors.shape}")
+    _require(totals, 3, *errors.shape)
     _loops.add_outcomes(errors, errors.size, totals)
 
 
@@ -237,8 +252,7 @@ def add_outcomes(errors: Plane, totals: Image) -> None:
 def rectified_sum(features: Values, planes: Values, bias: Values, weights: Values) -> Values:
     """See `plain.rectified_sum`."""
     count, pixels = features.shape
-    if planes.shape != (*_shape(bias, weights), count):
-        raise ValueError(f"planes of shape {planes.shape} for {len(bias)} of {count} features")
+    _require(planes, *_shape(bias, weights), count)
     planes, bias, weights = _in_pairs(planes), _in_pairs(bias), _in_pairs(weights)
     result, block = np.empty(pixels, np.float32), np.empty(count * BLOCK, np.float32)
     _loops.rectified_sum(features, count, pixels, planes, bias, weights, len(bias), block, result)

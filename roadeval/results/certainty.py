@@ -19,7 +19,7 @@ MARK: Final = "*"
 
 
 class Degree(Enum):
-    """What is known of a difference."""
+    """How sure a difference is."""
 
     UNDEFINED = auto()
     """No frame has it."""
