@@ -104,8 +104,8 @@ def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
     result = np.empty((height, width), np.uint8)
     room = np.empty(width, np.int32), np.empty(width, np.uint8)
     tables = road, left if len(left) else None
-    _require(road, COLOUR_WORDS)
-    _require(left if len(left) else road, COLOUR_WORDS)
+    for table in (road, left) if len(left) else (road,):
+        _require(table, COLOUR_WORDS)
     _loops.look_up_colours(*planes, height, width, *tables, result, *room)
     return result
 
