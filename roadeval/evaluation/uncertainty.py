@@ -76,6 +76,7 @@ from roadeval.evaluation.autocorrelation import (
     mean_distribution,
     series_for,
 )
+from roadeval.evaluation.corrections import holm_p_values
 from roadeval.evaluation.settings import EvaluationSettings
 
 MOST_FRAMES: Final = 1_000_000
@@ -172,22 +173,12 @@ def _needed(
 def holm(family: Sequence[Difference]) -> list[Difference]:
     """Correct p-values for the number of comparisons, so that few findings are false.
 
-    Of a family of which nothing is true, ``1 - confidence`` at most have one whose corrected
-    p-value is below that, however the comparisons depend on each other [1]_. One without a p-value
-    is left out; so is one whose difference is 0 on every frame, where nothing can be found.
-
-    References
-    ----------
-    .. [1] S. Holm, A Simple Sequentially Rejective Multiple Test Procedure, Scandinavian Journal
-       of Statistics 6, 1979, 65-70.
+    By `roadeval.evaluation.corrections.holm_p_values`. One without a p-value is left out; so is one
+    whose difference is 0 on every frame, where nothing can be found.
     """
-    tested = {
-        place: each.p
-        for place, each in enumerate(family)
-        if each.p is not None and not each.low == each.high == 0
-    }
-    corrected, least = list(family), 0.0
-    for rank, place in enumerate(sorted(tested, key=tested.__getitem__)):
-        least = max(least, min((len(tested) - rank) * tested[place], 1.0))
-        corrected[place] = replace(family[place], p_holm=least, comparisons=len(tested))
-    return corrected
+    values = [None if each.low == each.high == 0 else each.p for each in family]
+    comparisons = sum(p is not None for p in values)
+    return [
+        each if p is None else replace(each, p_holm=p, comparisons=comparisons)
+        for each, p in zip(family, holm_p_values(values), strict=True)
+    ]
