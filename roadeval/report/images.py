@@ -14,6 +14,8 @@ from roadeval.report.blocks import ImageFile
 WIDTH: Final = 420
 """Pixels across a picture, at most: about 200 an inch at a quarter of the page."""
 QUALITY: Final = 85
+FINEST: Final = 95
+"""Quality of a JPEG, and of one of which a figure is made."""
 DARKEN: Final = 0.75
 """Share of the camera's brightness that stays below an overlay."""
 
@@ -45,10 +47,23 @@ def jpeg(layer: LayerImage, width: int = WIDTH) -> ImageFile:
     """Return the layer as a JPEG file of at most ``width`` pixels across."""
     import cv2
 
-    bgr = cv2.cvtColor(shrink(painted(layer), width), cv2.COLOR_RGB2BGR)
-    done, content = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    return ImageFile(_packed(shrink(painted(layer), width), cv2.IMWRITE_JPEG_QUALITY, QUALITY))
+
+
+def finest_jpeg(image: Rgb) -> bytes:
+    """Return an image as a JPEG file in which a line of one pixel keeps its colour."""
+    import cv2
+
+    colours = cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444
+    return _packed(image, cv2.IMWRITE_JPEG_QUALITY, FINEST, *colours)
+
+
+def _packed(image: Rgb, *options: int) -> bytes:
+    import cv2
+
+    done, content = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), options)
     assert done
-    return ImageFile(content.tobytes())
+    return bytes(content)
 
 
 def painted(layer: LayerImage) -> Rgb:
@@ -88,7 +103,7 @@ def _overlaid(image: Rgb, spec: LayerSpec, labels: npt.NDArray[Any]) -> Rgb:
         opacity = colours[label, 3:] / 255
         mixed = _LEVELS * DARKEN * (1 - opacity) + colours[label, :3] * opacity
         tinted = cv2.LUT(image, np.rint(mixed).astype(np.uint8)[None])
-        np.copyto(overlaid, tinted, where=(labels == label)[..., None])
+        cv2.copyTo(tinted, (labels == label).view(np.uint8), overlaid)
     return overlaid
 
 

@@ -27,6 +27,8 @@ def road_masks(data: FigureData) -> Figure | None:
     """Draw a row a frame: the image, each variant's mask over it, and the truth over it."""
     from matplotlib.figure import Figure
 
+    from roadeval.report.figures.picture import Picture
+
     if not data.examples:
         return None
     truth = any(example.truth is not None for example in data.examples)
@@ -39,8 +41,7 @@ def road_masks(data: FigureData) -> Figure | None:
     grid = figure.subplots(len(rows), len(rows[0]), squeeze=False)
     for axes, example, pictures in zip(grid, data.examples, rows, strict=True):
         for ax, picture in zip(axes, pictures.values(), strict=True):
-            ax.set_axis_off()
-            ax.imshow(picture, interpolation="antialiased", aspect="auto")
+            Picture(ax, picture)
         _name_row(axes[0], example.frame)
     for ax, title in zip(grid[0], rows[0], strict=True):
         ax.set_title(title, color=INK, pad=4)

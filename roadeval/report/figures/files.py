@@ -5,11 +5,15 @@ Equal figures give equal files, byte for byte.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import struct
+import zlib
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
 
 from roadeval.report.blocks import ImageFile
 from roadeval.report.figures.figure import FigureData, FigureSpec, figures
@@ -19,12 +23,9 @@ from roadeval.report.pdf.typeset import page_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_SAVING: Final[Mapping[str, Mapping[str, Any]]] = {
-    # This packs twice as fast as Pillow's own choice, into files 4 % larger.
-    "png": {"metadata": {"Software": None}, "pil_kwargs": {"compress_level": 4}},
-    "svg": {"metadata": {"Date": None}},
-}
 _DPI: Final = 200
+_HEADER: Final = 33
+"""Bytes of a PNG's signature and first chunk."""
 
 
 def write_figures(folder: Path, data: FigureData) -> list[Path]:
@@ -58,14 +59,14 @@ def svg(draw: Callable[[], Figure]) -> ImageFile:
     the document embeds each font once and its figures can be searched.
     """
     with _style():
-        return ImageFile(_encoded(draw(), "svg"))
+        return ImageFile(_svg(draw()))
 
 
 def svg_of(spec: FigureSpec, data: FigureData) -> ImageFile | None:
     """Return a figure of the results folder as SVG; None if there is nothing to draw."""
     with _style():
         figure = spec.draw(data)
-        return None if figure is None else ImageFile(_encoded(figure, "svg"))
+        return None if figure is None else ImageFile(_svg(figure))
 
 
 def _write(folder: Path, spec: FigureSpec, data: FigureData) -> Iterator[Path]:
@@ -75,7 +76,7 @@ def _write(folder: Path, spec: FigureSpec, data: FigureData) -> Iterator[Path]:
             return
         # Typst, which sets the reports too, makes a PDF of an SVG in a few milliseconds;
         # Matplotlib's own way takes a few tenths of a second, most of it for the fonts.
-        files = {"png": _encoded(figure, "png"), "pdf": page_of(_encoded(figure, "svg"))}
+        files = {"png": _png(figure), "pdf": page_of(_svg(figure))}
     for kind, content in files.items():
         path = folder / f"{spec.name}.{kind}"
         path.write_bytes(content)
@@ -90,7 +91,43 @@ def _style() -> Iterator[None]:
         yield
 
 
-def _encoded(figure: Figure, kind: str) -> bytes:
+def _png(figure: Figure) -> bytes:
+    """Return a figure as PNG, packed several times as fast as by Matplotlib, into as few bytes."""
+    import cv2
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure.dpi = _DPI
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    bgr = cv2.cvtColor(np.asarray(canvas.buffer_rgba()), cv2.COLOR_RGBA2BGR)
+    options = (
+        *(cv2.IMWRITE_PNG_COMPRESSION, 1),
+        *(cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_SUB),
+        *(cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_DEFAULT),
+    )
+    done, content = cv2.imencode(".png", bgr, options)
+    assert done
+    return _with_dpi(content.tobytes())
+
+
+def _with_dpi(png: bytes) -> bytes:
+    """Return a PNG file that says how large its dots are, right after its header."""
+    dots = round(_DPI / 0.0254)
+    chunk = b"pHYs" + struct.pack(">IIB", dots, dots, 1)
+    sized = struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
+    return png[:_HEADER] + sized + png[_HEADER:]
+
+
+def _svg(figure: Figure) -> bytes:
+    """Return a figure as SVG."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    if engine := figure.get_layout_engine():
+        # As `savefig` would, but without drawing everything once more for it. An SVG's canvas
+        # measures letters in its own way.
+        FigureCanvasSVG(figure)
+        engine.execute(figure)
+        figure.set_layout_engine("none")
     content = BytesIO()
-    figure.savefig(content, format=kind, dpi=_DPI, **_SAVING[kind])
+    figure.savefig(content, format="svg", dpi=_DPI, metadata={"Date": None})
     return content.getvalue()

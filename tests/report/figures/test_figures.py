@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from io import BytesIO
 from itertools import combinations, pairwise
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
 from roadeval.report import figures as folder
 from roadeval.report.figures.fig2_masks import road_masks
 from roadeval.report.figures.fig3a_error_rate import error_rate
 from roadeval.report.figures.fig3b_fp_fn_rate import fp_fn_rate
 from roadeval.report.figures.figure import ExampleFrame, FigureData, figures
-from roadeval.report.figures.files import svg_of, write_figures
+from roadeval.report.figures.files import svg, svg_of, write_figures
 from roadeval.report.figures.rates_over_drive import CROWDED, MARKED, rates_over_drive
-from roadeval.report.figures.style import looks
+from roadeval.report.figures.style import RC, looks
 
 NO_WINDOWS = pd.DataFrame()
 BY_DEFAULT = ("filtered", "unfiltered", "blind")
@@ -317,6 +321,50 @@ def test_a_small_example_is_drawn_like_the_large_one(width: int) -> None:
         np.testing.assert_array_equal(mine, its)
 
 
+def test_a_picture_covers_its_axes_in_a_vector_file() -> None:
+    figure = masks_of([an_example()])
+    content = BytesIO()
+    figure.savefig(content, format="svg", dpi=200)
+    found = ElementTree.fromstring(content.getvalue()).iter("{http://www.w3.org/2000/svg}image")
+    places = [[float(each.attrib[k]) for k in ("x", "y", "width", "height")] for each in found]
+    width, height = 72 * figure.get_size_inches()
+    boxes = [ax.get_position() for ax in figure.axes]
+    assert places == [
+        pytest.approx([width * b.x0, height * (1 - b.y1), width * b.width, height * b.height])
+        for b in boxes
+    ]
+
+
+def test_pixels_and_size_of_a_png_are_those_that_matplotlib_would_save(tmp_path: Path) -> None:
+    data = FigureData("drive", a_table(3))
+    write_figures(tmp_path, data)
+    mine = Image.open(tmp_path / "fig3a_error_rate.png")
+    content = BytesIO()
+    with rc_context(RC):
+        figure = error_rate(data)
+        assert figure is not None
+        figure.savefig(content, format="png", dpi=200)
+    its = Image.open(content)
+    assert mine.info["dpi"] == its.info["dpi"]
+    np.testing.assert_array_equal(np.asarray(mine), np.asarray(its.convert("RGB")))
+
+
+def test_a_chart_is_laid_out_as_matplotlib_would() -> None:
+    def chart() -> Figure:
+        figure = Figure(figsize=(4, 2), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        left.plot([1, 2000], label="a line")
+        drawn = right.imshow(np.eye(9))
+        figure.colorbar(drawn, ax=right, location="bottom", aspect=30, pad=0.02).set_label("a bar")
+        figure.legend(loc="outside upper left")
+        return figure
+
+    content = BytesIO()
+    with rc_context(RC):
+        chart().savefig(content, format="svg", dpi=200, metadata={"Date": None})
+    assert svg(chart).content == content.getvalue()
+
+
 @pytest.fixture(scope="module")
 def twice(tmp_path_factory: pytest.TempPathFactory) -> list[list[Path]]:
     """The files of one drive, written twice."""
@@ -334,6 +382,11 @@ def test_all_files_appear_and_no_other(twice: list[list[Path]]) -> None:
 def test_equal_results_give_equal_files(twice: list[list[Path]]) -> None:
     for one, other in zip(*twice, strict=True):
         assert one.read_bytes() == other.read_bytes()
+
+
+def test_a_pdf_holds_each_picture_once_and_as_jpeg(twice: list[list[Path]]) -> None:
+    content = next(p for p in twice[0] if p.name == "fig2_masks.pdf").read_bytes()
+    assert content.count(b"/DCTDecode") == len({"the camera", "the mask, thrice"})
 
 
 def test_pdfs_embed_their_fonts_and_tell_no_date(twice: list[list[Path]]) -> None:
