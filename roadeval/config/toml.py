@@ -52,7 +52,7 @@ def read_tables(path: str | Path) -> dict[str, Any]:
 def _text(path: Path) -> str:
     check_input(path)
     if path.suffix != ".rrd":
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
     from roadeval.recording import Recording
 
     text = Recording(path).result("run")

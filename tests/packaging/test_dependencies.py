@@ -11,7 +11,9 @@ import roadeval
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-DECLARED = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["video"]]
+EXTRAS = ("remote", "video")
+DECLARED = [*PROJECT["dependencies"]]
+DECLARED += [each for extra in EXTRAS for each in PROJECT["optional-dependencies"][extra]]
 
 
 def plain(name: str) -> str:

@@ -1,0 +1,78 @@
+"""URLs: their parts, and how one is shown without its secrets."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Final
+from urllib.parse import unquote, urlsplit
+from urllib.request import url2pathname
+
+from roadeval.fleet.errors import FleetError
+from roadeval.runtime.text import visible
+
+BUCKETS: Final = ("s3", "gs")
+"""Schemes of stores that keep objects in buckets, and can list them."""
+SCHEMES: Final = (*BUCKETS, "https", "http", "file")
+
+_URL: Final = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
+
+
+def is_url(source: str) -> bool:
+    """Return whether a drive's source is a URL, and no path."""
+    return _URL.match(source) is not None
+
+
+def scheme_of(url: str) -> str:
+    """Return the scheme of a URL; a `FleetError` if it is none of `SCHEMES`."""
+    match = _URL.match(url)
+    scheme = match[1].lower() if match else ""
+    if scheme not in SCHEMES:
+        known = ", ".join(f"{each}://" for each in SCHEMES)
+        raise FleetError(f"{shown(url)}: no scheme that is known; choose {known}")
+    return scheme
+
+
+def shown(source: str) -> str:
+    """Return a drive's source as it may be shown: a URL without user, password and query.
+
+    The query of a signed URL is as good as a password.
+
+    >>> shown("https://me:secret@host/a.mcap?X-Amz-Signature=5d1c")
+    'https://host/a.mcap'
+    """
+    match = _URL.match(source)
+    if match is None:
+        return visible(source)
+    host, slash, path = re.split(r"[?#]", source[match.end() :], maxsplit=1)[0].partition("/")
+    return visible(f"{match[0]}{host.rpartition('@')[2]}{slash}{path}")
+
+
+def file_of(url: str) -> Path:
+    """Return the path of a ``file://`` URL; a `FleetError` if it names another machine."""
+    parts = urlsplit(url)
+    if parts.netloc not in ("", "localhost"):
+        raise FleetError(f"{shown(url)}: a file of another machine; write file:///PATH")
+    return Path(url2pathname(parts.path))
+
+
+def bucket_and_key(url: str) -> tuple[str, str]:
+    """Split the URL of an object, or of a folder in a bucket.
+
+    Its key is taken as it is written: nothing in it is encoded, and ``?`` and ``#`` are letters.
+    """
+    bucket, _, key = url.partition("://")[2].partition("/")
+    if "@" in bucket:
+        raise FleetError(f"{shown(url)}: credentials are read from the environment, not from a URL")
+    if not bucket:
+        raise FleetError(f"{shown(url)}: no bucket in it")
+    return bucket, key
+
+
+def last_part(url: str) -> str:
+    """Return the name of the file, folder or bucket that a URL leads to; empty if it has none."""
+    if scheme_of(url) in BUCKETS:
+        bucket, key = bucket_and_key(url)
+        return key.rstrip("/").rpartition("/")[2] or bucket
+    name = unquote(urlsplit(url).path.rstrip("/").rpartition("/")[2])
+    return name.rpartition("/")[2]

@@ -1,0 +1,114 @@
+"""A web server on 127.0.0.1 whose files behave as their folders are called.
+
+``/whole/...`` is served as it should be, ``/early/...`` breaks off, and so on. It answers as S3
+does, too: ``/bucket/key`` is an object of its bucket.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from threading import Thread
+from types import TracebackType
+from typing import Any, Self
+
+CONTENT = bytes(range(256)) * 40_000
+"""Ten megabytes: several blocks of a stream."""
+HALF = len(CONTENT) // 2
+SLOW = 5.0
+"""Seconds for which a server stalls."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    server: Server
+
+    def do_HEAD(self) -> None:
+        self._answer(body=False)
+
+    def do_GET(self) -> None:
+        self._answer(body=True)
+
+    def _answer(self, *, body: bool) -> None:
+        kind = self.path.strip("/").partition("/")[0]
+        self.server.asked.append((self.command, self.path, dict(self.headers)))
+        if kind.isdigit():
+            self._head(int(kind), 0)
+        elif kind == "signed" and not body:
+            self._head(403, 0)
+        elif kind == "unknown":
+            self._head(200, None)
+        else:
+            self._content(kind, body=body)
+
+    def _head(self, status: int, length: int | None, **headers: str) -> None:
+        self.send_response(status)
+        if length is not None:
+            self.send_header("Content-Length", str(length))
+        for name, value in headers.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.close_connection = length is None
+
+    def _content(self, kind: str, *, body: bool) -> None:
+        start = self._start(kind)
+        tag = "0" * 32 if kind in ("encrypted", "changing") else hashlib.md5(CONTENT).hexdigest()
+        headers = {"ETag": f'"{tag}"'}
+        if kind != "dateless":
+            headers["Last-Modified"] = "Wed, 21 Oct 2015 07:28:00 GMT"
+        if start:
+            headers["Content-Range"] = f"bytes {start}-{len(CONTENT) - 1}/{len(CONTENT)}"
+        self._head(206 if start else 200, len(CONTENT) - start, **headers)
+        if body:
+            self._send(kind, start)
+
+    def _start(self, kind: str) -> int:
+        """Return where a stream goes on that broke; only some servers can do that."""
+        asked = self.headers.get("Range", "bytes=0-").removeprefix("bytes=")
+        return int(asked.partition("-")[0]) if kind == "resumed" else 0
+
+    def _send(self, kind: str, start: int) -> None:
+        if kind in ("early", "stalled", "resumed") and not start:
+            self.close_connection = True
+            self.wfile.write(CONTENT[:HALF])
+            self.wfile.flush()
+            time.sleep(SLOW if kind == "stalled" else 0)
+        elif kind == "changing":
+            self.wfile.write(bytes([len(self.server.asked)]) + CONTENT[1:])
+        else:
+            self.wfile.write(CONTENT[start:])
+
+    def log_message(self, *_: Any) -> None:
+        """Stay silent."""
+
+
+class Server(ThreadingHTTPServer):
+    """The server; ``asked`` holds the requests: method, path and headers."""
+
+    daemon_threads = True
+
+    def __init__(self) -> None:
+        super().__init__(("127.0.0.1", 0), _Handler)
+        self.asked: list[tuple[str, str, dict[str, str]]] = []
+        self._thread = Thread(target=self.serve_forever, args=(0.05,), daemon=True)
+
+    def url(self, path: str, scheme: str = "http", user: str = "") -> str:
+        """Return the URL of one of its files."""
+        return f"{scheme}://{user}127.0.0.1:{self.server_port}/{path}"
+
+    def handle_error(self, *_: Any) -> None:
+        """Stay silent where a client goes away, which some cases are about."""
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.shutdown()
+        self.server_close()

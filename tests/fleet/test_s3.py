@@ -1,0 +1,144 @@
+"""Drives in a bucket: on the S3 server of moto, at 127.0.0.1."""
+
+import os
+from urllib.request import Request, urlopen
+
+import pytest
+
+from roadeval.errors import RoadevalError
+from roadeval.fleet import find_drives, staged, stamp
+from tests.fixtures.elsewhere import split_bag, talker
+
+LOG = talker(3).bytes()
+LONG = os.urandom(11 << 20)
+OBJECTS = {
+    "top.mcap": LOG,
+    "d/drive_10.mcap": LOG,
+    "d/drive_2.mcap": LONG,
+    "d/a b%20+#?.mcap": LOG,
+    "d/.hidden/a.mcap": LOG,
+    "d/x.5d1c02fe.partial.mcap": LOG,
+    "d/note.txt": b"note",
+    "d/more/metadata.yaml": b"title: something else",
+    "d/more/one.mcap": LOG,
+    **{f"d/run/{name}": content for name, content in split_bag().items()},
+    "empty/note.txt": b"note",
+}
+
+
+@pytest.fixture(scope="module")
+def bucket():
+    """A server's address, with a bucket of drives."""
+    moto = pytest.importorskip("moto.server", reason="moto[s3] and flask are not installed")
+    server = moto.ThreadedMotoServer("127.0.0.1", 0, verbose=False)
+    server.start()
+    url = "http://{}:{}".format(*server.get_host_and_port())
+    urlopen(Request(f"{url}/bucket", method="PUT"), timeout=20).close()
+    yield url
+    server.stop()
+
+
+@pytest.fixture
+def s3(bucket, monkeypatch):
+    for key in [key for key in os.environ if key.startswith("AWS_")]:
+        monkeypatch.delenv(key)
+    for key, value in {
+        "AWS_ACCESS_KEY_ID": "user",
+        "AWS_SECRET_ACCESS_KEY": "geheim",
+        "AWS_ENDPOINT_URL": bucket,
+        "AWS_ALLOW_HTTP": "true",
+    }.items():
+        monkeypatch.setenv(key, value)
+
+
+@pytest.fixture
+def filled(s3):
+    import obstore
+    from obstore.store import S3Store
+
+    store = S3Store("bucket", client_options={"allow_http": "true"})
+    urlopen(Request(f"{os.environ['AWS_ENDPOINT_URL']}/one-bag", method="PUT"), timeout=20).close()
+    for name, content in split_bag().items():
+        obstore.put(S3Store("one-bag", client_options={"allow_http": "true"}), name, content)
+    for key, content in OBJECTS.items():
+        obstore.put(store, key, content)
+
+
+def test_a_bucket_and_a_folder_are_listed_in_natural_order(filled):
+    below = [
+        "s3://bucket/d/a b%20+#?.mcap",
+        "s3://bucket/d/drive_2.mcap",
+        "s3://bucket/d/drive_10.mcap",
+        "s3://bucket/d/more/one.mcap",
+        "s3://bucket/d/run/",
+    ]
+    assert [entry.source for entry in find_drives(["s3://bucket/d/"])] == below
+    everything = find_drives(["s3://bucket/", "s3://bucket/top.mcap"])
+    assert [entry.source for entry in everything] == [*below, "s3://bucket/top.mcap"]
+    assert [entry.source for entry in find_drives(["s3://bucket/d/run/"])] == below[-1:]
+    assert [entry.name for entry in everything][-2:] == ["run", "top"]
+
+
+def test_objects_are_copied_and_removed(filled, tmp_path):
+    for key in ("d/drive_2.mcap", "d/a b%20+#?.mcap"):
+        with staged(f"s3://bucket/{key}", tmp_path) as copy:
+            assert copy.read_bytes() == OBJECTS[key]
+            assert copy.suffix == ".mcap"
+        assert not list(tmp_path.iterdir())
+
+
+def test_a_bag_is_copied_with_all_its_logs_and_can_be_opened(filled, tmp_path):
+    from roadeval.logs import open_log
+
+    with staged("s3://bucket/d/run/", tmp_path) as copy:
+        names = [path.name for path in sorted(copy.iterdir())]
+        assert names == ["bag_0.mcap", "bag_1.mcap", "bag_2.mcap"]
+        assert open_log(copy).name == "run"
+        assert [topic.count for topic in open_log(copy).topics] == [47]
+
+
+def test_a_bucket_that_is_a_bag_is_one_drive(filled, tmp_path):
+    (entry,) = find_drives(["s3://one-bag/"])
+    assert (entry.source, entry.name) == ("s3://one-bag/", "one-bag")
+    with staged(entry.source, tmp_path) as copy:
+        assert len(list(copy.iterdir())) == 3
+
+
+def test_a_stamp_tells_whether_an_object_has_changed(filled, s3):
+    import obstore
+    from obstore.store import S3Store
+
+    before = stamp("s3://bucket/top.mcap")
+    assert before == stamp("s3://bucket/top.mcap")
+    assert before["top.mcap"]["size"] == len(LOG)
+    store = S3Store("bucket", client_options={"allow_http": "true"})
+    obstore.put(store, "top.mcap", LOG[:-1] + b"x")
+    assert stamp("s3://bucket/top.mcap")["top.mcap"]["etag"] != before["top.mcap"]["etag"]
+    assert list(stamp("s3://bucket/d/run/")) == ["bag_0.mcap", "bag_1.mcap", "bag_2.mcap"]
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("s3://bucket/empty/", "s3://bucket/empty/: no log there or below"),
+        ("s3://bucket/gone/", "s3://bucket/gone/: no log there or below"),
+        ("s3://no-such-bucket/", "s3://no-such-bucket/: there is no such"),
+    ],
+)
+def test_a_folder_without_drives_is_an_error(filled, word, message):
+    with pytest.raises(RoadevalError, match=message) as error:
+        find_drives([word])
+    assert "\n" not in str(error.value)
+
+
+def test_an_object_that_is_not_there_is_an_error(filled, tmp_path):
+    url = "s3://bucket/gone.mcap"
+    with pytest.raises(RoadevalError, match=f"{url}: there is no such"), staged(url, tmp_path):
+        pytest.fail("the drive is there")
+
+
+def test_a_bucket_that_denies_access_is_an_error(filled, tmp_path, monkeypatch):
+    monkeypatch.setenv("AWS_SKIP_SIGNATURE", "true")
+    url = "s3://bucket/top.mcap"
+    with pytest.raises(RoadevalError, match="the server denies access"), staged(url, tmp_path):
+        pytest.fail("the drive is there")

@@ -1,0 +1,235 @@
+"""Which drives words name: logs, folders, rosbag2 folders, globs, URLs, manifests."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from roadeval.config import DriveSettings
+from roadeval.data.names import is_plain
+from roadeval.errors import RoadevalError
+from roadeval.fleet import find_drives
+from roadeval.fleet.entry import identity
+from tests.fixtures.elsewhere import split_bag, talker
+
+LOG = talker(3).bytes()
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty folder, and the current one."""
+    folder = tmp_path.resolve() / "drives"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def put(*names: str | Path, content: bytes = LOG) -> None:
+    for name in names:
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_bytes(content)
+
+
+def put_bag(folder: Path) -> None:
+    for name, content in split_bag().items():
+        put(folder / name, content=content)
+
+
+def found(*words: str | Path) -> list[str]:
+    """The paths of the drives that words name, below the current folder."""
+    return [os.path.relpath(entry.source) for entry in find_drives([str(w) for w in words])]
+
+
+def test_a_file_of_any_name_is_a_drive(folder):
+    put("a.mcap", "b.log", "no_suffix")
+    assert found("b.log", "no_suffix", folder / "a.mcap") == ["b.log", "no_suffix", "a.mcap"]
+
+
+def test_an_entry_has_an_absolute_path_a_name_and_an_identity(folder):
+    put("Monday, rain.mcap")
+    (entry,) = find_drives(["Monday, rain.mcap"])
+    assert entry.path == folder / "Monday, rain.mcap"
+    assert entry.source == str(entry.path)
+    assert (entry.name, entry.group, entry.tags, entry.settings) == ("Monday, rain", None, {}, None)
+    assert entry.id.startswith("Monday_rain-")
+    assert len(entry.id) == len("Monday_rain-") + 8
+
+
+def test_two_drives_of_one_name_stay_two(folder):
+    put("a/camera.mcap", "b/camera.mcap")
+    first, second = find_drives(["a", "b"])
+    assert first.name == second.name == "camera"
+    assert first.id != second.id
+
+
+@pytest.mark.parametrize("name", ["\u202e!?", "-rf", "..", "x" * 200, "a\nb", "ü", "\udcff"])
+def test_an_identity_is_plain_and_short_whatever_the_name(folder, name):
+    put(f"{name}.mcap")
+    (entry,) = find_drives([f"{name}.mcap"])
+    assert is_plain(entry.id)
+    assert entry.id[0] not in "-_"
+    assert len(entry.id) <= 49
+    assert entry.name.isprintable()
+
+
+def test_identities_that_are_equal_by_chance_become_longer():
+    clash = ["https://host/1884/a.mcap", "https://host/14768/a.mcap"]
+    first, second, third = find_drives([*clash, "https://host/a.mcap"])
+    assert first.id != second.id
+    assert identity(first.source) == identity(second.source)
+    assert (len(first.id), len(second.id), len(third.id)) == (18, 18, 10)
+
+
+def test_a_folder_is_searched_through_in_natural_order(folder):
+    put("d/drive_10.mcap", "d/drive_2.mcap", "d/b/1.mcap", "d/note.txt", "d/LOUD.MCAP")
+    assert found("d") == ["d/LOUD.MCAP", "d/b/1.mcap", "d/drive_2.mcap", "d/drive_10.mcap"]
+
+
+def test_hidden_and_incomplete_files_are_left_out_of_a_search(folder):
+    put("d/a.mcap", "d/.b.mcap", "d/.c/c.mcap", "d/e.5d1c02fe.partial.mcap", "d/lost+found/f.mcap")
+    assert found("d") == ["d/a.mcap"]
+    assert found("d/*.mcap") == ["d/a.mcap"]
+    assert found("d/.b.mcap") == ["d/.b.mcap"]
+
+
+def test_a_split_bag_is_one_drive_in_a_search_and_by_itself(folder):
+    put("d/a.mcap")
+    put_bag(folder / "d/run")
+    assert found("d") == ["d/a.mcap", "d/run"]
+    assert found("d/run") == ["d/run"]
+    assert [entry.name for entry in find_drives(["d/run"])] == ["run"]
+
+
+def test_a_bag_that_cannot_be_read_is_still_a_drive(folder):
+    put("d/run/metadata.yaml", content=b"rosbag2_bagfile_information:\n  version: 9\n")
+    put("d/run/run_0.db3", "d/a.mcap")
+    assert found("d") == ["d/a.mcap", "d/run"]
+
+
+def test_metadata_of_something_else_makes_no_bag(folder):
+    put("d/a.mcap", "d/b.mcap")
+    put("d/metadata.yaml", content=b"title: my drives\n")
+    assert found("d") == ["d/a.mcap", "d/b.mcap"]
+
+
+@pytest.mark.parametrize(
+    "words", [["d/run/*.mcap"], ["d/**/*.mcap"], ["d/run", "d/run/bag_1.mcap"]]
+)
+def test_all_files_of_a_bag_are_the_bag(folder, words):
+    put_bag(folder / "d/run")
+    assert found(*words) == ["d/run"]
+
+
+def test_one_file_of_a_bag_is_that_file(folder):
+    put_bag(folder / "run")
+    assert found("run/bag_1.mcap") == ["run/bag_1.mcap"]
+
+
+def test_a_folder_that_is_linked_twice_is_searched_once(folder):
+    put("d/real/a.mcap")
+    (folder / "d/real/again").symlink_to(folder / "d")
+    (folder / "d/zlink").symlink_to(folder / "d/real")
+    assert found("d") == ["d/real/a.mcap"]
+
+
+def test_a_link_is_called_by_its_own_name_and_counts_once(folder):
+    put("store/5d1c02fe.mcap")
+    (folder / "monday.mcap").symlink_to(folder / "store/5d1c02fe.mcap")
+    assert found("monday.mcap", "store") == ["monday.mcap"]
+
+
+def test_a_log_that_a_link_does_not_reach_is_still_a_drive_of_its_folder(folder):
+    put("d/a.mcap")
+    (folder / "d/b.mcap").symlink_to(folder / "gone")
+    assert found("d") == ["d/a.mcap", "d/b.mcap"]
+
+
+def test_a_glob_matches_files_and_folders(folder):
+    put("d/1/a.mcap", "d/2/b.mcap", "d/2/c/d.mcap", "d/2/x.log", "e[1].mcap")
+    assert found("d/*/*.mcap") == ["d/1/a.mcap", "d/2/b.mcap"]
+    assert found("d/**/*.mcap") == ["d/1/a.mcap", "d/2/b.mcap", "d/2/c/d.mcap"]
+    assert found("d/*") == ["d/1/a.mcap", "d/2/b.mcap", "d/2/c/d.mcap"]
+    assert found("d/2/*") == ["d/2/b.mcap", "d/2/c/d.mcap"]
+    assert found("d/2/*.log") == ["d/2/x.log"]
+    assert found("e[1].mcap") == ["e[1].mcap"]
+
+
+def test_a_drive_that_is_named_twice_counts_once_at_its_first_place(folder):
+    put("a.mcap", "b.mcap")
+    assert found("b.mcap", ".", "../drives/b.mcap", folder.as_uri()) == ["b.mcap", "a.mcap"]
+
+
+def test_a_manifest_says_more_of_a_drive_that_is_named_beside_it(folder):
+    put("a.mcap", "b.mcap")
+    Path("fleet.csv").write_text("path,group,frames.every\nb.mcap,tuesday,5\n")
+    for words in (["a.mcap", "b.mcap", "fleet.csv"], ["a.mcap", "fleet.csv", "b.mcap"]):
+        first, second = find_drives(words)
+        assert (first.group, second.group) == (None, "tuesday")
+        assert second.settings == DriveSettings(second.source, {"frames": {"every": 5}})
+
+
+def test_two_descriptions_of_one_drive_are_refused(folder):
+    put("a.mcap")
+    Path("1.csv").write_text("path,tag.weather\na.mcap,rain\n")
+    Path("2.csv").write_text("path,tag.weather\na.mcap,sun\n")
+    assert len(find_drives(["1.csv", "1.csv"])) == 1
+    with pytest.raises(
+        RoadevalError, match=r"a\.mcap: is named twice, with different groups, tags"
+    ):
+        find_drives(["1.csv", "2.csv"])
+
+
+def test_paths_of_a_manifest_are_relative_to_it(folder):
+    put("m/logs/1.mcap", "m/logs/2.mcap", "m/x.mcap")
+    Path("m/fleet.toml").write_text(
+        '[[drives]]\npath = "logs/*.mcap"\ngroup = "g"\n\n[[drives]]\npath = "s3://bucket/k.mcap"\n'
+    )
+    first, second, url = find_drives(["m/fleet.toml"])
+    assert (first.path, second.path) == (folder / "m/logs/1.mcap", folder / "m/logs/2.mcap")
+    assert (first.group, second.group, url.group) == ("g", "g", None)
+    assert (url.source, url.path, url.name) == ("s3://bucket/k.mcap", None, "k")
+
+
+def test_a_url_is_a_drive_that_nothing_is_asked_of_yet():
+    drives = find_drives(["gs://bucket/a b.mcap", "https://host/a%20b.mcap?sig=1"])
+    assert [entry.name for entry in drives] == ["a b", "a b"]
+    assert [entry.path for entry in drives] == [None, None]
+    assert drives[0].id != drives[1].id
+
+
+def test_what_shows_an_entry_shows_no_secret():
+    (entry,) = find_drives(["https://me:geheim@host/a.mcap?sig=geheim"])
+    assert "geheim" in entry.source
+    assert entry.shown == "https://host/a.mcap"
+    assert "geheim" not in f"{entry!r} {entry.shown} {entry.id} {entry.name}"
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("gone.mcap", r"gone\.mcap: there is no such file or folder"),
+        ("gone/*.mcap", r"gone/\*\.mcap: no log matches it"),
+        ("empty", r"empty: a folder without \*\.mcap files"),
+        ("bags", r"bags: no \*\.mcap file in it; a folder of ROS 1 bags"),
+        ("unfinished", "unfinished: no log that is complete"),
+        ("ftp://host/a.mcap", r"ftp://host/a\.mcap: no scheme that is known; choose s3://, gs://"),
+        ("file://host/a.mcap", "a file of another machine"),
+        ("file:///gone.mcap", r"/gone\.mcap: there is no such file or folder"),
+        ("s3://bucket/fleet.toml", "a manifest is named by itself"),
+        ("*.toml", "a manifest is named by itself"),
+        ("gone.toml", "there is no such file or folder"),
+        ("x" * 300, "File name too long"),
+    ],
+)
+def test_a_word_that_names_no_drive_is_an_error_of_one_line(folder, word, message):
+    Path("empty").mkdir()
+    put("bags/a.bag", "unfinished/.hidden.mcap", "m.toml")
+    Path("unfinished/a.5d1c02fe.partial.mcap").write_bytes(LOG)
+    with pytest.raises(RoadevalError, match=message) as error:
+        find_drives([word])
+    assert "\n" not in str(error.value)
+
+
+def test_no_words_are_an_error():
+    with pytest.raises(RoadevalError, match="no drive found"):
+        find_drives([])
