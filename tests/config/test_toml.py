@@ -111,3 +111,8 @@ def test_every_setting_is_documented_with_its_range():
     assert "Above 0, at most 1.\nscale = 1.0\n" in text
     assert "``" not in text
     assert max(map(len, lines)) <= 100
+
+
+def test_a_file_that_begins_with_a_mark_of_byte_order_is_read(tmp_path):
+    (tmp_path / "run.toml").write_text("[frames]\nevery = 2\n", encoding="utf-8-sig")
+    assert load_config(tmp_path / "run.toml").frames.every == 2
