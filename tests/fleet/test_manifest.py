@@ -55,9 +55,9 @@ def test_both_forms_say_the_same(entries, text, suffix, encoding):
 
 
 def test_a_cell_is_a_number_only_where_one_can_be(entries):
-    text = "path,tag.id,topics.image,topics.truth,topics.resize_truth,labels.road_colors\n"
-    (entry,) = entries(f'{text}12,0012,true,5,true,"[[1, 2, 3]]"\n', ".csv")
-    assert (entry.path, entry.tags) == ("12", {"id": "0012"})
+    text = "path,group,tag.id,topics.image,topics.truth,topics.resize_truth,labels.road_colors\n"
+    (entry,) = entries(f'{text}12,7.50,0012,true,5,true,"[[1, 2, 3]]"\n', ".csv")
+    assert (entry.path, entry.group, entry.tags) == ("12", "7.50", {"id": "0012"})
     tables = entry.settings.tables
     assert tables["topics"] == {"image": "true", "truth": "5", "resize_truth": True}
     assert tables["labels"]["road_colors"] == [[1, 2, 3]]

@@ -243,6 +243,12 @@ def test_an_object_is_read_again_where_its_sum_is_another(s3, tmp_path, bucket, 
     assert len(s3.asked) == times
 
 
+def test_the_tag_of_a_web_server_is_no_sum(server, tmp_path):
+    with staged(server.url("encrypted/a.mcap"), tmp_path):
+        pass
+    assert len(server.asked) == 1
+
+
 def test_an_object_that_arrives_changed_is_refused(s3, tmp_path):
     message = refused("s3://changing/key.mcap", tmp_path)
     assert message.startswith("s3://changing/key.mcap: its bytes arrive changed")

@@ -198,7 +198,7 @@ def test_a_url_is_a_drive_that_nothing_is_asked_of_yet():
 
 
 def test_what_shows_an_entry_shows_no_secret():
-    (entry,) = find_drives(["https://me:geheim@host/a.mcap?sig=geheim"])
+    (entry,) = find_drives(["https://me:a@geheim@host/a.mcap?sig=geheim"])
     assert "geheim" in entry.source
     assert entry.shown == "https://host/a.mcap"
     assert "geheim" not in f"{entry!r} {entry.shown} {entry.id} {entry.name}"
