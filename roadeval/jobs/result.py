@@ -162,7 +162,7 @@ class Result:
 
 
 def _recording(path: Path) -> Recording:
-    # Only here: Rerun takes a third of a second, and a folder is read without it.
+    # Only here: a folder is read without what reads a recording.
     from roadeval.recording import Recording
 
     return Recording(path)

@@ -12,7 +12,7 @@ rgb        PNG                         the same image; if not exact, a JPEG at h
 =========  ==========================  ============================================================
 
 What never changes (colours, class names, ranges) is a codec's ``style``, logged once; a frame
-adds only its payload.
+adds only its payload. Both need Rerun, which is imported there: who decodes does without.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from typing import Any, Final, Protocol
 import cv2
 import numpy as np
 import numpy.typing as npt
-import rerun as rr
 
 from roadeval import images
 from roadeval.data import ERRORS, TRUTH, LayerKind, LayerSpec
@@ -124,6 +123,8 @@ class MaskCodec:
 
     def style(self) -> Sequence[Any]:
         """Return a style that is drawn above the camera's image."""
+        import rerun as rr
+
         return [rr.EncodedImage.from_fields(media_type="image/png", draw_order=10)]
 
     def encode(self, array: npt.NDArray[np.uint8] | Packed) -> bytes:
@@ -137,6 +138,8 @@ class MaskCodec:
 
     def columns(self, payloads: list[bytes]) -> Any:
         """Return columns of encoded images."""
+        import rerun as rr
+
         return rr.EncodedImage.columns(blob=payloads)
 
     def decode(self, payload: bytes) -> Array:
@@ -156,6 +159,8 @@ class LabelCodec:
 
     def style(self) -> Sequence[Any]:
         """Return the classes' names and colours, and every frame's format."""
+        import rerun as rr
+
         classes = [rr.AnnotationInfo(c.value, c.name, c.rgba) for c in self.spec.classes]
         form = rr.components.ImageFormat(
             self.width,
@@ -174,6 +179,8 @@ class LabelCodec:
 
     def columns(self, payloads: list[bytes]) -> Any:
         """Return columns of segmentation images."""
+        import rerun as rr
+
         return rr.SegmentationImage.columns(buffer=payloads)
 
     def decode(self, payload: bytes) -> Array:
@@ -192,6 +199,8 @@ class ScalarCodec:
 
     def style(self) -> Sequence[Any]:
         """Return the colour map; the viewer takes grey levels for fractions, whatever the unit."""
+        import rerun as rr
+
         return [
             rr.EncodedDepthImage.from_fields(
                 media_type="image/png",
@@ -215,6 +224,8 @@ class ScalarCodec:
 
     def columns(self, payloads: list[bytes]) -> Any:
         """Return columns of encoded depth images."""
+        import rerun as rr
+
         return rr.EncodedDepthImage.columns(blob=payloads)
 
     def decode(self, payload: bytes) -> Array:
@@ -239,6 +250,8 @@ class CameraCodec:
 
     def style(self) -> Sequence[Any]:
         """Return a style that is drawn below every mask."""
+        import rerun as rr
+
         return [rr.EncodedImage.from_fields(draw_order=-10)]
 
     def encode(self, array: Array) -> bytes:
@@ -247,6 +260,8 @@ class CameraCodec:
 
     def columns(self, payloads: list[bytes]) -> Any:
         """Return columns of encoded images; the viewer tells JPEG from PNG by itself."""
+        import rerun as rr
+
         return rr.EncodedImage.columns(blob=payloads)
 
     def decode(self, payload: bytes) -> Array:

@@ -124,7 +124,7 @@ def unscored(number, role=Role.TRAINING):
 def rows_of(recording, path, component):
     """How many values each frame's row of an entity has: none where nothing is to be shown."""
     chunks = RrdFile(recording.path).stream()
-    chunks = chunks.filter(content=path, components=component, is_static=False)
+    chunks = chunks.filter(content=[path], components=[component], is_static=False)
     batches = [chunk.to_record_batch() for chunk in chunks]
     return {
         frame: len(values)

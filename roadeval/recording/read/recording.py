@@ -13,7 +13,6 @@ import numpy.typing as npt
 
 from roadeval.data import ERRORS, VariantLayout
 from roadeval.recording import layout as at
-from roadeval.recording.codecs import codecs_of
 from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.read.payloads import PayloadCache
 from roadeval.recording.read.rrd_file import RrdFile, whole
@@ -22,6 +21,8 @@ from roadeval.results.summary import parse_summary
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from roadeval.recording.codecs import Codec
 
 _CAMERA: Final = "EncodedImage:blob"
 
@@ -69,7 +70,6 @@ class Recording:
             raise RecordingError(f"{self.path}: the recording ends before its first frame")
         with whole(self.path, at.LAYOUT):
             self.layout = Layout.from_json(text)
-            self._codecs = codecs_of(self.layout, self.format)
         self._payloads = PayloadCache(self._file)
 
     @property
@@ -191,6 +191,13 @@ class Recording:
         paths = [at.CAMERA, *(at.layer_path(*layer) for layer in layers)]
         paths += [at.TRUTH_PATH] * scored
         return all(self._payloads.holds(p, self._codecs[p].component, frame) for p in paths)
+
+    @cached_property
+    def _codecs(self) -> dict[str, Codec]:
+        # Only here: what decodes pictures takes time to import, and tables are read without it.
+        from roadeval.recording.codecs import codecs_of
+
+        return codecs_of(self.layout, self.format)
 
     @cached_property
     def _notes(self) -> dict[int, tuple[str, ...]]:

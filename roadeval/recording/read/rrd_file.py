@@ -1,4 +1,9 @@
-"""A recording's file: opened whole, or, of a run that was killed, as far as it was written."""
+"""A recording's file: opened whole, or, of a run that was killed, as far as it was written.
+
+Rerun's compiled part reads it. The package around that takes a third of a second to import, and
+has, for reading, but a thin wrapper; nor has it a public name for a file's index. The versions
+allowed are of one minor version.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +13,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
-from rerun.chunk import Chunk, LazyChunkStream, LazyStore, RrdReader, StoreEntry
+from rerun_bindings import (
+    ChunkInternal,
+    LazyChunkStreamInternal,
+    LazyStoreInternal,
+    RrdReaderInternal,
+    StoreEntryInternal,
+)
 
 from roadeval.errors import RoadevalError
 from roadeval.recording import checks
@@ -50,7 +61,7 @@ class RrdFile:
         """Whether it has an index, which is written last: without one the run was killed."""
         return self._store is not None
 
-    def stream(self) -> LazyChunkStream:
+    def stream(self) -> LazyChunkStreamInternal:
         """Return all chunks; without an index the whole file is read, as far as it goes."""
         if self._store is not None:
             return self._store.stream()
@@ -65,7 +76,7 @@ class RrdFile:
             If they are not what was written.
         """
         self._check(path)
-        chunks = self.stream().filter(content=path, components=component, is_static=static)
+        chunks = self.stream().filter(content=[path], components=[component], is_static=static)
         for chunk in self._all(chunks, path):
             with whole(self.path, path):
                 batch = _filled(chunk.to_record_batch(), component)
@@ -118,7 +129,7 @@ class RrdFile:
                 raise DamagedError(self.path, path)
         self._places.pop(path, None)
 
-    def _all(self, chunks: LazyChunkStream, path: str) -> Iterator[Chunk]:
+    def _all(self, chunks: LazyChunkStreamInternal, path: str) -> Iterator[ChunkInternal]:
         """Yield chunks; a `DamagedError` where one cannot be unpacked."""
         with whole(self.path, path):
             found = iter(chunks)
@@ -146,9 +157,13 @@ def whole(path: Path, part: str) -> Iterator[None]:
 
 def _filled(batch: pa.RecordBatch, component: str) -> pa.RecordBatch:
     """Return the rows with a value: one without says that from there on nothing is shown."""
-    lengths = pc.fill_null(pc.list_value_length(batch.column(component)), 0)
-    filled = pc.greater(lengths, 0)
-    return batch if pc.all(filled).as_py() else batch.filter(filled)
+    values = batch.column(component)
+    if not values.null_count and np.diff(values.offsets.to_numpy()).all():
+        return batch
+    import pyarrow.compute as pc
+
+    lengths = pc.fill_null(pc.list_value_length(values), 0)
+    return batch.filter(pc.greater(lengths, 0))
 
 
 def indexed_chunks(path: Path) -> int:
@@ -157,10 +172,10 @@ def indexed_chunks(path: Path) -> int:
         store = _store(*_open(path))
     except RecordingError:
         return 0
-    return 0 if store is None else len(store)
+    return 0 if store is None else int(store.num_chunks())
 
 
-def _open(path: Path) -> tuple[RrdReader, StoreEntry]:
+def _open(path: Path) -> tuple[RrdReaderInternal, StoreEntryInternal]:
     try:
         check_input(path)
     except FileNotFoundError as error:
@@ -176,8 +191,8 @@ def _open(path: Path) -> tuple[RrdReader, StoreEntry]:
         with warnings.catch_warnings():
             # That a partial recording has no index is known by `RrdFile.indexed`.
             warnings.simplefilter("ignore")
-            reader = RrdReader(path)
-            entries = reader.recordings()
+            reader = RrdReaderInternal(str(path))
+            entries = [each for each in reader.store_entries() if each.kind == "recording"]
     except RuntimeError as error:
         raise RecordingError(_reason(path)) from error
     for entry in entries:
@@ -187,17 +202,16 @@ def _open(path: Path) -> tuple[RrdReader, StoreEntry]:
     raise RecordingError(f"{path}: a recording by {made_by}, not by {APPLICATION}")
 
 
-def _store(reader: RrdReader, entry: StoreEntry) -> LazyStore | None:
+def _store(reader: RrdReaderInternal, entry: StoreEntryInternal) -> LazyStoreInternal | None:
     try:
         return reader.store(store=entry)
     except RuntimeError:
         return None
 
 
-def _places(store: LazyStore) -> dict[str, list[Place]]:
+def _places(store: LazyStoreInternal) -> dict[str, list[Place]]:
     """Return where the messages of every entity lie, by its path, as the index says."""
-    # Rerun has no public name for its index yet; the versions allowed are of one minor version.
-    index = store._chunk_index().to_arrow()
+    _, index = store._chunk_index()
     columns = (f"chunk_{name}" for name in ("entity_path", "byte_offset", "byte_size"))
     places: dict[str, list[Place]] = {}
     for path, offset, size in zip(*(index.column(c).to_pylist() for c in columns), strict=True):
