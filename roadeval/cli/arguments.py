@@ -13,7 +13,7 @@ from roadeval.cli.options import FLAGS, Given, with_flags
 from roadeval.errors import RoadevalError
 
 if TYPE_CHECKING:
-    from roadeval.config import DriveSettings, RunConfig, Variant
+    from roadeval.config import DriveSettings, LogConfig, RunConfig, Variant
     from roadeval.report.pdf.typeset import Paper
 
 Drive = Annotated[
@@ -81,6 +81,15 @@ def configuration(given: Given) -> RunConfig:
             f"--train-frames and --train-gap do not go with a model ({whole.training.model})"
         )
     return whole
+
+
+def of_a_log(given: Given) -> LogConfig:
+    """Return what options ask of a log; wrong usage as in `configuration`."""
+    from roadeval.config import LogConfig
+
+    with usage():
+        _check_names([name for name, _ in given.get("topics.masks", ())])
+        return LogConfig.of(_tables(given))
 
 
 def _preset(given: Given) -> dict[str, str]:

@@ -10,17 +10,20 @@ from roadeval.runtime.on_demand import on_demand
 if TYPE_CHECKING:
     from roadeval.config.drives import DriveSettings
     from roadeval.config.errors import ConfigError
+    from roadeval.config.log import LogConfig
+    from roadeval.config.names import check_variant_name
     from roadeval.config.presets import PRESETS
     from roadeval.config.run import RunConfig, configure
     from roadeval.config.settings import ExecutionSettings, OutputSettings
     from roadeval.config.toml import load_config, read_tables
-    from roadeval.config.variants import Variant, check_variant_name
+    from roadeval.config.variants import Variant
 
 __all__ = [
     "PRESETS",
     "ConfigError",
     "DriveSettings",
     "ExecutionSettings",
+    "LogConfig",
     "OutputSettings",
     "RunConfig",
     "Variant",
@@ -35,10 +38,11 @@ _MODULES: Final = {
     "ConfigError": "errors",
     "DriveSettings": "drives",
     "ExecutionSettings": "settings",
+    "LogConfig": "log",
     "OutputSettings": "settings",
     "RunConfig": "run",
     "Variant": "variants",
-    "check_variant_name": "variants",
+    "check_variant_name": "names",
     "configure": "run",
     "load_config": "toml",
     "read_tables": "toml",

@@ -28,13 +28,13 @@ from typing import Any
 
 from roadeval.config.drives import DriveSettings, drives_of
 from roadeval.config.errors import ConfigError
+from roadeval.config.names import check_variant_name
 from roadeval.config.override import override
 from roadeval.config.presets import PRESETS
 from roadeval.config.settings import SECTIONS, ExecutionSettings, OutputSettings
 from roadeval.config.variants import (
     Variant,
     check_tables,
-    check_variant_name,
     pipeline_of,
     preset_of,
     variants_of,

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from roadeval.config.errors import ConfigError
+from roadeval.config.names import check_variant_name
 from roadeval.config.override import either, override
 from roadeval.config.presets import PRESETS
 from roadeval.config.settings import SECTIONS
-from roadeval.data import FILTERED, FINAL_STAGE, RESERVED, UNFILTERED, VariantLayout, is_plain
+from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED, VariantLayout
 from roadeval.pipeline.chain import STAGES, Pipeline
-
-LONGEST: Final = 64
-"""Letters of a variant's name: it is printed in the columns of tables."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,24 +71,6 @@ def variants_of(pipeline: Pipeline, extra: Iterable[Variant]) -> tuple[Variant, 
         check_variant_name(variant.name, {v.name for v in variants})
         variants.append(variant)
     return tuple(variants)
-
-
-def check_variant_name(name: str, taken: Collection[str]) -> None:
-    """Refuse, as a `ConfigError`, a variant's name that results cannot hold, or that is taken.
-
-    A spreadsheet takes a cell that begins with ``-`` for a formula, and Matplotlib leaves what
-    begins with ``_`` out of a legend.
-    """
-    if not is_plain(name) or name[0] in "-_" or len(name) > LONGEST:
-        shown = name if len(name) <= LONGEST else f"{name[:LONGEST]}..."
-        raise ConfigError(
-            f"variant {shown!r}: a name is made of letters, digits, '-' and '_' alone, begins with "
-            f"a letter or a digit, and has at most {LONGEST} of them"
-        )
-    if name in RESERVED:
-        raise ConfigError(f"variant {name!r}: the name is reserved ({either(RESERVED)})")
-    if name in taken:
-        raise ConfigError(f"variant {name!r}: the name is taken; choose another")
 
 
 def preset_of(tables: Mapping[str, Any], default: str, where: str) -> str:

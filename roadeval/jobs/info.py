@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from roadeval import logs
-from roadeval.config import RunConfig
+from roadeval.config import LogConfig
+
+if TYPE_CHECKING:
+    from roadeval.config import RunConfig
 
 
-def info(drive: str | Path, config: RunConfig | None = None) -> logs.LogDescription:
+def info(drive: str | Path, config: RunConfig | LogConfig | None = None) -> logs.LogDescription:
     """Describe a log: topics, rates, gaps, damage, and what a replay would pick and why.
 
     Raises
@@ -16,7 +20,7 @@ def info(drive: str | Path, config: RunConfig | None = None) -> logs.LogDescript
     RoadevalError
         If it is no log, or cannot be read.
     """
-    config = config or RunConfig()
+    config = config or LogConfig()
     return logs.describe(
         drive,
         config.topics,

@@ -15,13 +15,14 @@ def info(drive: arguments.Drive, *, given: Given, json: arguments.Json = False) 
     Topics with their kind, size, number and rate of messages, gaps and damage; and why replay
     would pick what it picks, or what it would ask for.
     """
-    config = arguments.configuration(given)
+    config = arguments.of_a_log(given)
     from roadeval.cli.screens import info as screen
     from roadeval.jobs.info import info as describe
-    from roadeval.results.summary import json_text
 
     found = describe(drive, config)
     if json:
+        from roadeval.results.summary import json_text
+
         console.emit(json_text(found.as_dict()).rstrip())
     else:
         screen.show(found.as_dict(), console.results())
