@@ -74,14 +74,19 @@ def test_help_imports_nothing_heavy():
     assert run.stderr.strip() == "[]"
 
 
-def test_help_takes_little_processor_time():
-    program = (
-        "import resource, sys; from roadeval.cli.app import main; main(['replay', '--help'])\n"
-        "used = resource.getrusage(resource.RUSAGE_SELF)\n"
-        "sys.exit(str(used.ru_utime + used.ru_stime))"
+def processor_seconds(program: str) -> float:
+    """Return what a process of its own takes for a program, Python's start included."""
+    timed = f"{program}\nimport sys, time; sys.exit(str(time.process_time()))"
+    run = subprocess.run([sys.executable, "-c", timed], capture_output=True, text=True, check=False)
+    return float(run.stderr)
+
+
+def test_help_takes_little_more_processor_time_than_typers_own():
+    """In turns, for a busy machine takes three times as long for the same work."""
+    ours = "from roadeval.cli.app import main; main(['replay', '--help'])"
+    least = (
+        "import typer; app = typer.Typer(); app.command()(lambda: None)\n"
+        "app(['--help'], standalone_mode=False)"
     )
-    runs = [
-        subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
-        for _ in range(3)
-    ]
-    assert min(float(run.stderr) for run in runs) < 0.3
+    pairs = [(processor_seconds(ours), processor_seconds(least)) for _ in range(3)]
+    assert min(pair[0] for pair in pairs) < 2 * min(pair[1] for pair in pairs)
