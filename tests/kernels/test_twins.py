@@ -10,11 +10,13 @@ from hypothesis import strategies as st
 
 from roadeval import kernels
 from roadeval.data.packed import Packed, pack, unpack
-from roadeval.kernels import compiled as fast
 from roadeval.kernels import plain
 from roadeval.pipeline.paper import compensation, shadow_mask, similarity
 from tests.pipeline.images import IMAGES, images, noise
 
+fast = pytest.importorskip(
+    "roadeval.kernels.compiled", reason="the loops were not compiled", exc_type=ImportError
+)
 RNG = np.random.default_rng(0)
 COLOUR_TABLES = RNG.integers(0, 1 << 64, (2, 1 << 18), np.uint64)
 WHITENING = similarity.whitening(np.cov(RNG.normal(0, 30, (3, 50))))
@@ -337,3 +339,16 @@ def test_bits_of_full_words_are_counted():
 def test_any_value_but_0_is_inside(value):
     mask = (noise(30, 70)[..., 0] > 128).astype(np.uint8)
     np.testing.assert_array_equal(pack(mask * np.uint8(value)), pack(mask))
+
+
+@pytest.mark.parametrize("count", [1, 11, 40])
+@pytest.mark.parametrize("pixels", [1, 511, 512, 1200])
+def test_the_sum_over_rectified_planes_equals_its_twin(pixels, count):
+    rng = np.random.default_rng(0)
+    features, planes, bias, weights = (
+        rng.normal(size=shape).astype(np.float32) for shape in ((count, pixels), (9, count), 9, 9)
+    )
+    np.testing.assert_array_equal(
+        fast.rectified_sum(features, planes, bias, weights),
+        plain.rectified_sum(features, planes, bias, weights),
+    )
