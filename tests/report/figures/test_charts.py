@@ -104,6 +104,7 @@ def test_a_comparison_shows_changes_with_their_intervals_and_levels_without():
     assert mean.get_xdata() == pytest.approx([1])
     assert interval.get_xdata() == pytest.approx([-2, 4])
     assert len(second.lines) == 2
-    assert [ax.lines[0].get_xdata()[0] for ax in charts.levels([row]).axes] == pytest.approx(
-        [10, 20, 30]
-    )
+    levels = [ax.lines[0] for ax in charts.levels([row]).axes]
+    assert [line.get_xdata()[0] for line in levels] == pytest.approx([10, 20, 30])
+    # The mark of a rate of 0 lies on the edge of its axes, which must not cut it in two.
+    assert not any(line.get_clip_on() for line in levels)
