@@ -35,6 +35,7 @@ from roadeval.data.result import (
     VariantLayout,
     VariantResult,
 )
+from roadeval.data.rows import Rows
 
 __all__ = [
     "BASELINE",
@@ -63,6 +64,7 @@ __all__ = [
     "Packed",
     "Rgb",
     "Role",
+    "Rows",
     "StageResult",
     "Tally",
     "Transition",

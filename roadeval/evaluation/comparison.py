@@ -7,14 +7,18 @@ a difference between them would mix the scene with the method.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from roadeval.data import BASELINE, UNFILTERED
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import BASELINE, UNFILTERED, Counts, Rows
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import analysis
+from roadeval.evaluation import scored
 from roadeval.evaluation.comparison_result import (
     ComparedResult,
     Comparison,
@@ -27,12 +31,11 @@ from roadeval.evaluation.comparison_result import (
     SettingsDiffer,
     TruthDiffers,
 )
-from roadeval.evaluation.metrics import COMPARED, METRICS
+from roadeval.evaluation.differences import final_stages
+from roadeval.evaluation.frame_counts import sum_up
+from roadeval.evaluation.metrics import COMPARED, METRICS, overlap
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import holm, mean_difference
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MOVED: Final = 5
 """Frames named of those that changed most, in each direction."""
@@ -62,12 +65,12 @@ class Side:
     label: str
     drive: str
     digest: str | None
-    frames: pd.DataFrame
+    frames: Rows
     asked: Mapping[str, Any] = field(default_factory=dict)
 
 
 def variants_as_sides(
-    frames: pd.DataFrame, drive: str, digest: str | None, chosen: Sequence[str] | None = None
+    frames: Rows, drive: str, digest: str | None, chosen: Sequence[str] | None = None
 ) -> list[Side]:
     """Return the variants of one result as results of their own, the base first.
 
@@ -85,7 +88,7 @@ def variants_as_sides(
     ComparisonError
         If a variant is not there, or fewer than two are.
     """
-    there = frames["variant"].unique().tolist() if len(frames) else []
+    there = frames.distinct("variant")
     pipelines = sorted((n for n in there if n != BASELINE), key=lambda name: name != UNFILTERED)
     names = list(chosen or pipelines)
     for name in names:
@@ -95,7 +98,7 @@ def variants_as_sides(
         raise ComparisonError(
             f"{drive}: {len(names)} variant to compare; two are needed, or a second result"
         )
-    return [Side(name, drive, digest, frames[frames["variant"] == name]) for name in names]
+    return [Side(name, drive, digest, frames.of_variant(name)) for name in names]
 
 
 def compare(
@@ -146,79 +149,135 @@ def _corrected(rows: Sequence[MaskComparison]) -> tuple[MaskComparison, ...]:
     )
 
 
-class _Pair:
-    """A base and a new result of the same drive, on the frames that both evaluated.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Common:
+    """A mask's rows in two results, on the frames that both have, in the base's order.
 
-    The rows of both, in the base's order, are indexed alike: by stamp, variant and stage.
+    ``keys`` are the frames' stamps, each with its place among equal ones.
     """
+
+    variant: str
+    stage: str
+    begins: int
+    keys: list[tuple[int, int]]
+    before: Rows
+    after: Rows
+
+    @property
+    def truth_differs(self) -> npt.NDArray[np.bool_]:
+        """Where the truth's road or labelled pixels differ, ``(n,)``."""
+        before, after = self.before, self.after
+        road = before["TP"] + before["FN"] != after["TP"] + after["FN"]
+        return np.asarray(road | (before["N"] != after["N"]))
+
+
+class _Pair:
+    """A base and a new result of the same drive, on the frames that both evaluated."""
 
     def __init__(
         self, base: Side, new: Side, settings: EvaluationSettings, *, across_variants: bool
     ) -> None:
         self._base, self._new, self._settings = base, new, settings
-        frames = base.frames.assign(variant=new.label) if across_variants else base.frames
-        before, after = _stamped(frames), _stamped(new.frames)
-        both = before.index.intersection(after.index, sort=False)
-        if not len(both):
+        self._common = _common(base.frames, new.frames, new.label if across_variants else None)
+        if not self._common:
             raise ComparisonError(
                 f"{base.label} and {new.label} have no evaluated frame and stage in common"
             )
-        self._before, self._after = before.loc[both], after.loc[both]
+        self._finals = final_stages((mask.variant, mask.stage) for mask in self._common)
 
     def changes(self) -> Iterator[MaskComparison]:
         """Yield a row for each variant and stage that both have."""
-        for variant, stage, final, after in _by_mask(self._after):
-            before = self._before.loc[after.index]
+        for mask in self._common:
             yield MaskComparison(
                 result=self._new.label,
-                variant=variant,
-                stage=stage,
-                final=final,
-                frames=len(after),
-                base=_rates(before),
-                new=_rates(after),
+                variant=mask.variant,
+                stage=mask.stage,
+                final=mask.stage == self._finals[mask.variant],
+                frames=len(mask.after),
+                base=_rates(mask.before),
+                new=_rates(mask.after),
                 difference={
-                    name: mean_difference(
-                        after[name].to_numpy(float), before[name].to_numpy(float), self._settings
-                    )
+                    name: mean_difference(mask.after[name], mask.before[name], self._settings)
                     for name in COMPARED
                 },
             )
 
     def moved(self) -> Iterator[MovedFrame]:
         """Yield the frames whose final ERR changed most, the first variant's."""
-        variant, stage = next(iter(analysis.final_stages(self._after).items()))
-        after = self._after[(self._after["variant"] == variant) & (self._after["stage"] == stage)]
-        before = self._before.loc[after.index, "ERR"]
-        paired = after[["frame", "stamp_ns"]].assign(base=before, ERR=after["ERR"] - before)
+        first = next(iter(self._finals.items()))
+        (mask,) = (each for each in self._common if (each.variant, each.stage) == first)
+        after, base = mask.after, mask.before["ERR"]
+        changes = after["ERR"] - base
         for harmed in (True, False):
-            most = analysis.most_changed(paired.set_index("frame"), MOVED, harmed=harmed)
-            for row in most.to_dict("records"):
+            places = scored.most_changed(after["stamp_ns"], changes, MOVED, harmed=harmed)
+            for place in places.tolist():
+                was, change = float(base[place]), float(changes[place])
                 yield MovedFrame(
                     result=self._new.label,
-                    variant=variant,
-                    frame=row["frame"],
-                    stamp_ns=row["stamp_ns"],
-                    base=row["base"],
-                    new=row["base"] + row["ERR"],
-                    change=row["ERR"],
+                    variant=mask.variant,
+                    frame=int(after["frame"][place]),
+                    stamp_ns=int(after["stamp_ns"][place]),
+                    base=was,
+                    new=was + change,
+                    change=change,
                 )
 
     def notes(self) -> Iterator[Note]:
         """Yield what was left out, and what makes the two less comparable than they look."""
         base, new = self._base, self._new
-        both = self._after["stamp"].nunique()
+        both = len(set().union(*(mask.keys for mask in self._common)))
         for side, other in ((base, new), (new, base)):
-            rest = side.frames["frame"].nunique() - both
+            rest = len(side.frames.distinct("frame")) - both
             if rest:
                 yield FramesLeftOut(side.label, other.label, rest)
         settings = _differing(base.asked, new.asked)
         if settings:
             yield SettingsDiffer(base.label, new.label, settings)
-        differs = _truths(self._after).ne(_truths(self._before)).any(axis=1)
-        if differs.any():
-            frames = self._after["stamp"][differs].nunique()
+        frames = self._relabelled()
+        if frames:
             yield TruthDiffers(base.label, new.label, frames, bool(settings))
+
+    def _relabelled(self) -> int:
+        """Count the frames whose truth differs."""
+        keys = (
+            key
+            for mask in self._common
+            for key, differs in zip(mask.keys, mask.truth_differs, strict=True)
+            if differs
+        )
+        return len(set(keys))
+
+
+def _common(base: Rows, new: Rows, variant: str | None) -> list[_Common]:
+    """Match the masks of two results, and their frames by stamp; in the base's order.
+
+    With ``variant`` the base's masks are taken for this variant's.
+    """
+    others = {(name, stage): places for name, stage, places in new.masks()}
+    found = []
+    for name, stage, places in base.masks():
+        other = others.get((variant or name, stage))
+        if other is None:
+            continue
+        theirs = dict(zip(_keys(new.take(other)), other.tolist(), strict=True))
+        mine = dict(zip(_keys(base.take(places)), places.tolist(), strict=True))
+        both = [key for key in mine if key in theirs]
+        if both:
+            before = [mine[key] for key in both]
+            after = np.array([theirs[key] for key in both])
+            rows = base.take(np.array(before)), new.take(after)
+            found.append(_Common(variant or name, stage, before[0], both, *rows))
+    return sorted(found, key=lambda mask: mask.begins)
+
+
+def _keys(mask: Rows) -> list[tuple[int, int]]:
+    """Return the stamps of a mask's rows; equal stamps are told apart by their order."""
+    seen: Counter[int] = Counter()
+    keys = []
+    for stamp in mask["stamp_ns"].tolist():
+        keys.append((stamp, seen[stamp]))
+        seen[stamp] += 1
+    return keys
 
 
 def _differing(base: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
@@ -228,43 +287,23 @@ def _differing(base: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tup
     }
 
 
-def _truths(frames: pd.DataFrame) -> pd.DataFrame:
-    """Return each row's road and labelled pixels of the truth, whatever the mask made of them."""
-    return frames[["N"]].assign(road=frames["TP"] + frames["FN"])
-
-
-def _stamped(frames: pd.DataFrame) -> pd.DataFrame:
-    """Index rows by stamp, variant and stage; equal stamps are told apart by their order."""
-    import pandas as pd
-
-    place = frames.groupby(["variant", "stage", "stamp_ns"], sort=False).cumcount()
-    stamp = frames["stamp_ns"].astype(str) + "/" + place.astype(str)
-    keys = [stamp, frames["variant"], frames["stage"]]
-    return frames.assign(stamp=stamp).set_index(pd.MultiIndex.from_arrays(keys, names=[None] * 3))
-
-
-def _by_mask(frames: pd.DataFrame) -> Iterator[tuple[str, str, bool, pd.DataFrame]]:
-    """Yield each variant and stage, whether that is its final one, and its rows, in order."""
-    last = analysis.final_stages(frames)
-    for (variant, stage), rows in frames.groupby(["variant", "stage"], sort=False):
-        yield str(variant), str(stage), stage == last[str(variant)], rows
-
-
-def _rates(rows: pd.DataFrame) -> dict[str, float]:
+def _rates(rows: Rows) -> dict[str, float]:
     """Sum up rows of one mask: mean and pooled metrics, and those of the overlap."""
-    total = analysis.sum_up_rows(rows)
+    total = sum_up(scored.counts(rows))
     names = (*METRICS, *(f"pooled_{name}" for name in METRICS))
-    return {name: total[name] for name in names} | analysis.overlap(total)
+    pooled = Counts(*(total[name] for name in scored.OUTCOMES))
+    return {name: total[name] for name in names} | overlap(pooled)
 
 
 def _levels(side: Side) -> Iterator[MaskComparison]:
-    for variant, stage, final, rows in _by_mask(side.frames):
-        new = _rates(rows)
-        yield MaskComparison(side.label, variant, stage, final, len(rows), {}, new, {})
+    last = scored.final_stages(side.frames)
+    for variant, stage, places in side.frames.masks():
+        new, final = _rates(side.frames.take(places)), stage == last[variant]
+        yield MaskComparison(side.label, variant, stage, final, len(places), {}, new, {})
 
 
 def _result(side: Side) -> ComparedResult:
-    frames, scale = side.frames["frame"].nunique(), side.asked.get("frames.scale")
+    frames, scale = len(side.frames.distinct("frame")), side.asked.get("frames.scale")
     return ComparedResult(side.label, side.drive, side.digest, frames, scale)
 
 

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.data import BASELINE
+import numpy as np
+
+from roadeval.data import BASELINE, Rows
+from roadeval.data.rows import joined
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import analysis, comparison
+from roadeval.evaluation import analysis, comparison, scored
 from roadeval.evaluation.comparison import Side
 from roadeval.evaluation.comparison_result import Comparison, EndMissing
 from roadeval.evaluation.conditions import Condition, Judgement, judge
+from roadeval.evaluation.windows import Window
 from roadeval.jobs.result import Result
-from roadeval.report.comparison import document, markdown
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.comparison import as_dict, judged
 from roadeval.results.lines import window_rows
@@ -46,14 +49,23 @@ class Compared:
         See `roadeval.evaluation.comparison.compare`.
     judgements
         Of the conditions, see `roadeval.evaluation.conditions.judge`.
-    windows
-        ERR and the rest over the drive, with each result as a variant; empty for different
-        drives.
+    sides
+        The results.
     """
 
     comparison: Comparison
     judgements: tuple[Judgement, ...]
-    windows: pd.DataFrame
+    sides: tuple[Side, ...]
+
+    @property
+    def windows(self) -> pd.DataFrame:
+        """ERR and the rest over the drive, with each result as a variant.
+
+        None for different drives.
+        """
+        size = self.comparison.settings.window
+        found = _windows(self.sides, size) if self.comparison.same_drive else ()
+        return table_of("windows", window_rows(found))
 
     @property
     def content(self) -> dict[str, Any]:
@@ -96,7 +108,7 @@ def compare(
     if across:
         (only,) = opened
         names = [only.name]
-        sides = comparison.variants_as_sides(only.frames, only.name, _digest(only), variants)
+        sides = comparison.variants_as_sides(only.rows, only.name, _digest(only), variants)
     else:
         names = _labels([each.path for each in opened])
         sides = [
@@ -114,8 +126,7 @@ def compare(
     cut = [EndMissing(name) for name, each in zip(names, opened, strict=True) if not each.complete]
     found = replace(found, notes=(*cut, *found.notes))
     judgements = judge(found, conditions, settings)
-    windows = _windows(sides, settings.window) if found.same_drive else sides[0].frames[:0]
-    return Compared(found, judgements, windows)
+    return Compared(found, judgements, tuple(sides))
 
 
 def write(compared: Compared, path: Path, *, paper: Paper = Paper.A4) -> Path:
@@ -138,15 +149,25 @@ def writer(path: Path) -> Callable[[Compared, Paper], bytes]:
         If nothing does.
     """
     known: dict[str, Callable[[Compared, Paper], bytes]] = {
-        ".pdf": lambda compared, paper: pdf(
-            document(compared.comparison, compared.judgements, compared.windows), paper
-        ),
-        ".md": lambda compared, _: markdown(compared.comparison, compared.judgements).encode(),
+        ".pdf": _pdf,
+        ".md": _markdown,
         ".json": lambda compared, _: as_json(compared).encode(),
     }
     if path.suffix.lower() not in known:
         raise RoadevalError(f"{path}: a comparison is written as {', '.join(known)}")
     return known[path.suffix.lower()]
+
+
+def _pdf(compared: Compared, paper: Paper) -> bytes:
+    from roadeval.report.comparison import document
+
+    return pdf(document(compared.comparison, compared.judgements, compared.windows), paper)
+
+
+def _markdown(compared: Compared, _: Paper) -> bytes:
+    from roadeval.report.comparison import markdown
+
+    return markdown(compared.comparison, compared.judgements).encode()
 
 
 def as_json(compared: Compared) -> str:
@@ -170,13 +191,13 @@ def _digest(opened: Result) -> str | None:
     return str(digest) if digest else None
 
 
-def _chosen(opened: Result, variants: Sequence[str] | None) -> pd.DataFrame:
-    frames = opened.frames
+def _chosen(opened: Result, variants: Sequence[str] | None) -> Rows:
+    rows = opened.rows
     if not variants:
-        return frames
-    chosen = frames[frames["variant"].isin(variants)]
+        return rows
+    chosen = rows.take(np.isin(rows["variant"], variants))
     if not len(chosen):
-        there = ", ".join(frames["variant"].unique())
+        there = ", ".join(rows.distinct("variant"))
         raise RoadevalError(f"{opened.path}: no variant {', '.join(variants)}; there are {there}")
     return chosen
 
@@ -192,18 +213,13 @@ def _labels(paths: Sequence[Path]) -> list[str]:
     return labels
 
 
-def _windows(sides: Sequence[Side], size: int) -> pd.DataFrame:
-    """Cut each result's first variant, and the base's baseline, into rows of common frames."""
-    import pandas as pd
-
+def _windows(sides: Sequence[Side], size: int) -> Iterator[Window]:
+    """Cut each result's first variant, and the base's baseline, into windows of common frames."""
     tables = []
     for side in sides:
-        variant = side.frames["variant"].iloc[0]
-        own = side.frames[side.frames["variant"] == variant]
-        tables.append(own.assign(variant=side.label))
-    blind = sides[0].frames[sides[0].frames["variant"] == BASELINE]
-    common = set.intersection(*(set(table["frame"]) for table in tables))
-    frames = pd.concat([*tables, blind])
-    frames = frames[frames["frame"].isin(common)]
+        own = side.frames.of_variant(side.frames["variant"][0])
+        tables.append(own.replace(variant=np.full(len(own), side.label)))
+    common = set.intersection(*(set(table["frame"].tolist()) for table in tables))
+    together = joined([*tables, sides[0].frames.of_variant(BASELINE)])
     size *= max(-(-len(common) // (size * ROWS)), 1)
-    return table_of("windows", window_rows(analysis.windows(frames, size)))
+    return scored.windows(together.take(np.isin(together["frame"], [*common])), size)

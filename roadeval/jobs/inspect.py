@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import analysis
+from roadeval.evaluation import scored
 from roadeval.evaluation.metrics import SHORT
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.result import Result
@@ -33,7 +35,7 @@ class WorstFrame:
     rates
         Of the final mask, as short tables show them.
     parts
-        How ERR came about, see `roadeval.evaluation.analysis.causes`.
+        How ERR came about, see `roadeval.evaluation.scored.causes`.
     notes
         What the recording says about it.
     """
@@ -64,15 +66,15 @@ def worst_frames(
     RoadevalError
         If nothing was scored, or ERR is undefined on every frame, or there is no such variant.
     """
-    frames = result.frames
+    rows = result.rows
     names = _scored(result)
     if not names:
         raise RoadevalError(f"{result.path}: nothing was scored, so no frame is the worst")
     chosen = variant or names[0]
     if chosen not in names:
         raise RoadevalError(f"{result.path}: no variant {chosen}; there are {', '.join(names)}")
-    looked_at = frames if among is None else frames[frames["frame"].isin(among)]
-    ranked = analysis.worst(looked_at, chosen, count)
+    looked_at = rows if among is None else rows.take(np.isin(rows["frame"], [*among]))
+    ranked = scored.worst(looked_at, chosen, count)
     if not len(ranked):
         if among is None:
             raise RoadevalError(
@@ -80,19 +82,20 @@ def worst_frames(
                 "so no frame is the worst"
             )
         return []
-    causes = analysis.causes(frames, chosen)
+    causes = scored.causes(rows, chosen)
+    frames, stamps = ranked["frame"].tolist(), ranked["stamp_ns"].tolist()
     return [
         WorstFrame(
-            rank,
-            row["frame"],
-            row["stamp_ns"],
+            place + 1,
+            frame,
+            stamp,
             chosen,
-            row["stage"],
-            {rate: row[rate] for rate in SHORT},
-            causes.loc[row["frame"]].to_dict(),
-            result.notes(row["frame"], chosen),
+            str(ranked["stage"][place]),
+            {rate: float(ranked[rate][place]) for rate in SHORT},
+            causes.of(frame),
+            result.notes(frame, chosen),
         )
-        for rank, row in enumerate(ranked.to_dict("records"), 1)
+        for place, (frame, stamp) in enumerate(zip(frames, stamps, strict=True))
     ]
 
 
@@ -117,9 +120,9 @@ def without_pictures(result: Result, frame: int) -> str:
 
     Empty for every other frame.
     """
-    if result.recording is None or frame in result.pictured or not len(result.frames):
+    if result.recording is None or frame in result.pictured:
         return ""
-    if frame not in set(result.frames["frame"]):
+    if frame not in result.rows["frame"]:
         return ""
     cleared = result.recording.format > 1
     return f"the recording has no pictures of frame {frame}, " + (
@@ -131,9 +134,7 @@ def without_pictures(result: Result, frame: int) -> str:
 
 def _scored(result: Result) -> list[str]:
     """Name the variants that were scored, without the baseline."""
-    if not len(result.frames):
-        return []
-    return [name for name in result.frames["variant"].unique() if name != BASELINE]
+    return [name for name in result.rows.distinct("variant") if name != BASELINE]
 
 
 def view(result: Result, frame: int | None, picture: Path | None = None) -> int | None:
@@ -153,7 +154,7 @@ def view(result: Result, frame: int | None, picture: Path | None = None) -> int 
         raise RoadevalError(
             f"{result.path}: a results folder holds no pictures; give the recording (.rrd)"
         )
-    numbers = sorted({*result.pictured, *(result.frames["frame"] if len(result.frames) else ())})
+    numbers = sorted({*result.pictured, *result.rows["frame"].tolist()})
     if frame is not None and frame not in numbers:
         held = f"frames {numbers[0]} to {numbers[-1]}" if numbers else "none"
         raise RoadevalError(f"{result.path}: no frame {frame}; the recording holds {held}")
@@ -172,7 +173,7 @@ def _first(result: Result, begin: int | None) -> int | None:
     Where none was it is the first with pictures of those that could be, from ``begin`` on, or
     else the first with pictures at all; where none has any, ``begin``.
     """
-    scored = set(result.frames["frame"]) if len(result.frames) else set()
-    evaluated = [number for number in result.pictured if number in scored]
+    counted = set(result.rows["frame"].tolist())
+    evaluated = [number for number in result.pictured if number in counted]
     later = [number for number in result.pictured if number >= (begin or 0)]
     return next(iter([*evaluated, *later, *result.pictured]), begin)

@@ -9,8 +9,8 @@ import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, TruthBits
 from roadeval.data.packed import Packed
-from roadeval.evaluation import analysis, counts, maps
-from roadeval.jobs.report_frames import FramePicker, evenly, str_keys, variants_but_baseline
+from roadeval.evaluation import analysis, counts, maps, scored
+from roadeval.jobs.report_frames import FramePicker, evenly, variants_but_baseline
 from roadeval.jobs.result import Result
 from roadeval.report.findings import Commands, ErrorHeatmap, Findings, PairedComparison
 from roadeval.results.lines import change_rows, heat_rows, window_rows
@@ -54,8 +54,7 @@ def collect(result: Result, commands: Commands | None = None) -> Findings:
         },
         changes=_stage_changes(changes),
         error_parts={
-            name: str_keys(analysis.causes(frames, name).mean().to_dict())
-            for name in variants_but_baseline(frames)
+            name: scored.causes(result.rows, name).means() for name in variants_but_baseline(frames)
         },
         heatmaps=[
             _heatmap(str(name), cells) for name, cells in heat.groupby("variant", sort=False)
@@ -88,7 +87,7 @@ def _windows(result: Result) -> tuple[pd.DataFrame, int]:
     if not count or (count <= WINDOWS and len(result.windows)):
         return result.windows, size
     size *= -(-count // WINDOWS)
-    return table_of("windows", window_rows(analysis.windows(result.frames, size))), size
+    return table_of("windows", window_rows(scored.windows(result.rows, size))), size
 
 
 def _paired(

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data import BASELINE, ERRORS, FILTERED, TRUTH, UNFILTERED, LayerKind
-from roadeval.evaluation import analysis
+from roadeval.evaluation import analysis, scored
 from roadeval.evaluation.metrics import SHORT
 from roadeval.jobs.result import Result
 from roadeval.recording import Recording
@@ -53,7 +53,7 @@ class FramePicker:
         self._recording = result.recording
         self._frames = result.frames
         self._variants = variants_but_baseline(result.frames)
-        self._causes = {name: analysis.causes(self._frames, name) for name in self._variants}
+        self._causes = {name: scored.causes(result.rows, name) for name in self._variants}
 
     def examples(self, numbers: Sequence[int]) -> list[ExampleFrame]:
         """Return frames for figure 2."""
@@ -67,8 +67,11 @@ class FramePicker:
         """Return the worst frames of the first variant."""
         if not self._variants:
             return []
-        rows = analysis.worst(self._frames, self._variants[0], WORST).to_dict("records")
-        return [self._notable(row["frame"], row["stamp_ns"]) for row in rows]
+        rows = scored.worst(self._result.rows, self._variants[0], WORST)
+        return [
+            self._notable(*row)
+            for row in zip(rows["frame"].tolist(), rows["stamp_ns"].tolist(), strict=True)
+        ]
 
     def moved(self, paired: Sequence[PairedComparison], *, harmed: bool) -> list[NotableFrame]:
         """Return the frames that the filter harmed most, or helped most."""
@@ -88,7 +91,7 @@ class FramePicker:
             stamp_ns=stamp_ns,
             variant=first,
             rates={name: str_keys(each) for name, each in rates.items()},
-            parts=str_keys(self._causes[first].loc[frame].to_dict()),
+            parts=self._causes[first].of(frame),
             change=change,
             notes=self._result.notes(frame, first),
             images=list(self._outcomes(recording, frame)) if recording and seen else [],

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sized
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from roadeval.evaluation import analysis
+import numpy as np
+
+from roadeval.data import Rows
+from roadeval.evaluation import analysis, scored
 from roadeval.evaluation.differences import drive_differences
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.recording.layout import DamagedError, RecordingError
@@ -72,7 +75,13 @@ class Result:
         if "difference" in summary:
             return summary
         # An earlier version found the differences in another way.
-        return summary | _found(self.frames, analysis.settings_of(summary))
+        return summary | _found(self.rows, analysis.settings_of(summary))
+
+    @cached_property
+    def rows(self) -> Rows:
+        """The rows of ``frames.csv``, without pandas."""
+        rows = self._tables.rows("frames")
+        return rows.take(np.isin(rows["frame"], self._both)) if self._may_be_cut(rows) else rows
 
     @cached_property
     def frames(self) -> pd.DataFrame:
@@ -94,7 +103,7 @@ class Result:
         if self.recording is None:
             return ()
         recording, unsure = self.recording, set(self.recording.unsure)
-        scored = set(self.frames["frame"]) if len(self.frames) else set()
+        scored = set(self.rows["frame"].tolist())
         return tuple(
             number
             for number in recording.frame_numbers
@@ -135,10 +144,17 @@ class Result:
 
     def _whole(self, table: pd.DataFrame) -> pd.DataFrame:
         """Keep the rows of frames that stand in both tables; a killed run may have cut one."""
-        if self.complete or not len(table):
-            return table
-        both = set(self._tables.frames["frame"]) & set(self._tables.regions["frame"])
-        return table[table["frame"].isin(both)]
+        return table[table["frame"].isin(self._both)] if self._may_be_cut(table) else table
+
+    def _may_be_cut(self, table: Sized) -> bool:
+        return not self.complete and len(table) > 0
+
+    @cached_property
+    def _both(self) -> list[int]:
+        """The frames that stand in the tables of frames and of regions."""
+        frames, regions = (self._tables.rows(name)["frame"] for name in ("frames", "regions"))
+        both: list[int] = np.intersect1d(frames, regions).tolist()
+        return both
 
     def _summary_of_part(self) -> dict[str, Any]:
         """Make the summary that a killed run did not get to write, of what it had scored."""
@@ -149,7 +165,7 @@ class Result:
             "frames": {
                 "with_pictures": len(self.pictured),
                 "trained_on": layout.properties.get("training_frames", 0),
-                "evaluated": self.frames["frame"].nunique() if len(self.frames) else 0,
+                "evaluated": len(self.rows.distinct("frame")),
             },
             "warnings": [],
             "losses": [],
@@ -158,7 +174,7 @@ class Result:
             "versions": {},
             "seconds": {},
             "training": {"source": layout.properties.get("trained_on")},
-        } | _found(self.frames, EvaluationSettings())
+        } | _found(self.rows, EvaluationSettings())
 
 
 def _recording(path: Path) -> Recording:
@@ -168,10 +184,9 @@ def _recording(path: Path) -> Recording:
     return Recording(path)
 
 
-def _found(frames: pd.DataFrame, settings: EvaluationSettings) -> dict[str, Any]:
+def _found(rows: Rows, settings: EvaluationSettings) -> dict[str, Any]:
     """Compute what a summary states of the frames that were scored."""
-    masks = list(analysis.masks(frames)) if len(frames) else []
-    totals = analysis.totals(frames) if len(frames) else {}
-    differences = drive_differences(masks, settings)
+    totals = scored.totals(rows)
+    differences = drive_differences(list(scored.masks(rows)), settings)
     verdict = verdict_of(totals, differences, settings)
     return {"verdict": verdict, "totals": totals, **differences.as_dict()}

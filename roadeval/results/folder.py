@@ -12,7 +12,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Final, Self
 
-from roadeval.results.reading import ResultsError, read_table
+from roadeval.data import Rows
+from roadeval.results.reading import ResultsError, read_rows, read_table
 from roadeval.results.schema import TABLES, TableSchema
 from roadeval.results.summary import SUMMARY, read_summary, summary_text
 from roadeval.runtime.folders import Content, NewFolder
@@ -226,3 +227,7 @@ class ResultsFolder:
             If it is damaged, or not the one of which the summary tells.
         """
         return read_table(name, self._folder / f"{name}.csv", self.summary)
+
+    def rows(self, name: str) -> Rows:
+        """Read a table as `table` does, without pandas."""
+        return read_rows(name, self._folder / f"{name}.csv", self.summary)

@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 
 import pytest
 
@@ -18,6 +20,20 @@ def worse(tmp_path_factory) -> Replayed:
     (folder / "worse.toml").write_text('[svm]\nkernel = "linear"\n[post]\nfill = false\n')
     words = ("--config", folder / "worse.toml", "--max-frames", 20, "--record", "none")
     return replay(folder, DEMO, *words)
+
+
+@pytest.mark.parametrize("words", [("compare", "R", "R"), ("inspect", "--list", "R")])
+def test_a_recording_is_compared_and_listed_without_heavy_libraries(words, demo):
+    heavy = {"cv2", "matplotlib", "pandas", "pyarrow.compute", "rerun"}
+    code = (
+        "import sys; from roadeval.cli.app import main; assert main(sys.argv[1:]) == 0; "
+        f"sys.exit(str({heavy} & {{*sys.modules}} or ''))"
+    )
+    typed = [str(demo.recording) if word == "R" else word for word in words]
+    done = subprocess.run(
+        [sys.executable, "-c", code, *typed], capture_output=True, text=True, check=False
+    )
+    assert not done.stderr.strip()
 
 
 def test_a_recording_against_itself_differs_by_nothing(demo):

@@ -9,7 +9,17 @@ import numpy.typing as npt
 import pandas as pd
 from scipy import signal
 
-from roadeval.data import Counts, Frame, Mask, Output, StageResult, Tally, Truth, VariantResult
+from roadeval.data import (
+    Counts,
+    Frame,
+    Mask,
+    Output,
+    Rows,
+    StageResult,
+    Tally,
+    Truth,
+    VariantResult,
+)
 from roadeval.data.arrays import Bits
 from roadeval.data.packed import Packed
 from roadeval.evaluation import metrics
@@ -77,6 +87,12 @@ def a_table(errors: Mapping[tuple[str, str], Sequence[int]], hertz: float = 10) 
                     }
                 )
     return pd.DataFrame(rows)
+
+
+def rows_of(table: pd.DataFrame) -> Rows:
+    """The rows of a table as `roadeval.results.reading.read_rows` gives them."""
+    texts = {"variant", "stage", "region"}
+    return Rows({n: np.array(table[n].tolist(), str if n in texts else None) for n in table})
 
 
 def autoregression(rng: np.random.Generator, frames: int, rho: float) -> npt.NDArray[np.float64]:

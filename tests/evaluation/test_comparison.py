@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import astuple, replace
 from typing import get_args
 
+import numpy as np
 import pytest
 
 from roadeval.evaluation.comparison import ComparisonError, Side, compare, variants_as_sides
@@ -18,14 +19,14 @@ from roadeval.evaluation.comparison_result import (
 )
 from roadeval.evaluation.conditions import Condition, ConditionError, judge
 from roadeval.evaluation.settings import EvaluationSettings
-from tests.evaluation.making import a_table
+from tests.evaluation.making import a_table, rows_of
 
 SETTINGS = EvaluationSettings()
 POST = ("filtered", "post")
 
 
 def a_side(label, errors, *, digest="d1", asked=None, **table):
-    return Side(label, "street", digest, a_table({POST: errors}, **table), asked or {})
+    return Side(label, "street", digest, rows_of(a_table({POST: errors}, **table)), asked or {})
 
 
 def test_a_result_against_itself_differs_by_nothing_for_sure():
@@ -51,14 +52,14 @@ def test_differences_are_new_minus_base_on_the_frames_that_both_have():
 
 def test_frames_are_matched_by_their_stamps_not_by_their_numbers():
     base, new = a_side("base", [10, 20, 30]), a_side("new", [10, 20, 30])
-    shifted = new.frames.assign(frame=new.frames["frame"] + 5)
+    shifted = new.frames.replace(frame=new.frames["frame"] + 5)
     found = compare([base, Side("new", "street", "d1", shifted)], SETTINGS)
     assert found.changes[0].difference["ERR"].mean == 0
 
 
 def test_frames_with_the_same_stamp_are_matched_in_their_order():
     base, new = (a_side(name, [10, 20, 30]) for name in ("base", "new"))
-    frozen = [each.frames.assign(stamp_ns=0) for each in (base, new)]
+    frozen = [each.frames.replace(stamp_ns=np.zeros(3, int)) for each in (base, new)]
     sides = [Side(name, "street", "d1", table) for name, table in zip("ab", frozen, strict=True)]
     (change,) = compare(sides, SETTINGS).changes
     assert change.frames == 3
@@ -82,7 +83,7 @@ def test_a_result_that_does_not_know_its_log_is_not_subtracted():
 
 def test_another_truth_is_told():
     base, new = a_side("base", [10, 20]), a_side("new", [10, 20])
-    relabelled = new.frames.assign(N=new.frames["N"] - 1)
+    relabelled = new.frames.replace(N=new.frames["N"] - 1)
     found = compare([base, Side("new", "street", "d1", relabelled)], SETTINGS)
     assert found.notes == (TruthDiffers("base", "new", 2, settings_differ=False),)
 
@@ -91,7 +92,7 @@ def test_settings_that_differ_are_named_with_both_values():
     asked = {"frames.scale": 1.0, "frames.every": 1, "labels.road": [], "topics.truth": "/a"}
     other = asked | {"frames.scale": 0.5, "labels.road": [3]}
     base, new = a_side("base", [10, 20], asked=asked), a_side("new", [10, 20], asked=other)
-    relabelled = replace(new, frames=new.frames.assign(N=new.frames["N"] - 1))
+    relabelled = replace(new, frames=new.frames.replace(N=new.frames["N"] - 1))
     assert compare([base, relabelled], SETTINGS).notes == (
         SettingsDiffer("base", "new", {"frames.scale": (1.0, 0.5), "labels.road": ([], [3])}),
         TruthDiffers("base", "new", 2, settings_differ=True),
@@ -118,7 +119,7 @@ def test_a_change_between_scales_is_not_judged_but_a_level_is():
 
 def test_nothing_in_common_is_an_error():
     late = a_side("new", [10, 20])
-    late = Side("new", "street", "d1", late.frames.assign(stamp_ns=late.frames["stamp_ns"] + 5))
+    late = Side("new", "street", "d1", late.frames.replace(stamp_ns=late.frames["stamp_ns"] + 5))
     with pytest.raises(ComparisonError, match="no evaluated frame and stage in common"):
         compare([a_side("base", [10, 20]), late], SETTINGS)
 
@@ -131,7 +132,9 @@ def test_frames_that_changed_most_are_named_in_both_directions():
 
 def test_variants_of_one_result_are_compared_with_unfiltered():
     names = ("filtered", "unfiltered", "other", "blind")
-    frames = a_table({(name, "post"): [10 + place] * 12 for place, name in enumerate(names)})
+    frames = rows_of(
+        a_table({(name, "post"): [10 + place] * 12 for place, name in enumerate(names)})
+    )
     sides = variants_as_sides(frames, "street", "d1")
     assert [side.label for side in sides] == ["unfiltered", "filtered", "other"]
     found = compare(sides, SETTINGS, across_variants=True)
@@ -140,7 +143,7 @@ def test_variants_of_one_result_are_compared_with_unfiltered():
 
 
 def test_chosen_variants_keep_their_order_and_must_be_there():
-    frames = a_table({("filtered", "post"): [1], ("unfiltered", "post"): [2]})
+    frames = rows_of(a_table({("filtered", "post"): [1], ("unfiltered", "post"): [2]}))
     sides = variants_as_sides(frames, "street", "d1", ["filtered", "unfiltered"])
     assert [side.label for side in sides] == ["filtered", "unfiltered"]
     with pytest.raises(ComparisonError, match="no variant net; there are filtered, unfiltered"):
@@ -184,7 +187,7 @@ def test_a_level_is_that_of_all_frames_of_the_new_result_whatever_the_base_has()
 
 def test_a_condition_is_not_judged_where_two_ranges_hardly_overlap():
     base, new = a_side("base", [10] * 50), a_side("new", [90] * 40)
-    late = new.frames.assign(stamp_ns=new.frames["stamp_ns"] + 31 * 10**8)
+    late = new.frames.replace(stamp_ns=new.frames["stamp_ns"] + 31 * 10**8)
     found = compare([base, Side("new", "street", "d1", late)], SETTINGS)
     assert found.changes[0].frames == 19
     with pytest.raises(ConditionError, match="fewer than half of the 40 of the shorter one"):
@@ -193,7 +196,7 @@ def test_a_condition_is_not_judged_where_two_ranges_hardly_overlap():
 
 def test_a_condition_is_judged_where_half_of_the_shorter_range_is_common():
     base, new = a_side("base", [10] * 50), a_side("new", [90] * 40)
-    later = new.frames.assign(stamp_ns=new.frames["stamp_ns"] + 30 * 10**8)
+    later = new.frames.replace(stamp_ns=new.frames["stamp_ns"] + 30 * 10**8)
     found = compare([base, Side("new", "street", "d1", later)], SETTINGS)
     assert found.changes[0].frames == 20
     assert judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)[0].holds
@@ -243,7 +246,7 @@ def strings(value):
 def test_a_comparison_is_made_of_names_and_numbers_and_says_nothing():
     base = a_side("base", [10] * 40, asked={"frames.every": 1})
     new = a_side("new", [12] * 30, asked={"frames.every": 2})
-    new = replace(new, frames=new.frames.assign(N=new.frames["N"] - 1))
+    new = replace(new, frames=new.frames.replace(N=new.frames["N"] - 1))
     found = compare([base, new], SETTINGS)
     apart = compare([base, a_side("other", [10] * 12, digest="d2")], SETTINGS)
     unknown = compare([base, a_side("other", [10] * 12, digest=None)], SETTINGS)

@@ -53,7 +53,7 @@ for kind in ("metrics", "regions"):
     spec.loader.exec_module(module)
 
 from roadeval.data import Role
-from roadeval.evaluation import analysis, regions
+from roadeval.evaluation import regions, scored
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.folder import ResultsFolder, ResultsWriter
@@ -76,7 +76,7 @@ read = ResultsFolder(folder / "out")
 assert read.frames["FDR"].tolist() == [0.25]
 assert read.windows["FDR"].tolist() == read.windows["pooled_FDR"].tolist() == [0.25]
 assert read.summary["totals"]["net"]["post"]["pooled_FDR"] == 0.25
-assert analysis.totals(read.frames)["net"]["post"]["FDR"] == 0.25
+assert scored.totals(read.rows("frames"))["net"]["post"]["FDR"] == 0.25
 assert "FP / (TP + FP)" in documentation()
 left = read.regions.set_index("region").loc["left"]
 assert left[["TP", "TN", "FP", "FN"]].tolist() == [3, 0, 0, 1]

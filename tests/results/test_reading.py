@@ -2,10 +2,11 @@
 
 import math
 
+import numpy as np
 import pandas as pd
 import pytest
 
-from roadeval.results.reading import ResultsError, fingerprint, read_table, table_of
+from roadeval.results.reading import ResultsError, fingerprint, read_rows, read_table, table_of
 from roadeval.results.schema import TABLES
 
 HEADER = TABLES["oracles"].header
@@ -71,6 +72,28 @@ def test_rows_make_the_table_that_their_text_would():
     pd.testing.assert_frame_equal(table_of("oracles", []), read_table("oracles", ""))
 
 
+MANY = "".join(
+    line(n, "net" if n % 3 else "other", n, "0.5" if n % 2 else "") for n in range(40_000)
+)
+"""More than what is parsed at once."""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        HEADER + MANY + line(40_000, "late", 1, ""),
+        HEADER.replace(",FPR", "") + line().replace(",0.25\n", "\n"),
+        HEADER,
+        "",
+    ],
+)
+def test_rows_are_those_of_the_table(text):
+    table, rows = read_table("oracles", text), read_rows("oracles", text)
+    assert len(rows) == len(table)
+    for name in TABLES["oracles"].names:
+        np.testing.assert_array_equal(rows[name].tolist(), table[name].tolist())
+
+
 @pytest.mark.parametrize(
     ("text", "why"),
     [
@@ -78,6 +101,7 @@ def test_rows_make_the_table_that_their_text_would():
         (f"{HEADER}{line()}2,net", "Expected 15 columns, got 2"),
         (f"{HEADER}{line()}"[:-2], "its last line is cut off"),
         (f"{HEADER}{line(tp='two')}", "two"),
+        (f"{HEADER}{line(tp='')}", "column TP lacks a value"),
         ("frame,variant\n1,net\n", "no column oracle, stage, TP"),
     ],
 )

@@ -17,10 +17,11 @@ from collections import deque
 from collections.abc import Iterable
 from typing import Final, NamedTuple
 
+import numpy as np
 import pyarrow as pa
 
 from roadeval.recording.layout import FRAME
-from roadeval.recording.read.rrd_file import RrdFile
+from roadeval.recording.read.rrd_file import RrdFile, flat
 
 READ_AHEAD: Final = 8 << 20
 """Bytes of an entity's payloads that are kept."""
@@ -54,12 +55,12 @@ class PayloadCache:
         if frame not in self._payloads[path]:
             self._read_around(path, component, frame)
         blob = self._payloads[path][frame]
-        return bytes(blob.values.to_numpy())
+        return bytes(np.from_dlpack(blob.values))
 
     def _read_around(self, path: str, component: str, frame: int) -> None:
         self._payloads.pop(path, None)
         pages = (
-            Page(batch.column(FRAME).to_pylist(), batch.column(component).flatten())
+            Page(batch.column(FRAME).to_pylist(), flat(batch.column(component)))
             for batch in self._file.batches(path, component, static=False)
         )
         self._frames[path], self._payloads[path] = around(frame, pages)

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import ERRORS, VariantLayout
+from roadeval.data import ERRORS, Rows, VariantLayout
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.read.payloads import PayloadCache
 from roadeval.recording.read.rrd_file import RrdFile, whole
-from roadeval.results.reading import read_table
+from roadeval.results.reading import read_rows, read_table
 from roadeval.results.summary import parse_summary
 
 if TYPE_CHECKING:
@@ -136,12 +136,18 @@ class Recording:
 
     def table(self, name: str) -> pd.DataFrame:
         """Return the rows of a table by its name, as ``oracles``; none if the run counted none."""
-        if name in self.layout.tables:
-            lines = self._file.texts(at.result_path(name))
-            text = "".join((self.layout.tables[name].rstrip(), "\n", *lines))
-        else:
-            text = self.result(name) or ""
-        return read_table(name, text, self.summary)
+        return read_table(name, self._text(name), self.summary)
+
+    def rows(self, name: str) -> Rows:
+        """Return the rows of a table as `table` does, without pandas."""
+        return read_rows(name, self._text(name), self.summary)
+
+    def _text(self, name: str) -> str:
+        """Return the text of a table; empty if the run counted none."""
+        if name not in self.layout.tables:
+            return self.result(name) or ""
+        lines = self._file.texts(at.result_path(name))
+        return "".join((self.layout.tables[name].rstrip(), "\n", *lines))
 
     def scalars(self, path: str) -> pd.Series[float]:
         """Return the numbers under an entity path, as ``/timing/filtered/svm``, by frame number."""

@@ -87,7 +87,7 @@ class RrdFile:
         """Yield the frame and the value of each row."""
         for batch in self.batches(path, component, static=False):
             with whole(self.path, path):
-                values = batch.column(component).flatten().to_pylist()
+                values = flat(batch.column(component)).to_pylist()
                 rows = list(zip(batch.column(FRAME).to_pylist(), values, strict=True))
             yield from rows
 
@@ -104,7 +104,7 @@ class RrdFile:
         """Return the value that was logged once; None if there is none."""
         for batch in self.batches(path, component, static=True):
             with whole(self.path, path):
-                return batch.column(component).flatten()[0].as_py()
+                return flat(batch.column(component))[0].as_py()
         return None
 
     def _read_sums(self) -> dict[int, int]:
@@ -155,10 +155,17 @@ def whole(path: Path, part: str) -> Iterator[None]:
         raise DamagedError(path, part) from error
 
 
+def flat(lists: pa.ListArray) -> pa.Array:
+    """Return the values of lists, none of which is null, one after the other."""
+    # Arrow's own way imports everything that it can compute.
+    begin, end = (lists.offsets[place].as_py() for place in (0, -1))
+    return lists.values.slice(begin, end - begin)
+
+
 def _filled(batch: pa.RecordBatch, component: str) -> pa.RecordBatch:
     """Return the rows with a value: one without says that from there on nothing is shown."""
     values = batch.column(component)
-    if not values.null_count and np.diff(values.offsets.to_numpy()).all():
+    if not values.null_count and np.diff(np.from_dlpack(values.offsets)).all():
         return batch
     import pyarrow.compute as pc
 

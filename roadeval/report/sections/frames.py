@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from roadeval.data.words import percent, points, timestamp
-from roadeval.evaluation.analysis import FILTER
 from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.scored import FILTER
 from roadeval.report.blocks import (
     Block,
     Command,

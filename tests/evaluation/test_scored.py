@@ -1,0 +1,98 @@
+"""What the rows of frames say by themselves."""
+
+import math
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from roadeval.data import Role, Rows
+from roadeval.evaluation import scored
+from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.scoreboard import Scoreboard
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.results.lines import lines as lines_of
+from roadeval.results.reading import read_rows
+from roadeval.results.schema import TABLES
+from tests.evaluation.making import a_frame, a_table, a_variant, pixels, rows_of
+
+POST, SVM = ("filtered", "post"), ("filtered", "svm")
+CONTROL_POST, CONTROL_SVM = ("unfiltered", "post"), ("unfiltered", "svm")
+
+
+def scored_drive() -> tuple[Scoreboard, Rows]:
+    """A drive of 12 frames with its scoreboard, and what its ``frames.csv`` reads as."""
+    settings = EvaluationSettings(window=5, boundary_width=1, bands=2)
+    truth = pixels("##..", "##.?")
+    board = Scoreboard(settings, ["filtered"], BlindPrior.of_truths([truth]))
+    lines = TABLES["frames"].header
+    for number in range(12):
+        mask = pixels("#..." if number % 3 else "###.", "....")
+        masks = {"svm": truth % 2, "post": mask}
+        result = board.score(
+            a_frame(truth, number), Role.EVALUATED, (a_variant("filtered", masks),)
+        )
+        board.add(result)
+        lines += lines_of(result)["frames"]
+    return board, read_rows("frames", lines)
+
+
+def test_totals_of_the_table_are_those_of_the_run():
+    board, frames = scored_drive()
+    assert scored.totals(frames) == board.totals()
+
+
+def test_totals_keep_the_table_s_order():
+    table = rows_of(a_table({("wide", "svm"): [1], ("wide", "post"): [1], ("blind", "post"): [1]}))
+    totals = scored.totals(table)
+    assert [*totals] == ["wide", "blind"]
+    assert [*totals["wide"]] == ["svm", "post"]
+
+
+def test_windows_of_the_table_are_those_of_the_run():
+    board, frames = scored_drive()
+    found = [asdict(window) for window in scored.windows(frames, 5)]
+    told = [asdict(window) for window in board.windows()]
+    assert sorted(map(str, found)) == sorted(map(str, told))
+
+
+def test_the_causes_of_an_error_add_up_to_it():
+    frames = rows_of(a_table({SVM: [30], POST: [12], CONTROL_SVM: [20], CONTROL_POST: [15]}))
+    filtered = scored.causes(frames, "filtered").of(0)
+    assert filtered == pytest.approx({"svm": 0.20, "filter": 0.10, "post": -0.18})
+    assert sum(filtered.values()) == pytest.approx(0.12)
+    unfiltered = scored.causes(frames, "unfiltered").of(0)
+    assert unfiltered == pytest.approx({"svm": 0.20, "post": -0.05})
+
+
+def test_a_variant_of_one_stage_has_one_cause():
+    frames = rows_of(a_table({("mine", "post"): [7], POST: [1]}))
+    assert scored.causes(frames, "mine").of(0) == pytest.approx({"post": 0.07})
+
+
+def test_where_err_is_undefined_on_every_frame_its_causes_are_undefined_too():
+    table = rows_of(a_table({key: [0, 0] for key in (SVM, POST, CONTROL_SVM, CONTROL_POST)}))
+    found = scored.causes(table.replace(ERR=np.full(len(table), math.nan)), "filtered")
+    assert [*found.parts] == ["svm", "filter", "post"]
+    assert found.frames.tolist() == [0, 1]
+    assert np.isnan([*found.parts.values()]).all()
+    assert np.isnan([*found.means().values()]).all()
+
+
+def test_the_mean_of_a_cause_is_that_of_the_frames_on_which_it_is_known():
+    frames = rows_of(a_table({("mine", "net"): [10, 20, 30], ("mine", "post"): [10, 10]}))
+    assert scored.causes(frames, "mine").means() == pytest.approx({"net": 0.2, "post": -0.05})
+
+
+def test_of_neighbouring_bad_frames_only_the_worst_is_picked():
+    frames = rows_of(a_table({POST: [*[0] * 10, 40, 50, 45, *[0] * 10, 30]}, hertz=10))
+    second = 1_000_000_000
+    assert scored.worst(frames, "filtered", 2, apart_ns=second)["frame"].tolist() == [11, 23]
+    assert scored.worst(frames, "filtered", 2, apart_ns=0)["frame"].tolist() == [11, 12]
+
+
+def test_neighbours_are_a_thirtieth_of_the_drive_apart_and_at_most_a_second():
+    errors = [40, 50, 45, *[0] * 57, 30]
+    short, long = (rows_of(a_table({POST: errors}, hertz=hertz)) for hertz in (10, 0.1))
+    assert scored.worst(short, "filtered", 3)["frame"].tolist() == [1, 60, 3]
+    assert scored.worst(long, "filtered", 3)["frame"].tolist() == [1, 2, 0]
