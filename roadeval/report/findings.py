@@ -132,7 +132,7 @@ class Findings:
         ``variant``, ``before``, ``after``, and ``repaired`` and ``spoiled`` as shares of labelled
         pixels.
     error_parts
-        The parts of each variant's mean ERR by stage, see `roadeval.evaluation.analysis.causes`.
+        The parts of each variant's mean ERR by stage, see `roadeval.evaluation.scored.causes`.
     heatmaps
         One a variant.
     oracles
