@@ -1,4 +1,4 @@
-"""Analysis of the tables for a report: paired differences, regions, perfect stages.
+"""Tables of a report that are made of tables: paired differences, regions, perfect stages.
 
 Everything is computed from ``frames.csv`` and ``regions.csv`` alone, so that a recording of a run
 that was killed is understood as well as a complete one.
@@ -6,44 +6,22 @@ that was killed is understood as well as a complete one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from roadeval.data import Counts
-from roadeval.evaluation import differences, metrics, scored
+from roadeval.evaluation import differences, metrics
 from roadeval.evaluation.regions import partitions
 from roadeval.evaluation.scored import OUTCOMES
-from roadeval.evaluation.settings import EvaluationSettings
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-def settings_of(summary: Mapping[str, Any]) -> EvaluationSettings:
-    """Return the settings that a summary was made with; the defaults where it states none.
-
-    A setting that this version does not know is left out.
-    """
-    given = summary.get("run", {}).get("evaluation", {})
-    known = {field.name for field in fields(EvaluationSettings)}
-    return EvaluationSettings(**{name: given[name] for name in known & given.keys()})
-
-
-def final_stages(frames: pd.DataFrame) -> dict[str, str]:
-    """Return each variant's final stage: ``post``, or the last that it has."""
-    masks = frames[["variant", "stage"]].drop_duplicates()
-    return differences.final_stages(masks.itertuples(index=False))
-
-
 def finals(frames: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of each variant's final mask, of a table with ``variant`` and ``stage``."""
-    return frames[frames["stage"] == frames["variant"].map(final_stages(frames))]
-
-
-def overlap(total: dict[str, Any]) -> dict[str, float]:
-    """Compute IoU, F1 and precision of a total's pooled counts."""
-    return metrics.overlap(Counts(*(total[name] for name in OUTCOMES)))
+    masks = frames[["variant", "stage"]].drop_duplicates()
+    last = differences.final_stages(masks.itertuples(index=False))
+    return frames[frames["stage"] == frames["variant"].map(last)]
 
 
 # --- One variant against another ------------------------------------------------------------------
@@ -118,16 +96,3 @@ def oracles(table: pd.DataFrame, frames: pd.DataFrame) -> pd.DataFrame:
     sums = grouped[[*metrics.SHORT, "as_is"]].mean()
     sums["frames"] = grouped.size()
     return sums.reset_index()
-
-
-# --- Frames worth opening -------------------------------------------------------------------------
-
-
-def most_changed(paired: pd.DataFrame, count: int, *, harmed: bool) -> pd.DataFrame:
-    """Pick the frames whose ERR rose most (``harmed``) or fell most, of what `pairs` returned.
-
-    Only frames that did rise, or fall, and of neighbours only one, see `scored.worst`.
-    """
-    stamps, changes = paired["stamp_ns"].to_numpy(), paired["ERR"].to_numpy()
-    places = scored.most_changed(stamps, changes, count, harmed=harmed)
-    return paired.reset_index().iloc[places]

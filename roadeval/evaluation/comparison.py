@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import BASELINE, UNFILTERED, Counts, Rows
+from roadeval.data import BASELINE, UNFILTERED, Rows
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import scored
 from roadeval.evaluation.comparison_result import (
@@ -33,7 +33,7 @@ from roadeval.evaluation.comparison_result import (
 )
 from roadeval.evaluation.differences import final_stages
 from roadeval.evaluation.frame_counts import sum_up
-from roadeval.evaluation.metrics import COMPARED, METRICS, overlap
+from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import holm, mean_difference
 
@@ -291,8 +291,7 @@ def _rates(rows: Rows) -> dict[str, float]:
     """Sum up rows of one mask: mean and pooled metrics, and those of the overlap."""
     total = sum_up(scored.counts(rows))
     names = (*METRICS, *(f"pooled_{name}" for name in METRICS))
-    pooled = Counts(*(total[name] for name in scored.OUTCOMES))
-    return {name: total[name] for name in names} | overlap(pooled)
+    return {name: total[name] for name in names} | scored.overlap(total)
 
 
 def _levels(side: Side) -> Iterator[MaskComparison]:

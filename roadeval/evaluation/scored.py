@@ -1,20 +1,20 @@
 """What the rows of ``frames.csv`` say by themselves: totals, windows, causes, worst frames.
 
-Like `roadeval.evaluation.analysis`, but of arrays and without pandas, for the commands that answer
-at once.
+Of arrays and without pandas, for the commands that answer at once; what only a report shows is in
+`roadeval.evaluation.analysis`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import FILTERED, UNFILTERED, Rows
-from roadeval.evaluation import differences
+from roadeval.data import FILTERED, UNFILTERED, Counts, Rows
+from roadeval.evaluation import differences, metrics
 from roadeval.evaluation.frame_counts import FourCounts, FrameCounts, sum_up
 from roadeval.evaluation.windows import Window, cut
 
@@ -44,7 +44,12 @@ def totals(rows: Rows) -> dict[str, dict[str, dict[str, Any]]]:
     return sums
 
 
-def masks(rows: Rows) -> Iterator[FrameCounts]:
+def overlap(total: Mapping[str, Any]) -> dict[str, float]:
+    """Compute IoU, F1 and precision of a total's pooled counts."""
+    return metrics.overlap(Counts(*(total[name] for name in OUTCOMES)))
+
+
+def mask_counts(rows: Rows) -> Iterator[FrameCounts]:
     """Yield the counts of each variant's stages, in the table's order."""
     places = {number: place for place, number in enumerate(rows.distinct("frame"))}
     for variant, stage, chosen in rows.masks():
@@ -56,7 +61,7 @@ def masks(rows: Rows) -> Iterator[FrameCounts]:
 def windows(rows: Rows, size: int) -> Iterator[Window]:
     """Cut the drive into windows of ``size`` evaluated frames, one mask after the other."""
     numbers = rows.distinct("frame")
-    for mask in masks(rows):
+    for mask in mask_counts(rows):
         yield from cut(mask, numbers, size)
 
 
@@ -140,7 +145,7 @@ def worst(rows: Rows, variant: str, count: int, apart_ns: int | None = None) -> 
     own = own.take(~np.isnan(own["ERR"]))
     stamps = own["stamp_ns"]
     ranked = np.argsort(-own["ERR"], kind="stable")
-    return own.take(apart(stamps, ranked, count, apart_ns))
+    return own.take(_apart(stamps, ranked, count, apart_ns))
 
 
 def most_changed(stamps: Ints, changes: Floats, count: int, *, harmed: bool) -> Ints:
@@ -150,10 +155,10 @@ def most_changed(stamps: Ints, changes: Floats, count: int, *, harmed: bool) -> 
     """
     sign = 1 if harmed else -1
     ranked = np.argsort(-sign * changes, kind="stable")
-    return apart(stamps, ranked[sign * changes[ranked] > 0], count)
+    return _apart(stamps, ranked[sign * changes[ranked] > 0], count)
 
 
-def apart(stamps: Ints, ranked: Ints, count: int, apart_ns: int | None = None) -> Ints:
+def _apart(stamps: Ints, ranked: Ints, count: int, apart_ns: int | None = None) -> Ints:
     """Return the first ``count`` places of a ranking that are no neighbours of one before.
 
     Parameters

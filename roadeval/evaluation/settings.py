@@ -1,6 +1,8 @@
 """Every choice of the evaluation that is not fixed by the paper, with its reason."""
 
-from typing import Annotated
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
@@ -53,3 +55,13 @@ class EvaluationSettings:
     confidence: Annotated[float, Field(gt=0.5, lt=1)] = 0.95
     least_frames: Annotated[int, Field(ge=4, le=1_000_000_000)] = 10
     negligible: Annotated[float, Field(gt=0, le=1)] = 0.01
+
+
+def settings_of(summary: Mapping[str, Any]) -> EvaluationSettings:
+    """Return the settings that a summary was made with; the defaults where it states none.
+
+    A setting that this version does not know is left out.
+    """
+    given = summary.get("run", {}).get("evaluation", {})
+    known = {field.name for field in fields(EvaluationSettings)}
+    return EvaluationSettings(**{name: given[name] for name in known & given.keys()})

@@ -13,10 +13,11 @@ import numpy as np
 from roadeval.data import BASELINE, Rows
 from roadeval.data.rows import joined
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import analysis, comparison, scored
+from roadeval.evaluation import comparison, scored
 from roadeval.evaluation.comparison import Side
 from roadeval.evaluation.comparison_result import Comparison, EndMissing
 from roadeval.evaluation.conditions import Condition, Judgement, judge
+from roadeval.evaluation.settings import settings_of
 from roadeval.evaluation.windows import Window
 from roadeval.jobs.result import Result
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
@@ -61,7 +62,7 @@ class Compared:
     def windows(self) -> pd.DataFrame:
         """ERR and the rest over the drive, with each result as a variant.
 
-        None for different drives.
+        Without rows for different drives.
         """
         size = self.comparison.settings.window
         found = _windows(self.sides, size) if self.comparison.same_drive else ()
@@ -121,7 +122,7 @@ def compare(
             )
             for name, each in zip(names, opened, strict=True)
         ]
-    settings = analysis.settings_of(opened[0].summary)
+    settings = settings_of(opened[0].summary)
     found = comparison.compare(sides, settings, across_variants=across)
     cut = [EndMissing(name) for name, each in zip(names, opened, strict=True) if not each.complete]
     found = replace(found, notes=(*cut, *found.notes))

@@ -10,6 +10,7 @@ import numpy as np
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, TruthBits
 from roadeval.data.packed import Packed
 from roadeval.evaluation import analysis, counts, maps, scored
+from roadeval.evaluation.settings import settings_of
 from roadeval.jobs.report_frames import FramePicker, evenly, variants_but_baseline
 from roadeval.jobs.result import Result
 from roadeval.report.findings import Commands, ErrorHeatmap, Findings, PairedComparison
@@ -34,7 +35,7 @@ def collect(result: Result, commands: Commands | None = None) -> Findings:
     pictured = _pictured(result)
     changes, heat, sampled = _mask_sums(result, pictured)
     windows, window_size = _windows(result)
-    paired = list(_paired(frames, summary, changes))
+    paired = list(_paired(result, changes))
     picker = FramePicker(result)
     return Findings(
         source=str(result.path),
@@ -43,13 +44,13 @@ def collect(result: Result, commands: Commands | None = None) -> Findings:
         pictured=len(pictured),
         summary=summary,
         properties=result.properties,
-        finals=analysis.final_stages(frames),
+        finals=scored.final_stages(result.rows),
         windows=windows,
         window_size=window_size,
         paired=paired,
         regions=analysis.by_region(result.regions) if len(frames) else result.regions,
         overlap={
-            variant: {stage: analysis.overlap(total) for stage, total in stages.items()}
+            variant: {stage: scored.overlap(total) for stage, total in stages.items()}
             for variant, stages in summary["totals"].items()
         },
         changes=_stage_changes(changes),
@@ -82,7 +83,7 @@ def _pictured(result: Result) -> list[int]:
 
 def _windows(result: Result) -> tuple[pd.DataFrame, int]:
     """Return the drive's windows and their size; longer ones where the drive is long."""
-    size = analysis.settings_of(result.summary).window
+    size = settings_of(result.summary).window
     count = -(-result.frames["frame"].nunique() // size)
     if not count or (count <= WINDOWS and len(result.windows)):
         return result.windows, size
@@ -90,11 +91,10 @@ def _windows(result: Result) -> tuple[pd.DataFrame, int]:
     return table_of("windows", window_rows(scored.windows(result.rows, size))), size
 
 
-def _paired(
-    frames: pd.DataFrame, summary: dict[str, Any], changes: pd.DataFrame
-) -> Iterator[PairedComparison]:
+def _paired(result: Result, changes: pd.DataFrame) -> Iterator[PairedComparison]:
     """Compare filtered against unfiltered, then every variant with the baseline."""
-    finals = analysis.final_stages(frames)
+    frames, summary = result.frames, result.summary
+    finals = scored.final_stages(result.rows)
     if change := summary["difference"].get(finals.get(FILTERED)):
         yield _pair(frames, FILTERED, UNFILTERED, change, changes)
     for variant, change in summary["against_blind"].items():

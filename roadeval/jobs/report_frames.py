@@ -77,7 +77,10 @@ class FramePicker:
         """Return the frames that the filter harmed most, or helped most."""
         for pair in paired:
             if (pair.treated, pair.control) == (FILTERED, UNFILTERED):
-                rows = analysis.most_changed(pair.frames, MOVED, harmed=harmed).to_dict("records")
+                frames = pair.frames
+                stamps, changes = frames["stamp_ns"].to_numpy(), frames["ERR"].to_numpy()
+                places = scored.most_changed(stamps, changes, MOVED, harmed=harmed)
+                rows = frames.iloc[places].reset_index().to_dict("records")
                 return [self._notable(row["frame"], row["stamp_ns"], row["ERR"]) for row in rows]
         return []
 

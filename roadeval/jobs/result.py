@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from roadeval.data import Rows
-from roadeval.evaluation import analysis, scored
+from roadeval.evaluation import scored
 from roadeval.evaluation.differences import drive_differences
-from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.settings import EvaluationSettings, settings_of
 from roadeval.recording.layout import DamagedError, RecordingError
 from roadeval.results.folder import RUN, ResultsFolder
 from roadeval.results.verdict import verdict_of
@@ -75,7 +75,7 @@ class Result:
         if "difference" in summary:
             return summary
         # An earlier version found the differences in another way.
-        return summary | _found(self.rows, analysis.settings_of(summary))
+        return summary | _found(self.rows, settings_of(summary))
 
     @cached_property
     def rows(self) -> Rows:
@@ -103,11 +103,11 @@ class Result:
         if self.recording is None:
             return ()
         recording, unsure = self.recording, set(self.recording.unsure)
-        scored = set(self.rows["frame"].tolist())
+        counted = set(self.rows["frame"].tolist())
         return tuple(
             number
             for number in recording.frame_numbers
-            if number not in unsure or recording.is_whole(number, scored=number in scored)
+            if number not in unsure or recording.is_whole(number, scored=number in counted)
         )
 
     def layer(self, variant: str, name: str, frame: int) -> npt.NDArray[Any] | None:
@@ -187,6 +187,6 @@ def _recording(path: Path) -> Recording:
 def _found(rows: Rows, settings: EvaluationSettings) -> dict[str, Any]:
     """Compute what a summary states of the frames that were scored."""
     totals = scored.totals(rows)
-    differences = drive_differences(list(scored.masks(rows)), settings)
+    differences = drive_differences(list(scored.mask_counts(rows)), settings)
     verdict = verdict_of(totals, differences, settings)
     return {"verdict": verdict, "totals": totals, **differences.as_dict()}

@@ -49,6 +49,11 @@ def test_totals_keep_the_table_s_order():
     assert [*totals["wide"]] == ["svm", "post"]
 
 
+def test_the_final_stage_is_post_or_else_the_last():
+    rows = rows_of(a_table({SVM: [1], POST: [1], ("mine", "net"): [1], ("mine", "crf"): [1]}))
+    assert scored.final_stages(rows) == {"filtered": "post", "mine": "crf"}
+
+
 def test_windows_of_the_table_are_those_of_the_run():
     board, frames = scored_drive()
     found = [asdict(window) for window in scored.windows(frames, 5)]
@@ -96,3 +101,18 @@ def test_neighbours_are_a_thirtieth_of_the_drive_apart_and_at_most_a_second():
     short, long = (rows_of(a_table({POST: errors}, hertz=hertz)) for hertz in (10, 0.1))
     assert scored.worst(short, "filtered", 3)["frame"].tolist() == [1, 60, 3]
     assert scored.worst(long, "filtered", 3)["frame"].tolist() == [1, 2, 0]
+
+
+SECONDS = np.arange(4) * 1_000_000_000
+
+
+@pytest.mark.parametrize(("harmed", "places"), [(True, [2, 1]), (False, [3])])
+def test_frames_that_changed_most_are_those_that_changed_at_all(harmed, places):
+    changes = np.array([0, 0.1, 0.2, -0.1])
+    assert scored.most_changed(SECONDS, changes, 5, harmed=harmed).tolist() == places
+
+
+@pytest.mark.parametrize("harmed", [True, False])
+def test_a_change_that_is_undefined_is_none(harmed):
+    changes = np.array([math.nan] * 4)
+    assert not len(scored.most_changed(SECONDS, changes, 5, harmed=harmed))

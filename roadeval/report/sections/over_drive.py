@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from roadeval.data.words import DASH, percent
-from roadeval.evaluation import analysis
 from roadeval.evaluation.metrics import FULL
+from roadeval.evaluation.settings import settings_of
 from roadeval.report.blocks import Block, Cell, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.figures.figure import figures
 from roadeval.report.figures.files import svg_of
@@ -42,7 +42,7 @@ def _claims(findings: Findings) -> Iterator[Block]:
     rows = list(claim_rows(found))
     if not rows:
         return
-    size = analysis.settings_of(findings.summary).window
+    size = settings_of(findings.summary).window
     short = any(each["short"] for each in found.values())
     yield Heading("What the paper claims", 2)
     yield Text(NO_NUMBERS)
