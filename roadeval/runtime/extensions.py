@@ -79,8 +79,9 @@ def _empty(packages: tuple[str, ...]) -> Iterator[None]:
         yield
     finally:
         below = tuple(f"{package}." for package in absent)
-        for name in [each for each in sys.modules if each in absent or each.startswith(below)]:
-            del sys.modules[name]
+        for name in list(sys.modules):  # other threads import what they need meanwhile
+            if name in absent or name.startswith(below):
+                del sys.modules[name]
 
 
 def _package(name: str) -> ModuleType:

@@ -22,6 +22,7 @@ assert sklearn.__version__ and sklearn.svm.SVC().fit([[0], [1]], [0, 1]).predict
 assert scipy.linalg.cython_blas and scipy.linalg.inv([[2]]) == 0.5
 """
 """The whole of the library, with the module in its place."""
+LEFT = "[name for name in list(sys.modules) if name.startswith(('sklearn', 'scipy.linalg'))]"
 
 
 def run(code: str) -> str:
@@ -31,8 +32,7 @@ def run(code: str) -> str:
 
 
 def test_neither_the_library_nor_the_empty_packages_remain():
-    left = "[name for name in sys.modules if name.startswith(('sklearn', 'scipy.linalg'))]"
-    assert run(f"{LIBSVM}\nprint(libsvm().fit.__name__, {left})") == "fit []"
+    assert run(f"{LIBSVM}\nprint(libsvm().fit.__name__, {LEFT})") == "fit []"
 
 
 def test_who_imports_the_library_later_gets_all_of_it():
@@ -65,6 +65,19 @@ sys.meta_path.insert(0, OnlyAfter())
 
 def test_where_the_module_cannot_be_had_alone_the_library_is_imported_with_it():
     run(f"{LIBSVM}{NEEDS_MORE}\nmodule = libsvm()\n{LIBRARY}")
+
+
+MEANWHILE = """
+class Name(str):
+    def startswith(self, _):
+        sys.modules["imported_meanwhile"] = sys
+        return False
+sys.modules[Name("of_another_thread")] = sys
+"""
+
+
+def test_another_thread_may_import_something_else_meanwhile():
+    assert run(f"{LIBSVM}{MEANWHILE}\nprint(libsvm().fit.__name__, {LEFT})") == "fit []"
 
 
 def test_what_is_not_there_is_told():
