@@ -47,12 +47,12 @@ def lines(result: FrameResult) -> dict[str, str]:
 
 def sum_lines(sums: DriveSums) -> dict[str, str]:
     """Return the lines of each table that sums up the drive; none where nothing was scored."""
-    rows = {
-        "windows": window_rows(sums.windows),
-        "changes": change_rows(sums.changes),
-        "heat": heat_rows(sums.heat),
+    texts = {
+        "windows": "".join(map(_line, window_rows(sums.windows))),
+        "changes": "".join(map(_line, change_rows(sums.changes))),
+        # There are tens of thousands of rows, without a rate that may be undefined.
+        "heat": "".join(f"{','.join(map(str, row))}\n" for row in heat_rows(sums.heat)),
     }
-    texts = {name: "".join(map(_line, each)) for name, each in rows.items()}
     return {name: text for name, text in texts.items() if text}
 
 
@@ -76,9 +76,11 @@ def heat_rows(heat: Mapping[str, HeatMap]) -> Iterator[Row]:
     """Yield the rows of ``heat.csv``, without cells that are never labelled."""
     for variant, each in heat.items():
         side, sums = each.cells()
-        for row, column in zip(*sums[0].nonzero(), strict=True):
-            place = int(row) * side, int(column) * side
-            yield (variant, *place, side, *sums[:, row, column].tolist())
+        rows, columns = sums[0].nonzero()
+        places = zip((rows * side).tolist(), (columns * side).tolist(), strict=True)
+        counted = sums[:, rows, columns].T.tolist()
+        for place, counts in zip(places, counted, strict=True):
+            yield (variant, *place, side, *counts)
 
 
 def _counts(counts: Counts) -> str:
