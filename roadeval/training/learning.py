@@ -15,7 +15,7 @@ from roadeval.pipeline.chain import Pipeline
 from roadeval.training.fitting import TrainingError, fit
 from roadeval.training.held import HeldFrames
 from roadeval.training.likeness import Likeness
-from roadeval.training.model import Model, load_model
+from roadeval.training.model import Model, kept_model
 from roadeval.training.schedule import Schedule
 from roadeval.training.settings import TrainingSettings
 
@@ -44,7 +44,7 @@ def from_file(path: Path, pipelines: Mapping[str, Pipeline]) -> tuple[Model, Sch
 
     Whether what it learnt fits their settings turns out when they are bound.
     """
-    model = load_model(path)
+    model = kept_model(path)
     for name, pipeline in pipelines.items():
         model.require(name, pipeline, path)
     known = None if model.fingerprints is None else Likeness(model.fingerprints)

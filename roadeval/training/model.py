@@ -6,6 +6,7 @@ import dataclasses
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -172,6 +173,23 @@ def load_model(path: Path) -> Model:
         return _model(header, arrays)
     except ValueError as error:
         raise ModelError(f"{path}: a damaged model file: {_line(error)}; train it again") from error
+
+
+def kept_model(path: Path) -> Model:
+    """Read a model file as `load_model` does, or return the one read before: a fleet has one.
+
+    What a stage computes from a model alone is kept with it, as the SVM's table of colours.
+    """
+    try:
+        there = path.stat()
+    except OSError:
+        return load_model(path)  # which says what is wrong
+    return _kept(path, there.st_ino, there.st_size, there.st_mtime_ns)
+
+
+@lru_cache(maxsize=2)
+def _kept(path: Path, _node: int, _size: int, _time: int) -> Model:
+    return load_model(path)
 
 
 def _content(path: Path) -> tuple[Any, dict[str, npt.NDArray[Any]]]:
