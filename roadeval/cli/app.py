@@ -19,7 +19,9 @@ from roadeval.runtime import memory
 from roadeval.runtime.discovery import found_in
 from roadeval.runtime.text import visible_lines
 
-FIRST = ("replay", "report", "inspect", "compare", "info", "train", "config", "pack", "demo")
+FIRST = (
+    *("replay", "fleet", "report", "inspect", "compare", "info", "train", "config", "pack", "demo"),
+)
 """The order of the commands in the help; others follow by their names."""
 LIGHT: Final = frozenset({"info", "config", "pack"})
 """Commands that load neither Rerun nor Arrow, and live with half a gigabyte of addresses."""

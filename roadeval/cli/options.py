@@ -241,6 +241,36 @@ OPTIONS: Final = (
         "all (the default), masks, worst:K, every:N or none.",
     ),
     Option("run.jobs", ("--jobs",), "N", "Worker threads. Default: one per CPU core.", int),
+    Option(
+        "fleet.folds",
+        ("--folds",),
+        "K",
+        "Score each drive by a model of others: deal drives, or their groups, into K folds.",
+        int,
+    ),
+    Option(
+        "fleet.keep", ("--keep",), "WHAT", "Recordings: all, those of the worst:N drives, or none."
+    ),
+    Option("fleet.workers", ("--workers",), "N", "Processes. Default: one per CPU core.", int),
+    Option(
+        "fleet.memory_gib",
+        ("--memory",),
+        "GIB",
+        "What each process may take. Default: its share of the machine's.",
+        float,
+    ),
+    Option(
+        "fleet.scheduler",
+        ("--scheduler",),
+        "ADDRESS",
+        "A Dask scheduler, as tcp://host:8786, or its file: its workers replay the drives.",
+    ),
+    Option(
+        "fleet.max_failures",
+        ("--max-failures",),
+        "N|P%",
+        "Exit with code 1 if more drives fail. Default: however many.",
+    ),
 )
 """In the order of the help."""
 

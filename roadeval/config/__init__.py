@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from roadeval.config.names import check_variant_name
     from roadeval.config.presets import PRESETS
     from roadeval.config.run import RunConfig, configure
-    from roadeval.config.settings import ExecutionSettings, OutputSettings
+    from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
     from roadeval.config.toml import load_config, read_tables
     from roadeval.config.variants import Variant
 
@@ -23,6 +23,7 @@ __all__ = [
     "ConfigError",
     "DriveSettings",
     "ExecutionSettings",
+    "FleetSettings",
     "LogConfig",
     "OutputSettings",
     "RunConfig",
@@ -38,6 +39,7 @@ _MODULES: Final = {
     "ConfigError": "errors",
     "DriveSettings": "drives",
     "ExecutionSettings": "settings",
+    "FleetSettings": "settings",
     "LogConfig": "log",
     "OutputSettings": "settings",
     "RunConfig": "run",

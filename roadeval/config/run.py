@@ -11,7 +11,7 @@ In a TOML file, and in the mapping that `configure` takes, it has this shape::
     preset = "gated"
 
     [frames]                # and [topics], [labels], [training], [evaluation], [output], [run]
-    every = 2
+    every = 2               # and [fleet]
 
     [[drives]]              # what differs in some drives: [topics], [labels] and [frames]
     path = "monday/*.mcap"
@@ -31,7 +31,7 @@ from roadeval.config.errors import ConfigError
 from roadeval.config.names import check_variant_name
 from roadeval.config.override import override
 from roadeval.config.presets import PRESETS
-from roadeval.config.settings import SECTIONS, ExecutionSettings, OutputSettings
+from roadeval.config.settings import SECTIONS, ExecutionSettings, FleetSettings, OutputSettings
 from roadeval.config.variants import (
     Variant,
     check_tables,
@@ -73,6 +73,8 @@ class RunConfig:
         Where the results are written.
     run
         How the run is executed.
+    fleet
+        How many drives are replayed together.
 
     Raises
     ------
@@ -91,6 +93,7 @@ class RunConfig:
     evaluation: EvaluationSettings = field(default_factory=EvaluationSettings)
     output: OutputSettings = field(default_factory=OutputSettings)
     run: ExecutionSettings = field(default_factory=ExecutionSettings)
+    fleet: FleetSettings = field(default_factory=FleetSettings)
 
     def __post_init__(self) -> None:
         names = {variant.name for variant in self.variants()}

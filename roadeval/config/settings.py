@@ -7,7 +7,9 @@ from typing import Annotated, Final
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
-SECTIONS: Final = ("topics", "labels", "frames", "training", "evaluation", "output", "run")
+SECTIONS: Final = (
+    *("topics", "labels", "frames", "training", "evaluation", "output", "run", "fleet"),
+)
 """The tables that hold for the whole run, by the names of the fields of
 `roadeval.config.RunConfig`."""
 
@@ -28,12 +30,15 @@ class OutputSettings:
         Whose pictures are recorded: ``all``; ``masks`` and labels, with the camera's image; all
         pictures of the ``worst:K`` frames by ERR, or of ``every:N``-th frame; ``none``, which
         means no recording.
+    figures
+        Whether the paper's figures are drawn; a fleet does not draw those of its drives.
     """
 
     save: str | None = None
     reports: str | None = None
     mcap: str | None = None
     record: str = "all"
+    figures: bool = True
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
@@ -47,3 +52,39 @@ class ExecutionSettings:
     """
 
     jobs: Annotated[int, Field(ge=1, le=1000)] | None = None
+
+
+@validated(frozen=True, config=ConfigDict(extra="forbid"))
+class FleetSettings:
+    """How a fleet of drives is replayed; means nothing to a single drive.
+
+    Parameters
+    ----------
+    folds
+        Deal the drives, or their groups, into so many folds: each is scored by a model that
+        learnt from the other folds. None: ``training.model`` scores all, or each drive trains its
+        own.
+    training_drives
+        Drives that the model of a fold learns from, at most; drawn by ``training.seed``, groups
+        in turn. Their training frames are held decoded.
+    keep
+        Whose recordings stay: ``all``; those of the ``worst:N`` drives by ERR; ``none``, which
+        means that none is made.
+    workers
+        Processes that replay drives; one a processor by default.
+    memory_gib
+        What each of them may take; by default its share of the machine's.
+    scheduler
+        Address of a Dask scheduler whose workers replay the drives, or the file that it has
+        written; by default processes of this machine do.
+    max_failures
+        Drives that may fail, as ``3`` or ``10%``, without the fleet having failed.
+    """
+
+    folds: Annotated[int, Field(ge=2, le=1000)] | None = None
+    training_drives: Annotated[int, Field(ge=1, le=10_000)] = 20
+    keep: Annotated[str, Field(pattern=r"^(all|none|worst:[1-9]\d{0,5})$")] = "none"
+    workers: Annotated[int, Field(ge=1, le=1000)] | None = None
+    memory_gib: Annotated[float, Field(gt=0, le=100_000)] | None = None
+    scheduler: str | None = None
+    max_failures: Annotated[str, Field(pattern=r"^(\d{1,9}|\d{1,2}(\.\d+)?%|100%)$")] | None = None

@@ -103,6 +103,8 @@ class Difference:
         The same after Holm's correction, see `holm`; None where none was applied.
     comparisons
         How many were corrected for; None where none was applied.
+    standard_error
+        Of the mean, without its skewness; None without an interval.
     frames
         Frames with a difference.
     effective_frames
@@ -125,6 +127,7 @@ class Difference:
     drives_needed: int | None = None
     p_holm: float | None = None
     comparisons: int | None = None
+    standard_error: float | None = None
 
 
 def mean_difference(rates: Series, base: Series, settings: EvaluationSettings) -> Difference:
@@ -145,7 +148,8 @@ def mean_difference(rates: Series, base: Series, settings: EvaluationSettings) -
     if n < settings.least_frames:
         return Difference(mean, None, None, confidence, None, n, None)
     if np.ptp(series) == 0:
-        return Difference(mean, mean, mean, confidence, float(mean == 0), n, float(n))
+        same = float(mean == 0)
+        return Difference(mean, mean, mean, confidence, same, n, float(n), standard_error=0.0)
     found = mean_distribution(series)
     low, high = found.interval(confidence)
     level = float(base[known].mean())
@@ -156,6 +160,7 @@ def mean_difference(rates: Series, base: Series, settings: EvaluationSettings) -
         *(mean, low, high, confidence, found.p_value(), n, found.frames),
         frames_needed=frames,
         drives_needed=drives,
+        standard_error=found.scale,
     )
 
 

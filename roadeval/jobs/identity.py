@@ -8,14 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from roadeval import logs
-from roadeval.config import ExecutionSettings, OutputSettings, RunConfig
+from roadeval.config import ExecutionSettings, FleetSettings, OutputSettings, RunConfig
 from roadeval.version import VERSION
 
 
 def deciding(config: RunConfig) -> RunConfig:
-    """Return a configuration without what changes no number: output paths and worker threads."""
+    """Return a configuration without what changes no number: output paths and who computes."""
     output = OutputSettings(record=config.output.record)
-    return replace(config, output=output, run=ExecutionSettings())
+    return replace(config, output=output, run=ExecutionSettings(), fleet=FleetSettings())
 
 
 def identity(log: logs.Log, config: RunConfig) -> str:
@@ -29,11 +29,15 @@ def identity(log: logs.Log, config: RunConfig) -> str:
         If the disk of the log fails.
     """
     model = config.training.model
+    digest = hashlib.sha256(Path(model).read_bytes()).hexdigest() if model else ""
+    return asked(config, digest, of=log.sha256)
+
+
+def asked(config: RunConfig, model: str, *, of: str = "") -> str:
+    """Return a digest of the settings, the version and the SHA-256 of a model file, in hexadecimal.
+
+    With ``of``, the SHA-256 of a log, it is that of all that decides what a run finds.
+    """
     settings = replace(deciding(config), training=replace(config.training, model=None))
-    parts = [
-        VERSION,
-        log.sha256,
-        json.dumps(settings.as_dict(), sort_keys=True),
-        hashlib.sha256(Path(model).read_bytes()).hexdigest() if model else "",
-    ]
+    parts = [VERSION, of, json.dumps(settings.as_dict(), sort_keys=True), model]
     return hashlib.blake2b("\n".join(parts).encode(), digest_size=16).hexdigest()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any
 from roadeval import logs
 from roadeval.config import RunConfig
 from roadeval.config.toml import run_toml
+from roadeval.data import FrameResult
 from roadeval.jobs import summary
 from roadeval.jobs.examples import ExampleFrames
 from roadeval.jobs.identity import deciding
@@ -27,6 +28,12 @@ from roadeval.results.schema import TABLES
 from roadeval.results.summary import summary_text
 from roadeval.runtime.memory import trim
 from roadeval.version import VERSION
+
+OnFrame = Callable[[FrameResult], None]
+
+
+def pass_by(_result: FrameResult) -> None:
+    """Do nothing with a frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +56,7 @@ def replay(
     reports: AnyPath | None = None,
     mcap: AnyPath | None = None,
     on_progress: OnProgress = ignore,
+    on_frame: OnFrame = pass_by,
 ) -> Outcome:
     """Replay a log through every variant; record, score and table every frame.
 
@@ -65,6 +73,9 @@ def replay(
     on_progress
         Called in the caller's thread after every frame, and where something else begins that takes
         its time.
+    on_frame
+        Called in the caller's thread with every frame in the drive's order: its image, truth, masks
+        and counts, without the stages' other layers.
 
     Raises
     ------
@@ -80,12 +91,14 @@ def replay(
     ) as log:
         to = Outputs.of(config.output, log.name)
         with to.holding((drive, config.training.model)) as left:
-            outcome = _written(log, config, to, on_progress)
+            outcome = _written(log, config, to, on_progress, on_frame)
             warnings = (*outcome.warnings, *_unwritten(config, to), *_superseded(left))
             return replace(outcome, warnings=warnings)
 
 
-def _written(log: logs.Log, config: RunConfig, to: Outputs, on_progress: OnProgress) -> Outcome:
+def _written(
+    log: logs.Log, config: RunConfig, to: Outputs, on_progress: OnProgress, on_frame: OnFrame
+) -> Outcome:
     """Run over the log. All outputs are whole before the first of them takes its name."""
     run = prepare(log, config, on_progress)
     rule = RecordRule.parse(config.output.record)
@@ -95,7 +108,9 @@ def _written(log: logs.Log, config: RunConfig, to: Outputs, on_progress: OnProgr
         recorder_for(to.recording, run.layout(), rule) as recorder,
         ResultsWriter(to.reports) as results,
     ):
-        examples = _record(run, recorder, results, sidecar, on_progress)
+        examples = _record(
+            run, recorder, results, sidecar, on_progress=on_progress, on_frame=on_frame
+        )
         sums = sum_lines(run.board.sums())
         results.append(sums)
         facts = summary.of(run) | {"tables": results.tables}
@@ -104,9 +119,10 @@ def _written(log: logs.Log, config: RunConfig, to: Outputs, on_progress: OnProgr
         sidecar.finish()
         del run  # figures take the room of its frames and models
         trim()
-        with results.explained():
-            data = FigureData(log.name, results.table("windows"), examples)
-            write_figures(results.folder, data)
+        if config.output.figures:
+            with results.explained():
+                data = FigureData(log.name, results.table("windows"), examples)
+                write_figures(results.folder, data)
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
     files = [to.reports / name for name in facts["files"]] + ([to.mcap] if to.mcap else [])
     return Outcome(to.recording, to.reports, facts, warnings, losses, tuple(files))
@@ -117,7 +133,9 @@ def _record(
     recorder: SelectiveRecorder | NullRecorder,
     results: ResultsWriter,
     sidecar: logs.SidecarWriter | logs.NoSidecar,
+    *,
     on_progress: OnProgress,
+    on_frame: OnFrame,
 ) -> list[ExampleFrame]:
     """Run over the frames; return those for the figure of masks."""
     examples = ExampleFrames(len(run.frames))
@@ -126,6 +144,7 @@ def _record(
         results.append(done.lines)
         sidecar.write(done.result)
         examples.offer(done.position, done.result)
+        on_frame(done.result)
     on_progress(Progress(len(run.frames), len(run.frames), "writing"))
     recorder.flush()
     trim()

@@ -26,6 +26,9 @@ TYPES: Final = {
     Kind.COUNT: "int64",
     Kind.TIME: "int64",
     Kind.RATE: "float64",
+    Kind.TEXT: "string",
+    Kind.NUMBER: "float64",
+    Kind.FLAG: "bool",
 }
 """Each kind's type in Arrow."""
 
@@ -119,7 +122,7 @@ def table_of(name: str, rows: Iterable[Row]) -> pd.DataFrame:
     """Return rows as `read_table` would have read them back."""
     import pyarrow as pa
 
-    schema = _types(TABLES[name])
+    schema = arrow_schema(TABLES[name])
     columns = [*zip(*rows, strict=True)] or [()] * len(schema)
     arrays = [pa.array(cells, kind) for cells, kind in zip(columns, schema.types, strict=True)]
     return _pandas(pa.Table.from_arrays(arrays, schema=schema))
@@ -150,7 +153,8 @@ def _check(where: Path | str, content: bytes, stated: Mapping[str, Any] | None) 
     )
 
 
-def _types(table: TableSchema) -> pa.Schema:
+def arrow_schema(table: TableSchema) -> pa.Schema:
+    """Return a table's columns with their types in Arrow."""
     import pyarrow as pa
 
     return pa.schema([(column.name, TYPES[column.kind]) for column in table.columns])

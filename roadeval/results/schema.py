@@ -5,7 +5,7 @@ Header, lines, types, the recording's headers and the documentation follow from 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
@@ -16,14 +16,18 @@ from roadeval.evaluation.metrics import METRICS
 class Kind(StrEnum):
     """The kind of value in a column.
 
-    `NAME`: text, whatever it looks like. `COUNT`: a whole number. `TIME`: nanoseconds. `RATE`: a
-    fraction; the cell is empty where it is undefined.
+    `NAME`: a word, whatever it looks like; `TEXT`: what a person reads. `COUNT`: a whole number.
+    `TIME`: nanoseconds. `RATE`: a fraction, and `NUMBER` any other number; the cell is empty where
+    it is undefined. `FLAG`: true or false.
     """
 
     NAME = "name"
     COUNT = "count"
     TIME = "time"
     RATE = "rate"
+    TEXT = "text"
+    NUMBER = "number"
+    FLAG = "flag"
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,11 +175,11 @@ def streamed() -> dict[str, TableSchema]:
     return {name: table for name, table in TABLES.items() if table.streamed}
 
 
-def documentation() -> str:
-    """Return the tables and their columns as Markdown."""
+def documentation(tables: Iterable[TableSchema] = TABLES.values(), ending: str = "csv") -> str:
+    """Return tables and their columns as Markdown."""
     parts = []
-    for table in TABLES.values():
-        parts += [f"### {table.name}.csv", "", table.doc, ""]
+    for table in tables:
+        parts += [f"### {table.name}.{ending}", "", table.doc, ""]
         parts += ["| column | holds | meaning |", "| --- | --- | --- |"]
         parts += [f"| `{c.name}` | {c.kind} | {c.doc} |" for c in table.columns]
         parts.append("")

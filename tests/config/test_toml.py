@@ -46,6 +46,12 @@ OTHER = {
     "frames.keep_corrupt": True,
     "frames.max_pixels": 1_000_000,
     "run.jobs": 1,
+    "fleet.folds": 5,
+    "fleet.keep": "worst:3",
+    "fleet.workers": 2,
+    "fleet.memory_gib": 1.5,
+    "fleet.scheduler": "tcp://host:8786",
+    "fleet.max_failures": "2.5%",
 }
 """A value other than the default for every option of the command line."""
 

@@ -1,0 +1,72 @@
+"""``roadeval fleet``: many drives in one run, at the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from roadeval.cli import arguments, console, messages
+from roadeval.cli.exit_codes import ExitCode
+from roadeval.cli.options import Given, takes
+
+Drives = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="DRIVE...",
+        show_default=False,
+        help="Logs, rosbag2 folders, folders to search, patterns, URLs, or manifests (.toml, "
+        ".csv).",
+    ),
+]
+
+
+@takes(
+    *("preset", "config", "variants", "drives", "training", "topics", "labels", "frames"),
+    *("output.record", "fleet"),
+)
+def fleet(
+    paths: Drives,
+    *,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FOLDER",
+            help="Where all results land; what is done there already is not done again.",
+        ),
+    ],
+    given: Given,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Try drives again that failed before.")
+    ] = False,
+    json: arguments.Json = False,
+    quiet: arguments.Quiet = False,
+) -> int:
+    """Replay many drives and judge them together.
+
+    On this machine or a cluster. The folder is the state: the same command again does only what is
+    missing or has changed. A drive that cannot be used is a row with the reason; the exit code is 3
+    then.
+    """
+    config = arguments.configuration(given)
+    from roadeval.cli import fleet_progress
+    from roadeval.cli.screens import fleet as screen
+    from roadeval.jobs.fleet import fleet as run
+    from roadeval.results.summary import json_text, plain
+
+    with fleet_progress.watched(quiet) as watch:
+        found = run(paths, output, config, retry_failed=retry_failed, on_progress=watch)
+    if json:
+        console.emit(json_text(plain(found.summary)).rstrip())
+    elif not quiet:
+        screen.show(found, console.results())
+    messages.loops_missing()
+    for sentence in screen.problems(found):
+        messages.warning(sentence)
+    return ExitCode.LOSS if found.lost else ExitCode.DONE
+
+
+COMMAND: Final = fleet

@@ -1,0 +1,102 @@
+"""The outcome of a fleet on one screen of 80 columns."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from roadeval.cli.screens import tables
+from roadeval.cli.screens.tables import Row, interval, percent, points
+from roadeval.evaluation.metrics import FULL
+from roadeval.results.fleet.record import DAMAGED, FAILED, SCORED, UNSCORED
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from roadeval.jobs.fleet import FleetOutcome
+
+TESTED: Final = "ERR"
+RATES: Final = {"ERR": "ERR %", "pooled_ERR": "pooled ERR %"} | {n: f"{n} %" for n in FULL}
+STATUSES: Final = {
+    SCORED: "scored",
+    DAMAGED: "scored but for what is lost",
+    UNSCORED: "without truth",
+    FAILED: "failed",
+}
+NAMED: Final = 5
+"""Drives that failed for one reason, which are named."""
+
+
+def show(outcome: FleetOutcome, out: Console) -> None:
+    """Print how many drives there are, the verdict, the rates, and the effects over drives."""
+    summary = outcome.summary
+    counted = (
+        f"{outcome.counts[s]} {text}" for s, text in STATUSES.items() if outcome.counts.get(s)
+    )
+    total = sum(outcome.counts.values())
+    out.print(f"{total} drives: {', '.join(counted)}; {summary['frames']} frames evaluated")
+    if outcome.replayed < total:
+        out.print(f"{total - outcome.replayed} of them were done before.")
+    out.print()
+    out.print(summary["verdict"])
+    out.print()
+    if summary["rates"]:
+        show_rates(summary["rates"], out)
+        out.print()
+    if summary["effects"]:
+        show_effects(summary["effects"], out)
+        out.print()
+    out.print(f"results    {outcome.folder}{os.sep}", soft_wrap=True)
+
+
+def show_rates(rates: Sequence[Mapping[str, Any]], out: Console) -> None:
+    """Print the rates of the final masks: the drives' means."""
+    out.print("Final masks: the mean of the drives' mean rates")
+    rows = [
+        Row([row["variant"], str(row["drives"]), *(percent(row[rate]) for rate in RATES)])
+        for row in rates
+    ]
+    tables.show(("variant",), ("drives", *RATES.values()), rows, out)
+
+
+def show_effects(effects: Sequence[Mapping[str, Any]], out: Console) -> None:
+    """Print the differences of ERR over drives."""
+    tested = [each for each in effects if each["metric"] == TESTED]
+    (confidence,) = {each["confidence"] for each in tested}
+    out.print(f"Change of ERR in percentage points, over drives ({confidence:.0%} interval)")
+    titles = ("mean", "interval", "worse", "better", "pooled", "spread")
+    rows = [
+        Row(
+            [
+                f"{each['variant']} - {each['base']}",
+                points(each["mean"]),
+                interval(each["low"], each["high"]),
+                str(each["worse"]),
+                str(each["better"]),
+                points(each["pooled"]),
+                percent(each["spread"]["tau"]) if each["spread"] else "-",
+            ]
+        )
+        for each in tested
+    ]
+    tables.show(("variants",), titles, rows, out)
+
+
+def problems(outcome: FleetOutcome) -> Iterator[str]:
+    """Yield a sentence for each reason why drives failed, with the first drives of it."""
+    reasons = Counter(_reason(drive, text, outcome) for drive, text in outcome.problems.items())
+    for reason, count in reasons.items():
+        drives = [d for d, text in outcome.problems.items() if _reason(d, text, outcome) == reason]
+        more = f" and {count - NAMED} more" if count > NAMED else ""
+        yield f"{', '.join(drives[:NAMED])}{more}: {reason}"
+
+
+def _reason(drive: str, text: str, outcome: FleetOutcome) -> str:
+    """Return a reason without the name of the drive's file, which begins most of them."""
+    sources = {each["drive"]: each["source"] for each in outcome.summary["drives"]}
+    source = sources.get(drive, "")
+    for name in (source, source.rpartition("/")[2]):
+        text = text.removeprefix(f"{name}: ") if name else text
+    return text

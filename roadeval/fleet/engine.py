@@ -1,0 +1,157 @@
+"""Who replays the drives: worker processes of Dask, here or of a cluster that is there.
+
+Everybody else sees a `concurrent.futures.Executor`, and may bring another one. Of those that come
+with Python none survives the death of a worker; Dask's does, and begins its task once more
+elsewhere.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import Any, Final
+
+from roadeval.fleet.errors import FleetError
+
+ATTEMPTS: Final = 2
+"""How often a drive is begun whose worker dies; on a cluster the scheduler's own settings say."""
+ANSWER_S: Final = 15
+"""So long a scheduler may take to answer."""
+_LOCAL: Final = {
+    "distributed.scheduler.allowed-failures": ATTEMPTS - 1,
+    # No drive waits at a busy worker while another one is idle.
+    "distributed.scheduler.worker-saturation": 1.0,
+    # A worker is bounded by its end alone: it holds no results that could be written to a disk, and
+    # one that pauses would wait for ever.
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.memory.terminate": 0.95,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Engine:
+    """Worker processes.
+
+    Parameters
+    ----------
+    executor
+        Takes tasks.
+    workers
+        How many work at once, as far as that is known.
+    dashboard
+        Address of a page that shows them at work, if there is one.
+    """
+
+    executor: Executor
+    workers: int | None
+    dashboard: str | None = None
+
+
+@contextmanager
+def started(
+    workers: int | None = None, memory_gib: float | None = None, scheduler: str | None = None
+) -> Iterator[Engine]:
+    """Start worker processes here, or connect to a scheduler, until the block ends.
+
+    Whatever still runs then is cancelled; workers that were started here end.
+
+    Parameters
+    ----------
+    workers
+        Processes here; one a processor by default.
+    memory_gib
+        What each may take; by default its share of the machine's. One that takes more is ended,
+        which costs its drive one more attempt.
+    scheduler
+        Address of a Dask scheduler, ``tcp://host:8786``, or the file that it has written.
+
+    Raises
+    ------
+    FleetError
+        If Dask is not installed, or the scheduler does not answer.
+    """
+    dask, distributed = _dask()
+    with ExitStack() as stack:
+        if scheduler is None:
+            stack.enter_context(dask.config.set(_LOCAL))
+            count = workers or _processors()
+            client = stack.enter_context(_local(distributed, count, memory_gib))
+        else:
+            client = stack.enter_context(_connected(distributed, scheduler))
+            count = len(client.scheduler_info(n_workers=-1)["workers"])
+        executor = client.get_executor(pure=False)
+        stack.callback(executor.shutdown, wait=False)
+        # Without Bokeh there is an address, and nothing to see there.
+        page = client.dashboard_link if find_spec("bokeh") else None
+        yield Engine(executor, count, page or None)
+
+
+def died(error: BaseException) -> bool:
+    """Return whether an error says that the processes that worked on a task have died."""
+    return type(error).__name__ in ("KilledWorker", "BrokenProcessPool", "TerminatedWorkerError")
+
+
+@contextmanager
+def _local(distributed: Any, count: int, memory_gib: float | None) -> Iterator[Any]:
+    limit = "auto" if memory_gib is None else math.floor(memory_gib * 2**30)
+    with (
+        distributed.LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit=limit,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            worker_dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client
+
+
+@contextmanager
+def _connected(distributed: Any, scheduler: str) -> Iterator[Any]:
+    # The library tells of every attempt to connect.
+    log = logging.getLogger("distributed")
+    before = log.level
+    log.setLevel(logging.CRITICAL)
+    is_file = os.path.exists(scheduler)  # noqa: PTH110 - for what is an address it is False
+    try:
+        try:
+            where = {"scheduler_file": scheduler} if is_file else {"address": scheduler}
+            client = distributed.Client(**where, timeout=ANSWER_S)
+        except (OSError, TimeoutError, ValueError, TypeError) as error:
+            raise FleetError(
+                f"`fleet.scheduler` {scheduler}: does not answer within {ANSWER_S} s, or is no "
+                "Dask scheduler; name it as tcp://host:8786, or by the file that it has written"
+            ) from error
+        with client:
+            yield client
+    finally:
+        log.setLevel(before)
+
+
+def _dask() -> tuple[Any, Any]:
+    try:
+        import dask
+        import distributed
+    except ImportError as error:
+        raise FleetError(
+            "a fleet needs Dask's scheduler, which is not installed: pip install 'roadeval[fleet]'"
+        ) from error
+    return dask, distributed
+
+
+def _processors() -> int:
+    """Return how many processors this process may use."""
+    allowed = getattr(os, "sched_getaffinity", None)
+    return len(allowed(0)) if allowed else os.cpu_count() or 1

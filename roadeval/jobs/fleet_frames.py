@@ -1,0 +1,127 @@
+"""What a fleet keeps of a drive's frames while it is replayed: their light, and the worst ones."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Iterator
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from roadeval.data import BASELINE, ERRORS, FrameResult, Role, Tally
+from roadeval.evaluation.light import Light, light_of
+from roadeval.report.images import LayerImage, jpeg
+from roadeval.results.fleet.record import PICTURES
+from roadeval.runtime.files import put
+
+WORST: Final = 3
+"""Frames of a drive that are kept as its worst."""
+APART_NS: Final = 1_000_000_000
+"""Neighbours fail alike: of frames less than this apart only the worst is kept."""
+WIDTH: Final = 320
+"""Pixels across their pictures."""
+
+
+@dataclass(frozen=True, slots=True)
+class _WorstFrame:
+    number: int
+    stamp_ns: int
+    tally: Tally
+    light: Light
+    picture: bytes
+
+    @property
+    def err(self) -> float:
+        return self.tally.rates["ERR"]
+
+
+class FrameGatherer:
+    """Takes a drive's frames in order.
+
+    Parameters
+    ----------
+    folder
+        Of the fleet.
+    drive
+        Its name there.
+    """
+
+    def __init__(self, folder: Path, drive: str) -> None:
+        self._folder: Final = folder
+        self._drive: Final = drive
+        self.lights: Final[dict[int, tuple[float, ...]]] = {}
+        self._stamps: list[int] = []
+        self._worst: list[_WorstFrame] = []
+
+    def add(self, result: FrameResult) -> None:
+        """Add a frame; one that was not evaluated is passed by."""
+        if result.role is not Role.EVALUATED:
+            return
+        light = light_of(result.frame.image)
+        self.lights[result.frame.number] = astuple(light)
+        self._stamps = [*self._stamps[:1], result.frame.stamp_ns]
+        first = next((t.variant for t in result.tallies if t.variant != BASELINE), None)
+        if first is not None:
+            *_, final = (tally for tally in result.tallies if tally.variant == first)
+            self._offer(result, final, light)
+
+    def _offer(self, result: FrameResult, tally: Tally, light: Light) -> None:
+        """Keep a frame as long as it is one of the worst."""
+        frame, err = result.frame, tally.rates["ERR"]
+        near = [w for w in self._worst if abs(w.stamp_ns - frame.stamp_ns) < APART_NS]
+        rest = [w for w in self._worst if w not in near]
+        bound = max((w.err for w in near), default=-1.0)
+        if len(rest) == WORST:
+            bound = max(bound, min(w.err for w in rest))
+        if math.isnan(err) or err <= bound:
+            return
+        errors = result.errors[tally.variant]
+        picture = jpeg(LayerImage("", frame.image, ERRORS, errors.array), WIDTH).content
+        kept = _WorstFrame(frame.number, frame.stamp_ns, tally, light, picture)
+        ranked = sorted([*rest, kept], key=lambda w: (-w.err, w.number))
+        self._worst = ranked[:WORST]
+
+    def facts(self) -> dict[str, Any]:
+        """Return what a drive's row says of its evaluated frames: their times and mean light."""
+        if not self.lights:
+            return {}
+        values = np.array([*self.lights.values()])
+        known = ~np.isnan(values)
+        sums = np.where(known, values, 0).sum(axis=0)
+        means = sums / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+        names = (field.name for field in fields(Light))
+        times = {"start_ns": self._stamps[0], "end_ns": self._stamps[-1]}
+        return times | dict(zip(names, means.tolist(), strict=True))
+
+    def write_pictures(self) -> None:
+        """Write the worst frames' pictures in place of those of an earlier replay.
+
+        Raises
+        ------
+        OSError
+            If they cannot be written.
+        """
+        shutil.rmtree(self._folder / PICTURES / self._drive, ignore_errors=True)
+        for each in self._worst:
+            put(self._folder / self._picture(each), each.picture)
+
+    def worst_rows(self) -> Iterator[dict[str, Any]]:
+        """Yield the rows of ``worst``; ranks are given over all drives."""
+        for rank, each in enumerate(self._worst, 1):
+            yield {
+                "rank": rank,
+                "drive": self._drive,
+                "frame": each.number,
+                "stamp_ns": each.stamp_ns,
+                "variant": each.tally.variant,
+                "stage": each.tally.stage,
+                **{name: each.tally.rates[name] for name in ("ERR", "FPR", "FNR")},
+                "picture": self._picture(each).as_posix(),
+                **{field.name: getattr(each.light, field.name) for field in fields(Light)},
+            }
+
+    def _picture(self, each: _WorstFrame) -> Path:
+        return Path(PICTURES, self._drive, f"{each.number}.jpg")

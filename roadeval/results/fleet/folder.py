@@ -1,0 +1,253 @@
+"""A fleet's folder: written by its command, read by everything that takes a fleet."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.results.fleet.metrics import flat_metrics, junit_xml
+from roadeval.results.fleet.record import RECORDS, Record, frames_path, read_record
+from roadeval.results.fleet.schema import FORMAT, TABLES
+from roadeval.results.fleet.summary import summarise
+from roadeval.results.fleet.tables import Member, read_parquet, write_tables
+from roadeval.results.reading import ResultsError
+from roadeval.results.summary import json_text, plain
+from roadeval.runtime.claims import claimed
+from roadeval.runtime.files import check_folder, put
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+
+FLEET: Final = "fleet.json"
+"""The file that makes a folder a fleet's; written last."""
+RUN: Final = "run.toml"
+METRICS: Final = "metrics.json"
+JUNIT: Final = "junit.xml"
+PATIENCE_S: Final = 0.2
+
+
+def is_fleet(path: str | Path) -> bool:
+    """Return whether a path leads to a fleet's folder."""
+    return (Path(path) / FLEET).is_file()
+
+
+class FleetWriter:
+    """Writes the folder of a fleet.
+
+    Parameters
+    ----------
+    folder
+        Its name.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder: Final = Path(folder).absolute()
+
+    def begin(self) -> None:
+        """Make the folder, or see that it is a fleet's of this version.
+
+        Raises
+        ------
+        ResultsError
+            If it is something else, or cannot be written to.
+        """
+        with self._explained():
+            check_folder(self.folder)
+            if is_fleet(self.folder):
+                _read(self.folder)
+            elif not (self.folder / RECORDS).is_dir() and _has_files(self.folder):
+                raise ResultsError(
+                    f"{self.folder}: holds other files and is no fleet's folder; name a new one"
+                )
+            (self.folder / RECORDS).mkdir(parents=True, exist_ok=True)
+
+    def finish(
+        self,
+        members: Sequence[Member],
+        settings: EvaluationSettings,
+        run: Mapping[str, Any],
+        run_toml: str,
+    ) -> dict[str, Any]:
+        """Write the tables of all drives and what follows from them; return ``fleet.json``.
+
+        Parameters
+        ----------
+        members
+            The drives in the tables' order; each has its record.
+        settings
+            The confidence of intervals, and what is negligible.
+        run, run_toml
+            The configuration of the fleet, as plain data and as the text of a TOML file.
+        """
+        with self._explained(), self._alone():
+            write_tables(self.folder, members, _Records(self.folder))
+            summary = {
+                "format": FORMAT,
+                **summarise(self.folder, members, settings),
+                "run": run,
+            }
+            put(self.folder / RUN, run_toml.encode())
+            metrics = json_text(plain(flat_metrics(summary)))
+            put(self.folder / METRICS, metrics.encode())
+            put(self.folder / JUNIT, junit_xml(self.folder.name, self._drives()))
+            put(self.folder / FLEET, json_text(plain(summary)).encode())
+        return summary
+
+    def _drives(self) -> Iterator[Mapping[str, Any]]:
+        columns = ["drive", "name", "status", "reason", "losses", "seconds", "verdict"]
+        yield from read_parquet(self.folder / "drives.parquet", columns).to_pylist()
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Hold the tables: two commands may replay drives of one folder together."""
+        while True:
+            try:
+                with claimed(self.folder / FLEET, self.folder):
+                    yield
+                    return
+            except BlockingIOError:
+                time.sleep(PATIENCE_S)
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise ResultsError(
+                f"{self.folder}: cannot be written: {error.strerror or error}"
+            ) from error
+
+
+def _has_files(folder: Path) -> bool:
+    return folder.is_dir() and any(folder.iterdir())
+
+
+class _Records(Mapping[str, Record]):
+    """The records of a folder, read as they are needed: all together would fill the memory."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder: Final = folder
+
+    def __getitem__(self, drive: str) -> Record:
+        record = read_record(self._folder, drive)
+        if record is None:
+            raise ResultsError(
+                f"{self._folder}: the record of {drive} has gone; run the same command again"
+            )
+        return record
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(sorted(path.stem for path in (self._folder / RECORDS).glob("*.json")))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
+class Fleet:
+    """The results of a fleet.
+
+    Parameters
+    ----------
+    folder
+        As ``roadeval fleet`` left it.
+
+    Raises
+    ------
+    ResultsError
+        If it is no fleet's folder, or one of another version, or a table of it cannot be read.
+
+    Examples
+    --------
+    >>> import roadeval
+    >>> fleet = roadeval.Fleet("monday")
+    >>> fleet.drives[["name", "status", "evaluated"]]
+    >>> fleet.scores.query("final and region == 'all'").groupby("variant").ERR.mean()
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.path: Final = Path(folder)
+        self.summary: Final[dict[str, Any]] = _read(self.path)
+
+    @property
+    def name(self) -> str:
+        """The folder's name."""
+        return self.path.resolve().name
+
+    @cached_property
+    def drives(self) -> pd.DataFrame:
+        """A row per drive, scored or not."""
+        return self._pandas("drives")
+
+    @cached_property
+    def scores(self) -> pd.DataFrame:
+        """A row per drive, variant, stage and region."""
+        return self._pandas("scores")
+
+    @cached_property
+    def effects(self) -> pd.DataFrame:
+        """A row per drive, difference between two masks, and rate."""
+        return self._pandas("effects")
+
+    @cached_property
+    def worst(self) -> pd.DataFrame:
+        """A row per frame among the worst of all."""
+        return self._pandas("worst")
+
+    def frames(self, drive: str) -> pd.DataFrame:
+        """Read the rows of a drive's frames, by its name in the fleet; empty if none was scored."""
+        path = frames_path(self.path, drive)
+        frame: pd.DataFrame = self._read(path, "frames").to_pandas()
+        return frame
+
+    def table(self, name: str, columns: list[str] | None = None) -> pa.Table:
+        """Read a table, or some columns of it, as Arrow has them."""
+        return self._read(self.path / f"{name}.parquet", name, columns)
+
+    def _pandas(self, name: str) -> pd.DataFrame:
+        frame: pd.DataFrame = self.table(name).to_pandas()
+        return frame
+
+    def _read(self, path: Path, name: str, columns: list[str] | None = None) -> pa.Table:
+        try:
+            table = read_parquet(path, columns)
+        except FileNotFoundError:
+            if name == "frames":
+                from roadeval.results.reading import arrow_schema
+
+                return arrow_schema(TABLES[name]).empty_table()
+            raise ResultsError(f"{path}: is not there; run the fleet's command again") from None
+        except (OSError, ValueError) as error:  # Arrow's too
+            reason = str(error).partition("\n")[0]
+            raise ResultsError(
+                f"{path}: damaged ({reason}); run the fleet's command again"
+            ) from error
+        lacking = [n for n in columns or TABLES[name].names if n not in table.column_names]
+        if lacking:
+            raise ResultsError(f"{path}: has no column {', '.join(lacking)}")
+        return table
+
+
+def _read(folder: Path) -> dict[str, Any]:
+    path = folder / FLEET
+    try:
+        content = json.loads(path.read_bytes())
+    except OSError as error:
+        raise ResultsError(
+            f"{folder}: no fleet here ({FLEET}: {error.strerror}); make one with roadeval fleet"
+        ) from error
+    except ValueError as error:
+        raise ResultsError(f"{path}: damaged ({error}); run the fleet's command again") from error
+    form = content.get("format") if isinstance(content, dict) else None
+    if form != FORMAT:
+        raise ResultsError(
+            f"{path}: not of format {FORMAT['name']} {FORMAT['version']}; another version of "
+            "roadeval made it: use that one, or another folder"
+        )
+    return dict(content)
