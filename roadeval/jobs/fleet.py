@@ -99,7 +99,7 @@ class FleetOutcome:
         return bool(self.counts.get(FAILED) or self.counts.get(DAMAGED))
 
 
-def fleet(
+def replay_fleet(
     drives: Sequence[AnyPath],
     output: AnyPath,
     config: RunConfig | None = None,

@@ -54,7 +54,7 @@ def fleet(
     config = arguments.configuration(given)
     from roadeval.cli import fleet_progress
     from roadeval.cli.screens import fleet as screen
-    from roadeval.jobs.fleet import fleet as run
+    from roadeval.jobs.fleet import replay_fleet as run
     from roadeval.results.summary import json_text, plain
 
     with fleet_progress.watched(quiet) as watch:
