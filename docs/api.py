@@ -20,6 +20,7 @@ from pdoc import docstrings
 
 import roadeval
 from roadeval.results import schema
+from roadeval.results.fleet import schema as of_a_fleet
 
 UNRESOLVED: Final = (
     r".*(array\[int\]|Series\[float\]|DataclassInstance|PydanticDataclass|ForwardRef)"
@@ -53,6 +54,8 @@ def main(folder: str = "build/api") -> None:
     """Write the pages into a folder."""
     prepare(roadeval)
     schema.__doc__ = f"{schema.__doc__}\n{schema.documentation()}"
+    tables = schema.documentation(of_a_fleet.TABLES.values(), "parquet")
+    of_a_fleet.__doc__ = f"{of_a_fleet.__doc__}\n{tables}"
     docstrings.numpy = in_markdown(docstrings.numpy)
     warnings.simplefilter("error")
     warnings.filterwarnings("ignore", UNRESOLVED, UserWarning)

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from roadeval.jobs.compare import compare
     from roadeval.jobs.config import config_toml
     from roadeval.jobs.demo import demo
+    from roadeval.jobs.fleet import FleetOutcome, FleetProgress, replay_fleet
     from roadeval.jobs.frame import run_frame
     from roadeval.jobs.info import info
     from roadeval.jobs.pack import pack
@@ -35,11 +36,15 @@ if TYPE_CHECKING:
     from roadeval.jobs.report import write_report
     from roadeval.jobs.train import train
     from roadeval.recording import Recording
+    from roadeval.results.fleet.folder import Fleet
     from roadeval.training import Model, load_model, save_model
 
 __version__ = VERSION
 
 __all__ = [
+    "Fleet",
+    "FleetOutcome",
+    "FleetProgress",
     "Model",
     "Outcome",
     "Progress",
@@ -55,6 +60,7 @@ __all__ = [
     "load_model",
     "pack",
     "replay",
+    "replay_fleet",
     "run_frame",
     "save_model",
     "train",
@@ -65,11 +71,15 @@ _HOMES: Final = {
     **{name: f"jobs.{name}" for name in ("compare", "demo", "info", "pack", "replay", "train")},
     **dict.fromkeys(("RunConfig", "configure", "load_config"), "config"),
     **dict.fromkeys(("Model", "load_model", "save_model"), "training"),
+    "Fleet": "results.fleet.folder",
+    "FleetOutcome": "jobs.fleet",
+    "FleetProgress": "jobs.fleet",
     "Outcome": "jobs.replay",
     "Progress": "jobs.progress",
     "Recording": "recording",
     "RoadevalError": "errors",
     "config_toml": "jobs.config",
+    "replay_fleet": "jobs.fleet",
     "run_frame": "jobs.frame",
     "write_report": "jobs.report",
 }

@@ -25,6 +25,11 @@ def warning(sentence: object) -> None:
     _write("warning", "bold yellow", with_flags(str(sentence)))
 
 
+def note(sentence: object) -> None:
+    """Write what happens now, where somebody waits for it: ``roadeval: note: ...``."""
+    _write("note", "bold", with_flags(str(sentence)))
+
+
 def losses(sentences: Sequence[str]) -> ExitCode:
     """Write which parts of a log could not be read: ``roadeval: lost: ...``.
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from roadeval.cli import arguments, console, messages
+from roadeval.cli import arguments, console, fleet_inspect, messages
 from roadeval.cli.exit_codes import ExitCode
+from roadeval.cli.fleet_inspect import Asked
 
 if TYPE_CHECKING:
     from roadeval.jobs.result import Result
@@ -25,6 +26,10 @@ Variant = Annotated[
         "--variant", metavar="NAME", help="Whose failures count. Default: the first variant's."
     ),
 ]
+Drive = Annotated[
+    str | None,
+    typer.Option("--drive", metavar="ID", help="Of a fleet: open this drive, at --frame."),
+]
 Screenshot = Annotated[
     Path | None,
     typer.Option(
@@ -36,26 +41,46 @@ Screenshot = Annotated[
 
 
 def inspect(
-    recording: arguments.Result,
+    recording: Annotated[
+        Path,
+        typer.Argument(
+            metavar="RESULT",
+            show_default=False,
+            help="A recording (.rrd), a results folder, or a fleet's folder.",
+        ),
+    ],
     *,
     listed: Listed = False,
     frame: Frame = None,
     worst: Rank = None,
     variant: Variant = None,
+    drive: Drive = None,
     screenshot: Screenshot = None,
     json: arguments.Json = False,
 ) -> int:
     """Open the viewer at a frame, or list the frames worth opening.
 
     The viewer works offline and listens on 127.0.0.1 alone. Of neighbouring frames only the worst
-    is listed.
+    is listed. Of a fleet the frames of all drives are ranked together, and without a frame its
+    kept recordings open as a catalogue; a drive that was not kept is replayed from its log.
     """
-    from roadeval.jobs.result import Result
-
     if frame is not None and worst is not None:
         raise typer.BadParameter("give --frame or --worst, not both")
     if listed and (frame is not None or screenshot is not None):
         raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
+    from roadeval.results.fleet.folder import Fleet, is_fleet
+
+    if is_fleet(recording):
+        if variant is not None:
+            raise typer.BadParameter(
+                "--variant does not go with a fleet: its worst are the first's"
+            )
+        asked = Asked(listed, drive, frame, worst, screenshot, json)
+        return fleet_inspect.inspect(Fleet(recording), asked)
+    if drive is not None:
+        raise typer.BadParameter("--drive goes with a fleet's folder alone")
+    from roadeval.jobs.result import Result
+
     opened = Result(recording)
     if listed:
         _list(opened, worst, variant, as_json=json)

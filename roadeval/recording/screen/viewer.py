@@ -14,7 +14,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 import rerun_cli
 from rerun.experimental import ViewerClient
@@ -50,7 +50,7 @@ def show(recording: Path, frame: int | None = None) -> None:
     RecordingError
         If there is no screen, or the viewer does not come up.
     """
-    if os.name == "posix" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    if not has_screen():
         raise RecordingError(
             "no screen to open a window on; take a screenshot instead, or open "
             f"{recording} on another machine"
@@ -58,6 +58,24 @@ def show(recording: Path, frame: int | None = None) -> None:
     with _viewer(recording, []) as (process, client):
         _go(client, frame)
         process.wait()
+
+
+def has_screen() -> bool:
+    """Return whether a window can be opened here."""
+    return os.name != "posix" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
+
+
+def show_address(address: str) -> None:
+    """Open a catalogue's address in the viewer, and wait until its window is closed.
+
+    Raises
+    ------
+    RecordingError
+        If the viewer does not come up.
+    """
+    with tempfile.TemporaryFile() as log, _process(address, _free_port(), [], log) as process:
+        if process.wait():
+            raise RecordingError(f"the viewer ended: {_reason(log.fileno())}")
 
 
 def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int | None:
@@ -96,20 +114,31 @@ def _viewer(
 ) -> Iterator[tuple[subprocess.Popen[bytes], ViewerClient]]:
     """Start the viewer on a recording; it ends with the block."""
     port = _free_port()
+    with (
+        tempfile.TemporaryFile() as log,
+        _process(str(recording), port, options, log, **environment) as process,
+    ):
+        yield process, _connect(process, port, log.fileno())
+
+
+@contextmanager
+def _process(
+    what: str, port: int, options: list[str], log: IO[bytes], **environment: str
+) -> Iterator[subprocess.Popen[bytes]]:
+    """Start the viewer's process on a file or an address; it ends with the block."""
     address = ["--bind", "127.0.0.1", "--port", str(port), "--hide-welcome-screen"]
-    with tempfile.TemporaryFile() as log:
-        process = subprocess.Popen(
-            [_program(), *address, *options, str(recording)],
-            stdout=log,
-            stderr=log,
-            # With CI set the viewer sends no usage statistics.
-            env={**os.environ, "CI": "1", "NO_COLOR": "1", **environment},
-        )
-        try:
-            yield process, _connect(process, port, log.fileno())
-        finally:
-            process.terminate()
-            process.wait()
+    process = subprocess.Popen(
+        [_program(), *address, *options, what],
+        stdout=log,
+        stderr=log,
+        # With CI set the viewer sends no usage statistics.
+        env={**os.environ, "CI": "1", "NO_COLOR": "1", **environment},
+    )
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait()
 
 
 def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerClient:

@@ -1,0 +1,98 @@
+"""``roadeval inspect`` of a fleet."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from roadeval.cli import console, messages, progress
+from roadeval.cli.exit_codes import ExitCode
+
+if TYPE_CHECKING:
+    from roadeval.results.fleet.folder import Fleet
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What was asked for: see the options of ``roadeval inspect``."""
+
+    listed: bool
+    drive: str | None
+    frame: int | None
+    worst: int | None
+    screenshot: Path | None
+    json: bool
+
+
+def inspect(fleet: Fleet, asked: Asked) -> int:
+    """List the worst frames of a fleet, open one of them, or serve the catalogue."""
+    if asked.frame is not None and asked.drive is None:
+        raise typer.BadParameter("--frame of a fleet needs its drive: --drive ID")
+    if asked.drive is not None and asked.worst is not None:
+        raise typer.BadParameter("--worst counts over all drives; give it without --drive")
+    if asked.listed:
+        _list(fleet, asked)
+    elif asked.drive is not None or asked.worst is not None or asked.screenshot is not None:
+        _open(fleet, asked)
+    else:
+        _catalogue(fleet)
+    return ExitCode.DONE
+
+
+def _list(fleet: Fleet, asked: Asked) -> None:
+    from roadeval.cli.screens import fleet_inspect as screen
+    from roadeval.jobs import inspect as of_a_drive
+    from roadeval.jobs.fleet_inspect import worst_frames
+    from roadeval.results.summary import json_text, plain
+
+    found = worst_frames(fleet, asked.worst or of_a_drive.LISTED)
+    if asked.json:
+        rows = [asdict(each) | {"picture": str(each.picture)} for each in found]
+        paths = [{"recording": each.recording and str(each.recording)} for each in found]
+        told = [row | path for row, path in zip(rows, paths, strict=True)]
+        console.emit(json_text(plain(told)).rstrip())
+    else:
+        screen.show(fleet.name, found, console.results())
+
+
+def _open(fleet: Fleet, asked: Asked) -> None:
+    """Open the viewer at a frame, or draw it into a file; the drive is replayed if need be."""
+    from roadeval.jobs import fleet_inspect as inspecting
+    from roadeval.jobs import inspect as of_a_drive
+    from roadeval.jobs.result import Result
+
+    drive, frame = asked.drive, asked.frame
+    if drive is None:
+        found = inspecting.frame_of_rank(fleet, asked.worst or 1)
+        drive, frame = found.drive, found.frame
+    with progress.watched() as watch:
+        recording, warnings = inspecting.recording_of(fleet, drive, watch, messages.note)
+    opened = Result(recording)
+    if frame is not None and (said := of_a_drive.without_pictures(opened, frame)):
+        messages.warning(said)
+    shown = of_a_drive.view(opened, frame, asked.screenshot)
+    if asked.screenshot is not None:
+        console.emit(f"{asked.screenshot}: {drive}, frame {shown}")
+    for warning in (*opened.warnings, *warnings):
+        messages.warning(warning)
+
+
+def _catalogue(fleet: Fleet) -> None:
+    """Serve all recordings, in a window where there is a screen, until it or the command ends."""
+    from roadeval.jobs import fleet_inspect as inspecting
+    from roadeval.recording.screen import viewer
+
+    with inspecting.catalogue(fleet) as catalogue:
+        for drive, first in catalogue.left_out.items():
+            messages.warning(f"{drive}: left out, for it shows the very frames of {first}")
+        count = len(catalogue.drives)
+        console.emit(f"{count} drive{'' if count == 1 else 's'} at {catalogue.address}")
+        console.flush()
+        if viewer.has_screen():
+            viewer.show_address(catalogue.address)
+        else:
+            messages.note(f"no screen here; open it with: rerun {catalogue.address} (Ctrl-C ends)")
+            inspecting.wait()

@@ -1,0 +1,239 @@
+"""A fleet looked into: its worst frames, a drive at one of them, and all its recordings."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from roadeval.config import OutputSettings, RunConfig, load_config
+from roadeval.errors import RoadevalError
+from roadeval.fleet.remote import staged
+from roadeval.fleet.urls import is_url
+from roadeval.jobs.progress import OnProgress, ignore
+from roadeval.jobs.replay import Outcome, replay
+from roadeval.results.fleet.folder import Fleet
+from roadeval.results.fleet.record import RECORDINGS, RESULTS, recording_path
+from roadeval.results.fleet.schema import ALL, TAG
+from roadeval.results.folder import RUN
+
+if TYPE_CHECKING:
+    from roadeval.recording.screen.catalogue import Catalogue
+
+FEWEST: Final = "worst:10"
+"""What is recorded of a drive that is replayed to be looked at, where the fleet recorded none."""
+SORTED_BY: Final = "ERR"
+
+
+@dataclass(frozen=True, slots=True)
+class FleetFrame:
+    """A frame among the worst of a fleet.
+
+    Parameters
+    ----------
+    rank
+        1 is the worst.
+    drive, frame, stamp_ns
+        Which.
+    variant, stage
+        Whose final mask.
+    rates
+        ERR, FPR and FNR of it.
+    light
+        As it was measured, by the columns' names; None where it could not be.
+    picture
+        The file of its errors.
+    recording
+        The drive's recording; None where it was not kept.
+    """
+
+    rank: int
+    drive: str
+    frame: int
+    stamp_ns: int
+    variant: str
+    stage: str
+    rates: dict[str, float | None]
+    light: dict[str, float | None]
+    picture: Path
+    recording: Path | None
+
+
+def worst_frames(fleet: Fleet, count: int | None = None) -> list[FleetFrame]:
+    """Return the worst frames of a fleet, the worst first.
+
+    Parameters
+    ----------
+    fleet
+        Whose.
+    count
+        How many, at most; all that its table names by default.
+
+    Raises
+    ------
+    RoadevalError
+        If there is none.
+    """
+    rows = fleet.table("worst").to_pylist()
+    if not rows:
+        raise RoadevalError(f"{fleet.path}: nothing was scored, so no frame is the worst")
+    return [_frame(fleet, row) for row in rows[:count]]
+
+
+def _frame(fleet: Fleet, row: dict[str, Any]) -> FleetFrame:
+    names = ("rank", "drive", "frame", "stamp_ns", "variant", "stage")
+    recording = recording_path(fleet.path, row["drive"])
+    return FleetFrame(
+        **{name: row[name] for name in names},
+        rates={name: row[name] for name in ("ERR", "FPR", "FNR")},
+        light={name: row[name] for name in ("luminance", "contrast", "shadow", "sun")},
+        picture=fleet.path / row["picture"],
+        recording=recording if recording.exists() else None,
+    )
+
+
+def frame_of_rank(fleet: Fleet, rank: int) -> FleetFrame:
+    """Return the frame of a rank among the worst.
+
+    Raises
+    ------
+    RoadevalError
+        If the fleet's table names fewer.
+    """
+    found = worst_frames(fleet)
+    if rank > len(found):
+        raise RoadevalError(f"{fleet.path}: only the worst {len(found)} frames are known")
+    return found[rank - 1]
+
+
+def recording_of(
+    fleet: Fleet,
+    drive: str,
+    on_progress: OnProgress = ignore,
+    on_replay: Callable[[str], None] = lambda _sentence: None,
+) -> tuple[Path, tuple[str, ...]]:
+    """Return the recording of a drive, made again from its log where it was not kept.
+
+    Parameters
+    ----------
+    fleet, drive
+        Which, by its name in the fleet.
+    on_progress
+        As of `roadeval.replay`.
+    on_replay
+        Told in a sentence that the drive is replayed.
+
+    Returns
+    -------
+    tuple
+        The file, and what to know of it first.
+
+    Raises
+    ------
+    RoadevalError
+        If there is no such drive, its log has gone, or it cannot be replayed.
+    """
+    row = _row(fleet, drive)
+    recording = recording_path(fleet.path, drive)
+    if recording.exists():
+        return recording, ()
+    source = str(row["source"])
+    if row["status"] == "failed":
+        raise RoadevalError(f"{source}: has no recording, for it failed: {row['reason']}")
+    if not is_url(source) and not Path(source).exists():
+        raise RoadevalError(
+            f"{source}: has gone, and no recording of it was kept; bring the log back, or see "
+            f"{fleet.path / 'pictures' / drive}"
+        )
+    config = _configuration(fleet, drive)
+    on_replay(f"{drive}: no recording was kept, so it is replayed from {source}")
+    outcome = _replayed(source, config, recording, on_progress)
+    changed = outcome.summary["log"]["sha256"] != row["sha256"]
+    warning = f"{source}: has changed since the fleet was run, and its results may have, too"
+    return recording, (warning,) if changed else ()
+
+
+def _row(fleet: Fleet, drive: str) -> dict[str, Any]:
+    """Return a drive's row of ``drives``."""
+    columns = ["drive", "name", "source", "status", "reason", "sha256"]
+    rows: list[dict[str, Any]] = fleet.table("drives", columns).to_pylist()
+    for row in rows:
+        if row["drive"] == drive:
+            return row
+    named = [row["drive"] for row in rows if row["name"] == drive]
+    hint = f"; by that name there is {', '.join(named)}" if named else ""
+    raise RoadevalError(f"{fleet.path}: no drive {drive}{hint}; `drives.parquet` names all")
+
+
+def _configuration(fleet: Fleet, drive: str) -> RunConfig:
+    """Return what a drive was replayed with."""
+    path = fleet.path / RESULTS / drive / RUN
+    if not path.exists():
+        raise RoadevalError(f"{path}: is not there; run the fleet's command again")
+    return load_config(path)
+
+
+def _replayed(source: str, config: RunConfig, recording: Path, on_progress: OnProgress) -> Outcome:
+    """Replay a drive for its recording alone: the fleet's results stay as they are."""
+    record = FEWEST if config.output.record == "none" else config.output.record
+    with tempfile.TemporaryDirectory(prefix="roadeval-") as reports, staged(source) as path:
+        output = OutputSettings(
+            save=str(recording), reports=str(Path(reports, "reports")), record=record, figures=False
+        )
+        return replay(path, replace(config, output=output), on_progress=on_progress)
+
+
+@contextmanager
+def catalogue(fleet: Fleet) -> Iterator[Catalogue]:
+    """Serve the recordings that a fleet kept, on 127.0.0.1, until the block ends.
+
+    Raises
+    ------
+    RoadevalError
+        If none was kept, or they cannot be served.
+    """
+    from roadeval.recording import Recording
+    from roadeval.recording.screen import catalogue as shown
+
+    drives = [
+        shown.CataloguedDrive(row["drive"], path, _facts(row, rates))
+        for row, rates in _with_rates(fleet)
+        if (path := recording_path(fleet.path, row["drive"])).exists()
+    ]
+    if not drives:
+        raise RoadevalError(
+            f"{fleet.path / RECORDINGS}: no recording was kept; run the fleet's command again with "
+            "`fleet.keep` all or worst:N, or look at one frame with --worst K"
+        )
+    drives.sort(key=lambda each: -float(each.facts.get(SORTED_BY, -1)))
+    layout = Recording(drives[0].recording).layout
+    with shown.served(fleet.name, drives, layout, SORTED_BY) as served:
+        yield served
+
+
+def wait() -> None:
+    """Wait for a signal to end the process."""
+    while True:
+        time.sleep(1)
+
+
+def _with_rates(fleet: Fleet) -> Iterator[tuple[dict[str, Any], dict[str, Any]]]:
+    """Yield the row of each drive, and the scores of its first variant's final mask."""
+    scores: dict[str, dict[str, Any]] = {}
+    for row in fleet.table("scores").to_pylist():
+        if row["final"] and row["region"] == ALL:
+            scores.setdefault(row["drive"], row)
+    for row in fleet.table("drives").to_pylist():
+        yield row, scores.get(row["drive"], {})
+
+
+def _facts(row: dict[str, Any], rates: dict[str, Any]) -> dict[str, str | int | float]:
+    """Return what the catalogue's table shows of a drive."""
+    facts = {name: rates.get(name) for name in (SORTED_BY, "FPR", "FNR")}
+    facts |= {name: row[name] for name in ("evaluated", "status", "group", "luminance", "sun")}
+    facts |= {name.removeprefix(TAG): row[name] for name in row if name.startswith(TAG)}
+    return {name: value for name, value in facts.items() if value is not None}
