@@ -166,6 +166,7 @@ class _Run:
     on_progress: OnFleetProgress
     retry: bool
     done: dict[str, Done] = field(default_factory=dict)
+    pruned: set[str] = field(default_factory=set)
     workers: int = 1
     dashboard: str | None = None
     began: float = field(default_factory=time.monotonic)
@@ -319,11 +320,14 @@ class _Run:
         keep = self.config.fleet.keep
         if not keep.startswith("worst:"):
             return
+        count = int(keep.removeprefix("worst:"))
         scored = [each for each in self.done.values() if each.err is not None]
-        ranked = sorted(scored, key=lambda each: (-(each.err or 0), each.drive))
-        for each in ranked[int(keep.removeprefix("worst:")) :]:
+        worst = sorted(scored, key=lambda each: (-(each.err or 0), each.drive))[:count]
+        # Once dropped a drive stays so, for more are done and none fewer.
+        for drive in self.done.keys() - {each.drive for each in worst} - self.pruned:
+            self.pruned.add(drive)
             with suppress(OSError):
-                recording_path(self.folder, each.drive).unlink(missing_ok=True)
+                recording_path(self.folder, drive).unlink(missing_ok=True)
 
 
 def _judge_failures(run: _Run, allowed: str | None) -> None:
