@@ -1,0 +1,269 @@
+"""``roadeval fleet``: many drives, every one accounted for, and nothing done twice."""
+
+import json
+import shutil
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from pathlib import Path
+
+import cv2
+import pyarrow.parquet as pq
+import pytest
+
+import roadeval
+from roadeval import logs
+from roadeval.cli.app import main
+from roadeval.errors import RoadevalError
+from roadeval.logs import LogWriter
+from roadeval.results.fleet.record import record_path, recording_path
+from tests.e2e.commands import here
+from tests.fixtures.make import make
+from tests.training.making import frame
+
+FRAMES = 14
+OPTIONS = {"training": {"frames": 4}}
+
+
+class Here(Executor):
+    """Does each task at once, in the caller's process."""
+
+    def __init__(self):
+        self.tasks = []
+
+    def submit(self, do, /, *args, **kwargs):
+        self.tasks.append(args[0])
+        future = Future()
+        try:
+            future.set_result(do(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+def write(path: Path, first: int) -> Path:
+    """Write a short drive; no two of different first numbers share a frame."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with LogWriter(path) as log:
+        for place in range(FRAMES):
+            made, stamp = frame(first + place), (place + 1) * 500_000_000
+            _, png = cv2.imencode(".png", made.image[..., ::-1])
+            log.image("/camera/image", stamp, png.tobytes(), "png")
+            log.mask("/truth/road", stamp, made.truth * 255)
+    return path
+
+
+@pytest.fixture(scope="module")
+def drives(tmp_path_factory):
+    """A folder with two drives, and a file between them that is none."""
+    folder = tmp_path_factory.mktemp("logs")
+    write(folder / "a.mcap", 0)
+    shutil.copy(make("broken/notmcap.mcap", folder / "made"), folder / "b.mcap")
+    shutil.rmtree(folder / "made")
+    write(folder / "c.mcap", 100)
+    return folder
+
+
+def run(drives, folder, *, executor=None, retry_failed=False, **fleet):
+    """Run a fleet in this process; returns its outcome, and what was submitted."""
+    executor = executor or Here()
+    config = roadeval.configure({**OPTIONS, "fleet": fleet})
+    found = roadeval.replay_fleet(
+        [drives], folder, config, executor=executor, retry_failed=retry_failed
+    )
+    return found, [Path(task.entry.source).stem for task in executor.tasks]
+
+
+def tables(folder):
+    """The tables without what differs from run to run."""
+    clock = ("seconds", "peak_memory_mib", "attempts")
+    read = {path.name: pq.read_table(path) for path in sorted(folder.glob("*.parquet"))}
+    return {
+        name: table.drop_columns([c for c in clock if c in table.column_names]).to_pylist()
+        for name, table in read.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def ran(drives, tmp_path_factory):
+    """A fleet of which the recording of the worst drive was kept."""
+    folder = tmp_path_factory.mktemp("fleet") / "f"
+    found, _ = run(drives, folder, keep="worst:1")
+    return found
+
+
+def copied(ran, tmp_path):
+    folder = tmp_path / "f"
+    shutil.copytree(ran.folder, folder)
+    return folder
+
+
+def test_dasks_workers_replay_every_drive_and_the_broken_one_is_named(drives, ran, tmp_path):
+    words = ("fleet", drives, "-o", tmp_path / "f", "--train-frames", 4, "--workers", 2)
+    done = here(*words)
+    assert done.returncode == 3, done.stderr
+    assert "3 drives: 2 scored, 1 failed; 20 frames evaluated" in done.stdout
+    (said,) = [line for line in done.stderr.splitlines() if "warning" in line]
+    assert said.startswith("roadeval: warning: b-")
+    assert "not an MCAP file" in said or "MCAP" in said
+    assert tables(tmp_path / "f") == tables(ran.folder)
+    assert not list(tmp_path.rglob("*.lock"))
+
+
+def test_the_numbers_are_those_of_single_replays(drives, ran, tmp_path):
+    scores = roadeval.Fleet(ran.folder).scores
+    for name in ("a", "c"):
+        alone = roadeval.replay(
+            drives / f"{name}.mcap",
+            roadeval.configure({**OPTIONS, "output": {"figures": False}}),
+            save=tmp_path / "out.rrd",
+            reports=tmp_path / "r",
+        )
+        own = scores[scores.drive.str.startswith(f"{name}-") & (scores.region == "all")]
+        totals = alone.summary["totals"]
+        assert {*zip(own.variant, own.stage, strict=True)} == {
+            (variant, stage) for variant, stages in totals.items() for stage in stages
+        }
+        for row in own.to_dict("records"):
+            total = totals[row["variant"]][row["stage"]]
+            for key in ("TP", "TN", "FP", "FN", "ERR", "FNR", "pooled_ERR"):
+                assert row[key] == total[key], (name, key)
+
+
+def test_the_same_command_again_replays_nothing(drives, ran, tmp_path):
+    folder = copied(ran, tmp_path)
+    before = tables(folder)
+    again, submitted = run(drives, folder, keep="worst:1")
+    assert (again.replayed, submitted) == (0, [])
+    assert again.counts == ran.counts
+    assert again.problems == ran.problems
+    assert tables(folder) == before
+
+
+def test_a_drive_whose_results_have_gone_is_replayed_alone(drives, ran, tmp_path):
+    folder = copied(ran, tmp_path)
+    before = tables(folder)
+    (gone,) = (folder / "results").glob("c-*")
+    shutil.rmtree(gone)
+    again, submitted = run(drives, folder, keep="worst:1")
+    assert (again.replayed, submitted) == (1, ["c"])
+    assert tables(folder) == before
+
+
+def test_a_drive_whose_log_has_changed_is_replayed(tmp_path):
+    log = write(tmp_path / "logs" / "a.mcap", 0)
+    run(log.parent, tmp_path / "f")
+    write(log, 50)
+    again, submitted = run(log.parent, tmp_path / "f")
+    assert (again.replayed, submitted) == (1, ["a"])
+
+
+def test_what_failed_is_tried_again_when_asked(drives, ran, tmp_path):
+    folder = copied(ran, tmp_path)
+    _, submitted = run(drives, folder, keep="worst:1", retry_failed=True)
+    assert submitted == ["b"]
+    assert tables(folder) == tables(ran.folder)
+
+
+@pytest.mark.parametrize(("allowed", "ends"), [("0", True), ("33%", True), ("1", False)])
+def test_more_failures_than_allowed_are_an_error_and_nothing_is_lost(
+    allowed, ends, drives, ran, tmp_path
+):
+    folder = copied(ran, tmp_path)
+    before = tables(folder)
+    if ends:
+        with pytest.raises(RoadevalError, match=f"1 of 3 drives failed, more than .* {allowed} "):
+            run(drives, folder, keep="worst:1", max_failures=allowed)
+    else:
+        run(drives, folder, keep="worst:1", max_failures=allowed)
+    assert tables(folder) == before
+
+
+def test_the_recording_of_the_worst_drive_alone_is_kept(ran):
+    scores = roadeval.Fleet(ran.folder).scores
+    final = scores[(scores.variant == "filtered") & scores.final & (scores.region == "all")]
+    (kept,) = (ran.folder / "recordings").glob("*.rrd")
+    assert kept.stem == final.loc[final.ERR.idxmax()].drive
+
+
+def test_of_recordings_that_are_not_kept_none_stays_of_a_drive_without_a_score(tmp_path):
+    folder = tmp_path / "logs"
+    write(folder / "a.mcap", 0)
+    make("drives/unlabelled.mcap", folder)
+    found, _ = run(folder, tmp_path / "f", keep="worst:1")
+    assert found.counts == {"scored": 1, "unscored": 1}
+    assert [path.stem[0] for path in (tmp_path / "f" / "recordings").glob("*")] == ["a"]
+
+
+def test_no_drive_is_scored_by_a_model_that_saw_it(drives, tmp_path):
+    folder = tmp_path / "logs"
+    for number, name in enumerate("xyz"):
+        write(folder / f"{name}.mcap", 100 * number)
+    found, _ = run(folder, tmp_path / "f", executor=ThreadTasks(), folds=3)
+    assert found.counts == {"scored": 3}
+    rows = pq.read_table(found.folder / "drives.parquet").to_pylist()
+    assert sorted(row["fold"] for row in rows) == [0, 1, 2]
+    for row in rows:
+        model = json.loads((found.folder / "models" / f"fold_{row['fold']}.json").read_text())
+        assert model["sha256"] == row["model"]
+        assert row["drive"] not in model["drives"]
+        assert len(model["drives"]) == 2
+        own = digests(Path(row["source"]))
+        assert len(own) == row["evaluated"] == FRAMES
+        assert not own & {*model["training_frames"]}
+        others = [digests(Path(r["source"])) for r in rows if r is not row]
+        assert {*model["training_frames"]} <= set.union(*others)
+
+
+class ThreadTasks(ThreadPoolExecutor):
+    """Another library's executor: one thread."""
+
+    def __init__(self):
+        super().__init__(1)
+        self.tasks = []
+
+
+def digests(path):
+    config = roadeval.RunConfig()
+    with logs.open_log(path) as log:
+        selection = log.select(config.topics, config.labels)
+        return {each.decode().digest() for each in log.frames(selection, logs.Span.of(config.frames))}
+
+
+def test_a_folder_with_other_files_is_refused(drives, tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(RoadevalError, match="holds other files and is no fleet's folder"):
+        run(drives, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+
+def test_a_scheduler_that_does_not_answer_is_one_line(drives, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("roadeval.fleet.engine.ANSWER_S", 1)
+    words = ["fleet", str(drives), "-o", str(tmp_path / "f"), "-q"]
+    assert main([*words, "--scheduler", "tcp://127.0.0.1:9"]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("roadeval: error: --scheduler tcp://127.0.0.1:9: does not answer")
+    assert said.count("\n") == 1
+
+
+def test_a_folder_without_drives_is_one_line(tmp_path, capsys):
+    (tmp_path / "logs").mkdir()
+    assert main(["fleet", str(tmp_path / "logs"), "-o", str(tmp_path / "f")]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "f").exists()
+
+
+def test_a_damaged_record_is_made_again(drives, ran, tmp_path):
+    folder = copied(ran, tmp_path)
+    drive = next(d["drive"] for d in ran.summary["drives"] if d["name"] == "a")
+    record_path(folder, drive).write_text("{")
+    _, submitted = run(drives, folder, keep="worst:1")
+    assert submitted == ["a"]
+    assert tables(folder) == tables(ran.folder)
+
+
+def test_recordings_that_must_be_kept_are_made_where_they_lack(drives, ran, tmp_path):
+    folder = copied(ran, tmp_path)
+    again, submitted = run(drives, folder, keep="all")
+    assert len(submitted) == 1
+    scored = [d["drive"] for d in ran.summary["drives"] if d["name"] != "b"]
+    assert all(recording_path(folder, drive).exists() for drive in scored)
+    assert tables(folder) == tables(ran.folder)
