@@ -225,7 +225,9 @@ def digests(path):
     config = roadeval.RunConfig()
     with logs.open_log(path) as log:
         selection = log.select(config.topics, config.labels)
-        return {each.decode().digest() for each in log.frames(selection, logs.Span.of(config.frames))}
+        return {
+            each.decode().digest() for each in log.frames(selection, logs.Span.of(config.frames))
+        }
 
 
 def test_a_folder_with_other_files_is_refused(drives, tmp_path):
@@ -262,7 +264,7 @@ def test_a_damaged_record_is_made_again(drives, ran, tmp_path):
 
 def test_recordings_that_must_be_kept_are_made_where_they_lack(drives, ran, tmp_path):
     folder = copied(ran, tmp_path)
-    again, submitted = run(drives, folder, keep="all")
+    _, submitted = run(drives, folder, keep="all")
     assert len(submitted) == 1
     scored = [d["drive"] for d in ran.summary["drives"] if d["name"] != "b"]
     assert all(recording_path(folder, drive).exists() for drive in scored)

@@ -1,0 +1,104 @@
+"""docs/fleet.md has the tables' columns, and its queries answer what they say."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import duckdb
+import pytest
+
+import roadeval
+from roadeval.fleet.manifest import read_manifest
+from roadeval.results.fleet.schema import TABLES
+from roadeval.results.schema import documentation
+from tests.results.fleet.making import fleet_of
+
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "fleet.md"
+TEXT = DOCUMENT.read_text()
+BEGIN, END = "<!-- tables -->\n", "<!-- end -->"
+
+
+def blocks(language):
+    return re.findall(rf"^```{language}\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
+
+
+DUSK, WEATHER, SUN = blocks("sql")
+
+
+def final(fleet):
+    return fleet.scores.query("variant == 'filtered' and final and region == 'all'")
+
+
+@pytest.fixture(scope="module")
+def fleets(tmp_path_factory):
+    """Two fleets of the same drives."""
+    folder = tmp_path_factory.mktemp("fleets")
+    for seed, name in enumerate(("last_week", "monday")):
+        fleet_of(folder / name, 30, seed, frames=5)
+    return folder
+
+
+@pytest.fixture
+def asked(fleets, monkeypatch):
+    """Ask DuckDB, where the fleets are."""
+    monkeypatch.chdir(fleets)
+    with duckdb.connect() as database:
+        yield lambda query: database.execute(query).df()
+
+
+def test_the_columns_are_the_schemas():
+    written = TEXT.partition(BEGIN)[2].partition(END)[0]
+    assert written == f"{documentation(TABLES.values(), 'parquet')}\n"
+
+
+def test_which_drives_got_worse_at_dusk(asked, fleets):
+    new, old = (roadeval.Fleet(fleets / name) for name in ("monday", "last_week"))
+    change = final(new).set_index("drive").ERR - final(old).set_index("drive").ERR
+    dark = new.drives[new.drives.luminance < 0.35].drive
+    wanted = change[change.index.isin(dark) & (change > 0)].sort_values(ascending=False)
+    found = asked(DUSK)
+    assert len(found) > 2
+    assert found.drive.to_list() == wanted.index.to_list()
+    assert found.change.to_list() == pytest.approx(wanted.to_list())
+
+
+def test_err_by_weather_in_duckdb_and_in_pandas(asked, fleets):
+    fleet = roadeval.Fleet(fleets / "monday")
+    rows = final(fleet).merge(fleet.drives, on="drive")
+    found = asked(WEATHER).set_index("weather")
+    assert {*found.index} == {"sun", "rain", "fog"}
+    names = {}
+    exec(blocks("python")[-1], names)
+    for weather, own in rows.groupby("tag_weather"):
+        row = found.loc[weather]
+        assert row.drives == len(own) == names["weather"].loc[weather, "count"]
+        assert row.mean_ERR == pytest.approx(own.ERR.mean())
+        assert row.mean_ERR == pytest.approx(names["weather"].loc[weather, "mean"])
+        assert row.pooled_ERR == pytest.approx((own.FP + own.FN).sum() / own.N.sum())
+
+
+def test_the_worst_frames_in_the_sun(asked, fleets):
+    fleet = roadeval.Fleet(fleets / "monday")
+    rows = []
+    for drive in fleet.drives.drive:
+        own = fleet.frames(drive).query("variant == 'filtered' and final and sun > 0.1")
+        rows += [(-(r.FP + r.FN) / r.N, drive, r.frame) for r in own.itertuples()]
+    found = asked(SUN)
+    assert len(found) == 20
+    assert [*zip(found.drive, found.frame, strict=True)] == [row[1:] for row in sorted(rows)[:20]]
+
+
+def test_the_manifests_say_the_same_of_a_drive_and_can_be_read(tmp_path):
+    (toml,), (csv,) = blocks("toml"), blocks("csv")
+    (tmp_path / "m.toml").write_text(toml)
+    (tmp_path / "m.csv").write_text(csv)
+    told = [read_manifest(tmp_path / name) for name in ("m.toml", "m.csv")]
+    for one, other in zip(*told, strict=True):
+        assert (one.path, one.group, one.tags) == (other.path, other.group, other.tags)
+    assert tomllib.loads(toml)["drives"][1]["labels"]["road"] == [7]
+
+
+def test_the_folder_is_what_the_page_says(fleets):
+    listed = TEXT.partition("## What the folder holds")[2].partition("An ID is")[0]
+    for path in (fleets / "monday").iterdir():
+        assert re.search(rf"(^| ){re.escape(path.name)}[ /]", listed, re.MULTILINE), path.name
