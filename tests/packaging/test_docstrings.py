@@ -1,6 +1,7 @@
 """Every example in a docstring runs, and shows what it says."""
 
 import doctest
+from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from pathlib import Path
 
@@ -24,12 +25,14 @@ MODULES = [name_of(path) for path, text in SOURCES.items() if ">>> " in text]
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
-    """A folder with the files that examples speak of: a drive, its recording and a model."""
+    """What examples speak of: a drive, its recording, a model, and a fleet of that drive."""
     folder = tmp_path_factory.mktemp("examples")
     drive.write(folder / "drive.mcap", frames=14)
     reports = folder / "reports"
     roadeval.replay(folder / "drive.mcap", save=folder / "out.rrd", reports=reports)
     roadeval.train([folder / "drive.mcap"], folder / "city.model")
+    with ThreadPoolExecutor(1) as pool:
+        roadeval.replay_fleet([folder / "drive.mcap"], folder / "monday", executor=pool)
     return folder
 
 

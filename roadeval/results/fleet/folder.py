@@ -167,8 +167,11 @@ class Fleet:
     --------
     >>> import roadeval
     >>> fleet = roadeval.Fleet("monday")
-    >>> fleet.drives[["name", "status", "evaluated"]]
-    >>> fleet.scores.query("final and region == 'all'").groupby("variant").ERR.mean()
+    >>> fleet.drives[["name", "status", "evaluated"]].to_dict("records")
+    [{'name': 'drive', 'status': 'scored', 'evaluated': 4}]
+    >>> final = fleet.scores.query("final and region == 'all'")
+    >>> sorted(final.groupby("variant").ERR.mean().index)
+    ['blind', 'filtered', 'unfiltered']
     """
 
     def __init__(self, folder: str | Path) -> None:
