@@ -111,14 +111,14 @@ def compare(
         names = [only.name]
         sides = comparison.variants_as_sides(only.rows, only.name, _digest(only), variants)
     else:
-        names = _labels([each.path for each in opened])
+        names = labels_of([each.path for each in opened])
         sides = [
             Side(
                 name,
                 each.name,
                 _digest(each),
                 _chosen(each, variants),
-                _asked(each.summary),
+                asked(each.summary),
             )
             for name, each in zip(names, opened, strict=True)
         ]
@@ -176,7 +176,7 @@ def as_json(compared: Compared) -> str:
     return json_text(plain(compared.content))
 
 
-def _asked(summary: Mapping[str, Any]) -> dict[str, Any]:
+def asked(summary: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a result's log was asked for that changes a frame's numbers, by the settings."""
     run = summary.get("run", {})
     return {
@@ -203,7 +203,7 @@ def _chosen(opened: Result, variants: Sequence[str] | None) -> Rows:
     return chosen
 
 
-def _labels(paths: Sequence[Path]) -> list[str]:
+def labels_of(paths: Sequence[Path]) -> list[str]:
     """Call each result by its file's name, or where that is not its own by its whole path."""
     stems = [visible(path.stem or str(path)) for path in paths]
     counted = Counter(stems)

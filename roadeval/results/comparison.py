@@ -57,7 +57,7 @@ def verdict(comparison: Comparison) -> str:
 
 def warnings(comparison: Comparison) -> list[str]:
     """Return what was left out and what makes results less comparable than they look."""
-    return [_note(note) for note in comparison.notes]
+    return [note(each) for each in comparison.notes]
 
 
 def judged(judgement: Judgement) -> str:
@@ -102,8 +102,9 @@ def _change(row: MaskComparison, settings: EvaluationSettings) -> str:
     return clauses[degree_of(change, settings)]
 
 
-def _note(note: Note) -> str:
-    match note:
+def note(told: Note) -> str:
+    """Return a note on a comparison as a clause."""
+    match told:
         case FramesLeftOut(result, other, frames):
             return (
                 f"{frames} frames that {result} evaluated are left out against {other}, which "

@@ -52,7 +52,13 @@ def fleet_of(
         rng = np.random.default_rng((seed, i))
         rows = _broken(i, member) if broken else None
         if rows is None:
-            rows = _scored(folder, i, member, rng, frames, change, broken, i < pictures)
+            masks = _counts(i, rng, frames or 20, change)
+            rows = _scored(i, member.drive, masks, rng, lost=broken and i % 10 == 8)
+            lights = {c.name: rows["drives"][0][c.name] for c in LIGHT}
+            if frames:
+                _write_frames(folder, member.drive, masks, lights)
+            if i < pictures:
+                _write_pictures(folder, member.drive)
         tables = {name: cells(name, own) for name, own in rows.items()}
         Record(member.drive, "asked", None, tables).write(folder)
     writer.finish(members, EvaluationSettings(), RUN if run is None else run, "")
@@ -80,17 +86,11 @@ def _broken(i, member):
     return {"drives": [own], "scores": [], "effects": [], "worst": []}
 
 
-def _scored(folder, i, member, rng, frames, change, broken, pictured):
-    n = frames or 20
-    masks = _counts(i, rng, n, change)
+def _scored(i, drive, masks, rng, *, lost):
+    n = len(masks["blind", "post"])
     lights = dict(zip((c.name for c in LIGHT), rng.random(4).tolist(), strict=True))
-    if frames:
-        _write_frames(folder, member.drive, masks, lights)
-    if pictured:
-        _write_pictures(folder, member.drive)
-    lost = broken and i % 10 == 8
     own = {
-        "drive": member.drive,
+        "drive": drive,
         "status": "damaged" if lost else "scored",
         "exit_code": 3 if lost else 0,
         "losses": f"frame {i} cannot be decoded\n3 records are cut off" if lost else None,
@@ -104,9 +104,9 @@ def _scored(folder, i, member, rng, frames, change, broken, pictured):
     }
     return {
         "drives": [own],
-        "scores": list(_scores(member.drive, masks)),
-        "effects": list(_effects(member.drive, masks)),
-        "worst": list(_worst(member.drive, masks, lights)),
+        "scores": list(_scores(drive, masks)),
+        "effects": list(_effects(drive, masks)),
+        "worst": list(_worst(drive, masks, lights)),
     }
 
 

@@ -1,0 +1,1 @@
+"""Reports of fleets: many drives judged together, and two fleets compared."""

@@ -1,0 +1,54 @@
+"""A drive's masks, frame by frame, from its fleet's table of frames."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from roadeval.evaluation.drives_comparison import Mask, MaskFrames
+from roadeval.results.fleet.record import frames_path
+from roadeval.results.fleet.tables import read_parquet
+from roadeval.results.reading import ResultsError
+
+_OUTCOMES: Final = ("TP", "TN", "FP", "FN")
+_COLUMNS: Final = ["stamp_ns", "variant", "stage", *_OUTCOMES]
+
+
+def read_masks(folder: Path, drive: str) -> dict[Mask, MaskFrames]:
+    """Read the counts of a drive's masks, in the order of its frames.
+
+    Raises
+    ------
+    ResultsError
+        If they are not there, or damaged.
+    """
+    path = frames_path(folder, drive)
+    try:
+        table = read_parquet(path, _COLUMNS)
+        counts = np.stack([table[name].to_numpy() for name in _OUTCOMES], axis=1)
+        stamps = table["stamp_ns"].to_numpy()
+    except FileNotFoundError:
+        raise ResultsError(f"{path}: is not there; run the fleet's command again") from None
+    except (OSError, ValueError, KeyError) as error:  # Arrow's too
+        reason = str(error).partition("\n")[0]
+        raise ResultsError(f"{path}: damaged ({reason}); run the fleet's command again") from error
+    codes, masks = _codes(table)
+    return {
+        mask: MaskFrames(stamps[own], counts[own])
+        for code, mask in enumerate(masks)
+        for own in [np.flatnonzero(codes == code)]
+        if len(own)
+    }
+
+
+def _codes(table: Any) -> tuple[Any, list[Mask]]:
+    """Return the number of each row's mask, and the masks in the order in which they come."""
+    variants, stages = (
+        table[name].combine_chunks().dictionary_encode() for name in ("variant", "stage")
+    )
+    width = len(stages.dictionary)
+    codes = variants.indices.to_numpy().astype(np.int64) * width + stages.indices.to_numpy()
+    names = [(v, s) for v in variants.dictionary.to_pylist() for s in stages.dictionary.to_pylist()]
+    return codes, names
