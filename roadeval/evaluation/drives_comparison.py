@@ -199,11 +199,11 @@ def pair_drive(
     # What would tell on a single drive takes as long again to find, and nobody asks for it here.
     settings = replace(settings, negligible=1.0)
     masks, truths = {}, 0
-    left = [0, 0]
+    left = 0, 0
     for mask in (each for each in new if each in base):
         before, after = base[mask], new[mask]
         mine, theirs = matched(before.stamps, after.stamps)
-        left = [len(before.stamps) - len(mine), len(after.stamps) - len(mine)]
+        left = len(before.stamps) - len(mine), len(after.stamps) - len(mine)
         if len(mine):
             counts = before.counts[mine], after.counts[theirs]
             masks[mask] = _pair(*counts, settings, tested=mask in tested)
@@ -223,11 +223,11 @@ def matched(base: Integers, new: Integers) -> tuple[Integers, Integers]:
         every = np.arange(len(base))
         return every, every
     _, codes = np.unique(np.concatenate([base, new]), return_inverse=True)
-    keys = [
+    before, after = (
         codes[part] * (len(codes) + 1) + _occurrences(codes[part])
         for part in (slice(len(base)), slice(len(base), None))
-    ]
-    _, mine, theirs = np.intersect1d(*keys, return_indices=True)
+    )
+    _, mine, theirs = np.intersect1d(before, after, return_indices=True)
     order = np.argsort(mine)
     return mine[order], theirs[order]
 

@@ -11,6 +11,7 @@ from typing import Any, Final
 from roadeval.data import BASELINE, Counts
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import analysis, metrics
+from roadeval.evaluation.comparison import ComparisonError
 from roadeval.evaluation.comparison_result import SettingsDiffer
 from roadeval.evaluation.conditions import Condition
 from roadeval.evaluation.drives import AcrossSettings
@@ -117,7 +118,7 @@ def compare_fleets(
     labels = labels_of([fleet.path.resolve() for fleet in fleets])
     settings = analysis.settings_of(fleets[0].summary)
     drives = [_drives(fleet) for fleet in fleets]
-    matched = match_drives(*drives)
+    matched = match_drives(drives[0], drives[1])
     finals, levels = _levels(fleets[1], variants)
     tested, untested = _tested(finals, len(matched.pairs))
     pairs, left = [], list(matched.left_out)
@@ -126,6 +127,11 @@ def compare_fleets(
             pairs.append(pair)
         else:
             left.append(LeftOut(pair.drive, "new", LeftOutBecause.NO_FRAME))
+    if not pairs:
+        raise ComparisonError(
+            f"{labels[0]} and {labels[1]} have no evaluated frame of one drive in common, so "
+            "nothing can be compared; replay the same drives into both"
+        )
     across = AcrossSettings(confidence=settings.confidence)
     changes = compare_drives(pairs, finals, across)
     scored = [sum(each.scored for each in own.values()) for own in drives]
@@ -133,11 +139,13 @@ def compare_fleets(
         conditions, changes, levels, smaller=min(scored), scales=_scales(fleets)
     )
     masks = [mask for mask in finals if mask[0] != BASELINE]
+    sides = [
+        FleetSide(label, len(own), count, fleet.summary["version"])
+        for label, own, count, fleet in zip(labels, drives, scored, fleets, strict=True)
+    ]
     comparison = FleetComparison(
-        *(
-            FleetSide(label, len(own), count, fleet.summary["version"])
-            for label, own, count, fleet in zip(labels, drives, scored, fleets, strict=True)
-        ),
+        base=sides[0],
+        new=sides[1],
         drives=len(pairs),
         by_log=matched.by_log,
         changes=tuple(changes),
@@ -276,4 +284,4 @@ def _settings_differ(fleets: Sequence[Fleet], labels: Sequence[str]) -> Settings
     differing: Mapping[str, tuple[Any, Any]] = {
         name: (base[name], new[name]) for name in base if name in new and base[name] != new[name]
     }
-    return SettingsDiffer(*labels, differing) if differing else None
+    return SettingsDiffer(labels[0], labels[1], differing) if differing else None

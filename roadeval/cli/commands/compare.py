@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from roadeval.report.pdf.typeset import Paper
 
 
 def _condition(texts: list[str] | None) -> list[str] | None:
@@ -32,7 +39,8 @@ Results = Annotated[
     typer.Argument(
         metavar="BASE NEW...",
         show_default=False,
-        help="Recordings or results folders; of a single one its variants are compared.",
+        help="Recordings or results folders; of a single one its variants are compared. Or two "
+        "fleets.",
     ),
 ]
 Variants = Annotated[
@@ -75,31 +83,72 @@ def compare(
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
-    """Compare results of one drive, or the variants of one result.
+    """Compare results of one drive, the variants of one result, or two fleets.
 
     Frame by frame; those that either trained on are left out. Results of different drives are put
     side by side without differences. Exit code 4 if a --fail-if condition holds; 1 if one cannot be
     judged, as where two results have fewer than ten frames in common, or fewer than half of those
-    of the shorter one.
+    of the shorter one. Fleets are paired by drive, and judged over drives.
     """
-    from roadeval.cli.screens import compare as screen
-    from roadeval.jobs import compare as comparing
+    from roadeval.jobs.compare_fleets import are_fleets
     from roadeval.jobs.outputs import holding
 
     size = arguments.paper_of(paper)
+    told = _fleets if are_fleets(results) else _results
     with holding(*(output or ()), inputs=results):
-        compared = comparing.compare(results, variants=variant, fail_if=fail_if or ())
-        for path in output or ():
-            comparing.write(compared, path, paper=size)
+        shown = told(results, variant, fail_if or [], output or [], size)
     if json:
-        console.emit(comparing.as_json(compared).rstrip())
+        console.emit(shown.json().rstrip())
     elif not quiet:
-        screen.show(compared.content, console.results())
-    for warning in compared.content["warnings"]:
+        shown.show(shown.content, console.results())
+    for warning in shown.content["warnings"]:
         messages.warning(warning)
-    for sentence in compared.held:
+    for sentence in shown.held:
         messages.error(sentence)
-    return ExitCode.CONDITION_HELD if compared.held else ExitCode.DONE
+    return ExitCode.CONDITION_HELD if shown.held else ExitCode.DONE
+
+
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """A comparison, whatever of: its content, conditions that hold, and how it is shown."""
+
+    content: Mapping[str, Any]
+    held: Sequence[str]
+    json: Callable[[], str]
+    show: Callable[[Mapping[str, Any], Console], None]
+
+
+def _results(
+    results: list[Path],
+    variants: list[str] | None,
+    conditions: list[str],
+    outputs: list[Path],
+    paper: Paper,
+) -> _Shown:
+    from roadeval.cli.screens import compare as screen
+    from roadeval.jobs import compare as comparing
+
+    compared = comparing.compare(results, variants=variants, fail_if=conditions)
+    for path in outputs:
+        comparing.write(compared, path, paper=paper)
+    return _Shown(compared.content, compared.held, lambda: comparing.as_json(compared), screen.show)
+
+
+def _fleets(
+    results: list[Path],
+    variants: list[str] | None,
+    conditions: list[str],
+    outputs: list[Path],
+    paper: Paper,
+) -> _Shown:
+    from roadeval.cli.screens import compare_fleets as screen
+    from roadeval.jobs import compare_fleets as comparing
+
+    base, new = results
+    compared = comparing.compare_fleets(base, new, variants=variants, fail_if=conditions)
+    for path in outputs:
+        comparing.write(compared, path, paper=paper)
+    return _Shown(compared.content, compared.held, lambda: comparing.as_json(compared), screen.show)
 
 
 COMMAND: Final = compare

@@ -220,10 +220,10 @@ def _summary(ax: Axes, mean: ForestMean, top: float, scale: float) -> None:
         ax.plot(ends, [places[1]] * 2, color=INK, linewidth=1.3, linestyle=(0, (3, 1.5)), zorder=4)
         ax.plot(ends, [places[1]] * 2, "|", color=INK, markersize=6, zorder=4)
     ticks = list(ax.get_yticks()), [label.get_text() for label in ax.get_yticklabels()]
-    size = ax.get_yticklabels()[0].get_size() if ticks[0] else 7
+    size = ax.get_yticklabels()[0].get_fontsize() if ticks[0] else 7
     ax.set_yticks([*ticks[0], *places], [*ticks[1], *words], size=size)
     for label in ax.get_yticklabels()[-2:]:
-        label.set_weight("bold")
+        label.set_fontweight("bold")
 
 
 def _short(name: str, longest: int = LONGEST) -> str:

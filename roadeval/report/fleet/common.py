@@ -49,12 +49,10 @@ class MarkedRow:
         value = str(told["value"])
         if told["by"] in _LIGHT:
             value = f"{value} ({_number(told['least'])} to {_number(told['most'])})"
-        names = ("drives", "mean", "low", "high", "worse", "better")
         return cls(
-            told["by"].removeprefix(TAG),
-            value,
-            *(told[name] for name in names),
-            stands(told["p_holm"], told["confidence"]),
+            *(told["by"].removeprefix(TAG), value),
+            *(told["drives"], told["mean"], told["low"], told["high"]),
+            *(told["worse"], told["better"], stands(told["p_holm"], told["confidence"])),
             told["comparisons"],
         )
 

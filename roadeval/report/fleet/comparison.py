@@ -92,8 +92,6 @@ def _blocks(comparison: FleetComparison, judgements: Sequence[FleetJudgement]) -
 def _drives(comparison: FleetComparison) -> Iterator[Block]:
     """Yield which drives changed, and the plot of all."""
     finals = comparison.finals()
-    if not comparison.drives:
-        return
     yield Heading("Which drives changed")
     for change in finals:
         yield Text(changed_drives(comparison, (change.variant, change.stage)))

@@ -128,11 +128,6 @@ def as_dict(
 
 def verdict(comparison: FleetComparison) -> str:
     """Return whether the new fleet is better or worse than the base, and how sure that is."""
-    if not comparison.drives:
-        return (
-            f"Nothing to compare: {comparison.base.label} and {comparison.new.label} have no "
-            "scored drive in common."
-        )
     return " ".join(_verdicts(comparison))
 
 
@@ -141,7 +136,7 @@ def _verdicts(comparison: FleetComparison) -> Iterator[str]:
     finals = comparison.finals()
     for change in finals:
         found = asdict(change.difference[TESTED])
-        about = {"stage": change.stage, "metric": TESTED}
+        about: dict[str, Any] = {"stage": change.stage, "metric": TESTED}
         if change.p_holm is not None:
             about["p"] = change.p_holm
         told = sentence(found | about, what, comparison.settings)
