@@ -1,0 +1,53 @@
+"""What the report of a fleet is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from roadeval.report.blocks import ImageFile
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class WorstFrame:
+    """One of the worst frames over all drives; without a picture where none is left."""
+
+    drive: str
+    frame: int
+    rates: Mapping[str, float]
+    picture: ImageFile | None
+
+
+@dataclass(frozen=True, slots=True)
+class FleetFindings:
+    """What the report of a fleet is made of.
+
+    Parameters
+    ----------
+    name, folder
+        Of the fleet.
+    summary
+        The content of ``fleet.json``.
+    drives
+        Rows of ``drives`` by the drives' identity.
+    names
+        The drives' names for people, by their identity; no two are equal.
+    effects
+        Rows of ``effects`` of the final masks' ERR, by kind and variant.
+    scores
+        Rows of ``scores`` of the first variant's final mask, over all labelled pixels.
+    worst
+        The worst frames over all drives.
+    """
+
+    name: str
+    folder: str
+    summary: Mapping[str, Any]
+    drives: Mapping[str, Row]
+    names: Mapping[str, str]
+    effects: Mapping[tuple[str, str], Sequence[Row]]
+    scores: Sequence[Row]
+    worst: Sequence[WorstFrame] = field(default_factory=tuple)

@@ -1,0 +1,176 @@
+"""The first page of a fleet's report: the verdict, the rates, and the differences over drives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from roadeval.data import BASELINE
+from roadeval.data.words import DASH, defined, interval, listing, number, percent, points
+from roadeval.evaluation.metrics import FULL, SHORT
+from roadeval.report.blocks import Block, BulletList, Cell, Heading, Table, Text, TwoColumns
+from roadeval.report.fleet.findings import FleetFindings
+from roadeval.report.sections.common import variant_cell
+
+STATUSES: Final = {
+    "scored": "scored",
+    "damaged": "scored, but for what is lost of the log",
+    "unscored": "without truth",
+    "failed": "failed",
+}
+ROWS: Final = 24
+"""Variants that the tables have, at most."""
+
+
+def section(findings: FleetFindings) -> Iterator[Block]:
+    """Yield the first page."""
+    told = findings.summary
+    yield Heading("Summary")
+    yield Text(told["verdict"], "verdict")
+    if note := _how_sure(told):
+        yield Text(note, "note")
+    if told["rates"]:
+        yield rates_table(findings)
+    if told["effects"]:
+        yield effects_table(findings)
+        yield Text(_effects_note(), "note")
+    yield TwoColumns(
+        [_counts(told)],
+        [BulletList("Beware", warnings(findings) or ["Nothing known."], _tone(findings))],
+    )
+
+
+def _tone(findings: FleetFindings) -> str:
+    return "warning" if warnings(findings) else "plain"
+
+
+def rates_table(findings: FleetFindings) -> Table:
+    """Tabulate the final masks' rates; the best of each column is bold."""
+    rows = findings.summary["rates"][:ROWS]
+    names = [row["variant"] for row in rows]
+    columns = {name: metric.higher_is_better for name, metric in FULL.items()}
+    columns["pooled_ERR"] = False
+    best = {name: _best([row[name] for row in rows], higher) for name, higher in columns.items()}
+    return Table(
+        ["final mask", "drives", "frames", *(name.replace("_", " ") for name in columns)],
+        [
+            [
+                variant_cell(row["variant"], names),
+                number(row["drives"]),
+                number(row["frames"]),
+                *(Cell(percent(row[name]), bold=row[name] == best[name]) for name in columns),
+            ]
+            for row in rows
+        ],
+        caption=(
+            "Percent: the mean over drives of each drive's mean rate; pooled ERR is of all pixels "
+            "of all drives together, so that long drives count for more. Bold: the best."
+        ),
+    )
+
+
+def _best(values: list[float | None], higher: bool) -> float | None:
+    known = [value for value in values if defined(value)]
+    return (max if higher else min)(known, default=None)
+
+
+def effects_table(findings: FleetFindings) -> Table:
+    """Tabulate the differences over drives: the filter's, and each variant's against blind."""
+    told = [each for each in findings.summary["effects"] if each["metric"] in SHORT]
+    keys = list(dict.fromkeys((each["kind"], each["variant"]) for each in told))[:ROWS]
+    rows: list[list[Cell | str]] = []
+    breaks = []
+    for key in keys:
+        breaks.append(len(rows))
+        own = {each["metric"]: each for each in told if (each["kind"], each["variant"]) == key}
+        there = [name for name in SHORT if name in own]
+        rows += [_effect_cells(own[name], first=name == there[0]) for name in there]
+    return Table(
+        ["difference", "rate", "mean", "interval", "worse", "better", "pooled", "spread"],
+        rows,
+        text_columns=(0, 1),
+        breaks=breaks[1:],
+        groups=[("", 2), ("over drives", 2), ("drives", 2), ("", 2)],
+        small=True,
+    )
+
+
+def _effect_cells(each: Mapping[str, Any], *, first: bool) -> list[Cell | str]:
+    spread = each["spread"]
+    return [
+        f"{each['variant']} \N{MINUS SIGN} {each['base']}" if first else "",
+        each["metric"],
+        Cell(points(each["mean"]), bold=first),
+        interval(each["low"], each["high"]),
+        number(each["worse"]),
+        number(each["better"]),
+        points(each["pooled"]),
+        percent(spread["tau"]) if spread else DASH,
+    ]
+
+
+def _effects_note() -> str:
+    return (
+        "Percentage points. A drive is as good as any other, long or short; drives of one group "
+        "count as one. Pooled: of all pixels together. Spread: how far the drives' true "
+        "differences lie apart (standard deviation), their own errors set aside."
+    )
+
+
+def _how_sure(told: Mapping[str, Any]) -> str:
+    effects = [each for each in told["effects"] if each["metric"] == "ERR" and each["drives"]]
+    if not effects:
+        return ""
+    first = effects[0]
+    groups = (
+        f" The {first['drives']} drives are {first['clusters']} groups: drives of a group count "
+        "as one."
+        if first["clusters"] < first["drives"]
+        else ""
+    )
+    if first["low"] is None:
+        return f"No interval: it takes {first['clusters_needed']} drives or groups.{groups}"
+    method = {"t": "Student's t over drives", "sign flip": "the exact sign-flip test"}
+    return (
+        f"Intervals of {percent(first['confidence'], 0)} %, by "
+        f"{method.get(first['method'], first['method'])}; the drive is the unit.{groups}"
+    )
+
+
+def _counts(told: Mapping[str, Any]) -> Table:
+    rows = [[text, number(told["counts"].get(name, 0))] for name, text in STATUSES.items()]
+    rows.append(["all", number(len(told["drives"]))])
+    return Table(["drives", "count"], rows, breaks=[len(STATUSES)], small=True)
+
+
+def warnings(findings: FleetFindings) -> list[str]:
+    """Return what a reader must know before believing the numbers."""
+    return list(_warnings(findings))
+
+
+def _warnings(findings: FleetFindings) -> Iterator[str]:
+    told = findings.summary
+    if failed := told["counts"].get("failed"):
+        of = number(len(told["drives"]))
+        yield f"{number(failed)} of {of} drives failed: no number has them."
+    if damaged := told["counts"].get("damaged"):
+        yield f"{number(damaged)} drives were scored without what is lost of their logs."
+    own = sum(1 for row in findings.drives.values() if row["evaluated"] and not row["model"])
+    if own and told["run"].get("training", {}).get("source") != "reference":
+        yield (
+            f"{number(own)} drives were scored by models trained on their own first frames (none "
+            "of these is evaluated): the rates say how well it does on a road that it has seen."
+        )
+    yield from _worse_than_baseline(told)
+
+
+def _worse_than_baseline(told: Mapping[str, Any]) -> Iterator[str]:
+    rates = {row["variant"]: row["ERR"] for row in told["rates"]}
+    blind = rates.get(BASELINE)
+    if not defined(blind):
+        return
+    if worse := [name for name, err in rates.items() if defined(err) and err > blind]:
+        yield (
+            f"{listing(worse)} {'is' if len(worse) == 1 else 'are'} worse than {BASELINE} (ERR "
+            f"{percent(blind)} %), which never looks at the image."
+        )
