@@ -17,7 +17,7 @@ WORST: Final = 12
 """Worst frames that are shown."""
 _DRIVES: Final = [
     *("drive", "name", "group", "fold", "status", "reason", "sha256", "evaluated", "losses"),
-    *("model", "luminance", "contrast", "shadow", "sun"),
+    *("trained_on", "model", "luminance", "contrast", "shadow", "sun"),
 ]
 _EFFECTS: Final = [
     *("drive", "kind", "variant", "stage", "final", "base", "metric"),

@@ -26,7 +26,7 @@ LONGEST: Final = 32
 """Letters of a name, at most."""
 ROW: Final = 0.17
 """Inches that a named drive takes; in long plots a little less."""
-CATERPILLAR: Final = 4.2
+CATERPILLAR: Final = 3.3
 """Inches that drives without names take together."""
 BELOW: Final = 2.2
 """Rows below the last drive, for the mean and a new drive."""
@@ -97,7 +97,7 @@ def forest(rows: Sequence[ForestRow], mean: ForestMean, label: str) -> Figure:
 def height(drives: int) -> float:
     """Return the inches that a plot of so many drives is high."""
     if drives > NAMED:
-        return CATERPILLAR + 1.2
+        return CATERPILLAR + 1.1
     return 0.75 + (drives + BELOW) * (ROW if drives <= 40 else 0.85 * ROW)
 
 

@@ -119,7 +119,7 @@ def caption(rows: Sequence[ForestRow], mean: ForestMean) -> str:
     if missing := sum(row.low is None for row in rows):
         told.append(f"{missing} drive{' has' if missing == 1 else 's have'} no interval.")
     if beyond := cut(rows, mean):
-        told.append(f"{beyond} interval{'' if beyond == 1 else 's'} reach beyond the edge.")
+        told.append(f"{beyond} interval{' reaches' if beyond == 1 else 's reach'} beyond the edge.")
     if mean.low is None:
         told.append("The mean has no interval: too few drives or groups of drives.")
     else:

@@ -107,5 +107,5 @@ def _of_kind(findings: FleetFindings, kind: str) -> Iterator[Row]:
 
 
 def _tags(tags: Mapping[str, str]) -> str:
-    text = ", ".join(f"{key} {value}" for key, value in tags.items())
+    text = ", ".join(f"{key}: {value}" for key, value in tags.items())
     return text if len(text) <= TAGS else f"{text[: TAGS - 1]}\N{HORIZONTAL ELLIPSIS}"

@@ -152,16 +152,20 @@ def _warnings(findings: FleetFindings) -> Iterator[str]:
     told = findings.summary
     if failed := told["counts"].get("failed"):
         of = number(len(told["drives"]))
-        yield f"{number(failed)} of {of} drives failed: no number has them."
+        yield f"{number(failed)} of {of} drives failed: no number counts them."
     if damaged := told["counts"].get("damaged"):
-        yield f"{number(damaged)} drives were scored without what is lost of their logs."
-    own = sum(1 for row in findings.drives.values() if row["evaluated"] and not row["model"])
-    if own and told["run"].get("training", {}).get("source") != "reference":
+        yield f"{_drives(damaged)} scored without what is lost of the log."
+    scored = [row for row in findings.drives.values() if row["evaluated"]]
+    if own := sum(1 for row in scored if row["trained_on"] and not row["model"]):
         yield (
-            f"{number(own)} drives were scored by models trained on their own first frames (none "
-            "of these is evaluated): the rates say how well it does on a road that it has seen."
+            f"{_drives(own)} scored by a model trained on the drive's own first frames (none of "
+            "these is evaluated): the rates say how well it does on a road that it has seen."
         )
     yield from _worse_than_baseline(told)
+
+
+def _drives(count: int) -> str:
+    return f"{number(count)} drive{' was' if count == 1 else 's were'}"
 
 
 def _worse_than_baseline(told: Mapping[str, Any]) -> Iterator[str]:

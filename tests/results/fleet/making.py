@@ -99,6 +99,7 @@ def _scored(i, drive, masks, rng, *, lost):
         "sha256": f"{i:064x}",
         "size_bytes": 10**6,
         "evaluated": n,
+        "trained_on": 10,
         "in_log": n + 10,
         **lights,
     }
