@@ -79,8 +79,7 @@ def _show_drives(content: Mapping[str, Any], out: Console) -> None:
         worse = sum(row["mean"] > 0 for row in changed)
         out.print(
             f"{variant}: {TESTED} changed on {len(changed)} of {tested} drives (worse on {worse}, "
-            f"better on {len(changed) - worse}; false discovery rate {rate:.0%})",
-            soft_wrap=True,
+            f"better on {len(changed) - worse}; false discovery rate {rate:.0%})"
         )
         if changed:
             tables.show(("drive",), DRIVE, [_drive(row) for row in changed[:NAMED]], out)

@@ -102,7 +102,7 @@ def _legend(rows: Sequence[MarkedRow], left_out: int) -> str:
             f" {MARK} stands after Holm's correction for the {max(counts)} parts that were "
             "tested together."
         )
-    else:
+    elif all(row.low is None for row in rows):
         told += " No part has enough drives, or groups of them, for an interval."
     if left_out:
         told += f" {left_out} smaller parts are left out."

@@ -130,7 +130,7 @@ def _strata(comparison: FleetComparison) -> Iterator[Block]:
             for each in comparison.strata
             if (each.variant, each.stage) == (change.variant, change.stage)
         ]
-        if rows:
+        if any(row.mean for row in rows):
             yield Heading(f"Change of {TESTED} of {change.variant} by tag", 2)
             yield from strata_table(rows)
 
@@ -161,18 +161,16 @@ def changes_table(comparison: FleetComparison) -> Table:
                 percent(change.new[TESTED]),
                 Cell(points(over.mean), bold=change.final),
                 interval(over.low, over.high) + mark,
-                number(over.worse),
-                number(over.better),
                 *(points(change.difference[rate].mean) for rate in OTHERS),
             ]
         )
-    titles = ["base", "new", "change", "interval", "worse", "better"]
+    titles = ["base", "new", "change", "interval"]
     return Table(
         ["variant", "stage", "drives", *titles, *OTHERS],
         rows,
         text_columns=(0, 1),
         breaks=breaks,
-        groups=[("", 3), (TESTED, 4), ("drives", 2), ("change", len(OTHERS))],
+        groups=[("", 3), (TESTED, 4), ("change", len(OTHERS))],
         small=True,
     )
 

@@ -1,0 +1,85 @@
+"""The forest plot."""
+
+import numpy as np
+import pytest
+
+from roadeval.report.figures.files import svg
+from roadeval.report.figures.forest import (
+    EXTREMES,
+    NAMED,
+    ForestMean,
+    ForestRow,
+    cut,
+    forest,
+    limits,
+)
+
+MEAN = ForestMean(0.01, 0.005, 0.015, -0.02, 0.04)
+
+
+def rows(count, group=None):
+    return [
+        ForestRow(f"drive_{i:04}", group, 0.02 * (i / count - 0.4), -0.01, 0.015)
+        for i in range(count)
+    ]
+
+
+def drawn(figure):
+    (ax,) = figure.axes
+    return ax, [label.get_text() for label in ax.get_yticklabels()]
+
+
+def test_the_worst_drive_is_above_and_the_mean_below_all():
+    ax, names = drawn(forest(rows(3), MEAN, "pp"))
+    assert names == ["drive_0002", "drive_0001", "drive_0000", "mean over drives", "a new drive"]
+    assert ax.get_ylim()[0] > ax.get_ylim()[1]
+    (diamond,) = (patch for patch in ax.patches if len(patch.get_xy()) == 5 and patch.zorder == 4)
+    x = diamond.get_xy()[:, 0]
+    assert (x.min(), x.max()) == pytest.approx((0.5, 1.5))
+
+
+def test_a_drive_has_its_interval_and_one_without_has_none():
+    ax, _ = drawn(forest([ForestRow("a", None, 0.01, 0.005, 0.03)], MEAN, "pp"))
+    (line,) = (line for line in ax.lines if len(line.get_xdata()) == 3)
+    assert line.get_xdata()[:2] == pytest.approx([0.5, 3.0])
+    ax, _ = drawn(forest([ForestRow("a", None, 0.01, None, None)], MEAN, "pp"))
+    assert not [line for line in ax.lines if len(line.get_xdata()) == 3]
+
+
+def test_groups_stand_at_the_edge():
+    ax, _ = drawn(forest(rows(2, "monday"), MEAN, "pp"))
+    assert [text.get_text() for text in ax.texts[:2]] == ["monday", "monday"]
+
+
+def test_of_many_drives_only_the_extremes_are_named():
+    _, names = drawn(forest(rows(NAMED), MEAN, "pp"))
+    assert len(names) == NAMED + 2
+    ax, names = drawn(forest(rows(NAMED + 1), MEAN, "pp"))
+    assert names == ["mean over drives", "a new drive"]
+    worst, best = (text.get_text() for text in ax.texts[:2])
+    assert worst.splitlines()[0].startswith(f"drive_{NAMED:04} +")
+    assert best.splitlines()[-1].startswith("drive_0000")
+    assert len(worst.splitlines()) == EXTREMES
+
+
+def test_without_an_interval_the_mean_is_a_mark_and_no_new_drive_is_told():
+    mean = ForestMean(0.01, None, None, None, None)
+    ax, names = drawn(forest(rows(3), mean, "pp"))
+    assert names[-1].startswith("a new drive \N{EN DASH}")
+    assert [line.get_marker() for line in ax.lines].count("D") == 1
+
+
+def test_one_huge_interval_does_not_hide_the_rest_and_is_counted():
+    many = [*rows(20), ForestRow("huge", None, 0.0, -0.9, 0.9)]
+    low, high = limits(many, MEAN)
+    assert -5 < low < -2
+    assert 4 < high < 5
+    assert cut(many, MEAN) == 1
+
+
+def test_thousands_of_drives_make_a_small_picture():
+    rng = np.random.default_rng(0)
+    many = [
+        ForestRow(str(i), None, m, m - 0.01, m + 0.01) for i, m in enumerate(rng.normal(size=3000))
+    ]
+    assert len(svg(lambda: forest(many, MEAN, "pp")).content) < 1_500_000
