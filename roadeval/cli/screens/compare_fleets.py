@@ -9,7 +9,7 @@ from roadeval.cli.screens import tables
 from roadeval.cli.screens.tables import Row, interval, percent, points
 from roadeval.data import BASELINE
 from roadeval.evaluation.metrics import SHORT
-from roadeval.results.certainty import MARK, stands
+from roadeval.results.certainty import MARK, correction, stands
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,11 +32,8 @@ def show(content: Mapping[str, Any], out: Console) -> None:
     )
     if content["changes"]:
         tables.show(("variant", "stage", "rate"), CHANGE, list(_changes(content["changes"])), out)
-        if counts := {c["comparisons"] for c in content["changes"] if c["comparisons"]}:
-            out.print(
-                f"{MARK} stands after Holm's correction for the {max(counts)} differences of "
-                f"{TESTED}; other rates are not corrected."
-            )
+        if legend := correction(content["changes"]):
+            out.print(legend)
     out.print()
     _show_drives(content, out)
     out.print(content["verdict"])

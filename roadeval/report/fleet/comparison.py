@@ -14,7 +14,7 @@ from roadeval.report.figures.files import svg
 from roadeval.report.figures.forest import ForestMean, ForestRow, forest
 from roadeval.report.fleet.common import MarkedRow, caption, q_value, strata_table
 from roadeval.report.markdown import table as markdown_table
-from roadeval.results.certainty import MARK, stands
+from roadeval.results.certainty import MARK, correction, stands
 from roadeval.results.fleet.comparison import (
     FleetComparison,
     changed_drives,
@@ -59,7 +59,8 @@ def markdown(comparison: FleetComparison, judgements: Sequence[FleetJudgement]) 
         for each in judgements
     ]
     if comparison.changes:
-        lines += ["", *markdown_table(changes_table(comparison)), "", as_markdown(_legend()), ""]
+        lines += ["", *markdown_table(changes_table(comparison)), ""]
+        lines += [line for legend in _legend(comparison) for line in (as_markdown(legend), "")]
     for change in comparison.finals():
         mask = change.variant, change.stage
         lines += [as_markdown(changed_drives(comparison, mask)), ""]
@@ -82,7 +83,7 @@ def _blocks(comparison: FleetComparison, judgements: Sequence[FleetJudgement]) -
     if comparison.changes:
         yield changes_table(comparison)
         yield Text(UNIT, "note")
-        yield Text(_legend(), "note")
+        yield from (Text(legend, "note") for legend in _legend(comparison))
     if comparison.left_out or warnings(comparison):
         yield BulletList("Beware", warnings(comparison), "warning")
     yield from _drives(comparison)
@@ -135,11 +136,10 @@ def _strata(comparison: FleetComparison) -> Iterator[Block]:
             yield from strata_table(rows)
 
 
-def _legend() -> str:
-    return (
-        f"{MARK} stands after Holm's correction for all masks in the table; other rates than "
-        f"{TESTED} are not corrected."
-    )
+def _legend(comparison: FleetComparison) -> list[str]:
+    """Return what the mark in the table means, where something was corrected."""
+    told = correction({"comparisons": each.comparisons} for each in comparison.changes)
+    return [told] if told else []
 
 
 def changes_table(comparison: FleetComparison) -> Table:

@@ -60,3 +60,4 @@ def test_the_document_has_the_limits_the_plot_and_the_drives(compared):
     words = text(pdf(made))
     assert "raises ERR of post" in words
     assert "a new drive" in words
+    assert "Holm's correction for the 3 differences of ERR" in words
