@@ -161,7 +161,7 @@ def changed_drives(comparison: FleetComparison, mask: Mask) -> str:
 def discovery_note() -> str:
     """Return what it means that a drive is named as changed."""
     return (
-        f"Of the drives that are called changed, {percent(FALSE, 0)} % on average are not "
+        f"Of the drives that are called changed, at most {percent(FALSE, 0)} % on average are not "
         "(Benjamini and Hochberg's correction over the drives; q is the p-value after it)."
     )
 
