@@ -168,7 +168,7 @@ class Fleet:
     >>> import roadeval
     >>> fleet = roadeval.Fleet("monday")
     >>> fleet.drives[["name", "status", "evaluated"]].to_dict("records")
-    [{'name': 'drive', 'status': 'scored', 'evaluated': 4}]
+    [{'name': 'drive', 'status': 'scored', 'evaluated': 3}]
     >>> final = fleet.scores.query("final and region == 'all'")
     >>> sorted(final.groupby("variant").ERR.mean().index)
     ['blind', 'filtered', 'unfiltered']
