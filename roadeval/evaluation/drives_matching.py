@@ -76,19 +76,18 @@ def match_drives(base: Mapping[str, FleetDrive], new: Mapping[str, FleetDrive]) 
     return Matched(tuple(pairs), by_log, tuple(left))
 
 
-def _by_log(drives: Mapping[str, FleetDrive]) -> Mapping[str, deque[str]]:
-    found: defaultdict[str, deque[str]] = defaultdict(deque)
+def _by_log(drives: Mapping[str, FleetDrive]) -> Mapping[str | None, deque[str]]:
+    found: defaultdict[str | None, deque[str]] = defaultdict(deque)
     for drive, each in drives.items():
         if each.sha256:
             found[each.sha256].append(drive)
     return found
 
 
-def _next(logs: Mapping[str, deque[str]], sha256: str | None) -> str | None:
+def _next(logs: Mapping[str | None, deque[str]], sha256: str | None) -> str | None:
     """Return a drive of a log that is not matched yet: a log may be in a fleet twice."""
-    if not sha256 or not logs.get(sha256):
-        return None
-    return logs[sha256].popleft()
+    found = logs.get(sha256)
+    return found.popleft() if found else None
 
 
 def _why_not(base: FleetDrive, new: FleetDrive) -> LeftOutBecause | None:
