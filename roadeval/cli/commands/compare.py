@@ -83,7 +83,7 @@ def compare(
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
-    """Compare results of one drive, the variants of one result, or two fleets.
+    """Compare results of one drive, a result's variants, or two fleets.
 
     Frame by frame; those that either trained on are left out. Results of different drives are put
     side by side without differences. Exit code 4 if a --fail-if condition holds; 1 if one cannot be
