@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from roadeval.data import BASELINE, Counts
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import analysis, metrics
+from roadeval.evaluation import metrics
 from roadeval.evaluation.comparison import ComparisonError
 from roadeval.evaluation.comparison_result import SettingsDiffer
 from roadeval.evaluation.conditions import Condition
@@ -32,7 +32,7 @@ from roadeval.evaluation.drives_matching import (
     match_drives,
 )
 from roadeval.evaluation.metrics import METRICS
-from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.settings import EvaluationSettings, settings_of
 from roadeval.jobs.compare import asked, labels_of
 from roadeval.report.fleet.comparison import document, markdown
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
@@ -116,7 +116,7 @@ def compare_fleets(
     conditions = [Condition.parse(text) for text in fail_if]
     fleets = Fleet(base), Fleet(new)
     labels = labels_of([fleet.path.resolve() for fleet in fleets])
-    settings = analysis.settings_of(fleets[0].summary)
+    settings = settings_of(fleets[0].summary)
     drives = [_drives(fleet) for fleet in fleets]
     matched = match_drives(drives[0], drives[1])
     finals, levels = _levels(fleets[1], variants)
