@@ -3,8 +3,10 @@
 import json
 import shutil
 
+import numpy as np
 import pytest
 
+from roadeval.data.rows import Rows
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import comparison
 from roadeval.evaluation.comparison import Side
@@ -65,7 +67,8 @@ def _with_rates(frames):
     from roadeval.evaluation.metrics import METRICS
 
     rates = metrics.table(frames[["TP", "TN", "FP", "FN"]].to_numpy())
-    return frames.assign(**dict(zip(METRICS, rates.T, strict=True)))
+    named = {name: np.array(frames[name].tolist()) for name in frames}
+    return Rows(named | dict(zip(METRICS, rates.T, strict=True)))
 
 
 def test_drives_that_have_moved_are_known_by_their_logs(fleets, tmp_path):
