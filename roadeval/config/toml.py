@@ -64,17 +64,27 @@ def _text(path: Path) -> str:
     return text
 
 
-def run_toml(config: RunConfig, drive: str, version: str) -> str:
-    """Write the TOML file that makes a run again, with every effective setting."""
+def run_toml(config: RunConfig, drive: str, version: str, command: str = "replay") -> str:
+    """Write the TOML file that makes a run again, with every effective setting.
+
+    Parameters
+    ----------
+    config, drive, version
+        Of the run; for a person the drive's name, or how many there are.
+    command
+        That takes the file.
+    """
     import tomlkit
 
     document = tomlkit.document()
     document.add(
-        tomlkit.comment(f"The configuration of a replay of {visible(drive)} by roadeval {version}.")
+        tomlkit.comment(
+            f"The configuration of a {command} of {visible(drive)} by roadeval {version}."
+        )
     )
     document.add(
         tomlkit.comment(
-            "To repeat the run, give this file to roadeval replay as its configuration."
+            f"To repeat the run, give this file to roadeval {command} as its configuration."
         )
     )
     for key, value in without_none(config.as_dict()).items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from roadeval.fleet.errors import FleetError
 
@@ -39,7 +39,7 @@ def deal(groups: Mapping[str, str], folds: int, seed: int) -> dict[str, int]:
     >>> deal({"a": "monday", "b": "monday", "c": "tuesday"}, 2, seed=0)
     {'a': 1, 'b': 1, 'c': 0}
     """
-    names = sorted(set(groups.values()), key=lambda name: _shuffled(name, seed))
+    names = shuffled(set(groups.values()), seed)
     if len(names) < folds:
         raise FleetError(
             f"`fleet.folds`: {folds} folds need as many drives with truth, or groups of them, "
@@ -49,5 +49,10 @@ def deal(groups: Mapping[str, str], folds: int, seed: int) -> dict[str, int]:
     return {drive: fold[group] for drive, group in groups.items()}
 
 
-def _shuffled(name: str, seed: int) -> bytes:
-    return hashlib.blake2b(f"{seed} {name}".encode("utf-8", "surrogateescape")).digest()
+def shuffled(names: Iterable[str], seed: int) -> list[str]:
+    """Return names in an order that the seed draws, whatever order they came in."""
+
+    def drawn(name: str) -> bytes:
+        return hashlib.blake2b(f"{seed} {name}".encode("utf-8", "surrogateescape")).digest()
+
+    return sorted(names, key=drawn)

@@ -18,7 +18,7 @@ from roadeval.errors import RoadevalError
 from roadeval.fleet.engine import ATTEMPTS, died, started
 from roadeval.fleet.entry import DriveEntry
 from roadeval.fleet.errors import FleetError
-from roadeval.fleet.folds import deal
+from roadeval.fleet.folds import deal, shuffled
 from roadeval.fleet.sources import find_drives
 from roadeval.jobs.fleet_drive import Done, DriveTask, done, failed, replay_drive, standing
 from roadeval.jobs.fleet_models import FoldTask, train_fold
@@ -147,7 +147,7 @@ def replay_fleet(
     run.all_of_them(executor)
     run.show("writing")
     members = [Member(e.id, e.name, e.shown, e.group, e.tags) for e in entries]
-    text = run_toml(config, f"{len(entries)} drives", VERSION)
+    text = run_toml(config, f"{len(entries)} drives", VERSION, "fleet")
     summary = writer.finish(members, config.evaluation, config.as_dict(), text)
     _judge_failures(run, config.fleet.max_failures)
     counts = Counter(each.status for each in run.done.values())
@@ -252,13 +252,13 @@ class _Run:
         assert settings.fleet.folds is not None
         groups = {entry.id: entry.group or entry.id for entry in self.entries}
         folds = deal(groups, settings.fleet.folds, settings.training.seed)
-        order = deal({e.id: e.id for e in self.entries}, len(self.entries), settings.training.seed)
-        shuffled = sorted(self.entries, key=lambda entry: order[entry.id])
+        by_id = {entry.id: entry for entry in self.entries}
+        asked = [by_id[drive] for drive in shuffled(by_id, settings.training.seed)]
         training = [
             FoldTask(
                 self.folder,
                 fold,
-                tuple((e, configs[e.id]) for e in shuffled if folds[e.id] != fold),
+                tuple((e, configs[e.id]) for e in asked if folds[e.id] != fold),
                 settings,
             )
             for fold in range(settings.fleet.folds)
