@@ -53,6 +53,27 @@ def usage() -> Iterator[None]:
         raise typer.BadParameter(with_flags(str(error))) from error
 
 
+def _condition(texts: list[str] | None) -> list[str] | None:
+    from roadeval.evaluation.conditions import Condition
+
+    with usage():
+        for text in texts or ():
+            Condition.parse(text)
+    return texts
+
+
+Conditions = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fail-if",
+        metavar="CONDITION",
+        callback=_condition,
+        help="As 'post.filtered.ERR > +0.5pp' (change; with 'surely' at the end: its whole "
+        "interval) or '> 20%' (level). Repeatable.",
+    ),
+]
+
+
 def configuration(given: Given) -> RunConfig:
     """Return the configuration of a preset, a file, and options on top of both.
 

@@ -15,6 +15,7 @@ from typing import Any
 from roadeval.config import RunConfig
 from roadeval.config.toml import run_toml
 from roadeval.errors import RoadevalError
+from roadeval.evaluation.conditions import Condition
 from roadeval.fleet.engine import ATTEMPTS, died, started
 from roadeval.fleet.entry import DriveEntry
 from roadeval.fleet.errors import FleetError
@@ -23,6 +24,7 @@ from roadeval.fleet.sources import find_drives
 from roadeval.jobs.fleet_drive import Done, DriveTask, done, failed, replay_drive, standing
 from roadeval.jobs.fleet_models import FoldTask, train_fold
 from roadeval.jobs.outputs import AnyPath
+from roadeval.results.fleet.conditions import check_conditions
 from roadeval.results.fleet.folder import FleetWriter
 from roadeval.results.fleet.record import DAMAGED, FAILED, recording_path
 from roadeval.results.fleet.tables import Member
@@ -94,6 +96,11 @@ class FleetOutcome:
     summary: Mapping[str, Any]
 
     @property
+    def held(self) -> list[str]:
+        """The sentences of the conditions that hold, a drive each."""
+        return [text for each in self.summary["conditions"] for text in each["holds"].values()]
+
+    @property
     def lost(self) -> bool:
         """Whether a drive failed, or a part of one was lost."""
         return bool(self.counts.get(FAILED) or self.counts.get(DAMAGED))
@@ -105,6 +112,7 @@ def replay_fleet(
     config: RunConfig | None = None,
     *,
     executor: Executor | None = None,
+    fail_if: Sequence[str] = (),
     retry_failed: bool = False,
     on_progress: OnFleetProgress = _ignore,
 ) -> FleetOutcome:
@@ -124,6 +132,9 @@ def replay_fleet(
         Every option, those of the fleet included (`RunConfig.fleet`).
     executor
         Who replays the drives; by default Dask's workers, as `RunConfig.fleet` says.
+    fail_if
+        Conditions on a rate of each drive, as ``post.filtered.ERR > 20%``; see
+        `roadeval.evaluation.conditions`.
     retry_failed
         Whether drives that failed before are tried again.
     on_progress
@@ -141,6 +152,8 @@ def replay_fleet(
         raise FleetError(
             "`fleet.folds` and `training.model` do not go together: folds train models"
         )
+    conditions = [Condition.parse(text) for text in fail_if]
+    check_conditions(conditions)
     writer = FleetWriter(Path(output))
     writer.begin()
     run = _Run(writer.folder, tuple(entries), config, on_progress, retry_failed)
@@ -148,7 +161,7 @@ def replay_fleet(
     run.show("writing")
     members = [Member(e.id, e.name, e.shown, e.group, e.tags) for e in entries]
     text = run_toml(config, f"{len(entries)} drives", VERSION, "fleet")
-    summary = writer.finish(members, config.evaluation, config.as_dict(), text)
+    summary = writer.finish(members, config.evaluation, config.as_dict(), text, conditions)
     _judge_failures(run, config.fleet.max_failures)
     counts = Counter(each.status for each in run.done.values())
     problems = {d.drive: d.reason for d in run.done.values() if d.status == FAILED}

@@ -18,15 +18,6 @@ if TYPE_CHECKING:
     from roadeval.report.pdf.typeset import Paper
 
 
-def _condition(texts: list[str] | None) -> list[str] | None:
-    from roadeval.evaluation.conditions import Condition
-
-    with arguments.usage():
-        for text in texts or ():
-            Condition.parse(text)
-    return texts
-
-
 def _ending(paths: list[Path] | None) -> list[Path] | None:
     for path in paths or ():
         if path.suffix.lower() not in (".pdf", ".md", ".json"):
@@ -51,16 +42,6 @@ Variants = Annotated[
         help="Only this one; of a single result the first is the base. Repeatable.",
     ),
 ]
-Conditions = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--fail-if",
-        metavar="CONDITION",
-        callback=_condition,
-        help="As 'post.filtered.ERR > +0.5pp' (change; with 'surely' at the end: its whole "
-        "interval) or '> 20%' (level). Repeatable.",
-    ),
-]
 Outputs = Annotated[
     list[Path] | None,
     typer.Option(
@@ -77,7 +58,7 @@ def compare(
     results: Results,
     *,
     variant: Variants = None,
-    fail_if: Conditions = None,
+    fail_if: arguments.Conditions = None,
     output: Outputs = None,
     paper: arguments.PaperSize = "a4",
     json: arguments.Json = False,

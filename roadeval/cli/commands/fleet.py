@@ -39,6 +39,7 @@ def fleet(
         ),
     ],
     given: Given,
+    fail_if: arguments.Conditions = None,
     retry_failed: Annotated[
         bool, typer.Option("--retry-failed", help="Try drives again that failed before.")
     ] = False,
@@ -49,7 +50,7 @@ def fleet(
 
     On this machine or a cluster. The folder is the state: the same command again does only what is
     missing or has changed. A drive that cannot be used is a row with the reason; the exit code is 3
-    then.
+    then, and 4 where a --fail-if condition holds on a drive.
     """
     config = arguments.configuration(given)
     from roadeval.cli import fleet_progress
@@ -58,7 +59,14 @@ def fleet(
     from roadeval.results.summary import json_text, plain
 
     with fleet_progress.watched(quiet) as watch:
-        found = run(paths, output, config, retry_failed=retry_failed, on_progress=watch)
+        found = run(
+            paths,
+            output,
+            config,
+            fail_if=fail_if or (),
+            retry_failed=retry_failed,
+            on_progress=watch,
+        )
     if json:
         console.emit(json_text(plain(found.summary)).rstrip())
     elif not quiet:
@@ -66,6 +74,10 @@ def fleet(
     messages.loops_missing()
     for sentence in screen.problems(found):
         messages.warning(sentence)
+    for sentence in found.held:
+        messages.error(sentence)
+    if found.held:
+        return ExitCode.CONDITION_HELD
     return ExitCode.LOSS if found.lost else ExitCode.DONE
 
 

@@ -10,7 +10,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from roadeval.evaluation.conditions import Condition
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.results.fleet.conditions import DriveJudgement, judge_drives
 from roadeval.results.fleet.metrics import flat_metrics, junit_xml
 from roadeval.results.fleet.record import RECORDS, Record, frames_path, read_record
 from roadeval.results.fleet.schema import FORMAT, TABLES
@@ -74,6 +76,7 @@ class FleetWriter:
         settings: EvaluationSettings,
         run: Mapping[str, Any],
         run_toml: str,
+        conditions: Sequence[Condition] = (),
     ) -> dict[str, Any]:
         """Write the tables of all drives and what follows from them; return ``fleet.json``.
 
@@ -85,18 +88,22 @@ class FleetWriter:
             The confidence of intervals, and what is negligible.
         run, run_toml
             The configuration of the fleet, as plain data and as the text of a TOML file.
+        conditions
+            Judged on each drive, see `roadeval.results.fleet.conditions`.
         """
         with self._explained(), self._alone():
             write_tables(self.folder, members, _Records(self.folder))
+            judgements = [*judge_drives(self.folder, conditions, settings.least_frames)]
             summary = {
                 "format": FORMAT,
                 **summarise(self.folder, members, settings),
+                "conditions": [_condition(each, judgements) for each in conditions],
                 "run": run,
             }
             put(self.folder / RUN, run_toml.encode())
             metrics = json_text(plain(flat_metrics(summary)))
             put(self.folder / METRICS, metrics.encode())
-            put(self.folder / JUNIT, junit_xml(self.folder.name, self._drives()))
+            put(self.folder / JUNIT, junit_xml(self.folder.name, self._drives(), judgements))
             put(self.folder / FLEET, json_text(plain(summary)).encode())
         return summary
 
@@ -123,6 +130,16 @@ class FleetWriter:
             raise ResultsError(
                 f"{self.folder}: cannot be written: {error.strerror or error}"
             ) from error
+
+
+def _condition(condition: Condition, judgements: Sequence[DriveJudgement]) -> dict[str, Any]:
+    """Return what ``fleet.json`` holds of a condition: on which drives it holds."""
+    own = [each for each in judgements if each.condition == condition.text]
+    return {
+        "condition": condition.text,
+        "judged": sum(each.holds is not None for each in own),
+        "holds": {each.drive: each.sentence for each in own if each.holds},
+    }
 
 
 def _has_files(folder: Path) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from roadeval.evaluation.metrics import METRICS
+from roadeval.results.fleet.conditions import DriveJudgement
 from roadeval.results.fleet.record import DAMAGED, FAILED, UNSCORED
 from roadeval.runtime.text import visible
 
@@ -36,7 +37,7 @@ def flat_metrics(summary: Mapping[str, Any]) -> dict[str, float]:
 
 
 def junit_xml(
-    fleet: str, drives: Iterable[Mapping[str, Any]], conditions: Iterable[Mapping[str, Any]] = ()
+    fleet: str, drives: Iterable[Mapping[str, Any]], conditions: Iterable[DriveJudgement] = ()
 ) -> bytes:
     """Return JUnit's XML: a case a drive, and a case a drive and condition.
 
@@ -47,8 +48,8 @@ def junit_xml(
     drives
         Rows of ``drives``. One that failed is an error, one without a score is skipped.
     conditions
-        Each with ``drive``, ``condition``, ``sentence`` and ``holds``: where a condition holds,
-        its case fails.
+        Judged on drives: where a condition holds its case fails, where it was not judged its case
+        is skipped.
     """
     suite = ElementTree.Element("testsuite", name=visible(fleet))
     for row in drives:
@@ -62,9 +63,9 @@ def junit_xml(
         if row["verdict"]:
             _part(case, "system-out", row["verdict"])
     for judged in conditions:
-        case = _case(suite, judged["condition"], judged["drive"], None)
-        if judged["holds"]:
-            _part(case, "failure", judged["sentence"])
+        case = _case(suite, judged.condition, judged.drive, None)
+        if judged.holds is not False:
+            _part(case, "failure" if judged.holds else "skipped", judged.sentence)
     for name, kind in (
         ("tests", "testcase"),
         ("errors", "testcase/error"),
