@@ -6,7 +6,7 @@ import os
 import re
 from base64 import b64encode
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from datetime import timedelta
 from http import HTTPStatus
@@ -19,6 +19,8 @@ from roadeval.fleet.urls import bucket_and_key, scheme_of, shown
 
 TIMES: Final[dict[str, str]] = {"connect_timeout": "10s", "read_timeout": "30s", "timeout": "1d"}
 """Until a connection stands, until the next bytes come, and until the last one has come."""
+PATIENCE_S: Final = 0.2
+"""Between two looks whether an answer has come."""
 RETRIES: Final[dict[str, Any]] = {"max_retries": 4, "retry_timeout": timedelta(minutes=2)}
 
 _OPTIONS: Final = (
@@ -125,6 +127,9 @@ def ask(url: str, function: Callable[..., Answer], *arguments: Any, **options: A
             answer.set_exception(error)
 
     Thread(target=call, name="roadeval-url", daemon=True).start()
+    # In pieces: a signal that another thread receives does not end one long wait.
+    while not wait([answer], PATIENCE_S).done:
+        pass
     try:
         return answer.result()
     except Exception as error:
