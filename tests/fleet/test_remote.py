@@ -278,7 +278,16 @@ def test_without_obstore_a_url_names_what_to_install(tmp_path, monkeypatch):
         stamp("s3://bucket/a.mcap")
 
 
+@pytest.fixture
+def interruptible():
+    """Let SIGINT interrupt, which a shell's background processes ignore from their start on."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for a process alone")
+@pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_ends_a_copy_at_once_and_removes_it(server, tmp_path, monkeypatch):
     monkeypatch.setitem(stores.TIMES, "read_timeout", "60s")
     begun = time.monotonic()
