@@ -6,7 +6,17 @@ log uses.
 """
 
 from roadeval.data.counts import Change, Counts, Tally, Transition
-from roadeval.data.frame import IGNORE, NON_ROAD, ROAD, Frame, Mask, Rgb, Role, Truth
+from roadeval.data.frame import (
+    IGNORE,
+    NON_ROAD,
+    ROAD,
+    Frame,
+    Mask,
+    Probability,
+    Rgb,
+    Role,
+    Truth,
+)
 from roadeval.data.layer import (
     ERRORS,
     ROAD_CLASSES,
@@ -62,6 +72,7 @@ __all__ = [
     "Mask",
     "Output",
     "Packed",
+    "Probability",
     "Rgb",
     "Role",
     "Rows",

@@ -17,6 +17,8 @@ Mask = npt.NDArray[np.uint8]
 """``(H, W)`` uint8: 1 inside, 0 outside."""
 Truth = npt.NDArray[np.uint8]
 """``(H, W)`` uint8: 0 non-road, 1 road, 255 ignore."""
+Probability = npt.NDArray[np.uint16]
+"""``(H, W)`` uint16: codes 0..65535 that span 0..1."""
 
 NON_ROAD: Final = 0
 ROAD: Final = 1

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from roadeval.data.counts import Change, Tally, Transition
-from roadeval.data.frame import Frame, Mask, Rgb, Role
+from roadeval.data.frame import Frame, Mask, Probability, Rgb, Role
 from roadeval.data.layer import Layer, LayerSpec
 from roadeval.data.packed import Packed, TruthBits
 
@@ -28,6 +28,9 @@ class Output:
         Sets of pixels to count separately, by name.
     facts
         Numbers about the frame, by name, as ``components`` and ``max_gain``.
+    probability
+        How probable road is, ``(H, W)`` uint16 codes 0..65535 that span 0..1, where the mask is a
+        threshold on it.
     """
 
     layers: tuple[Layer, ...] = ()
@@ -35,6 +38,7 @@ class Output:
     mask: Packed | None = None
     regions: Mapping[str, Packed] = field(default_factory=dict)
     facts: Mapping[str, float] = field(default_factory=dict)
+    probability: Probability | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
