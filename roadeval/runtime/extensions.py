@@ -6,7 +6,7 @@ needs; SciPy's of ``special`` take a quarter of a second. `extension` puts empty
 places while the compiled module is loaded, and takes them away again: whoever imports the library
 later gets the whole of it, and the very same compiled module in it.
 
-No other thread may import the library while that happens.
+No other thread may import the library while that happens, unless by `whole`.
 """
 
 from __future__ import annotations
@@ -45,14 +45,20 @@ def extension(name: str, *packages: str) -> ModuleType:
     ImportError
         If the library has no such module.
     """
-    if name in sys.modules:
-        return sys.modules[name]
     with _ONE_AT_A_TIME:
+        if name in sys.modules:
+            return sys.modules[name]
         try:
             with _empty(packages):
                 return import_module(name)
         except Exception:  # whatever it is that the module misses
             return import_module(name)
+
+
+def whole(name: str) -> ModuleType:
+    """Return a module of a library with its packages, while none stands empty for `extension`."""
+    with _ONE_AT_A_TIME:
+        return import_module(name)
 
 
 @cache
@@ -62,7 +68,7 @@ def special(function: str) -> Any:
         compiled = extension("scipy.special._ufuncs", "scipy.special", "scipy.linalg")
         return getattr(compiled, function)
     except (ImportError, AttributeError):  # it lies elsewhere in this version of SciPy
-        return getattr(import_module("scipy.special"), function)
+        return getattr(whole("scipy.special"), function)
 
 
 @contextmanager

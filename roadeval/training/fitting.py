@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +14,7 @@ from roadeval.data import Frame, Rgb, Truth
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import TrainingSet, View
+from roadeval.runtime.threads import ordered
 from roadeval.training.likeness import fingerprint
 from roadeval.training.model import Model
 from roadeval.training.sampling import sample
@@ -22,6 +24,8 @@ from roadeval.training.settings import TrainingSettings
 COLLAPSED: Final = 0.001
 """A classifier that calls less than this share of its training frames road, or more than the
 rest of it, has collapsed."""
+_AT_ONCE: Final = 2
+"""Variants that are fitted together; each holds its filtered images meanwhile."""
 
 
 class TrainingError(RoadevalError):
@@ -55,9 +59,9 @@ def fit(
     source, truths = _truths(frames, settings)
     samples = _sampled(frames, truths, settings)
     parameters, warnings = {}, []
-    for name, pipeline in pipelines.items():
-        parameters[name] = _fit_variant(samples, pipeline)
-        warnings += _collapsed(name, samples.images, pipeline, parameters[name])
+    for name, learnt, told in ordered(partial(_fit_variant, samples), pipelines.items(), _AT_ONCE):
+        parameters[name] = learnt
+        warnings += told
     return Model(
         parameters,
         {name: pipeline.relevant() for name, pipeline in pipelines.items()},
@@ -100,7 +104,16 @@ def _sampled(
     return TrainingSet(images, pixels.frame, pixels.row, pixels.column, pixels.road, settings.seed)
 
 
-def _fit_variant(training_set: TrainingSet, pipeline: Pipeline) -> dict[str, Any]:
+def _fit_variant(
+    samples: TrainingSet, variant: tuple[str, Pipeline]
+) -> tuple[str, dict[str, Any], list[str]]:
+    """Return the variant's name, what its stages learn, and the warnings."""
+    name, pipeline = variant
+    learnt = _fit_stages(samples, pipeline)
+    return name, learnt, _collapsed(name, samples.images, pipeline, learnt)
+
+
+def _fit_stages(training_set: TrainingSet, pipeline: Pipeline) -> dict[str, Any]:
     """Fit the stages in order; what follows a filter learns from the filtered images."""
     parameters: dict[str, Any] = {}
     for stage in pipeline.stages():

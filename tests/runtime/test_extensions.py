@@ -96,3 +96,29 @@ def test_a_special_function_that_is_not_compiled_is_found_too():
     import scipy.special
 
     assert special("logsumexp") is scipy.special.logsumexp
+
+
+TOGETHER = """
+import importlib.abc, threading, time
+begun = threading.Event()
+class Slow(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == "sklearn.svm._libsvm":
+            begun.set()
+            time.sleep(0.2)
+sys.meta_path.insert(0, Slow())
+alone = threading.Thread(target=libsvm)
+alone.start()
+begun.wait()
+"""
+
+
+def test_who_needs_all_of_the_library_waits_until_the_module_is_loaded():
+    run(
+        f"{LIBSVM}{TOGETHER}\nfrom roadeval.runtime.extensions import whole\n"
+        f"assert whole('sklearn.svm').SVC\nalone.join()\nmodule = libsvm()\n{LIBRARY}"
+    )
+
+
+def test_two_threads_that_need_the_module_both_get_all_of_it():
+    run(f"{LIBSVM}{TOGETHER}\nassert libsvm().fit\nalone.join()")

@@ -19,7 +19,7 @@ from roadeval.pipeline import colour_cube as cube
 from roadeval.pipeline.colour_table import ColourTable
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask
-from roadeval.runtime.extensions import extension
+from roadeval.runtime.extensions import extension, whole
 
 SVM: Final = mask_spec("svm", "SVM: road (Eq. 16)")
 
@@ -55,6 +55,11 @@ class SvmSettings:
     gamma: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.5
     standardise: bool = True
     threshold: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+
+
+# Of scipy.linalg's BLAS, which libsvm and liblinear call, the compiled part is enough.
+NOT_RUN: Final = ("sklearn", "sklearn.svm", "sklearn.utils", "scipy.linalg")
+"""The packages around scikit-learn's libsvm and liblinear: see `roadeval.runtime.extensions`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,11 +117,7 @@ def _by_libsvm(
     that another version of scikit-learn has it elsewhere, or with other arguments or results, or
     that the numbers are not to be solved for.
     """
-    libsvm = extension(
-        "sklearn.svm._libsvm",
-        *("sklearn", "sklearn.svm", "sklearn.utils"),
-        "scipy.linalg",  # of its BLAS, which libsvm calls, the compiled part is enough
-    )
+    libsvm = extension("sklearn.svm._libsvm", *NOT_RUN)
     libsvm.set_verbosity_wrap(0)  # or it prints what it did
     _, vectors, _, (weights,), (offset,), *_ = libsvm.fit(
         features,
@@ -138,9 +139,9 @@ def _by_svc(
 ) -> tuple[Floats, Floats, float]:
     """Solve the dual; return the support vectors, their weights and the offset."""
     # Only here: the import takes a second and 40 MiB, and a model from a file needs neither.
-    from sklearn.svm import SVC
-
-    machine = SVC(C=settings.c, kernel=settings.kernel, gamma=settings.gamma).fit(features, road)
+    svm = whole("sklearn.svm")
+    machine = svm.SVC(C=settings.c, kernel=settings.kernel, gamma=settings.gamma)
+    machine.fit(features, road)
     return (
         np.ascontiguousarray(machine.support_vectors_),
         np.ascontiguousarray(machine.dual_coef_[0]),

@@ -1,8 +1,11 @@
 """The machine on colour, place, the column below and texture."""
 
+from unittest.mock import Mock
+
 import cv2
 import numpy as np
 import pytest
+from sklearn.svm import LinearSVC
 
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.beyond import context
@@ -360,3 +363,45 @@ def test_its_mask_is_tabled_as_svm():
     settings = {name: STAGES[name].settings() for name in names}
     assert Pipeline.default(names).masks() == ("similarity", "svm", "post")
     assert [spec.name for spec in Pipeline(("context",), settings).layers()] == ["decision", "svm"]
+
+
+class Another:
+    """A liblinear of another version."""
+
+    @staticmethod
+    def set_verbosity_wrap(_):
+        pass
+
+    @staticmethod
+    def train_wrap(*_):
+        return np.zeros(3)
+
+
+class Hasty(Another):
+    """A liblinear that gives up."""
+
+    @staticmethod
+    def train_wrap(mapped, *_):
+        return np.zeros((1, mapped.shape[1] + 1)), np.full(1, 1000)
+
+
+def refuse(*_):
+    raise ImportError("it is elsewhere")
+
+
+@pytest.mark.parametrize(
+    ("library", "asked"), [(None, 0), (refuse, 1), (object, 1), (Another, 1), (Hasty, 1)]
+)
+def test_the_linear_machine_is_scikit_learns_bit_for_bit(monkeypatch, library, asked):
+    rng = np.random.default_rng(0)
+    mapped = rng.normal(size=(500, 7)).astype(np.float32)
+    road = mapped[:, 0] + rng.normal(size=500) > 0.3
+    expected = LinearSVC(C=0.7, dual=False).fit(mapped, road)
+    if library is not None:
+        found = library if library is refuse else lambda *_: library
+        monkeypatch.setattr(context, "extension", found)
+    monkeypatch.setattr(context, "_by_linear_svc", svc := Mock(wraps=context._by_linear_svc))
+    _, weights, offset = context.solve(mapped, road, ContextSettings(planes=7, spare=0, c=0.7))
+    assert svc.call_count == asked
+    np.testing.assert_array_equal(weights, expected.coef_[0], strict=True)
+    assert offset == expected.intercept_[0]
