@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What was asked for: see the options of ``roadeval inspect``."""
+    """The options of ``roadeval inspect`` that hold for a fleet."""
 
     listed: bool
     drive: str | None

@@ -5,7 +5,7 @@ otherwise, or `Packed`. Times are integer nanoseconds since the Unix epoch, or w
 log uses.
 """
 
-from roadeval.data.counts import Change, Counts, Tally, Transition
+from roadeval.data.counts import OUTCOMES, Change, Counts, Tally, Transition
 from roadeval.data.frame import (
     IGNORE,
     NON_ROAD,
@@ -55,6 +55,7 @@ __all__ = [
     "FINAL_STAGE",
     "IGNORE",
     "NON_ROAD",
+    "OUTCOMES",
     "RESERVED",
     "ROAD",
     "ROAD_CLASSES",

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
+
+OUTCOMES: Final = ("TP", "TN", "FP", "FN")
+"""The columns of `Counts` in tables, in the order of its fields."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from roadeval.data import Counts
+from roadeval.data.counts import OUTCOMES
 from roadeval.evaluation import differences, metrics
 from roadeval.evaluation.regions import partitions
-from roadeval.evaluation.scored import OUTCOMES
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from roadeval.evaluation.conditions import OPERATORS, Condition, ConditionError
-from roadeval.evaluation.drives_comparison import FleetChange, Mask
+from roadeval.evaluation.drives_comparison_result import FleetChange, Mask
 
 _Found = TypeVar("_Found")
 

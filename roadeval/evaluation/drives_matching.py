@@ -19,7 +19,7 @@ class LeftOutBecause(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class FleetDrive:
-    """What matching needs of a drive: its log's SHA-256, where known, and whether it was scored."""
+    """A drive to be matched: its log's SHA-256, where known, and whether it was scored."""
 
     sha256: str | None
     scored: bool

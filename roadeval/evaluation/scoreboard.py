@@ -32,7 +32,7 @@ from roadeval.evaluation.settings import EvaluationSettings
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DriveSums:
-    """What the drive's tables of sums hold: its windows, changes of masks, and heat maps."""
+    """The content of the drive's tables of sums: windows, changes of masks, and heat maps."""
 
     windows: Sequence[windows.Window]
     changes: Mapping[Transition, Change]

@@ -1,4 +1,4 @@
-"""What the rows of ``frames.csv`` say by themselves: totals, windows, causes, worst frames.
+"""Totals, windows, causes and worst frames, computed from the rows of ``frames.csv``.
 
 Of arrays and without pandas, for the commands that answer at once; what only a report shows is in
 `roadeval.evaluation.analysis`.
@@ -14,11 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import FILTERED, UNFILTERED, Counts, Rows
+from roadeval.data.counts import OUTCOMES
 from roadeval.evaluation import differences, metrics
 from roadeval.evaluation.frame_counts import FourCounts, FrameCounts, sum_up
 from roadeval.evaluation.windows import Window, cut
 
-OUTCOMES: Final = ("TP", "TN", "FP", "FN")
 FILTER: Final = "filter"
 """The part of an error rate that the filter caused, beside the stages'."""
 

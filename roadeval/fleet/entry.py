@@ -59,7 +59,7 @@ class DriveEntry:
 
     @property
     def known(self) -> tuple[str | None, Mapping[str, str], Mapping[str, Any]]:
-        """What was said of it besides its source: group, tags and tables of settings."""
+        """Group, tags and tables of settings that were given for it."""
         return self.group, self.tags, self.settings.tables if self.settings else {}
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from roadeval.data import BASELINE, Counts
+from roadeval.data.counts import OUTCOMES
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import metrics
 from roadeval.evaluation.comparison import ComparisonError
@@ -16,13 +17,12 @@ from roadeval.evaluation.comparison_result import SettingsDiffer
 from roadeval.evaluation.conditions import Condition
 from roadeval.evaluation.drives import AcrossSettings
 from roadeval.evaluation.drives_comparison import (
-    DrivePair,
-    Mask,
     change_strata,
     changed_drives,
     compare_drives,
     pair_drive,
 )
+from roadeval.evaluation.drives_comparison_result import DrivePair, Mask
 from roadeval.evaluation.drives_conditions import FleetJudgement, FleetLevel, judge_over_drives
 from roadeval.evaluation.drives_matching import (
     FleetDrive,
@@ -45,7 +45,6 @@ from roadeval.results.summary import json_text, plain
 
 TESTS: Final = 6_000
 """Single drives that are tested, at most: one takes some four milliseconds."""
-_OUTCOMES: Final = ("TP", "TN", "FP", "FN")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,34 +114,26 @@ def compare_fleets(
     """
     conditions = [Condition.parse(text) for text in fail_if]
     fleets = Fleet(base), Fleet(new)
-    labels = labels_of([fleet.path.resolve() for fleet in fleets])
+    sides = _sides(fleets)
     settings = settings_of(fleets[0].summary)
-    drives = [_drives(fleet) for fleet in fleets]
-    matched = match_drives(drives[0], drives[1])
+    matched = match_drives(_drives(fleets[0]), _drives(fleets[1]))
     finals, levels = _levels(fleets[1], variants)
     tested, untested = _tested(finals, len(matched.pairs))
-    pairs, left = [], list(matched.left_out)
-    for pair in _pairs(fleets, matched, variants, tested, settings):
-        if pair.masks:
-            pairs.append(pair)
-        else:
-            left.append(LeftOut(pair.drive, "new", LeftOutBecause.NO_FRAME))
+    every = list(_pairs(fleets, matched, variants, tested, settings))
+    pairs = [pair for pair in every if pair.masks]
+    without = [LeftOut(p.drive, "new", LeftOutBecause.NO_FRAME) for p in every if not p.masks]
     if not pairs:
         raise ComparisonError(
-            f"{labels[0]} and {labels[1]} have no evaluated frame of one drive in common, so "
-            "nothing can be compared; replay the same drives into both"
+            f"{sides[0].label} and {sides[1].label} have no evaluated frame of one drive in "
+            "common, so nothing can be compared; replay the same drives into both"
         )
     across = AcrossSettings(confidence=settings.confidence)
     changes = compare_drives(pairs, finals, across)
-    scored = [sum(each.scored for each in own.values()) for own in drives]
+    smaller = min(side.scored for side in sides)
     judgements = judge_over_drives(
-        conditions, changes, levels, smaller=min(scored), scales=_scales(fleets)
+        conditions, changes, levels, smaller=smaller, scales=_scales(fleets)
     )
     masks = [mask for mask in finals if mask[0] != BASELINE]
-    sides = [
-        FleetSide(label, len(own), count, fleet.summary["version"])
-        for label, own, count, fleet in zip(labels, drives, scored, fleets, strict=True)
-    ]
     comparison = FleetComparison(
         base=sides[0],
         new=sides[1],
@@ -151,14 +142,14 @@ def compare_fleets(
         changes=tuple(changes),
         strata=tuple(change_strata(pairs, masks, _tags(fleets, pairs), across)),
         drive_changes=tuple(changed_drives(pairs, tested)),
-        left_out=tuple(left),
+        left_out=(*matched.left_out, *without),
         untested=tuple(untested),
         frames_left_out=(
             sum(pair.base_left_out for pair in pairs),
             sum(pair.new_left_out for pair in pairs),
         ),
         truths_differ=sum(pair.truth_differs > 0 for pair in pairs),
-        settings_differ=_settings_differ(fleets, labels),
+        settings_differ=_settings_differ(fleets, sides),
         names=_names(fleets),
         settings=settings,
     )
@@ -188,6 +179,19 @@ def as_json(compared: ComparedFleets) -> str:
     return json_text(plain(compared.content))
 
 
+def _sides(fleets: tuple[Fleet, Fleet]) -> tuple[FleetSide, FleetSide]:
+    base, new = (
+        FleetSide(
+            label,
+            len(own := _drives(fleet)),
+            sum(each.scored for each in own.values()),
+            fleet.summary["version"],
+        )
+        for label, fleet in zip(labels_of([f.path.resolve() for f in fleets]), fleets, strict=True)
+    )
+    return base, new
+
+
 def _drives(fleet: Fleet) -> dict[str, FleetDrive]:
     rows = fleet.table("drives", ["drive", "sha256", "status", "evaluated"]).to_pylist()
     return {
@@ -202,7 +206,7 @@ def _levels(
     fleet: Fleet, variants: Sequence[str] | None
 ) -> tuple[list[Mask], dict[Mask, FleetLevel]]:
     """Return the new fleet's final masks, and every mask's rates over its drives."""
-    columns = ["variant", "stage", "final", "region", *_OUTCOMES, *METRICS]
+    columns = ["variant", "stage", "final", "region", *OUTCOMES, *METRICS]
     frame = fleet.table("scores", columns).to_pandas()
     frame = frame[frame["region"] == ALL]
     if variants:
@@ -216,7 +220,7 @@ def _levels(
     levels = {}
     for (variant, stage), rows in frame.groupby(["variant", "stage"], sort=False):
         mask = str(variant), str(stage)
-        counts = Counts(*(int(rows[name].sum()) for name in _OUTCOMES))
+        counts = Counts(*(int(rows[name].sum()) for name in OUTCOMES))
         means = {name: float(rows[name].mean()) for name in METRICS}
         pooled = {f"pooled_{name}": value for name, value in metrics.of(counts).items()}
         levels[mask] = FleetLevel(len(rows), means | pooled | metrics.overlap(counts))
@@ -279,9 +283,9 @@ def _scales(fleets: tuple[Fleet, Fleet]) -> tuple[float | None, float | None]:
     return base, new
 
 
-def _settings_differ(fleets: Sequence[Fleet], labels: Sequence[str]) -> SettingsDiffer | None:
+def _settings_differ(fleets: Sequence[Fleet], sides: Sequence[FleetSide]) -> SettingsDiffer | None:
     base, new = (asked(fleet.summary) for fleet in fleets)
     differing: Mapping[str, tuple[Any, Any]] = {
         name: (base[name], new[name]) for name in base if name in new and base[name] != new[name]
     }
-    return SettingsDiffer(labels[0], labels[1], differing) if differing else None
+    return SettingsDiffer(sides[0].label, sides[1].label, differing) if differing else None

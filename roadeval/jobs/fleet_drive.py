@@ -41,7 +41,7 @@ _FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS})
 
 @dataclass(frozen=True, slots=True)
 class DriveTask:
-    """What a worker needs to replay a drive; travels to another process.
+    """The task of a worker that replays a drive; travels to another process.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class DriveTask:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What the fleet's command is told of a drive that is done.
+    """The report of a drive that is done, to the command that replays the fleet.
 
     ``err`` is the ERR by which the worst drives are kept; None where nothing was scored.
     ``repeated`` tells that the drive was done before.

@@ -1,4 +1,4 @@
-"""What a fleet keeps of a drive's frames while it is replayed: their light, and the worst ones."""
+"""The light of a drive's frames and the worst of them, collected while it is replayed."""
 
 from __future__ import annotations
 

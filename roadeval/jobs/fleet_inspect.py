@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from roadeval.recording.screen.catalogue import Catalogue
 
 FEWEST: Final = "worst:10"
-"""What is recorded of a drive that is replayed to be looked at, where the fleet recorded none."""
+"""The pictures that are recorded of a drive that is replayed to be looked at."""
 SORTED_BY: Final = "ERR"
 
 

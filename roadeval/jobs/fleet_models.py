@@ -27,7 +27,7 @@ MODELS = "models"
 
 @dataclass(frozen=True, slots=True)
 class FoldTask:
-    """What a worker needs to train the model of a fold.
+    """The task of a worker that trains the model of a fold.
 
     Parameters
     ----------

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Counts
+from roadeval.data.counts import OUTCOMES
 from roadeval.evaluation import metrics
 from roadeval.evaluation.differences import final_stages
 from roadeval.fleet.entry import DriveEntry
@@ -19,7 +20,6 @@ from roadeval.results.fleet.schema import ALL
 from roadeval.results.reading import arrow_schema
 from roadeval.results.schema import TABLES
 
-OUTCOMES: Final = ("TP", "TN", "FP", "FN")
 FILTER: Final = "filter"
 BLIND: Final = "blind"
 LOST: Final = 3

@@ -1,4 +1,4 @@
-"""What the report of a fleet is made of, from its folder."""
+"""Reading the data of a fleet's report from its folder."""
 
 from __future__ import annotations
 

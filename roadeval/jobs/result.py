@@ -50,7 +50,7 @@ class Result:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader should know first."""
+        """The warnings that a reader should see first."""
         return () if self.complete else (f"{self.path}: a partial recording: the end is missing",)
 
     @property

@@ -135,7 +135,7 @@ def _require_a_drive_for_each(config: RunConfig, drives: Sequence[AnyPath]) -> N
 
 
 def _understood(selection: logs.Selection, own: RunConfig) -> Iterator[str]:
-    """Tell of a mask that was understood by itself although labels were given for all drives."""
+    """Return a warning for a mask that was understood by itself although labels were given."""
     if selection.truth and own.labels.road and selection.truth.labels.by_itself:
         yield (
             f"none of the given labels occurs in {selection.truth.topic.name}, which "

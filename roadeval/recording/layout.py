@@ -20,6 +20,7 @@ from roadeval.data import (
     is_plain,
 )
 from roadeval.data.colours import CLEAR, SHADOW, with_opacity
+from roadeval.data.counts import OUTCOMES
 from roadeval.data.layer import IGNORED_CLASS
 from roadeval.errors import RoadevalError
 
@@ -52,7 +53,7 @@ SECONDS: Final = "/timing/summary"
 PROPERTIES: Final = "/__properties/roadeval"
 """Where the viewer and `rerun.RecordingStream.send_property` keep a recording's properties."""
 ROLE: Final = "/state/frame"
-COUNTS: Final = ("TP", "TN", "FP", "FN", "N")
+COUNTS: Final = (*OUTCOMES, "N")
 """The order of the five numbers under ``/counts``."""
 MOST_WAITING: Final = 128
 """Frames whose images and text may wait to be written, at most: a killed run loses them."""

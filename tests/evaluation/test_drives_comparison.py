@@ -7,12 +7,12 @@ import pytest
 
 from roadeval.evaluation.drives import AcrossSettings
 from roadeval.evaluation.drives_comparison import (
-    MaskFrames,
     changed_drives,
     compare_drives,
     matched,
     pair_drive,
 )
+from roadeval.evaluation.drives_comparison_result import MaskFrames
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import mean_difference
 

@@ -6,7 +6,7 @@ import pytest
 
 from roadeval.evaluation.conditions import Condition, ConditionError
 from roadeval.evaluation.drives import AcrossSettings, DriveEffect, across_drives
-from roadeval.evaluation.drives_comparison import FleetChange
+from roadeval.evaluation.drives_comparison_result import FleetChange
 from roadeval.evaluation.drives_conditions import FleetLevel, judge_over_drives
 
 MASK = ("filtered", "post")

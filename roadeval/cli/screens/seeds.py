@@ -1,4 +1,4 @@
-"""What other seeds of the training make of a replay's rates."""
+"""The table of a replay's rates with other seeds of the training."""
 
 from __future__ import annotations
 

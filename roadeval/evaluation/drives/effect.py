@@ -1,4 +1,4 @@
-"""What a drive tells: a paired difference of a rate, and which drives belong together."""
+"""Paired differences of a rate, one a drive, and the drives that belong together."""
 
 from __future__ import annotations
 

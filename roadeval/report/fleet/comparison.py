@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from roadeval.data.words import DASH, interval, number, percent, points
-from roadeval.evaluation.drives_comparison import TESTED, DriveChange, FleetChange
+from roadeval.evaluation.drives_comparison_result import TESTED, DriveChange, FleetChange
 from roadeval.evaluation.drives_conditions import FleetJudgement
 from roadeval.evaluation.metrics import SHORT
 from roadeval.report.blocks import Block, BulletList, Cell, Document, Figure, Heading, Table, Text

@@ -1,4 +1,4 @@
-"""What the report of a fleet is made of."""
+"""The data that the report of a fleet is made of."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class WorstFrame:
 
 @dataclass(frozen=True, slots=True)
 class FleetFindings:
-    """What the report of a fleet is made of.
+    """The data that the report of a fleet is made of.
 
     Parameters
     ----------

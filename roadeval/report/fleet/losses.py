@@ -1,4 +1,4 @@
-"""What is missing: drives that failed, and why; and what was lost of others."""
+"""The page on what is missing: drives that failed, and why; and what was lost of others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was run: the settings, version, models and folds behind a fleet's results."""
+"""The page on what was run: the settings, version, models and folds behind a fleet's results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What other seeds of the training make of the rates; part of the first page."""
+"""The rates with other seeds of the training; part of the first page."""
 
 from __future__ import annotations
 

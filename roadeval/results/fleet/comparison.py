@@ -9,7 +9,7 @@ from typing import Any, Final
 from roadeval.data import BASELINE
 from roadeval.data.words import MINUS, percent, points
 from roadeval.evaluation.comparison_result import SettingsDiffer
-from roadeval.evaluation.drives_comparison import (
+from roadeval.evaluation.drives_comparison_result import (
     FALSE,
     TESTED,
     DriveChange,

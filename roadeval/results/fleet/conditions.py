@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from roadeval.data import Counts
+from roadeval.data.counts import OUTCOMES
 from roadeval.evaluation import metrics
 from roadeval.evaluation.comparison_result import MaskComparison
 from roadeval.evaluation.conditions import Condition, ConditionError
@@ -16,8 +17,6 @@ from roadeval.evaluation.metrics import METRICS
 from roadeval.results.comparison import judged
 from roadeval.results.fleet.schema import ALL
 from roadeval.results.fleet.tables import read_parquet
-
-OUTCOMES = ("TP", "TN", "FP", "FN")
 
 
 @dataclass(frozen=True, slots=True)

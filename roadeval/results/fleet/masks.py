@@ -7,13 +7,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from roadeval.evaluation.drives_comparison import Mask, MaskFrames
+from roadeval.data.counts import OUTCOMES
+from roadeval.evaluation.drives_comparison_result import Mask, MaskFrames
 from roadeval.results.fleet.record import frames_path
 from roadeval.results.fleet.tables import read_parquet
 from roadeval.results.reading import ResultsError
 
-_OUTCOMES: Final = ("TP", "TN", "FP", "FN")
-_COLUMNS: Final = ["stamp_ns", "variant", "stage", *_OUTCOMES]
+_COLUMNS: Final = ["stamp_ns", "variant", "stage", *OUTCOMES]
 
 
 def read_masks(folder: Path, drive: str) -> dict[Mask, MaskFrames]:
@@ -27,7 +27,7 @@ def read_masks(folder: Path, drive: str) -> dict[Mask, MaskFrames]:
     path = frames_path(folder, drive)
     try:
         table = read_parquet(path, _COLUMNS)
-        counts = np.stack([table[name].to_numpy() for name in _OUTCOMES], axis=1)
+        counts = np.stack([table[name].to_numpy() for name in OUTCOMES], axis=1)
         stamps = table["stamp_ns"].to_numpy()
     except FileNotFoundError:
         raise ResultsError(f"{path}: is not there; run the fleet's command again") from None

@@ -35,7 +35,7 @@ Cells = Sequence[Any]
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What a fleet knows of a drive.
+    """The record of a drive in a fleet's folder.
 
     Parameters
     ----------

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from roadeval.data import Counts
+from roadeval.data.counts import OUTCOMES
 from roadeval.evaluation import metrics
 from roadeval.evaluation.drives import (
     AcrossSettings,
@@ -133,7 +134,7 @@ def _stratum(each: Stratum, *, is_tag: bool) -> dict[str, Any]:
 def _rates(folder: Path) -> Rows:
     """Return the rates of each final mask: the drives' mean, and of all pixels together."""
     sums: dict[tuple[str, str], _Rates] = {}
-    columns = ["variant", "stage", "final", "region", "frames", "TP", "TN", "FP", "FN", *METRICS]
+    columns = ["variant", "stage", "final", "region", "frames", *OUTCOMES, *METRICS]
     for row in final_rows(folder / "scores.parquet", columns):
         sums.setdefault((row["variant"], row["stage"]), _Rates()).add(row)
     return [
@@ -165,13 +166,13 @@ class _Rates:
     def add(self, row: Mapping[str, Any]) -> None:
         self._drives += 1
         self._frames += row["frames"]
-        self._counts.update({name: row[name] for name in ("TP", "TN", "FP", "FN")})
+        self._counts.update({name: row[name] for name in OUTCOMES})
         for name in METRICS:
             if row[name] is not None:
                 self._sums[name].append(row[name])
 
     def row(self) -> dict[str, Any]:
-        counts = Counts(*(self._counts[name] for name in ("TP", "TN", "FP", "FN")))
+        counts = Counts(*(self._counts[name] for name in OUTCOMES))
         means = {
             name: math.fsum(self._sums[name]) / len(self._sums[name]) if self._sums[name] else None
             for name in METRICS

@@ -28,7 +28,7 @@ COMPRESSION: Final = "zstd"
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """What a fleet says of a drive, whatever its log holds.
+    """A drive as the fleet's command names it, whatever its log holds.
 
     Parameters
     ----------
