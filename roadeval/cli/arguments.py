@@ -88,14 +88,16 @@ def configuration(given: Given) -> RunConfig:
     """
     from roadeval.config import configure
 
-    named = [*given.get("variants", ()), *given.get("topics.masks", ())]
+    options = ("variants", "topics.masks", "masks")
+    named = [each for option in options for each in given.get(option, ())]
     with usage():
         _check_names([name for name, _ in named])
         base = configure(_preset(given)) if "config" not in given else None
     config = _from_file(given) if base is None else base
     variants = [_variant(*each) for each in given.get("variants", ())]
+    masks = {"masks": dict(_masks(*each) for each in given.get("masks", ()))}
     with usage():
-        whole = config.override(_tables(given)).with_variants(variants)
+        whole = config.override(_tables(given) | masks).with_variants(variants)
     whole = whole.with_drives(_drive(*each) for each in given.get("drives", ()))
     if whole.training.model and {"training.frames", "training.gap"} & given.keys():
         raise typer.BadParameter(
@@ -136,6 +138,18 @@ def _variant(name: str, path: str | None) -> Variant:
         return Variant.of(name, read_tables(path), path)
     with usage():
         return Variant.of(name, {"preset": name}, f"{FLAGS['variants']} {name} names no file")
+
+
+def _masks(name: str, path: str) -> tuple[str, dict[str, Any]]:
+    """Return the table of masks that lie under a path, or that a file describes."""
+    from roadeval.config import read_tables
+    from roadeval.config.masks import with_masks
+
+    if not path.endswith(".toml"):
+        return name, {"path": path}
+    tables = read_tables(path)
+    with_masks({}, {name: tables}, path)
+    return name, tables
 
 
 def _drive(path: str, file: str) -> DriveSettings:

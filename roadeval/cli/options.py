@@ -46,8 +46,8 @@ class Option:
     Parameters
     ----------
     setting
-        ``table.key`` in a run's configuration; ``preset``, ``config``, ``variants`` and
-        ``drives`` are read by `roadeval.cli.arguments`.
+        ``table.key`` in a run's configuration; ``preset``, ``config``, ``variants``, ``masks``
+        and ``drives`` are read by `roadeval.cli.arguments`.
     flags
         As they are typed; the last one is named in messages.
     metavar
@@ -119,6 +119,15 @@ OPTIONS: Final = (
         "Repeatable.",
         list[str],
         variant,
+    ),
+    Option(
+        "masks",
+        ("--masks",),
+        "NAME=FOLDER|LOG:TOPIC|FILE.toml",
+        "Score masks that lie in a folder, or in another log, as one more variant; of a file with "
+        "a path and more, as a threshold of confidences. Repeatable.",
+        list[str],
+        named,
     ),
     Option(
         "drives",

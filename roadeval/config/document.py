@@ -31,6 +31,7 @@ def documented(config: RunConfig) -> str:
         parts.append(f"[variants.{variant.name}]\npreset = {named}")
         parts[-1] += "\n" + "\n".join(_chain(variant.pipeline))
         parts += _stages(variant.pipeline, f"variants.{variant.name}.")
+    parts += [_table(f"masks.{name}", own) for name, own in config.masks.items()]
     parts += [_table(name, getattr(config, name)) for name in SECTIONS]
     parts += [tomlkit.dumps({"drives": [drive.as_dict()]}).strip() for drive in config.drives]
     return "\n\n".join(parts) + "\n"

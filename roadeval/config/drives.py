@@ -11,7 +11,7 @@ from typing import Any, Final
 from roadeval.config.errors import ConfigError
 from roadeval.config.variants import check_tables
 
-OF_A_LOG: Final = ("topics", "labels", "frames")
+OF_A_LOG: Final = ("topics", "labels", "frames", "masks")
 """The tables that may differ from drive to drive."""
 
 
@@ -25,8 +25,8 @@ class DriveSettings:
         Of the drives: a path, or the end of one, as a file's name; ``*`` and ``?`` stand for any
         text within a name.
     tables
-        ``topics``, ``labels`` and ``frames`` in the shape of a TOML file. Labels take the place
-        of the run's as a whole, the others key by key.
+        ``topics``, ``labels``, ``frames`` and ``masks`` in the shape of a TOML file. Labels take
+        the place of the run's as a whole, the others key by key.
     where
         Begins a message about them.
     """

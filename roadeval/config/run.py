@@ -10,10 +10,13 @@ In a TOML file, and in the mapping that `configure` takes, it has this shape::
     [variants.wide]         # a further variant: a preset, a chain, tables of its stages
     preset = "gated"
 
+    [masks.net]             # masks of another method, beside the log
+    path = "net/{drive}"
+
     [frames]                # and [topics], [labels], [training], [evaluation], [output], [run]
     every = 2               # and [fleet]
 
-    [[drives]]              # what differs in some drives: [topics], [labels] and [frames]
+    [[drives]]              # what differs in some drives: [topics], [labels], [frames], [masks.*]
     path = "monday/*.mcap"
     labels = { road = [3], ignore = [11] }
 """
@@ -28,6 +31,7 @@ from typing import Any
 
 from roadeval.config.drives import DriveSettings, drives_of
 from roadeval.config.errors import ConfigError
+from roadeval.config.masks import of_drive, with_masks
 from roadeval.config.names import check_variant_name
 from roadeval.config.override import override
 from roadeval.config.presets import PRESETS
@@ -41,7 +45,7 @@ from roadeval.config.variants import (
 )
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.logs.settings import FrameSettings, LabelSettings, TopicSettings
+from roadeval.logs.settings import FrameSettings, LabelSettings, MaskSettings, TopicSettings
 from roadeval.pipeline.chain import Pipeline
 from roadeval.recording import RecordRule
 from roadeval.training.settings import TrainingSettings
@@ -63,6 +67,8 @@ class RunConfig:
         The chain of stages of the variants ``filtered`` and ``unfiltered``, and their settings.
     extra
         Further variants.
+    masks
+        Masks of other methods that lie beside the log, by the name of their variant.
     topics, labels, frames
         What is asked of the log.
     drives
@@ -85,6 +91,7 @@ class RunConfig:
     preset: str = "paper"
     pipeline: Pipeline = field(default_factory=_paper)
     extra: tuple[Variant, ...] = ()
+    masks: Mapping[str, MaskSettings] = field(default_factory=dict)
     topics: TopicSettings = field(default_factory=TopicSettings)
     labels: LabelSettings = field(default_factory=LabelSettings)
     frames: FrameSettings = field(default_factory=FrameSettings)
@@ -97,8 +104,9 @@ class RunConfig:
 
     def __post_init__(self) -> None:
         names = {variant.name for variant in self.variants()}
-        for name in self.topics.masks:
+        for name in (*self.topics.masks, *self.masks):
             check_variant_name(name, names)
+            names.add(name)
         try:
             RecordRule.parse(self.output.record)
         except RoadevalError as error:
@@ -140,12 +148,15 @@ class RunConfig:
             For a key or a value that cannot be used; names it, and what is allowed.
         """
         pipeline = pipeline_of(self.pipeline, tables, where)
-        check_tables(tables, ("chain", *pipeline.chain, "variants", "drives", *SECTIONS), where)
+        check_tables(
+            tables, ("chain", *pipeline.chain, "variants", "masks", "drives", *SECTIONS), where
+        )
         try:
             return replace(
                 self,
                 pipeline=pipeline,
                 extra=self._with_variants(tables.get("variants", {}), where),
+                masks=with_masks(self.masks, tables.get("masks", {}), where),
                 **{name: override(getattr(self, name), tables, name, where) for name in SECTIONS},
             ).with_drives(drives_of(tables.get("drives", ()), where))
         except ConfigError as error:
@@ -180,7 +191,7 @@ class RunConfig:
         for drive in self.drives:
             if drive.holds_for(path):
                 config = config._with_drive(drive)
-        return config
+        return replace(config, masks=of_drive(config.masks, path))
 
     def _with_drive(self, drive: DriveSettings) -> RunConfig:
         labels = LabelSettings() if "labels" in drive.tables else self.labels
@@ -209,9 +220,13 @@ class RunConfig:
             "variants": {
                 each.name: {"preset": each.preset, **each.pipeline.as_dict()} for each in self.extra
             },
+            **({"masks": masks} if (masks := self._masks()) else {}),
             **{name: dataclasses.asdict(getattr(self, name)) for name in SECTIONS},
             **({"drives": [drive.as_dict() for drive in self.drives]} if self.drives else {}),
         }
+
+    def _masks(self) -> dict[str, Any]:
+        return {name: dataclasses.asdict(own) for name, own in self.masks.items()}
 
     def _with_variants(self, tables: Any, where: str) -> tuple[Variant, ...]:
         begin = f"{where}: " if where else ""

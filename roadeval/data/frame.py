@@ -46,7 +46,9 @@ class Frame:
     shadow_truth
         ``(H, W)`` uint8 (0, 1, 255) mask of truly shadowed pixels, or None.
     external
-        Masks that the log itself carries (another system's output), by variant name.
+        Another system's road masks, from the log itself or from elsewhere, by variant name.
+    probabilities
+        How probable road is to such a system, where its masks are thresholds on that.
     """
 
     number: int
@@ -58,6 +60,7 @@ class Frame:
     truth: Truth | None = None
     shadow_truth: Truth | None = None
     external: Mapping[str, Mask] = field(default_factory=dict)
+    probabilities: Mapping[str, Probability] = field(default_factory=dict)
 
     def digest(self) -> str:
         """Hash of the image as logged: equal for equal images, whatever log they lie in."""

@@ -75,8 +75,9 @@ class DriveTask:
 
     @property
     def asked(self) -> str:
-        """Digest of settings, model and version."""
-        return asked(self.config, self.model, of=str(self.fold))
+        """Digest of settings, model, version, and sizes and times of masks beside the log."""
+        masks = {name: logs.mask_stamp(own) for name, own in self.config.masks.items()}
+        return asked(self.config, self.model, of=str(self.fold), masks=masks)
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,7 +245,7 @@ def _made(task: DriveTask) -> Record:
 def _replayed(task: DriveTask) -> Record:
     memory.forget_peak()
     started, before = time.perf_counter(), _stamp(task.entry)
-    drive, folder = task.entry.id, task.folder
+    drive, folder, wanted = task.entry.id, task.folder, task.asked
     results = folder / RESULTS / drive
     gatherer = FrameGatherer(folder, drive)
     with staged(task.entry.source) as path:
@@ -260,7 +261,7 @@ def _replayed(task: DriveTask) -> Record:
         | {
             "fold": task.fold,
             "model": task.model or None,
-            "identity": asked(task.config, task.model, of=outcome.summary["log"]["sha256"]),
+            "identity": _identity(task, outcome.summary),
             "size_bytes": size,
             "attempts": _begun(task),
             "seconds": time.perf_counter() - started,
@@ -273,7 +274,13 @@ def _replayed(task: DriveTask) -> Record:
         "effects": cells("effects", effect_rows(drive, outcome.summary)),
         "worst": cells("worst", gatherer.worst_rows()),
     }
-    return Record(drive, task.asked, before, rows)
+    return Record(drive, wanted, before, rows)
+
+
+def _identity(task: DriveTask, summary: Mapping[str, Any]) -> str:
+    """Return the digest of all that decided what a replay found."""
+    masks = {name: each["sha256"] for name, each in summary.get("masks", {}).items()}
+    return asked(task.config, task.model, of=summary["log"]["sha256"], masks=masks)
 
 
 def _config(task: DriveTask, results: Path) -> RunConfig:

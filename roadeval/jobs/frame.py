@@ -11,8 +11,11 @@ from roadeval.data import (
     FILTERED,
     FINAL_STAGE,
     Layer,
+    LayerKind,
+    LayerSpec,
     Mask,
     Output,
+    Probability,
     Rgb,
     StageResult,
     Truth,
@@ -22,11 +25,15 @@ from roadeval.data import (
 )
 from roadeval.data.packed import Packed
 from roadeval.errors import RoadevalError
+from roadeval.images.samples import eight_bits
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import View
 from roadeval.training import Model
 
-EXTERNAL: Final = mask_spec(FINAL_STAGE, "Road mask in the log")
+EXTERNAL: Final = mask_spec(FINAL_STAGE, "Road mask by another method")
+PROBABILITY: Final = LayerSpec(
+    "probability", LayerKind.SCALAR, "How probable road is", value_range=(0.0, 1.0), exact=False
+)
 
 
 def run_variant(
@@ -60,16 +67,25 @@ def run_variant(
     return VariantResult(name, tuple(results), oracles, again)
 
 
-def external_layout(name: str, topic: str) -> VariantLayout:
-    """Describe a variant whose masks the log carries, under ``topic``."""
-    return VariantLayout(name, f"mask in {topic}", (FINAL_STAGE,), (EXTERNAL,))
+def external_layout(name: str, where: str, *, probable: bool = False) -> VariantLayout:
+    """Describe a variant whose masks another system has made, and where they lie.
+
+    ``probable`` tells whether they are thresholds on how probable road is.
+    """
+    layers = (PROBABILITY, EXTERNAL) if probable else (EXTERNAL,)
+    return VariantLayout(name, f"mask in {where}", (FINAL_STAGE,), layers)
 
 
-def external_variant(name: str, mask: Mask) -> VariantResult:
-    """Present a mask that the log carries as a variant with the final stage alone."""
+def external_variant(
+    name: str, mask: Mask, probability: Probability | None = None
+) -> VariantResult:
+    """Present a mask that another system has made as a variant with the final stage alone."""
     road = Packed.of(mask)
-    stage = StageResult(FINAL_STAGE, Output((Layer(EXTERNAL, road),), mask=road), 0.0)
-    return VariantResult(name, (stage,))
+    layers = [Layer(EXTERNAL, road)]
+    if probability is not None:
+        layers.insert(0, Layer(PROBABILITY, eight_bits(probability)))
+    output = Output(tuple(layers), mask=road, probability=probability)
+    return VariantResult(name, (StageResult(FINAL_STAGE, output, 0.0),))
 
 
 def bind(variants: tuple[Variant, ...], model: Model) -> Mapping[str, Chain]:

@@ -85,7 +85,10 @@ def _process(
         )
         for name, chain in run.chains.items()
     ]
-    variants += [one_frame.external_variant(name, mask) for name, mask in frame.external.items()]
+    variants += [
+        one_frame.external_variant(name, mask, frame.probabilities.get(name))
+        for name, mask in frame.external.items()
+    ]
     result = run.board.score(frame, use.role, tuple(variants))
     result = replace(result, notes=notes.of_tallies(result.tallies, run.config.evaluation))
     own = lines(result)

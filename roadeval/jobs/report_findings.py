@@ -164,9 +164,10 @@ def _sample(result: Result, numbers: Sequence[int]) -> maps.Maps:
     for number in evenly(numbers, SAMPLED):
         truth = recording.truth(number)
         masks = {
-            (variant.name, stage): recording.layer(variant.name, stage, number)
+            (variant.name, stage): mask
             for variant in recording.variants
             for stage in variant.stages
+            if (mask := result.layer(variant.name, stage, number)) is not None
         }
         finals = {variant: mask for (variant, _), mask in masks.items()}
         errors = {name: counts.error_map(mask, truth) for name, mask in finals.items()}
@@ -197,8 +198,9 @@ def _coverage(result: Result, numbers: Sequence[int]) -> pd.DataFrame:
     return pd.DataFrame(
         {
             variant.name: [
-                float(np.mean(recording.layer(variant.name, variant.stages[-1], number) == 1))
+                np.nan if mask is None else float(np.mean(mask == 1))
                 for number in chosen
+                for mask in [result.layer(variant.name, variant.stages[-1], number)]
             ]
             for variant in recording.variants
         },

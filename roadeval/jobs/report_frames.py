@@ -12,7 +12,7 @@ from roadeval.jobs.result import Result
 from roadeval.recording import Recording
 from roadeval.report.figures.figure import ExampleFrame
 from roadeval.report.findings import NotableFrame, PairedComparison
-from roadeval.report.images import LayerImage
+from roadeval.report.images import LayerImage, faded
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -109,8 +109,11 @@ class FramePicker:
         yield LayerImage("camera", image)
         yield LayerImage("truth", image, TRUTH, recording.truth(frame))
         for variant in recording.variants[:OUTCOMES]:
-            errors = recording.layer(variant.name, ERRORS.name, frame)
-            yield LayerImage(f"{variant.name}: errors", image, ERRORS, errors)
+            errors = self._result.layer(variant.name, ERRORS.name, frame)
+            if errors is None:
+                yield LayerImage(f"{variant.name}: no mask", faded(image))
+            else:
+                yield LayerImage(f"{variant.name}: errors", image, ERRORS, errors)
 
     def _layers(self, recording: Recording, frame: int) -> Iterator[list[LayerImage]]:
         """Yield each variant's layers: the stages' masks, and all that is not a mask.
@@ -143,6 +146,9 @@ class FramePicker:
         return LayerImage(f"frame {frame}", recording.image(frame), spec, layer)
 
     def _example(self, recording: Recording, frame: int) -> ExampleFrame:
-        masks = {v.name: recording.layer(v.name, v.stages[-1], frame) for v in recording.variants}
+        masks = {
+            v.name: self._result.layer(v.name, v.stages[-1], frame) for v in recording.variants
+        }
+        there = {name: mask for name, mask in masks.items() if mask is not None}
         truth = recording.truth(frame) if len(self._frames) else None
-        return ExampleFrame(frame, recording.image(frame), truth, masks)
+        return ExampleFrame(frame, recording.image(frame), truth, there)

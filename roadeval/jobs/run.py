@@ -90,10 +90,11 @@ class Run:
         )
 
     def _properties(self) -> dict[str, str | int | float]:
+        masks = {name: each.digest() for name, each in self.selection.elsewhere.items()}
         return {
             "version": VERSION,
             # The recording's identity comes from its layout, this digest included.
-            "input": identity(self.log, self.config),
+            "input": identity(self.log, self.config, masks),
             "drive": self.log.name,
             "preset": self.config.preset,
             "image_topic": self.selection.image.name,
@@ -111,7 +112,9 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress) -> Run:
     RoadevalError
         If the log, the configuration or the training leave nothing to run.
     """
-    selection = log.select(config.topics, config.labels, scale=config.frames.scale)
+    selection = log.select(
+        config.topics, config.labels, masks=config.masks, scale=config.frames.scale
+    )
     again = partial(log.frames, selection, logs.Span.of(config.frames))
     variants = config.variants()
     labelled = selection.truth is not None
@@ -168,6 +171,12 @@ def _bind(variants: tuple[Variant, ...], model: Model, path: str | None) -> Mapp
 
 
 def _external(selection: logs.Selection) -> tuple[VariantLayout, ...]:
-    """Describe the variants whose masks the log carries."""
+    """Describe the variants whose masks another system has made."""
     masks: Mapping[str, Any] = selection.masks
-    return tuple(frame.external_layout(name, label.topic.name) for name, label in masks.items())
+    return (
+        *(frame.external_layout(name, label.topic.name) for name, label in masks.items()),
+        *(
+            frame.external_layout(name, mask.where, probable=mask.is_confidence)
+            for name, mask in selection.elsewhere.items()
+        ),
+    )

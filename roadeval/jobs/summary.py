@@ -41,6 +41,7 @@ def of(run: Run) -> dict[str, Any]:
         "settings": {each.name: each.pipeline.as_dict() for each in run.variants},
         "versions": versions(),
         "log": {"path": str(run.log.path), "sha256": run.log.sha256},
+        **({"masks": masks} if (masks := _masks(run)) else {}),
     }
 
 
@@ -63,6 +64,7 @@ def warnings(run: Run) -> tuple[str, ...]:
         *((unlabelled,) if missing else ()),
         *run.frames.oddities,
         *_sizes(run),
+        *_missing(run),
         *run.config.ignored(),
         *_near_training(run),
         *run.model.warnings,
@@ -93,6 +95,33 @@ def _sizes(run: Run) -> tuple[str, ...]:
                 f"are {width}x{height}: texture and sizes in pixels mean something else there"
             )
     return tuple(warned)
+
+
+def _missing(run: Run) -> Iterator[str]:
+    """Tell where masks of other systems are missing, or belong to no frame."""
+    seen, elsewhere = run.frames.accounting, run.selection.elsewhere
+    for name in (*run.selection.masks, *elsewhere):
+        if missing := seen.read - seen.masks[name]:
+            yield (
+                f"{name}: {missing} of the {seen.read} frames read have no mask of it: it is "
+                "scored on the others alone"
+            )
+        if name in elsewhere and (unused := elsewhere[name].pairing.unused):
+            yield f"{name}: {unused} files of {elsewhere[name].where} belong to no frame"
+
+
+def _masks(run: Run) -> dict[str, Any]:
+    """State where masks of other systems lie that are not in the log, and of which frames."""
+    return {
+        name: {
+            "path": run.config.masks[name].path,
+            "sha256": each.digest(),
+            "pairing": each.why,
+            "meaning": each.meaning.words,
+            "frames": run.frames.accounting.masks[name],
+        }
+        for name, each in run.selection.elsewhere.items()
+    }
 
 
 def _near_training(run: Run) -> Iterator[str]:

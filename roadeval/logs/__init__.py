@@ -19,8 +19,9 @@ if TYPE_CHECKING:
     from roadeval.logs.frames import FrameStream
     from roadeval.logs.log import Log, open_log
     from roadeval.logs.logged_frame import LoggedFrame
+    from roadeval.logs.masks.elsewhere import mask_stamp
     from roadeval.logs.messages.schemas import TopicKind
-    from roadeval.logs.settings import FrameSettings, LabelSettings, TopicSettings
+    from roadeval.logs.settings import FrameSettings, LabelSettings, MaskSettings, TopicSettings
     from roadeval.logs.span import Span
     from roadeval.logs.times import Instant, parse_time
     from roadeval.logs.topics.description import TopicInfo
@@ -43,6 +44,7 @@ __all__ = [
     "LogError",
     "LogWriter",
     "LoggedFrame",
+    "MaskSettings",
     "NoSidecar",
     "PackResult",
     "Selection",
@@ -52,6 +54,7 @@ __all__ = [
     "TopicKind",
     "TopicSettings",
     "describe",
+    "mask_stamp",
     "open_log",
     "pack",
     "parse_time",
@@ -71,6 +74,7 @@ _MODULES: Final = {
     "LogError": "errors",
     "LogWriter": "writing.writer",
     "LoggedFrame": "logged_frame",
+    "MaskSettings": "settings",
     "NoSidecar": "writing.sidecar",
     "PackResult": "writing.pack",
     "Selection": "topics.selection",
@@ -80,6 +84,7 @@ _MODULES: Final = {
     "TopicKind": "messages.schemas",
     "TopicSettings": "settings",
     "describe": "description",
+    "mask_stamp": "masks.elsewhere",
     "open_log": "log",
     "pack": "writing.pack",
     "parse_time": "times",

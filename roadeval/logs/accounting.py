@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 
 
@@ -21,8 +22,10 @@ class Accounting:
         Frames returned so far.
     labelled
         Of these, those with truth.
+    masks
+        Of these, those that have a mask of another method, by its name.
     undecodable
-        Of these, those that could not be decoded, and why.
+        Of the frames returned, those that could not be decoded, and why.
     damaged
         Those that are damaged and were decoded all the same, and what is wrong.
     sizes
@@ -39,6 +42,7 @@ class Accounting:
     in_range: int = 0
     read: int = 0
     labelled: int = 0
+    masks: Counter[str] = field(default_factory=Counter)
     undecodable: dict[int, str] = field(default_factory=dict)
     damaged: dict[int, str] = field(default_factory=dict)
     sizes: dict[int, tuple[int, int]] = field(default_factory=dict)

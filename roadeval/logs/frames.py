@@ -13,7 +13,7 @@ from roadeval.logs.logged_frame import SHADOW, TRUTH, FrameRules, LoggedFrame
 from roadeval.logs.messages.schemas import TopicKind
 from roadeval.logs.messages.video import PictureSequence, Video
 from roadeval.logs.span import Span
-from roadeval.logs.topics.label_reader import LabelReader, read_or_error
+from roadeval.logs.topics.label_reader import LabelReader, clocks_of, read_or_error
 from roadeval.logs.topics.pairing import UNREADABLE
 from roadeval.logs.topics.reader import TopicReader
 from roadeval.logs.topics.selection import Clock, Selection
@@ -94,6 +94,7 @@ class FrameStream:
         }
         self.accounting.read += 1
         self.accounting.labelled += TRUTH in labels
+        self.accounting.masks.update(labels.keys() - {TRUTH, SHADOW})
         if TRUTH in self._labels and self._span.every == 1:
             self.accounting.truth_unused = self._labels[TRUTH].unused
         # Reading a message corrects its log time where the file's index is wrong.
@@ -116,10 +117,14 @@ class FrameStream:
         return log_time if stamp == UNREADABLE else stamp
 
     def _label_readers(self, readers: Mapping[str, TopicReader]) -> dict[str, LabelReader]:
-        chosen = {TRUTH: self._selection.truth, SHADOW: self._selection.shadow}
-        chosen |= self._selection.masks
-        return {
-            name: LabelReader(readers[label.topic.name], label, self._images, self._selection)
-            for name, label in chosen.items()
-            if label is not None
-        }
+        selection, images = self._selection, self._images
+        chosen = {TRUTH: selection.truth, SHADOW: selection.shadow, **selection.masks}
+        found = {}
+        for name, label in chosen.items():
+            if label is not None:
+                reader = readers[label.topic.name]
+                clocks = clocks_of(images, reader, selection.clock)
+                found[name] = LabelReader(
+                    reader, label.labels, images, clocks, selection.tolerance_ns
+                )
+        return found | {name: each.reader(images) for name, each in selection.elsewhere.items()}

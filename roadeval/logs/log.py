@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -18,12 +18,16 @@ from roadeval.logs.container.file import Container
 from roadeval.logs.errors import BadRecord, LogError
 from roadeval.logs.files import files_of
 from roadeval.logs.frames import FrameStream
+from roadeval.logs.masks.elsewhere import log_and_topic, of_folder, of_topic
+from roadeval.logs.masks.folder import open_folder
 from roadeval.logs.messages.decoders import kind_of, message_is_whole
 from roadeval.logs.messages.schemas import TopicKind
-from roadeval.logs.settings import LabelSettings, TopicSettings
+from roadeval.logs.settings import LabelSettings, MaskSettings, TopicSettings
 from roadeval.logs.span import Span
 from roadeval.logs.times import NS
+from roadeval.logs.topics.choose import named
 from roadeval.logs.topics.description import TopicInfo, describe_topic
+from roadeval.logs.topics.mask_source import MaskSource
 from roadeval.logs.topics.reader import topic_readers
 from roadeval.logs.topics.selection import Selection, settle
 from roadeval.logs.topics.survey import survey
@@ -80,6 +84,8 @@ class Log:
         self.path = path
         self.name = visible(path.stem if path.is_file() else path.resolve().name)
         self._lost_files = damage
+        self._limits = limits
+        self._beside: list[Log] = []
         self._containers = [
             Container(f, _is_image, message_is_whole, keep_corrupt=limits.keep_damaged)
             for f in files
@@ -158,6 +164,7 @@ class Log:
         topics: TopicSettings | None = None,
         labels: LabelSettings | None = None,
         *,
+        masks: Mapping[str, MaskSettings] | None = None,
         scale: float = 1.0,
         several: bool = False,
     ) -> Selection:
@@ -169,6 +176,9 @@ class Log:
             What the user chose; the rest is chosen here, where the log leaves no doubt.
         labels
             What the values of the truth mean.
+        masks
+            Other methods' masks that lie beside the log, by name. Another log that holds some
+            stays open as long as this one.
         scale
             Of the frames that `frames` returns, with their labels, to the logged ones' width and
             height.
@@ -179,13 +189,41 @@ class Log:
         ------
         LogError
             If a topic is missing or the choice is not plain, a label value does not occur or
-            cannot be understood, or a label image has another size.
+            cannot be understood, a label image has another size, or no mask belongs to a frame.
         """
         topics, labels = topics or TopicSettings(), labels or LabelSettings()
         try:
-            return settle(self.topics, self._readers, topics, labels, scale, several=several)
+            found = settle(self.topics, self._readers, topics, labels, scale, several=several)
+            beside = {name: self._masks(name, own, found) for name, own in (masks or {}).items()}
         except LogError as error:
             raise LogError(f"{self.path.name}: {error}") from error
+        return replace(found, elsewhere=beside)
+
+    def _masks(self, name: str, settings: MaskSettings, selection: Selection) -> MaskSource:
+        """Settle masks that lie beside the log; errors begin with their variant's name."""
+        images, place = self._readers[selection.image.name], log_and_topic(settings.path)
+        try:
+            if place is None:
+                folder = open_folder(Path(settings.path), settings, self._limits)
+                return of_folder(folder, settings, selection, images)
+            limits = self._limits
+            other = open_log(
+                place[0], keep_corrupt=limits.keep_damaged, max_pixels=limits.max_pixels
+            )
+            self._beside.append(other)
+            topic = named(other.topics, place[1], "topic").name
+            reader = other._readers[topic]
+            return of_topic(
+                reader,
+                settings,
+                selection,
+                images,
+                log=other.name,
+                digest=lambda: other.sha256,
+            )
+        except LogError as error:
+            told = str(error).replace("`labels.", f"`masks.{name}.labels.")
+            raise LogError(f"`masks` {name}: {told}") from error
 
     def oddities(self, selection: Selection) -> tuple[str, ...]:
         """Go through all selected images, without decoding them: see `LogDescription.oddities`."""
@@ -222,9 +260,11 @@ class Log:
         )
 
     def close(self) -> None:
-        """Close the log's files."""
+        """Close the log's files, and those of logs beside it."""
         for container in self._containers:
             container.close()
+        for other in self._beside:
+            other.close()
 
     def __enter__(self) -> Log:
         return self

@@ -9,14 +9,14 @@ from typing import Any, Final, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import IGNORE, Frame, Mask, Rgb, Truth
+from roadeval.data import IGNORE, Frame, Mask, Rgb
 from roadeval.images import Limits, format_of
 from roadeval.logs.accounting import Accounting
 from roadeval.logs.errors import BadMessage, DamagedMessage, FrameError
 from roadeval.logs.messages.pictures import CompressedPicture, Picture
 from roadeval.logs.messages.pixels import to_rgb
 from roadeval.logs.scaling import at_scale, nearest
-from roadeval.logs.topics.labels import Label
+from roadeval.logs.topics.labels import Label, LabelPixels
 
 T = TypeVar("T")
 
@@ -100,7 +100,7 @@ class LoggedFrame:
         image, is_whole = self._pixels(lambda limits: to_rgb(picture, limits))
         self._check_size(image)
         labels = {name: self._label(label, image) for name, label in self.labels.items()}
-        truth, shadow = labels.pop(TRUTH, None), labels.pop(SHADOW, None)
+        truth, shadow = (labels.pop(name, None) for name in (TRUTH, SHADOW))
         return Frame(
             self.number,
             self.stamp_ns,
@@ -108,12 +108,17 @@ class LoggedFrame:
             image,
             picture.data,
             _media_type(picture) if is_whole else None,
-            truth,
-            shadow,
-            {name: _as_mask(mask) for name, mask in labels.items()},
+            None if truth is None else truth.truth,
+            None if shadow is None else shadow.truth,
+            {name: _as_mask(label.truth) for name, label in labels.items()},
+            {
+                name: label.probability
+                for name, label in labels.items()
+                if label.probability is not None
+            },
         )
 
-    def _pixels(self, decode: Callable[[Limits], T], topic: str = "") -> tuple[T, bool]:
+    def _pixels(self, decode: Callable[[Limits], T], place: str = "") -> tuple[T, bool]:
         """Decode, damaged or not as the limits say; return also whether it was undamaged."""
         try:
             return decode(replace(self.rules.limits, keep_damaged=False)), True
@@ -121,7 +126,7 @@ class LoggedFrame:
             if not self.rules.limits.keep_damaged:
                 raise
             found = decode(self.rules.limits)
-            where = f"{topic}: " if topic else ""
+            where = f"{place}: " if place else ""
             self.accounting.damaged[self.number] = f"{where}{error.damage}, used all the same"
             return found, False
 
@@ -130,29 +135,31 @@ class LoggedFrame:
         if self.rules.size is not None and size != self.rules.size:
             self.accounting.sizes[self.number] = size
 
-    def _label(self, label: Label, image: Rgb) -> Truth:
+    def _label(self, label: Label, image: Rgb) -> LabelPixels:
         try:
-            picture = _readable(label.picture)
-            (truth, fringe), _ = self._pixels(
-                lambda limits: label.labels.read(picture, limits), label.topic
-            )
+            found, _ = self._pixels(label.read, label.place)
         except BadMessage as error:
-            raise FrameError(f"{label.topic}: {error}") from error
-        if fringe:
-            self.accounting.fringes[self.number, label.topic] = fringe, truth.size
-        return self._fitted(truth, image, label.topic)
+            raise FrameError(f"{label.place}: {error}") from error
+        if found.fringe:
+            self.accounting.fringes[self.number, label.topic] = found.fringe, found.truth.size
+        return self._fitted(found, image, label.place)
 
-    def _fitted(self, truth: Truth, image: Rgb, topic: str) -> Truth:
+    def _fitted(self, label: LabelPixels, image: Rgb, place: str) -> LabelPixels:
         height, width = image.shape[:2]
-        if truth.shape == (height, width):
-            return truth
+        high, wide = label.truth.shape
+        if (high, wide) == (height, width):
+            return label
         if not self.rules.resize:
-            size = f"{truth.shape[1]}x{truth.shape[0]}"
             raise FrameError(
-                f"{topic} is {size}, its image {width}x{height}: "
+                f"{place} is {wide}x{high}, its image {width}x{height}: "
                 "scale the labels with `topics.resize_truth`"
             )
-        return nearest(truth, (width, height))
+        probability = label.probability
+        return replace(
+            label,
+            truth=nearest(label.truth, (width, height)),
+            probability=None if probability is None else nearest(probability, (width, height)),
+        )
 
 
 def _media_type(picture: Picture) -> str | None:

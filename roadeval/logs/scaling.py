@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
-from roadeval.data import Frame, Truth
+from roadeval.data import Frame
+
+Pixels = TypeVar("Pixels", npt.NDArray[np.uint8], npt.NDArray[np.uint16])
 
 
 def scaled_size(size: tuple[int, int], scale: float) -> tuple[int, int]:
@@ -33,12 +37,13 @@ def at_scale(frame: Frame, scale: float) -> Frame:
         truth=None if frame.truth is None else nearest(frame.truth, size),
         shadow_truth=None if frame.shadow_truth is None else nearest(frame.shadow_truth, size),
         external={name: nearest(mask, size) for name, mask in frame.external.items()},
+        probabilities={name: nearest(each, size) for name, each in frame.probabilities.items()},
     )
 
 
-def nearest(labels: Truth, size: tuple[int, int]) -> Truth:
-    """Resize labels to a width and height, by the nearest pixel."""
+def nearest(labels: Pixels, size: tuple[int, int]) -> Pixels:
+    """Resize labels, or probabilities, to a width and height, by the nearest pixel."""
     import cv2
 
     how = cv2.INTER_NEAREST_EXACT
-    return np.asarray(cv2.resize(labels, size, interpolation=how), np.uint8)
+    return np.asarray(cv2.resize(labels, size, interpolation=how), labels.dtype)

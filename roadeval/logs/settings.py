@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import field
 from datetime import datetime
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass as validated
@@ -112,6 +112,48 @@ class LabelSettings:
             raise ValueError("`labels.tolerance` is for masks of values, in which 0 is non-road")
         for both in {*self.road} & {*self.ignore} or {*self.road_colors} & {*self.ignore_colors}:
             raise ValueError(f"label {both} cannot mean road and ignore at once")
+        return self
+
+
+@validated(frozen=True, config=ConfigDict(extra="forbid"))
+class MaskSettings:
+    """Another method's road masks that do not lie in the log.
+
+    Parameters
+    ----------
+    path
+        A folder of images or NPY files, one a frame; or ``LOG.mcap:/topic``, a topic of another
+        log. ``{drive}`` stands for the name of the drive's file, without its ending.
+    pair
+        How masks and frames belong together: by ``number``, for a folder the last number in a
+        file's name; or by ``stamp``, for a folder the time that the name is (seconds, or milli-,
+        micro- or nanoseconds since 1970). By default stamps of a log, and of a folder in which
+        every name is a time of more than ten digits.
+    first
+        The number of the first frame's mask.
+    images
+        The folder of images that the log was made of, in their order: masks belong to the image of
+        the same name, endings such as ``_mask`` aside. ``{drive}`` stands for the same here.
+    threshold
+        For confidence maps: road is what has at least this confidence. A value of 8 or 16 bits is
+        a share of the greatest such value; one with a fraction is from 0 to 1.
+    labels
+        For masks of other values than 0 and 255 (road), or 0 and 1 (road): what they mean.
+    """
+
+    path: str = ""
+    pair: Literal["number", "stamp"] | None = None
+    first: Annotated[int, Field(ge=0, le=1_000_000_000)] = 0
+    images: str | None = None
+    threshold: Annotated[float, Field(gt=0, le=1)] | None = None
+    labels: LabelSettings = LabelSettings()
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.images is not None and (self.pair is not None or self.first):
+            raise ValueError("with images masks are paired by name: leave out pair and first")
+        if self.threshold is not None and self.labels != LabelSettings():
+            raise ValueError("threshold is for confidence maps, labels are for masks of classes")
         return self
 
 

@@ -16,6 +16,8 @@ WIDTH: Final = 420
 QUALITY: Final = 85
 FINEST: Final = 95
 """Quality of a JPEG, and of one of which a figure is made."""
+FADED: Final = 5
+"""The part of the camera's contrast that is left where there is no mask, as one of so many."""
 DARKEN: Final = 0.75
 """Share of the camera's brightness that stays below an overlay."""
 
@@ -105,6 +107,11 @@ def _overlaid(image: Rgb, spec: LayerSpec, labels: npt.NDArray[Any]) -> Rgb:
         tinted = cv2.LUT(image, np.rint(mixed).astype(np.uint8)[None])
         cv2.copyTo(tinted, (labels == label).view(np.uint8), overlaid)
     return overlaid
+
+
+def faded(image: Rgb) -> Rgb:
+    """Return an image nearly white, in place of a mask that there is not."""
+    return np.asarray(255 - (255 - image) // FADED, np.uint8)
 
 
 def shrink(

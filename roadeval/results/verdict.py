@@ -117,6 +117,11 @@ def _alone(totals: Mapping[str, Mapping[str, Any]], stages: Mapping[str, str]) -
 
 
 def _lowest(differences: DriveDifferences) -> str:
-    """Return the variant with the lowest error rate; one that is undefined comes last."""
-    means = {name: rates[RATE].mean for name, rates in differences.blind.items()}
+    """Return the variant with the lowest error rate; one that is undefined comes last.
+
+    A variant that has no masks of some frames is not held against those that have.
+    """
+    found = {name: rates[RATE] for name, rates in differences.blind.items()}
+    most = max(each.frames for each in found.values())
+    means = {name: each.mean for name, each in found.items() if each.frames == most}
     return min(means, key=lambda name: (math.isnan(means[name]), means[name]))

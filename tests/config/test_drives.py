@@ -71,7 +71,7 @@ def test_a_later_entry_overrides_an_earlier_one():
         ("[[drives]]\npath = ''", "[[drives]]: path must name a log, or several as *.mcap"),
         (
             "[[drives]]\npath = 'a'\ntraining = {}",
-            "[[drives]] a: [training] is no table here; choose frames, labels, topics",
+            "[[drives]] a: [training] is no table here; choose frames, labels, masks, topics",
         ),
         ("[[drives]]\npath = 'a'\nroad = 3", "[[drives]] a: road stands in no table"),
         ("[[drives]]\npath = 'a'\nlabels = 3", "[[drives]] a: [labels] must be a table"),
@@ -91,3 +91,36 @@ def test_a_bad_entry_is_named(tmp_path, text, message):
     with pytest.raises(ConfigError) as caught:
         load_config(file)
     assert str(caught.value).startswith(f"{file}: {message}")
+
+
+def test_masks_are_those_of_the_drive():
+    config = configure({"masks": {"net": {"path": "net/{drive}", "threshold": 0.4}}})
+    entry = {"path": "b.mcap", "masks": {"net": {"path": "elsewhere"}}}
+    config = config.override({"drives": [entry]})
+    assert config.for_drive("logs/a.mcap").masks["net"].path == "net/a"
+    assert config.for_drive("logs/b.mcap").masks["net"].path == "elsewhere"
+    assert config.for_drive("logs/b.mcap").masks["net"].threshold == 0.4
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"path": "a", "thresold": 1}, "there is no such setting; choose first, images"),
+        ({"path": "a", "threshold": 2}, "must be at most 1"),
+        ({"path": "a", "threshold": 0.5, "labels": {"road": [3]}}, "threshold is for confidence"),
+        ({"path": "a", "images": "b", "first": 1}, "with images masks are paired by name"),
+    ],
+)
+def test_bad_masks_are_named(table, message):
+    with pytest.raises(ConfigError, match=message):
+        configure({"masks": {"net": table}})
+
+
+def test_masks_without_a_path_are_refused_with_the_drive():
+    with pytest.raises(ConfigError, match=r"\[masks.net\] has no path"):
+        configure({"masks": {"net": {"threshold": 0.5}}}).for_drive("a.mcap")
+
+
+def test_masks_and_a_variant_cannot_share_a_name():
+    with pytest.raises(ConfigError, match="'net': the name is taken"):
+        configure({"variants": {"net": {"preset": "gated"}}, "masks": {"net": {"path": "a"}}})

@@ -38,6 +38,7 @@ OTHER = {
     "labels.road_colors": [[128, 64, 128]],
     "labels.ignore_colors": [[0, 0, 0]],
     "labels.tolerance": 32,
+    "masks": {"net": {"path": "net/{drive}", "threshold": 0.4}},
     "frames.start": "2013-05-01T12:00:00Z",
     "frames.end": "90",
     "frames.every": 3,

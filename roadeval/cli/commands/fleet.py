@@ -23,7 +23,7 @@ Drives = Annotated[
 
 
 @takes(
-    *("preset", "config", "variants", "drives", "training", "topics", "labels", "frames"),
+    *("preset", "config", "variants", "masks", "drives", "training", "topics", "labels", "frames"),
     *("output.record", "fleet"),
 )
 def fleet(

@@ -9,7 +9,7 @@ from roadeval.cli.options import Given, takes
 
 
 @takes(
-    *("output", "preset", "config", "variants"),
+    *("output", "preset", "config", "variants", "masks"),
     *("training", "topics", "labels", "frames", "run"),
 )
 def replay(

@@ -151,9 +151,12 @@ def size(file: Path) -> str:
 
 
 def _lowest(totals: Totals) -> str | None:
+    """Return the variant of the lowest ERR, of those that have a mask of every frame."""
+    finals = {name: stages[FINAL_STAGE] for name, stages in totals.items() if FINAL_STAGE in stages}
+    most = max((each["frames"] for each in finals.values()), default=0)
     errors = {
-        variant: stages[FINAL_STAGE]["ERR"]
-        for variant, stages in totals.items()
-        if defined(stages.get(FINAL_STAGE, {}).get("ERR"))
+        name: each["ERR"]
+        for name, each in finals.items()
+        if defined(each["ERR"]) and each["frames"] == most
     }
     return min(errors, key=errors.__getitem__, default=None)

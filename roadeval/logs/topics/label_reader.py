@@ -3,20 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from roadeval.images import Limits
 from roadeval.logs.errors import FrameError
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.messages.video import PictureSequence
-from roadeval.logs.topics.labels import Label
+from roadeval.logs.topics.labels import Label, Meaning
 from roadeval.logs.topics.pairing import Pairing, Stamps
 from roadeval.logs.topics.reader import TopicReader
-from roadeval.logs.topics.selection import Clock, LabelTopic, Selection
+from roadeval.logs.topics.selection import Clock
+
+Clocks = tuple[Stamps, Stamps]
+"""The times by which images and labels are paired."""
 
 
-class _Times:
+class LabelPictures(PictureSequence, Stamps, Protocol):
+    """Label pictures in the order of their times: a topic's, or a folder's."""
+
+    @property
+    def name(self) -> str:
+        """The topic, or the folder."""
+
+    @property
+    def limits(self) -> Limits:
+        """On the pictures."""
+
+    @property
+    def log_times(self) -> npt.NDArray[np.int64]:
+        """``(n,)`` int64, rising."""
+
+    def __len__(self) -> int: ...
+
+    def place(self, position: int) -> str:
+        """Return where a picture lies, for messages to people."""
+        ...
+
+
+class Times:
     """Other numbers in place of stamps, for logs whose stamps are all zero or equal."""
 
     def __init__(self, times: Sequence[int] | npt.NDArray[np.int64]) -> None:
@@ -26,22 +53,34 @@ class _Times:
         return len(self._times)
 
     def stamp(self, position: int) -> int:
+        """Return the number at a position."""
         return int(self._times[position])
 
 
-def _clocks(images: TopicReader, labels: TopicReader, clock: Clock) -> tuple[Stamps, Stamps]:
+def clocks_of(images: TopicReader, labels: LabelPictures, clock: Clock) -> Clocks:
     """Return the times by which images and labels are paired."""
     if clock is Clock.STAMP:
         return images, labels
     if clock is Clock.LOG_TIME:
-        return _Times(images.log_times), _Times(labels.log_times)
+        return Times(images.log_times), Times(labels.log_times)
     # Without any time, order means something only if there is a label for each image.
     count = len(labels) if len(images) == len(labels) else 0
-    return _Times(range(len(images))), _Times(range(count))
+    return Times(range(len(images))), Times(range(count))
 
 
 class LabelReader:
-    """The labels of one topic, each found by its image's position.
+    """The labels of one topic, or folder, each found by its image's position.
+
+    Parameters
+    ----------
+    reader
+        The labels' pictures.
+    meaning
+        How they are read.
+    images
+        The camera's topic.
+    clocks, tolerance_ns
+        By what they are paired, and how far apart a pair may be.
 
     Attributes
     ----------
@@ -51,15 +90,19 @@ class LabelReader:
     """
 
     def __init__(
-        self, reader: TopicReader, label: LabelTopic, images: TopicReader, selection: Selection
+        self,
+        reader: LabelPictures,
+        meaning: Meaning,
+        images: TopicReader,
+        clocks: Clocks,
+        tolerance_ns: int,
     ) -> None:
         self.reader = reader
         self.unused = 0
         self._images = images
-        self._label = label
+        self._meaning = meaning
         self._last: int | None = None
-        clocks = _clocks(images, reader, selection.clock)
-        self._pairing = Pairing(*clocks, selection.tolerance_ns)
+        self._pairing = Pairing(*clocks, tolerance_ns)
 
     def of(self, image: int) -> Label | None:
         """Find the label of the image at a position."""
@@ -72,7 +115,8 @@ class LabelReader:
         if self._last is not None:
             self.unused += max(position - self._last - 1, 0)
         self._last = position
-        return Label(read_or_error(self.reader, position), self._label.labels, self.reader.name)
+        picture, place = read_or_error(self.reader, position), self.reader.place(position)
+        return Label(picture, self._meaning, self.reader.name, place)
 
 
 def read_or_error(pictures: PictureSequence, position: int) -> Picture | FrameError:

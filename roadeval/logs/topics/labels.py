@@ -12,12 +12,13 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import IGNORE, NON_ROAD, ROAD, Truth
+from roadeval.data import IGNORE, NON_ROAD, ROAD, Probability, Truth
 from roadeval.images import Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.messages.pixels import lossy_format, to_labels, to_rgb
 from roadeval.logs.settings import Color, LabelSettings
+from roadeval.logs.topics.confidence import Confidence
 
 UNKNOWN: Final = 254
 """Marks a value whose meaning is not known."""
@@ -121,13 +122,45 @@ class LabelMap:
         return truth
 
 
+Meaning = LabelMap | Confidence
+"""How the pictures of a topic, or of a folder, are read."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LabelPixels:
+    """A decoded label: its truth, how many pixels of it are fringes, and a map's probability."""
+
+    truth: Truth
+    fringe: int = 0
+    probability: Probability | None = None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Label:
-    """A label's picture, or why it cannot be read, and what its values mean."""
+    """A label's picture, or why it cannot be read, and how it is read.
+
+    ``topic`` is the topic or folder that it comes from, ``place`` that or its own file.
+    """
 
     picture: Picture | FrameError
-    labels: LabelMap
+    meaning: Meaning
     topic: str
+    place: str
+
+    def read(self, limits: Limits) -> LabelPixels:
+        """Decode the label.
+
+        Raises
+        ------
+        BadMessage, FrameError
+            If it cannot be read or decoded.
+        """
+        if isinstance(self.picture, FrameError):
+            raise self.picture
+        if isinstance(self.meaning, LabelMap):
+            return LabelPixels(*self.meaning.read(self.picture, limits))
+        probability = self.meaning.read(self.picture, limits)
+        return LabelPixels(self.meaning.road(probability), probability=probability)
 
 
 def pack_colors(colors: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint32]:

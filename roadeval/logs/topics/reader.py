@@ -151,6 +151,10 @@ class TopicReader:
             self._stamps[position] = stamp
         return stamp
 
+    def place(self, _position: int) -> str:
+        """Return where a message lies, for messages to people."""
+        return self.name
+
     def expected(self) -> int:
         """How many messages there should be, by the files' own statistics."""
         return sum(s.container.expected.get(s.channel_id, 0) for s in self.channels)

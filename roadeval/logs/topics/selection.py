@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import partial
 from itertools import islice
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.messages.pixels import to_rgb
+from roadeval.logs.messages.video import PictureSequence
 from roadeval.logs.scaling import scaled_size
 from roadeval.logs.settings import LabelSettings, TopicSettings
 from roadeval.logs.topics.choose import (
@@ -28,6 +29,9 @@ from roadeval.logs.topics.description import TopicInfo, median_period
 from roadeval.logs.topics.labels import LabelMap, seen_in, understand
 from roadeval.logs.topics.pairing import UNREADABLE
 from roadeval.logs.topics.reader import TopicReader
+
+if TYPE_CHECKING:
+    from roadeval.logs.topics.mask_source import MaskSource
 
 LOOKED_AT: Final = 10
 """Label images at the log's start, and as many spread over it, that settle what values mean."""
@@ -60,6 +64,8 @@ class Selection:
         The camera's topic, and why that one.
     truth, shadow, masks
         Road truth, truth of shadow, and other systems' road masks by name.
+    elsewhere
+        Their masks that do not lie in the log, by name.
     no_truth
         Why there is no road truth; empty if there is.
     tolerance_ns
@@ -83,6 +89,7 @@ class Selection:
     resize_truth: bool = False
     scale: float = 1.0
     no_truth: str = ""
+    elsewhere: Mapping[str, MaskSource] = field(default_factory=dict)
 
     @property
     def size(self) -> tuple[int, int] | None:
@@ -101,6 +108,8 @@ class Selection:
                 if label is self.shadow:
                     words = words.replace("road is", "shadow is")
                 lines.append(f"{name}: {label.topic.name} ({label.why}; {words})")
+        for name, mask in self.elsewhere.items():
+            lines.append(f"mask {name}: {mask.where} ({mask.why}; {mask.meaning.words})")
         if self.no_truth:
             lines.append(f"no truth: {self.no_truth}")
         if self.clock is not Clock.STAMP:
@@ -169,7 +178,7 @@ def _label_topic(
             "scale the labels with `topics.resize_truth`"
         )
     reader, seen, problem = readers[topic.name], list[int](), ""
-    for picture in _samples(reader):
+    for picture in samples(reader):
         try:
             seen += seen_in(picture, labels, topic.name, reader.limits)
         except BadMessage as error:
@@ -190,7 +199,7 @@ def check_readable(reader: TopicReader, topic: TopicInfo) -> None:
     """
     if not topic.problem:
         return
-    for picture in _samples(reader):
+    for picture in samples(reader):
         with suppress(BadMessage):
             to_rgb(picture, reader.limits)
             return
@@ -224,8 +233,8 @@ def tolerance(reader: TopicReader, asked_ms: float | None) -> int:
     return period // 2
 
 
-def _samples(reader: TopicReader) -> Iterator[Picture]:
-    """Read the first images of a topic and some spread over the rest."""
+def samples(reader: PictureSequence) -> Iterator[Picture]:
+    """Read the first images of a topic, or of a folder, and some spread over the rest."""
     if not len(reader):
         return
     spread = np.linspace(0, max(len(reader) - 1, 0), LOOKED_AT, dtype=int).tolist()

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from roadeval.images import ImageError, Limits, to_png
 from roadeval.logs.errors import LogError
-from roadeval.logs.files import natural
+from roadeval.logs.image_folder import IMAGES, by_name, listed, ordered
 from roadeval.logs.times import NS
 from roadeval.logs.writing.pack_video import VIDEO_SUFFIXES, frames_of
 from roadeval.logs.writing.writer import LogWriter
@@ -25,13 +24,8 @@ LABEL_DELAY_NS: Final = 1
 """A label is logged right after its image."""
 
 _VERBATIM: Final = {".jpg": "jpeg", ".jpeg": "jpeg", ".png": "png"}
-_CONVERTED: Final = (".bmp", ".tif", ".tiff", ".webp", ".ppm", ".pgm")
 GREATEST: Final = 1 << 30
 """Most pixels of an image that is converted."""
-_LABEL_SUFFIX: Final = re.compile(
-    r"[_.-]?(labelids|labels?|masks?|gt|truth|road|seg|segmentation|annotations?|L)$"
-)
-_TIME: Final = re.compile(r"(\d{10})(?:[._](\d{1,9}))?|(\d{13})|(\d{16})|(\d{19})")
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +96,8 @@ def pack(
 def _pack_folder(
     images: Path, output: Path, masks: Path | None, rate_hz: float | None
 ) -> PackResult:
-    files, labels = _listed(images), _listed(masks) if masks else []
-    by_image = _pair(files, labels)
+    files, labels = listed(images, IMAGES), listed(masks, IMAGES) if masks else []
+    by_image = by_name(files, labels)
     if labels and not by_image:
         raise LogError(f"{masks}: no mask has the name of an image in {images}")
     stamps, words = _stamps(files, rate_hz)
@@ -130,10 +124,9 @@ def _unpaired(what: str, files: Sequence[Path]) -> Iterator[str]:
 
 def _stamps(files: list[Path], rate_hz: float | None) -> tuple[dict[Path, int], str]:
     """Return each file's stamp, in the order of the stamps, and their source in words."""
-    times = {file: time for file in files if (time := _time_in(file.stem)) is not None}
-    if rate_hz is None and len(times) == len(files) == len(set(times.values())):
-        ordered = sorted(times.items(), key=lambda item: item[1])
-        return dict(ordered), "the times in the files' names"
+    in_order, times = ordered(files)
+    if rate_hz is None and times is not None:
+        return dict(zip(in_order, times, strict=True)), "the times in the files' names"
     rate = rate_hz or DEFAULT_RATE_HZ
     regular = {file: round(i * NS / rate) for i, file in enumerate(files)}
     return regular, f"{rate:g} images a second"
@@ -150,25 +143,6 @@ def _pack_video(video: Path, output: Path, rate_hz: float | None) -> PackResult:
             raise LogError(f"{video}: a video without frames")
     words = "the video's own times" if rate_hz is None else f"{rate_hz:g} images a second"
     return PackResult(output, count, 0, words)
-
-
-def _listed(folder: Path) -> list[Path]:
-    """Image files of a folder in natural order."""
-    if not folder.is_dir():
-        raise LogError(f"{folder}: no such folder")
-    known = {*_VERBATIM, *_CONVERTED}
-    files = sorted((f for f in folder.iterdir() if f.suffix.lower() in known), key=natural)
-    if not files:
-        raise LogError(f"{folder}: no image in it ({', '.join(sorted(known))})")
-    return files
-
-
-def _pair(images: list[Path], masks: list[Path]) -> Mapping[Path, Path]:
-    """Find for each image the mask of its name, or of its name with a label's ending."""
-    exact = {mask.stem: mask for mask in masks}
-    loose = {_LABEL_SUFFIX.sub("", mask.stem): mask for mask in masks}
-    found = {image: exact.get(image.stem) or loose.get(image.stem) for image in images}
-    return {image: mask for image, mask in found.items() if mask is not None}
 
 
 def _image(file: Path) -> tuple[bytes, str]:
@@ -196,15 +170,3 @@ def _as_png(file: Path) -> bytes:
         return to_png(_read(file), Limits(GREATEST))
     except ImageError as error:
         raise LogError(f"{file}: {error}") from error
-
-
-def _time_in(stem: str) -> int | None:
-    """Nanoseconds since 1970, if the whole name is a time."""
-    match = _TIME.fullmatch(stem)
-    if match is None:
-        return None
-    seconds, fraction, milli, micro, nano = match.groups()
-    if seconds is not None:
-        return int(seconds) * NS + int((fraction or "").ljust(9, "0"))
-    scales = ((milli, 1_000_000), (micro, 1000), (nano, 1))
-    return next(int(digits) * scale for digits, scale in scales if digits is not None)

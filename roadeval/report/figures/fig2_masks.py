@@ -8,9 +8,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from roadeval.data import IGNORE, ROAD, Mask, Rgb, Truth, colours
-from roadeval.report.figures.figure import EXAMPLE_WIDTH, ExampleFrame, FigureData, FigureSpec
+from roadeval.report.figures.figure import (
+    EXAMPLE_WIDTH,
+    ExampleFrame,
+    FigureData,
+    FigureSpec,
+    variants_of,
+)
 from roadeval.report.figures.style import FAINT, INK, heading
-from roadeval.report.images import shrink
+from roadeval.report.images import faded, shrink
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +38,8 @@ def road_masks(data: FigureData) -> Figure | None:
     if not data.examples:
         return None
     truth = any(example.truth is not None for example in data.examples)
-    rows = [_pictures(example, truth=truth) for example in data.examples]
+    names = variants_of(data.examples)
+    rows = [_pictures(example, names, truth=truth) for example in data.examples]
     height, width = rows[0]["camera image"].shape[:2]
     row = (WIDTH - LEFT) / len(rows[0]) * height / width
     total = TOP + row * len(rows) + 0.05
@@ -61,17 +68,25 @@ FIGURE = FigureSpec(
 )
 
 
-def _pictures(example: ExampleFrame, *, truth: bool) -> dict[str, Rgb]:
+def _pictures(example: ExampleFrame, variants: Sequence[str], *, truth: bool) -> dict[str, Rgb]:
     """Return an example's pictures by their columns' titles."""
     image = example.image
     pictures = {"camera image": shrink(image, EXAMPLE_WIDTH)}
-    pictures |= {variant: _overlay(image, mask) for variant, mask in example.masks.items()}
+    for name in variants:
+        mask = example.masks.get(name)
+        small = shrink(image, EXAMPLE_WIDTH)
+        pictures[name] = faded(small) if mask is None else _overlay(image, mask)
     return pictures | ({"ground truth": _overlay(image, example.truth)} if truth else {})
 
 
 def _legend(examples: Sequence[ExampleFrame]) -> str:
     ignored = any(e.truth is not None and (e.truth == IGNORE).any() for e in examples)
-    return "Green with a white edge: road" + ("; grey: ignored, counted nowhere" * ignored)
+    missing = any(len(e.masks) < len(variants_of(examples)) for e in examples)
+    return (
+        "Green with a white edge: road"
+        + "; grey: ignored, counted nowhere" * ignored
+        + "; faded: there is no mask of this frame" * missing
+    )
 
 
 def _name_row(ax: Axes, frame: int) -> None:

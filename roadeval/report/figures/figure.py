@@ -20,10 +20,11 @@ EXAMPLE_WIDTH: Final = 400
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExampleFrame:
-    """A frame to show: its image, its truth if it has one, and each variant's final mask.
+    """A frame to show: its image, its truth if it has one, and the final masks of variants.
 
-    ``image`` is ``(H, W, 3)`` uint8 RGB, ``truth`` ``(H, W)`` uint8 (0, 1, 255) and each of
-    ``masks``, by variant, ``(H, W)`` uint8 (0, 1).
+    A variant whose masks another system has made may have none. ``image`` is ``(H, W, 3)`` uint8
+    RGB, ``truth`` ``(H, W)`` uint8 (0, 1, 255) and each of ``masks``, by variant, ``(H, W)`` uint8
+    (0, 1).
     """
 
     frame: int
@@ -41,6 +42,11 @@ class ExampleFrame:
         )
 
 
+def variants_of(examples: Sequence[ExampleFrame]) -> list[str]:
+    """Return the variants that have a mask of one of the frames."""
+    return list(dict.fromkeys(name for example in examples for name in example.masks))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FigureData:
     """The results that figures are drawn from.
@@ -52,7 +58,7 @@ class FigureData:
     windows
         As ``windows.csv``, any number of variants; no row without truth.
     examples
-        A few frames, all with masks of the same variants.
+        A few frames.
     """
 
     drive: str

@@ -9,10 +9,10 @@ from roadeval.data import TRUTH, mask_spec
 from roadeval.data.words import percent
 from roadeval.evaluation.metrics import SHORT
 from roadeval.report.blocks import Cell, ImageFile
-from roadeval.report.figures.figure import ExampleFrame
+from roadeval.report.figures.figure import ExampleFrame, variants_of
 from roadeval.report.figures.style import looks
 from roadeval.report.findings import Findings
-from roadeval.report.images import LayerImage, jpeg
+from roadeval.report.images import LayerImage, faded, jpeg
 
 SIDE_BY_SIDE: Final = 3
 """More variants than this do not fit beside each other under several rates."""
@@ -44,9 +44,14 @@ def sampled_frames(findings: Findings) -> str:
 
 def example_pictures(examples: Sequence[ExampleFrame]) -> Iterator[tuple[str, ImageFile]]:
     """Yield for each example the image, each variant's mask over it, and the truth over it."""
+    names = variants_of(examples)
     for example in examples:
         yield f"frame {example.frame}", jpeg(LayerImage("", example.image))
-        for name, mask in example.masks.items():
-            yield name, jpeg(LayerImage("", example.image, ROAD, mask))
+        for name in names:
+            mask = example.masks.get(name)
+            if mask is None:
+                yield f"{name}: no mask", jpeg(LayerImage("", faded(example.image)))
+            else:
+                yield name, jpeg(LayerImage("", example.image, ROAD, mask))
         if example.truth is not None:
             yield "truth", jpeg(LayerImage("", example.image, TRUTH, example.truth))

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from roadeval.report.blocks import Block, Figure, Heading, ImageGrid, Text
 from roadeval.report.figures.charts import coverage
+from roadeval.report.figures.figure import variants_of
 from roadeval.report.figures.files import svg
 from roadeval.report.findings import Findings
 from roadeval.report.sections.common import example_pictures
@@ -20,7 +21,7 @@ def section(findings: Findings) -> Iterator[Block]:
     )
     if findings.examples:
         pictures = list(example_pictures(findings.examples))
-        yield ImageGrid(pictures, len(findings.examples[0].masks) + 1)
+        yield ImageGrid(pictures, len(variants_of(findings.examples)) + 1)
     if len(findings.coverage):
         yield Figure(
             svg(lambda: coverage(findings.coverage)),

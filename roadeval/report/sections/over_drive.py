@@ -9,7 +9,7 @@ from roadeval.data.words import DASH, percent
 from roadeval.evaluation.metrics import FULL
 from roadeval.evaluation.settings import settings_of
 from roadeval.report.blocks import Block, Cell, Figure, Heading, ImageGrid, Table, Text
-from roadeval.report.figures.figure import figures
+from roadeval.report.figures.figure import figures, variants_of
 from roadeval.report.figures.files import svg_of
 from roadeval.report.findings import Findings
 from roadeval.report.sections.common import SIDE_BY_SIDE, example_pictures
@@ -28,7 +28,7 @@ def section(findings: Findings) -> Iterator[Block]:
         yield from _tables(findings)
     if findings.examples:
         pictures = list(example_pictures(findings.examples))
-        yield ImageGrid(pictures, len(findings.examples[0].masks) + 2)
+        yield ImageGrid(pictures, len(variants_of(findings.examples)) + 2)
         yield Text("The paper's figure 2: input and output images, and the truth.", "note")
     for figure in figures():
         if figure.in_report and (picture := svg_of(figure, findings.figure_data)):

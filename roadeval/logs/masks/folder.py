@@ -1,0 +1,176 @@
+"""A folder of masks, a file a frame, read as a topic of label images is."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.images import Limits
+from roadeval.images.errors import ImageError
+from roadeval.logs.errors import BadMessage, FrameError, LogError
+from roadeval.logs.image_folder import IMAGES, bare, listed, ordered, time_in
+from roadeval.logs.masks.npy import ENDING, npy_picture
+from roadeval.logs.messages.pictures import CompressedPicture, Picture
+from roadeval.logs.settings import MaskSettings
+from roadeval.runtime.files import check_input
+from roadeval.runtime.text import visible
+
+MASKS: Final = IMAGES | {ENDING}
+"""Endings of the files that can be masks."""
+_LAST_NUMBER: Final = re.compile(r"(\d+)\D*$")
+SHORT: Final = 10
+"""Digits of what may be a time in seconds, or a frame's number with zeros before it."""
+_DIGITS: Final = 18
+"""Most digits of a number that 64 bits hold."""
+
+
+@dataclass(frozen=True, eq=False)
+class MaskFolder:
+    """The masks of a folder, each with its key: the number, or the stamp, of its frame.
+
+    Parameters
+    ----------
+    path
+        The folder.
+    files
+        In the order of their keys.
+    log_times
+        ``(n,)`` int64: the keys, rising.
+    by
+        ``number``, ``stamp`` or ``name``: where the keys come from.
+    limits
+        On the images.
+    nameless
+        Further files, whose name no image has.
+    """
+
+    path: Path
+    files: tuple[Path, ...]
+    log_times: npt.NDArray[np.int64]
+    by: str
+    limits: Limits
+    nameless: int = 0
+
+    @property
+    def name(self) -> str:
+        """The folder, for messages."""
+        return visible(str(self.path))
+
+    def __len__(self) -> int:
+        return len(self.files)
+
+    def stamp(self, position: int) -> int:
+        """Return the key of a mask."""
+        return int(self.log_times[position])
+
+    def picture(self, position: int) -> Picture:
+        """Read a mask's file.
+
+        Raises
+        ------
+        FrameError
+            If it cannot be read.
+        """
+        file = self.files[position]
+        try:
+            data = _content(file)
+            if file.suffix.lower() == ENDING:
+                return npy_picture(data, self.limits)
+            return CompressedPicture(0, file.suffix[1:].lower(), data)
+        except OSError as error:
+            raise FrameError(f"{self.place(position)}: {error.strerror}") from error
+        except (BadMessage, ImageError) as error:
+            raise FrameError(f"{self.place(position)}: {error}") from error
+
+    def place(self, position: int) -> str:
+        """Return a mask's file, for messages to people."""
+        return visible(str(self.files[position]))
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of all keys and files, in hexadecimal.
+
+        Raises
+        ------
+        LogError
+            If one cannot be read.
+        """
+        digest = hashlib.sha256()
+        for key, file in zip(self.log_times.tolist(), self.files, strict=True):
+            try:
+                content = _content(file)
+            except OSError as error:
+                raise LogError(f"{file}: {error.strerror}") from error
+            digest.update(f"{key} {hashlib.sha256(content).hexdigest()}\n".encode())
+        return digest.hexdigest()
+
+
+def open_folder(path: Path, settings: MaskSettings, limits: Limits) -> MaskFolder:
+    """List the masks of a folder, and find the key of each.
+
+    Raises
+    ------
+    LogError
+        If there is none, or a name has no key, or two files have the same.
+    """
+    if path.suffix == ".mcap" and path.is_file():
+        raise LogError(f"{path}: a log; name a topic of it, as {path}:/topic")
+    files = listed(path, MASKS)
+    by, keys = _keys(files, settings)
+    places = sorted(keys, key=keys.__getitem__)
+    for one, other in pairwise(places):
+        if keys[one] == keys[other]:
+            both = f"{visible(one.name)} and {visible(other.name)}"
+            raise LogError(f"{path}: {both} belong to the same frame, by {by}")
+    in_order = np.array([keys[file] for file in places], np.int64)
+    return MaskFolder(path, tuple(places), in_order, by, limits, len(files) - len(places))
+
+
+def _keys(files: Sequence[Path], settings: MaskSettings) -> tuple[str, dict[Path, int]]:
+    """Return what the keys are, and that of each file that has one."""
+    if settings.images is not None:
+        return "name", _by_image(files, Path(settings.images))
+    times = {file: time for file in files if (time := time_in(bare(file))) is not None}
+    are_times = len(times) == len(files) and all(len(bare(file)) > SHORT for file in files)
+    if settings.pair == "number" or (settings.pair is None and not are_times):
+        return "number", {file: _number(file) - settings.first for file in files}
+    for file in files:
+        if file not in times:
+            raise LogError(f"{file}: its name is no time by which to find its frame")
+    return "stamp", times
+
+
+def _number(file: Path) -> int:
+    found = _LAST_NUMBER.search(bare(file))
+    if found is None or len(found[1]) > _DIGITS:
+        raise LogError(f"{file}: its name has no number by which to find its frame")
+    return int(found[1])
+
+
+def _by_image(files: Sequence[Path], folder: Path) -> dict[Path, int]:
+    """Return for each mask the place of the image of its name."""
+    images, _ = ordered(listed(folder, IMAGES))
+    names = [image.stem for image in images]
+    if len(set(names)) < len(names):
+        raise LogError(f"{folder}: two of its images have the same name")
+    places = {name: place for place, name in enumerate(names)}
+    found = {}
+    for file in files:
+        place = places.get(file.stem, places.get(bare(file)))
+        if place is not None:
+            found[file] = place
+    return found
+
+
+def _content(file: Path) -> bytes:
+    check_input(file)
+    return file.read_bytes()

@@ -1,0 +1,256 @@
+"""Masks that lie beside the log give the numbers of the same masks in it."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import roadeval
+from roadeval import RoadevalError
+from roadeval.jobs.identity import identity
+from roadeval.logs import LogWriter, TopicSettings, open_log
+from tests.e2e.commands import here
+from tests.jobs.making import FRAMES, settings, write_log
+
+IN_LOG = "/net/road_mask_prediction"
+
+
+@pytest.fixture(scope="module")
+def places(tmp_path_factory) -> Path:
+    """A log with masks in it, the same masks in folders of every kind, and in another log."""
+    base = tmp_path_factory.mktemp("places")
+    drive = write_log(base / "drive.mcap", net=True)
+    kinds = ("number", "stamp", "npy", "classes", "confidence", "images", "named", "half")
+    for kind in kinds:
+        (base / kind).mkdir()
+    with open_log(drive) as log, LogWriter(base / "other.mcap") as other:
+        selection = log.select(TopicSettings(masks={"net": IN_LOG}))
+        for frame in (logged.decode() for logged in log.frames(selection)):
+            # Wrong somewhere, and elsewhere in each frame.
+            mask = np.roll(frame.external["net"], frame.number % 5 - 2, 0)
+            _write(base, frame.number, frame.stamp_ns, mask)
+            other.mask("/seg", frame.stamp_ns, mask, log_time_ns=frame.stamp_ns + 5)
+    return base
+
+
+def _write(base, number, stamp, mask):
+    cv2.imwrite(str(base / "number" / f"frame_{number:04d}.png"), mask * 255)
+    cv2.imwrite(str(base / "stamp" / f"{stamp:019d}.png"), mask)
+    np.save(base / "npy" / f"{number}.npy", mask.astype(bool))
+    cv2.imwrite(str(base / "classes" / f"{number}.png"), 3 + 4 * mask)
+    cv2.imwrite(str(base / "confidence" / f"{number}.png"), 100 + 55 * mask)
+    name = f"{chr(ord('a') + number)}.png"
+    (base / "images" / name).touch()
+    cv2.imwrite(str(base / "named" / name), mask)
+    if number % 2:
+        cv2.imwrite(str(base / "half" / f"{number}.png"), mask * 255)
+
+
+def masks(base, **tables):
+    return {
+        name: {
+            key: str(base / value) if key in ("path", "images") else value
+            for key, value in own.items()
+        }
+        for name, own in tables.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def outcome(places, tmp_path_factory):
+    """A replay with the masks of all places side by side; with those in the log, rolled alike."""
+    inside = tmp_path_factory.mktemp("inside")
+    drive = inside / "drive.mcap"
+    with open_log(places / "drive.mcap") as log, LogWriter(drive) as writer:
+        selection = log.select(TopicSettings(masks={"net": IN_LOG}))
+        for frame in (logged.decode() for logged in log.frames(selection)):
+            writer.image("/camera/image", frame.stamp_ns, bytes(frame.payload), "png")
+            if frame.truth is not None:
+                writer.mask("/truth/road", frame.stamp_ns, frame.truth * 255)
+            rolled = np.roll(frame.external["net"], frame.number % 5 - 2, 0)
+            writer.mask(IN_LOG, frame.stamp_ns, rolled * 255)
+    beside = masks(
+        places,
+        number={"path": "number"},
+        stamp={"path": "stamp"},
+        npy={"path": "npy"},
+        classes={"path": "classes", "labels": {"road": [7]}},
+        confidence={"path": "confidence", "threshold": 0.5},
+        named={"path": "named", "images": "images"},
+        other={"path": "other.mcap:/seg"},
+        order={"path": "other.mcap:/seg", "pair": "number"},
+        half={"path": "half"},
+    )
+    config = settings(masks={"inside": IN_LOG}).override({"masks": beside})
+    return roadeval.replay(drive, config, save=inside / "out.rrd", reports=inside / "reports")
+
+
+WHOLE = ("number", "stamp", "npy", "classes", "confidence", "named", "other", "order")
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_the_numbers_are_those_of_the_same_masks_in_the_log(outcome, name):
+    frames = roadeval.Recording(outcome.recording).frames
+
+    def of(variant):
+        return frames[frames["variant"] == variant].drop(columns="variant").to_numpy().tolist()
+
+    assert of(name) == of("inside")
+    assert outcome.summary["totals"]["inside"]["post"]["FP"] > 0
+
+
+def test_the_recording_holds_the_masks(outcome):
+    recording = roadeval.Recording(outcome.recording)
+    inside = recording.layer("inside", "post", 15)
+    np.testing.assert_array_equal(recording.layer("confidence", "post", 15), inside)
+    probability = recording.layer("confidence", "probability", 15)
+    assert np.abs(probability - (100 + 55 * inside) / 255).mean() < 0.05
+
+
+def test_a_frame_without_a_mask_is_left_out_of_its_variant_and_told(outcome):
+    assert outcome.summary["totals"]["half"]["post"]["frames"] == 8
+    assert outcome.summary["totals"]["number"]["post"]["frames"] == 15
+    assert outcome.summary["masks"]["half"]["frames"] == FRAMES // 2
+    (told,) = [each for each in outcome.warnings if each.startswith("half: ")]
+    assert "13 of the 26 frames read have no mask" in told
+
+
+def test_a_variant_with_few_masks_is_not_called_the_best(outcome):
+    assert not outcome.summary["verdict"].startswith("half ")
+
+
+def test_a_report_shows_frames_without_a_mask(outcome, tmp_path):
+    assert roadeval.write_report(outcome.recording, tmp_path / "out.pdf").stat().st_size
+
+
+def test_the_summary_says_where_masks_lie_and_how_they_are_read(outcome, places):
+    stated = outcome.summary["masks"]
+    assert stated["confidence"]["meaning"] == "a confidence map: road is 0.5 or more"
+    assert stated["other"]["pairing"] == "26 messages, paired by header stamps"
+    assert stated["named"]["pairing"] == "26 files, paired by name"
+    assert stated["number"]["path"] == str(places / "number")
+
+
+def refused(places, **table) -> str:
+    config = settings().override({"masks": {"net": table}})
+    with pytest.raises(RoadevalError) as caught:
+        roadeval.replay(places / "drive.mcap", config, reports=places / "refused")
+    assert not (places / "refused").exists()
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("shift", "message"),
+    [
+        (1, "its numbers are 1 to 26, and the frames' 0 to 25"),
+        (500, "no mask belongs to a frame by number: theirs are 500 to 525"),
+    ],
+)
+def test_masks_that_belong_to_no_frame_or_to_the_next_are_refused(places, tmp_path, shift, message):
+    for number in range(FRAMES):
+        cv2.imwrite(str(tmp_path / f"{number + shift}.png"), np.eye(4, dtype=np.uint8))
+    assert message in refused(places, path=str(tmp_path))
+
+
+def test_masks_of_another_time_are_refused(places, tmp_path):
+    with LogWriter(tmp_path / "other.mcap") as log:
+        log.mask("/seg", 10**18, np.eye(4, dtype=np.uint8))
+    assert "no mask belongs to a frame" in refused(places, path=f"{tmp_path}/other.mcap:/seg")
+
+
+def test_masks_of_another_size_are_refused_unless_they_are_to_be_scaled(places, tmp_path):
+    for number in range(FRAMES):
+        mask = cv2.imread(str(places / "number" / f"frame_{number:04d}.png"), 0)
+        cv2.imwrite(str(tmp_path / f"{number}.png"), cv2.resize(mask, (30, 20)) // 128 * 255)
+    message = refused(places, path=str(tmp_path))
+    assert "is 30x20, but /camera/image is" in message
+    assert "`topics.resize_truth`" in message
+    config = settings(resize_truth=True).override({"masks": {"net": {"path": str(tmp_path)}}})
+    done = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "reports")
+    assert done.summary["totals"]["net"]["post"]["frames"] == 15
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (
+            {"path": "classes"},
+            "holds the values 3 7: name those that mean road with `masks.net.labels.road`",
+        ),
+        ({"path": "npy", "threshold": 0.5}, "holds only 0 and 1, as masks do"),
+        ({"path": "nowhere"}, "no such folder"),
+        ({"path": "other.mcap"}, "name a topic of it, as"),
+        ({"path": "other.mcap:/no"}, "topic /no: is not in the log; its image topics are: /seg"),
+        ({"path": "other.mcap:/seg", "images": "images"}, "images are for a folder of masks"),
+    ],
+)
+def test_masks_that_cannot_be_used_are_one_line(places, table, message):
+    (own,) = masks(places, net=table).values()
+    found = refused(places, **own)
+    assert message in found
+    assert "`masks` net: " in found
+    assert "\n" not in found
+
+
+def test_a_broken_mask_costs_its_frame_and_is_named(places, tmp_path):
+    for file in (places / "number").iterdir():
+        content = b"no image" if file.name == "frame_0015.png" else file.read_bytes()
+        (tmp_path / file.name).write_bytes(content)
+    config = settings().override({"masks": {"net": {"path": str(tmp_path)}}})
+    done = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "reports")
+    (loss,) = done.losses
+    assert loss.startswith(f"frame 15: {tmp_path}/frame_0015.png: ")
+
+
+def test_the_command_takes_them_and_says_what_is_wrong_with_a_file(places, tmp_path):
+    (tmp_path / "own.toml").write_text(f'path = "{places}/confidence"\nthreshold = 0.5\n')
+    (tmp_path / "bad.toml").write_text(f'path = "{places}/confidence"\nthreshold = 5\n')
+    words = ("replay", places / "drive.mcap", "-q", "--record", "none", "--reports", tmp_path / "r")
+    assert (
+        here(
+            *words, "--masks", f"a={places}/number", "--masks", f"b={tmp_path}/own.toml"
+        ).returncode
+        == 0
+    )
+    bad = here(*words, "--masks", f"b={tmp_path}/bad.toml")
+    assert bad.returncode == 1
+    assert "bad.toml: [masks.b] threshold: must be at most 1" in bad.stderr
+    twice = here(*words, "--masks", f"a={places}/number", "--masks", f"a={places}/npy")
+    assert twice.returncode == 2
+    assert "the name is taken" in twice.stderr
+
+
+def test_a_run_is_repeated_by_its_file(places, tmp_path):
+    config = settings(record="none").override({"masks": {"net": {"path": f"{places}/number"}}})
+    one = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "a")
+    again = roadeval.load_config(tmp_path / "a" / "run.toml")
+    two = roadeval.replay(places / "drive.mcap", again, reports=tmp_path / "b")
+    assert two.summary["totals"] == one.summary["totals"]
+
+
+def test_masks_of_other_content_make_another_recording_wherever_they_lie(places):
+    def of(digest, path):
+        config = settings().override({"masks": {"net": {"path": path}}})
+        with open_log(places / "drive.mcap") as log:
+            return identity(log, config, {"net": digest})
+
+    assert of("1", "here") == of("1", "there") != of("2", "here")
+
+
+def test_a_drive_of_a_fleet_is_replayed_again_when_its_masks_change(places, tmp_path):
+    own = tmp_path / "masks" / "drive"
+    own.mkdir(parents=True)
+    for file in (places / "number").iterdir():
+        (own / file.name).write_bytes(file.read_bytes())
+    config = settings().override(
+        {"masks": {"net": {"path": f"{tmp_path}/masks/{{drive}}"}}, "fleet": {"workers": 1}}
+    )
+
+    def replayed():
+        return roadeval.replay_fleet([places / "drive.mcap"], tmp_path / "fleet", config).replayed
+
+    assert (replayed(), replayed()) == (1, 0)
+    np.save(own / "25.npy", np.zeros((1, 1)))
+    (own / "frame_0025.png").unlink()
+    assert replayed() == 1

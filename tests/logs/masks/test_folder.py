@@ -1,0 +1,124 @@
+"""Which mask of a folder belongs to which frame, by its name."""
+
+import numpy as np
+import pytest
+
+from roadeval.images import Limits
+from roadeval.logs import LogError, MaskSettings
+from roadeval.logs.masks.elsewhere import log_and_topic
+from roadeval.logs.masks.folder import open_folder
+
+
+def folder(tmp_path, *names):
+    made = tmp_path / "masks"
+    made.mkdir()
+    for name in names:
+        (made / name).write_bytes(name.encode())
+    return made
+
+
+def keys(path, **settings):
+    opened = open_folder(path, MaskSettings(str(path), **settings), Limits())
+    names = [file.name for file in opened.files]
+    return opened.by, dict(zip(names, opened.log_times.tolist(), strict=True))
+
+
+def test_the_last_number_of_a_name_is_its_frame(tmp_path):
+    path = folder(tmp_path, "0016E5_10.png", "0016E5_2_mask.png", "x7_L.npy", "notes.txt")
+    expected = {"0016E5_2_mask.png": 2, "x7_L.npy": 7, "0016E5_10.png": 10}
+    assert keys(path) == ("number", expected)
+    assert list(keys(path)[1]) == list(expected)
+
+
+def test_numbers_may_begin_elsewhere(tmp_path):
+    assert keys(folder(tmp_path, "5.png", "6.png"), first=5)[1] == {"5.png": 0, "6.png": 1}
+
+
+def test_names_that_are_times_are_stamps(tmp_path):
+    path = folder(tmp_path, "1700000000.25.png", "1700000000123.png", "1700000000500000001_gt.png")
+    assert keys(path) == (
+        "stamp",
+        {
+            "1700000000123.png": 1_700_000_000_123_000_000,
+            "1700000000.25.png": 1_700_000_000_250_000_000,
+            "1700000000500000001_gt.png": 1_700_000_000_500_000_001,
+        },
+    )
+
+
+def test_ten_digits_are_a_number_unless_told_otherwise(tmp_path):
+    path = folder(tmp_path, "0000000012.png")
+    assert keys(path) == ("number", {"0000000012.png": 12})
+    assert keys(path, pair="stamp")[1] == {"0000000012.png": 12 * 10**9}
+
+
+def test_a_mask_belongs_to_the_image_of_its_name_at_its_place(tmp_path):
+    path = folder(tmp_path, "c_mask.png", "a.png", "other.png")
+    images = tmp_path / "images"
+    images.mkdir()
+    for name in ("a.jpg", "b.jpg", "c.jpg"):
+        (images / name).touch()
+    assert keys(path, images=str(images)) == ("name", {"a.png": 0, "c_mask.png": 2})
+    assert open_folder(path, MaskSettings(str(path), images=str(images)), Limits()).nameless == 1
+
+
+@pytest.mark.parametrize(
+    ("names", "settings", "message"),
+    [
+        ((), {}, "no image in it"),
+        (("road.png",), {}, "road.png: its name has no number"),
+        (("1.png", "a1.npy"), {}, "a1.npy and 1.png belong to the same frame, by number"),
+        (("1.png",), {"pair": "stamp"}, "1.png: its name is no time"),
+    ],
+)
+def test_names_that_tell_no_frame_are_refused(tmp_path, names, settings, message):
+    with pytest.raises(LogError, match=message):
+        keys(folder(tmp_path, *names), **settings)
+
+
+def test_the_digest_tells_content_and_frame_not_the_place(tmp_path):
+    def digest(name, file, content):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / file).write_bytes(content)
+        return open_folder(tmp_path / name, MaskSettings(), Limits()).digest
+
+    one = digest("a", "1.png", b"x")
+    assert digest("b", "frame_01.png", b"x") == one
+    assert digest("c", "2.png", b"x") != one
+    assert digest("d", "1.png", b"y") != one
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ("a.mcap:/net", ("a.mcap", "/net")),
+        ("d/a.mcap:net", ("d/a.mcap", "net")),
+        ("bag:/net/road", ("bag", "/net/road")),
+        ("a:b/masks", None),
+        ("C:/masks", None),
+        ("masks", None),
+    ],
+)
+def test_a_topic_of_a_log_is_told_from_a_folder(path, expected):
+    assert log_and_topic(path) == expected
+
+
+def test_confidences_of_eight_and_sixteen_bits_and_fractions_are_the_same(tmp_path):
+    from roadeval.logs.masks.npy import npy_picture
+    from roadeval.logs.messages.pictures import CompressedPicture
+    from roadeval.logs.topics.confidence import Confidence
+    from tests.logs.making import png
+    from tests.logs.masks.test_npy import file_of
+
+    levels = np.arange(256, dtype=np.uint8).reshape(16, 16)
+    confidence = Confidence(0.5)
+    pictures = [
+        CompressedPicture(0, "png", png(levels)),
+        CompressedPicture(0, "png", png(levels.astype(np.uint16) * 257)),
+        npy_picture(file_of(levels / 255), Limits()),
+        npy_picture(file_of((levels / 255).astype(np.float32)), Limits()),
+    ]
+    for picture in pictures:
+        codes = confidence.read(picture, Limits())
+        np.testing.assert_array_equal(codes, levels.astype(np.uint16) * 257)
+    np.testing.assert_array_equal(confidence.road(codes), levels / 255 >= 0.5)
