@@ -88,13 +88,14 @@ def configuration(given: Given) -> RunConfig:
     """
     from roadeval.config import configure
 
-    options = ("variants", "topics.masks", "masks")
+    options = ("variants", "nets", "topics.masks", "masks")
     named = [each for option in options for each in given.get(option, ())]
     with usage():
         _check_names([name for name, _ in named])
         base = configure(_preset(given)) if "config" not in given else None
     config = _from_file(given) if base is None else base
     variants = [_variant(*each) for each in given.get("variants", ())]
+    variants += [_network(*each) for each in given.get("nets", ())]
     masks = {"masks": dict(_masks(*each) for each in given.get("masks", ()))}
     with usage():
         whole = config.override(_tables(given) | masks).with_variants(variants)
@@ -138,6 +139,12 @@ def _variant(name: str, path: str | None) -> Variant:
         return Variant.of(name, read_tables(path), path)
     with usage():
         return Variant.of(name, {"preset": name}, f"{FLAGS['variants']} {name} names no file")
+
+
+def _network(name: str, path: str) -> Variant:
+    from roadeval.config import network_variant
+
+    return network_variant(name, path)
 
 
 def _masks(name: str, path: str) -> tuple[str, dict[str, Any]]:

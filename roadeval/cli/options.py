@@ -46,8 +46,8 @@ class Option:
     Parameters
     ----------
     setting
-        ``table.key`` in a run's configuration; ``preset``, ``config``, ``variants``, ``masks``
-        and ``drives`` are read by `roadeval.cli.arguments`.
+        ``table.key`` in a run's configuration; ``preset``, ``config``, ``variants``, ``nets``,
+        ``masks`` and ``drives`` are read by `roadeval.cli.arguments`.
     flags
         As they are typed; the last one is named in messages.
     metavar
@@ -119,6 +119,15 @@ OPTIONS: Final = (
         "Repeatable.",
         list[str],
         variant,
+    ),
+    Option(
+        "nets",
+        ("--net",),
+        "NAME=FILE",
+        "One more variant: the network of an ONNX file, or of a TOML file with its settings, as "
+        "the size of its input. Repeatable.",
+        list[str],
+        named,
     ),
     Option(
         "masks",

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from roadeval.config.errors import ConfigError
     from roadeval.config.log import LogConfig
     from roadeval.config.names import check_variant_name
+    from roadeval.config.networks import network_variant
     from roadeval.config.presets import PRESETS
     from roadeval.config.run import RunConfig, configure
     from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
@@ -31,6 +32,7 @@ __all__ = [
     "check_variant_name",
     "configure",
     "load_config",
+    "network_variant",
     "read_tables",
 ]
 
@@ -47,6 +49,7 @@ _MODULES: Final = {
     "check_variant_name": "names",
     "configure": "run",
     "load_config": "toml",
+    "network_variant": "networks",
     "read_tables": "toml",
 }
 

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -130,6 +130,21 @@ class RunConfig:
     def pipelines(self) -> dict[str, Pipeline]:
         """Return the pipeline of every variant, by name."""
         return {variant.name: variant.pipeline for variant in self.variants()}
+
+    def resolved(self) -> RunConfig:
+        """Return the configuration with settings stated that stages find in files.
+
+        A `RoadevalError` if a file cannot be used.
+        """
+        return self._with_pipelines(Pipeline.resolved)
+
+    def without_places(self) -> RunConfig:
+        """Return the configuration without the stages' settings that say where files lie."""
+        return self._with_pipelines(Pipeline.without_places)
+
+    def _with_pipelines(self, change: Callable[[Pipeline], Pipeline]) -> RunConfig:
+        extra = tuple(replace(each, pipeline=change(each.pipeline)) for each in self.extra)
+        return replace(self, pipeline=change(self.pipeline), extra=extra)
 
     def override(self, tables: Mapping[str, Any], where: str = "") -> RunConfig:
         """Return the configuration with the values of some tables in place.

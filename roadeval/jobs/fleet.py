@@ -102,7 +102,7 @@ def replay_fleet(
         If there is no drive, or the folder or the engine cannot be used, or more drives fail than
         ``fleet.max_failures`` allows: then all that was done is kept.
     """
-    config = config or RunConfig()
+    config = (config or RunConfig()).resolved()
     entries = find_drives([str(drive) for drive in drives])
     if config.fleet.folds is not None and config.training.model is not None:
         raise FleetError(

@@ -90,11 +90,11 @@ def external_variant(
 
 def bind(variants: tuple[Variant, ...], model: Model) -> Mapping[str, Chain]:
     """Make the variants' chains ready to run with what the model learnt for each."""
-    return {v.name: v.pipeline.bind(model.parameters[v.name]) for v in variants}
+    return {v.name: v.pipeline.bind(model.parameters.get(v.name, {})) for v in variants}
 
 
 def run_frame(
-    image: Rgb, model: Model, config: RunConfig | None = None, *, variant: str = FILTERED
+    image: Rgb, model: Model | None, config: RunConfig | None = None, *, variant: str = FILTERED
 ) -> VariantResult:
     """Run one variant on one image, with all layers: the notebook's way in.
 
@@ -103,7 +103,8 @@ def run_frame(
     image
         ``(H, W, 3)`` uint8 RGB.
     model
-        What `roadeval.train` or `roadeval.load_model` gave.
+        What `roadeval.train` or `roadeval.load_model` gave; None for a variant that learns nothing,
+        as a network.
     config
         The configuration that the model was trained with; the preset ``paper`` by default.
     variant
@@ -124,7 +125,11 @@ def run_frame(
     >>> {layer.spec.name: layer.array.shape for layer in result.layers()}["compensated"]
     (48, 64, 3)
     """
-    chains = bind((config or RunConfig()).variants(), model)
-    if variant not in chains:
-        raise RoadevalError(f"there is no variant {variant}; there are {', '.join(chains)}")
-    return run_variant(variant, chains[variant], View.of(image))
+    pipelines = (config or RunConfig()).pipelines()
+    if variant not in pipelines:
+        raise RoadevalError(f"there is no variant {variant}; there are {', '.join(pipelines)}")
+    pipeline = pipelines[variant]
+    if model is None and pipeline.learning():
+        raise RoadevalError(f"variant {variant} needs a model: its stages learn")
+    learnt = {} if model is None else model.parameters.get(variant, {})
+    return run_variant(variant, pipeline.bind(learnt), View.of(image))

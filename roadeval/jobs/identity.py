@@ -45,7 +45,8 @@ def asked(
     that of all that decides what a run finds.
     """
     plain = {name: replace(each, path="", images=None) for name, each in config.masks.items()}
-    settings = replace(deciding(config), training=replace(config.training, model=None), masks=plain)
+    training = replace(config.training, model=None)
+    settings = replace(deciding(config).without_places(), training=training, masks=plain)
     parts = [VERSION, of, json.dumps(settings.as_dict(), sort_keys=True), model]
     if masks:
         parts.append(json.dumps(masks, sort_keys=True))

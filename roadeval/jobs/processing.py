@@ -13,7 +13,7 @@ from roadeval.data import FrameResult, Role
 from roadeval.jobs import frame as one_frame
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.jobs.run import Run
-from roadeval.pipeline.stage import View
+from roadeval.pipeline.stage import StageError, View
 from roadeval.results import notes
 from roadeval.results.lines import lines
 from roadeval.runtime.memory import TRIM_EVERY, trim
@@ -73,18 +73,22 @@ def _process(
     known = (frame.truth, frame.shadow_truth) if use.role is Role.EVALUATED else (None, None)
     shared: dict[Any, Any] = {}
     view = View.of(frame.image)
-    variants = [
-        one_frame.run_variant(
-            name,
-            chain,
-            view,
-            truth=known[0],
-            shadow_truth=known[1],
-            known=shared,
-            repeats={seed: chains[name] for seed, chains in run.repeats.items()},
-        )
-        for name, chain in run.chains.items()
-    ]
+    try:
+        variants = [
+            one_frame.run_variant(
+                name,
+                chain,
+                view,
+                truth=known[0],
+                shadow_truth=known[1],
+                known=shared,
+                repeats={seed: chains[name] for seed, chains in run.repeats.items()},
+            )
+            for name, chain in run.chains.items()
+        ]
+    except StageError as error:
+        run.failures[frame.number] = error
+        return None
     variants += [
         one_frame.external_variant(name, mask, frame.probabilities.get(name))
         for name, mask in frame.external.items()

@@ -84,7 +84,7 @@ def replay(
     """
     given = {"save": save, "reports": reports, "mcap": mcap}
     wanted = {name: str(path) for name, path in given.items() if path is not None}
-    config = (config or RunConfig()).for_drive(drive).override({"output": wanted})
+    config = (config or RunConfig()).for_drive(drive).override({"output": wanted}).resolved()
     frames = config.frames
     with logs.open_log(
         drive, keep_corrupt=frames.keep_corrupt, max_pixels=frames.max_pixels

@@ -18,7 +18,7 @@ from roadeval.jobs import frame
 from roadeval.jobs.identity import identity
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.pipeline.chain import Chain
-from roadeval.pipeline.stage import MisfitError
+from roadeval.pipeline.stage import MisfitError, StageError
 from roadeval.recording import Layout
 from roadeval.results.schema import streamed
 from roadeval.runtime.memory import trim
@@ -56,6 +56,8 @@ class Run:
         The score so far.
     beside
         The training frames of a model file that show a place of this drive, so far.
+    failures
+        Why a stage failed on frames, by their numbers: so far, from any thread.
     """
 
     log: logs.Log
@@ -70,6 +72,7 @@ class Run:
     layouts: tuple[VariantLayout, ...]
     board: Scoreboard
     beside: set[int] = field(default_factory=set)
+    failures: dict[int, StageError] = field(default_factory=dict)
 
     def layout(self) -> Layout:
         """Describe the recording before its first frame."""

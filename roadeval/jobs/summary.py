@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Final
 
-from roadeval.data import Role
+from roadeval.data import BASELINE, Role
 from roadeval.jobs.run import Run
 from roadeval.results.verdict import verdict_of
 from roadeval.version import VERSION
@@ -28,6 +28,7 @@ def of(run: Run) -> dict[str, Any]:
     found, differences = run.board.summary(), run.board.differences()
     repeats = run.board.repeats()
     seeds = {"seeds": [run.config.training.seed, *run.repeats], **repeats} if repeats else None
+    methods = {each.name: told for each in run.variants if (told := each.pipeline.about())}
     return found | {
         "verdict": verdict_of(found["totals"], differences, run.config.evaluation),
         **differences.as_dict(),
@@ -39,6 +40,7 @@ def of(run: Run) -> dict[str, Any]:
         "losses": list(losses(run)),
         "run": run.config.as_dict(),
         "settings": {each.name: each.pipeline.as_dict() for each in run.variants},
+        **({"methods": methods} if methods else {}),
         "versions": versions(),
         "log": {"path": str(run.log.path), "sha256": run.log.sha256},
         **({"masks": masks} if (masks := _masks(run)) else {}),
@@ -67,13 +69,15 @@ def warnings(run: Run) -> tuple[str, ...]:
         *_missing(run),
         *run.config.ignored(),
         *_near_training(run),
+        *_constant(run),
         *run.model.warnings,
     )
 
 
 def losses(run: Run) -> tuple[str, ...]:
-    """List the parts of the log that were lost."""
-    return (*run.log.losses, *run.frames.accounting.losses)
+    """List the parts of the log that were lost, and the frames on which a stage failed."""
+    failed = (f"frame {number}: {error}" for number, error in sorted(run.failures.items()))
+    return (*run.log.losses, *run.frames.accounting.losses, *failed)
 
 
 def _sizes(run: Run) -> tuple[str, ...]:
@@ -153,6 +157,15 @@ def _near_training(run: Run) -> Iterator[str]:
         )
 
 
+def _constant(run: Run) -> Iterator[str]:
+    """Warn of variants whose final mask is road nowhere, or everywhere."""
+    for variant, stages in run.board.totals().items():
+        *_, total = stages.values()
+        for share, where in ((0, "nowhere"), (1, "everywhere")):
+            if variant != BASELINE and total["pooled_TPR"] == total["pooled_FPR"] == share:
+                yield f"{variant}: its final mask is road {where}, on every frame"
+
+
 def _drive(run: Run) -> dict[str, Any]:
     width, height = run.selection.size or (0, 0)
     return {
@@ -171,6 +184,7 @@ def _accounting(run: Run) -> dict[str, Any]:
         "outside the range": seen.in_log - seen.in_range,
         "not read (stride or limit)": seen.in_range - seen.read,
         "undecodable": len(seen.undecodable),
+        "failed in a stage": len(run.failures),
         "trained on": roles[Role.TRAINING],
         "copies of training frames": roles[Role.COPY],
         "gap after training": roles[Role.GAP],

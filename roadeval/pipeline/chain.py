@@ -73,6 +73,37 @@ class Pipeline:
                 }
         return found
 
+    def resolved(self) -> Pipeline:
+        """Return the pipeline with settings stated that its stages find in files.
+
+        A `RoadevalError` if a file cannot be used.
+        """
+        found = {
+            stage.name: stage.resolve(self.settings[stage.name])
+            for stage in self.stages()
+            if stage.resolve is not None
+        }
+        return dataclasses.replace(self, settings={**self.settings, **found})
+
+    def without_places(self) -> Pipeline:
+        """Return the pipeline without the settings that say where files lie."""
+        found = {
+            stage.name: dataclasses.replace(
+                self.settings[stage.name], **dict.fromkeys(stage.places, "")
+            )
+            for stage in self.stages()
+            if stage.places
+        }
+        return dataclasses.replace(self, settings={**self.settings, **found})
+
+    def about(self) -> dict[str, dict[str, Any]]:
+        """Return what results tell of stages beside their settings, by stage."""
+        return {
+            stage.reported: dict(stage.about(self.settings[stage.name]))
+            for stage in self.stages()
+            if stage.about is not None
+        }
+
     def as_dict(self) -> dict[str, Any]:
         """Return the chain and its settings as plain data, in the shape of a TOML file."""
         settings = {name: dataclasses.asdict(self.settings[name]) for name in self.chain}

@@ -24,7 +24,7 @@ Recording, tables and report iterate over stages and layers, and know none by na
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
@@ -36,7 +36,7 @@ from roadeval.errors import RoadevalError
 from roadeval.pipeline.channels import split
 from roadeval.pipeline.training_set import TrainingSet
 
-__all__ = ["MisfitError", "Output", "Stage", "TrainingSet", "View", "perfect_mask"]
+__all__ = ["MisfitError", "Output", "Stage", "StageError", "TrainingSet", "View", "perfect_mask"]
 
 S = TypeVar("S")
 """Settings of a stage: a frozen, validated dataclass."""
@@ -46,6 +46,10 @@ P = TypeVar("P")
 
 class MisfitError(RoadevalError, ValueError):
     """Parameters that do not fit a stage's settings: which, and what to do."""
+
+
+class StageError(RoadevalError):
+    """A stage that fails on a frame, which that frame is lost for: which stage, and why."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,6 +127,14 @@ class Stage(Generic[S, P]):
     sees_mask_alone
         Whether it looks at nothing but the mask before it. After a perfect mask its result is then
         the same in every variant that has its settings.
+    resolve
+        ``resolve(settings)`` returns the settings with all stated that they leave to a file, its
+        digest included; a `RoadevalError` if the file cannot be used. None where they name none.
+    places
+        Settings that say where a file lies, and decide nothing once its digest is stated.
+    about
+        ``about(settings)`` returns what results tell of the stage beside its settings, as plain
+        data by name.
     """
 
     name: str
@@ -138,6 +150,9 @@ class Stage(Generic[S, P]):
     inference_only: tuple[str, ...] = ()
     mask: str = ""
     sees_mask_alone: bool = False
+    resolve: Callable[[S], S] | None = None
+    places: tuple[str, ...] = ()
+    about: Callable[[S], Mapping[str, Any]] | None = None
 
     @property
     def yields_mask(self) -> bool:

@@ -17,13 +17,13 @@ SUMMARY: Final = "summary.json"
 PARTS: Final = (
     *("format", "verdict", "drive", "frames", "totals", "beyond", "difference", "against_blind"),
     *("seeds", "oracles", "windows", "claims", "health", "training", "seconds", "warnings"),
-    *("losses", "run", "settings", "versions", "log", "masks", "tables", "files"),
+    *("losses", "run", "settings", "methods", "versions", "log", "masks", "tables", "files"),
 )
 """The parts of the summary, in the file's order."""
-LATER: Final = frozenset({"seeds", "claims", "masks", "tables", "files"})
+LATER: Final = frozenset({"seeds", "claims", "methods", "masks", "tables", "files"})
 """Parts that not every summary has, so that readers must do without them: earlier versions did not
-write them, a recording has no files, and most runs train with one seed and have all masks in the
-log."""
+write them, a recording has no files, and most runs train with one seed, have no network, and all
+masks in the log."""
 _SELECTION: Final[Mapping[str, Mapping[str, str]]] = {
     "topics": {
         "image": "image_topic",

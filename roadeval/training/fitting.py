@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any, Final
 
@@ -13,7 +14,7 @@ import numpy.typing as npt
 from roadeval.data import Frame, Rgb, Truth
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import Pipeline
-from roadeval.pipeline.stage import TrainingSet, View
+from roadeval.pipeline.stage import StageError, TrainingSet, View
 from roadeval.runtime.threads import ordered
 from roadeval.training.likeness import fingerprint
 from roadeval.training.model import Model
@@ -38,7 +39,7 @@ def fit(
     settings: TrainingSettings,
     prior: npt.NDArray[np.float32] | None = None,
 ) -> Model:
-    """Train every variant.
+    """Train every variant that learns anything.
 
     Parameters
     ----------
@@ -54,20 +55,25 @@ def fit(
     Raises
     ------
     TrainingError
-        If there is no frame, or if the frames show road alone or no road at all.
+        If there is no frame, or if the frames show road alone or no road at all and some variant
+        has something to learn.
     """
+    learning = {name: pipeline for name, pipeline in pipelines.items() if pipeline.learning()}
     source, truths = _truths(frames, settings)
-    samples = _sampled(frames, truths, settings)
-    parameters, warnings = {}, []
-    for name, learnt, told in ordered(partial(_fit_variant, samples), pipelines.items(), _AT_ONCE):
-        parameters[name] = learnt
-        warnings += told
+    samples = _sampled(frames, truths, settings) if learning else None
+    parameters: dict[str, dict[str, Any]] = {name: {} for name in pipelines}
+    warnings: list[str] = []
+    if samples is not None:
+        each = partial(_fit_variant, samples)
+        for name, learnt, told in ordered(each, learning.items(), _AT_ONCE):
+            parameters[name] = learnt
+            warnings += told
     return Model(
         parameters,
         {name: pipeline.relevant() for name, pipeline in pipelines.items()},
         source,
         frozenset(frame.digest() for frame in frames),
-        len(samples.road),
+        0 if samples is None else len(samples.road),
         prior,
         tuple(warnings),
         np.stack([fingerprint(frame.image) for frame in frames]),
@@ -133,9 +139,10 @@ def _collapsed(
     chain = pipeline.bind(parameters)
     shares: dict[str, list[float]] = {}
     for image in images:
-        for name, output in chain.run(View.of(image)):
-            if output.mask is not None:
-                shares.setdefault(name, []).append(output.mask.area() / image[..., 0].size)
+        with suppress(StageError):  # it is told of where the frame is replayed
+            for name, output in chain.run(View.of(image)):
+                if output.mask is not None:
+                    shares.setdefault(name, []).append(output.mask.area() / image[..., 0].size)
     return [
         f"{variant}: {name} has collapsed: it calls {share:.1%} of its own training frames road"
         for name, share in ((name, float(np.mean(values))) for name, values in shares.items())

@@ -87,6 +87,8 @@ def from_log(
         If there is nothing to learn from, or nothing left to evaluate.
     """
     candidates, by_truth = _candidates(frames, labelled=labelled)
+    if not by_truth and not any(pipeline.learning() for pipeline in pipelines.values()):
+        return (untrained(pipelines),), Schedule(frozenset())
     held, rest = _hold(candidates, settings.frames, on_frame)
     following = [readable.number for readable in islice(rest, settings.gap + 1)]
     if by_truth:
@@ -104,6 +106,12 @@ def from_log(
         first=following[settings.gap] if len(following) > settings.gap else None,
         sizes=frozenset(len(frame.payload) for frame in held.frames),
     )
+
+
+def untrained(pipelines: Mapping[str, Pipeline]) -> Model:
+    """Return the model of variants that learn nothing, without a truth for the baseline."""
+    settings = {name: pipeline.relevant() for name, pipeline in pipelines.items()}
+    return Model({name: {} for name in pipelines}, settings, "none", frozenset(), 0)
 
 
 def _with_each_seed(

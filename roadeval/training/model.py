@@ -47,7 +47,7 @@ class Model:
     settings
         By variant: the settings that training depended on (filters, and stages that learn).
     source
-        ``truth`` or ``patch``.
+        ``truth`` or ``patch``; ``none`` where nothing was learnt at all.
     digests
         The hashes of the frames that trained it (`roadeval.data.Frame.digest`). They are never
         evaluated.
@@ -85,8 +85,11 @@ class Model:
     def require(self, variant: str, pipeline: Pipeline, path: Path) -> None:
         """Raise a `ModelError` for a variant that this model was not made for.
 
-        Settings that what is learnt does not depend on may differ.
+        Settings that what is learnt does not depend on may differ, and a variant that learns
+        nothing needs no model.
         """
+        if not pipeline.learning():
+            return
         if variant not in self.settings:
             known = ", ".join(sorted(self.settings))
             raise ModelError(
@@ -216,7 +219,7 @@ class _Header:
     """The JSON part of a model file, see `Model`."""
 
     settings: dict[str, dict[str, dict[str, Any]]]
-    source: Literal["truth", "patch"]
+    source: Literal["truth", "patch", "none"]
     digests: frozenset[str]
     pixels: Annotated[int, Field(ge=0)]
     warnings: tuple[str, ...]

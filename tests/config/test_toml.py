@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from roadeval.cli.options import OPTIONS
-from roadeval.config import PRESETS, RunConfig, configure, load_config
+from roadeval.config import PRESETS, RunConfig, configure, load_config, network_variant
 from roadeval.config.document import documented
 from roadeval.config.settings import SECTIONS
 from roadeval.config.toml import run_toml
@@ -71,7 +71,8 @@ def tables(setting: str) -> dict:
 
 
 def test_every_option_is_tried_here():
-    assert OTHER.keys() == {option.setting for option in OPTIONS} - {"config"}
+    # In a file a network is a variant like others.
+    assert OTHER.keys() == {option.setting for option in OPTIONS} - {"config", "nets"}
 
 
 @pytest.mark.parametrize("setting", OTHER)
@@ -79,6 +80,14 @@ def test_every_option_is_tried_here():
 def test_the_file_of_a_run_gives_the_same_configuration_again(setting, write, tmp_path):
     config = configure(tables(setting))
     assert config != RunConfig()
+    (tmp_path / "run.toml").write_text(write(config), encoding="utf-8")
+    assert load_config(tmp_path / "run.toml") == config
+
+
+@pytest.mark.parametrize("write", [lambda c: run_toml(c, "drive", "1.0"), documented])
+def test_a_network_reads_back_from_the_file_of_a_run(write, tmp_path):
+    (tmp_path / "net.toml").write_text('file = "n.onnx"\nsize = [64, 48]\nroad = ["road", 3]\n')
+    config = RunConfig().with_variants([network_variant("mine", str(tmp_path / "net.toml"))])
     (tmp_path / "run.toml").write_text(write(config), encoding="utf-8")
     assert load_config(tmp_path / "run.toml") == config
 

@@ -11,7 +11,7 @@ import roadeval
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-EXTRAS = ("fleet", "remote", "video")
+EXTRAS = ("fleet", "onnx", "remote", "video")
 DECLARED = [*PROJECT["dependencies"]]
 DECLARED += [each for extra in EXTRAS for each in PROJECT["optional-dependencies"][extra]]
 

@@ -10,7 +10,7 @@ from roadeval.cli.options import Given, takes
 
 
 @takes(
-    *("preset", "config", "variants", "masks", "drives"),
+    *("preset", "config", "variants", "nets", "masks", "drives"),
     *("output", "training", "topics", "labels", "frames", "run"),
 )
 def config(*, given: Given) -> int:

@@ -23,7 +23,8 @@ Drives = Annotated[
 
 
 @takes(
-    *("preset", "config", "variants", "masks", "drives", "training", "topics", "labels", "frames"),
+    *("preset", "config", "variants", "nets", "masks", "drives"),
+    *("training", "topics", "labels", "frames"),
     *("output.record", "fleet"),
 )
 def fleet(

@@ -9,7 +9,7 @@ from roadeval.cli.options import Given, takes
 
 
 @takes(
-    *("output", "preset", "config", "variants", "masks"),
+    *("output", "preset", "config", "variants", "nets", "masks"),
     *("training", "topics", "labels", "frames", "run"),
 )
 def replay(

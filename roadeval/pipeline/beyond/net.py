@@ -1,0 +1,75 @@
+"""Road by a network, from an ONNX file that somebody has trained elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from roadeval.data import Layer, LayerKind, LayerSpec, mask_spec
+from roadeval.data.packed import Packed
+from roadeval.networks.errors import NetworkError
+from roadeval.networks.settings import NetSettings
+from roadeval.pipeline.stage import Output, Stage, StageError, View
+
+NET: Final = mask_spec("net", "Road by the network")
+PROBABILITY: Final = LayerSpec(
+    "probability", LayerKind.SCALAR, "How probable road is, by the network", exact=False
+)
+
+
+def bind(settings: NetSettings, _parameters: None) -> Callable[[View], Output]:
+    """Return the network as a pure function of what it sees; a `NetworkError`, see `resolve`."""
+    from roadeval.networks.network import Network
+
+    network = Network.of(settings)
+
+    def run(view: View) -> Output:
+        try:
+            road = network.road(view.image)
+        except NetworkError as error:
+            raise StageError(f"net: {error}") from error
+        mask = Packed.of(road.mask)
+        levels = (road.codes >> 8).astype(np.uint8)
+        return Output(
+            (Layer(PROBABILITY, levels), Layer(NET, mask)),
+            mask=mask,
+            probability=road.codes if road.graded else None,
+        )
+
+    return run
+
+
+def resolve(settings: NetSettings) -> NetSettings:
+    """Return the settings with everything stated that the network's file tells.
+
+    A `NetworkError` if the file cannot be used, or leaves something open.
+    """
+    from roadeval.networks.network import Network
+
+    return Network.of(settings).settings
+
+
+def about(settings: NetSettings) -> Mapping[str, Any]:
+    """Return what results tell of the network: who runs it, its licence, inputs and outputs."""
+    from roadeval.networks.network import Network
+
+    return Network.of(settings).facts()
+
+
+def layers(_settings: NetSettings) -> tuple[LayerSpec, ...]:
+    """Return the layers of the network."""
+    return PROBABILITY, NET
+
+
+STAGE: Final[Stage[NetSettings, None]] = Stage(
+    name="net",
+    title="Network",
+    settings=NetSettings,
+    bind=bind,
+    layers=layers,
+    resolve=resolve,
+    places=("file",),
+    about=about,
+)

@@ -1,0 +1,213 @@
+"""A network as a variant: in the tables, the recording, the report, a fleet and a notebook."""
+
+import json
+import shutil
+from importlib import import_module
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import roadeval
+from roadeval.config import network_variant
+from roadeval.jobs import identity
+from roadeval.logs import open_log
+from tests.jobs.making import settings, write_log
+from tests.networks.making import network, red_network
+
+
+@pytest.fixture(autouse=True)
+def _no_figures(monkeypatch):
+    monkeypatch.setattr(import_module("roadeval.jobs.replay"), "write_figures", lambda *given: [])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("networks")
+    write_log(folder / "drive.mcap")
+    write_log(folder / "bare.mcap", truth=False)
+    red_network(folder / "red.onnx")
+    return folder
+
+
+def with_network(path, **values):
+    return settings(**values).with_variants([network_variant("mine", str(path))])
+
+
+def alone(path, **values):
+    """A network and nothing that learns."""
+    post = {"operations": [], "region": "all", "fill": False}
+    return settings(chain=["net", "post"], net={"file": str(path)}, post=post, **values)
+
+
+def run(drive, to, config):
+    return roadeval.replay(drive, config, save=to / "out.rrd", reports=to / "reports")
+
+
+@pytest.fixture(scope="module")
+def once(folder, tmp_path_factory):
+    to = tmp_path_factory.mktemp("once")
+    patched = pytest.MonkeyPatch()
+    patched.setattr(import_module("roadeval.jobs.replay"), "write_figures", lambda *given: [])
+    outcome = run(folder / "drive.mcap", to, with_network(folder / "red.onnx"))
+    patched.undo()
+    return to, outcome
+
+
+def test_the_network_and_its_answer_stand_in_the_tables(once):
+    to, _ = once
+    rows = pd.read_csv(to / "reports" / "frames.csv").query("variant == 'mine'")
+    assert set(rows.stage) == {"net", "post"}
+    assert rows.ERR.max() < 0.01
+    net, post = (rows[rows.stage == stage].ERR.to_numpy() for stage in ("net", "post"))
+    assert np.array_equal(net, post)
+
+
+def test_results_tell_who_ran_which_network_and_how_long_it_took(once, folder):
+    _, outcome = once
+    told = outcome.summary["methods"]["mine"]["net"]
+    assert told["licence"] == "CC0: made by hand"
+    assert told["file"] == "red.onnx"
+    assert told["backend"] in ("onnxruntime", "opencv")
+    assert told["version"]
+    assert outcome.summary["seconds"]["mine"]["net"] > 0
+    assert outcome.summary["settings"]["mine"]["net"]["sha256"] == told["sha256"]
+
+
+def test_mask_and_probability_are_layers_of_the_recording(once):
+    to, _ = once
+    recording = roadeval.Recording(to / "out.rrd")
+    mask = recording.layer("mine", "net", 15)
+    share = recording.layer("mine", "probability", 15)
+    assert mask.shape == (24, 32)
+    assert mask[20, 10] == 1
+    assert mask[2, 10] == 0
+    assert share.max() > share.min()
+
+
+def test_the_run_is_repeated_by_its_run_toml(once, folder, tmp_path):
+    to, _ = once
+    again = roadeval.load_config(to / "reports" / "run.toml")
+    run(folder / "drive.mcap", tmp_path, again)
+    for name in ("frames.csv", "windows.csv", "regions.csv"):
+        assert (tmp_path / "reports" / name).read_text() == (to / "reports" / name).read_text()
+
+
+def test_a_network_that_has_changed_since_is_refused(once, folder, tmp_path):
+    to, _ = once
+    text = (to / "reports" / "run.toml").read_text()
+    network(tmp_path / "other.onnx")
+    (tmp_path / "run.toml").write_text(
+        text.replace(str(folder / "red.onnx"), str(tmp_path / "other.onnx"))
+    )
+    again = roadeval.load_config(tmp_path / "run.toml")
+    with pytest.raises(roadeval.RoadevalError, match="another network than was asked for"):
+        run(folder / "drive.mcap", tmp_path, again)
+
+
+def test_numbers_do_not_depend_on_threads_nor_on_the_backend(once, folder, tmp_path):
+    to, _ = once
+    path = tmp_path / "mine.toml"
+    path.write_text(f"file = '{folder / 'red.onnx'}'\nbackend = 'opencv'\n")
+    run(folder / "drive.mcap", tmp_path, with_network(path, jobs=4))
+    tables = [pd.read_csv(each / "reports" / "frames.csv") for each in (to, tmp_path)]
+    assert tables[0].equals(tables[1])
+
+
+def test_what_a_recording_is_known_by_holds_the_network_and_not_its_place(folder, tmp_path):
+    def known_by(path):
+        with open_log(folder / "drive.mcap") as log:
+            return identity.identity(log, with_network(path).resolved())
+
+    moved = shutil.copy(folder / "red.onnx", tmp_path / "moved.onnx")
+    other = red_network(tmp_path / "other.onnx", bias=-120)
+    assert known_by(folder / "red.onnx") == known_by(moved) != known_by(other)
+
+
+def test_post_processing_is_done_where_it_is_asked_for(folder, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(f"file = '{folder / 'red.onnx'}'\n[post]\noperations = ['open']\n")
+    variant = network_variant("mine", str(path))
+    assert variant.pipeline.settings["post"].operations == ("open",)
+    assert variant.pipeline.settings["post"].region == "all"
+
+
+def test_a_networks_file_is_found_from_the_folder_of_its_settings(folder, tmp_path):
+    (folder / "near.toml").write_text("file = 'red.onnx'\n")
+    found = network_variant("mine", str(folder / "near.toml")).pipeline.settings["net"]
+    assert found.file == str(folder / "red.onnx")
+
+
+# --- Nothing to learn -----------------------------------------------------------------------------
+
+
+def test_a_network_alone_needs_truth_for_the_baseline_only(folder, tmp_path):
+    found = run(folder / "drive.mcap", tmp_path, alone(folder / "red.onnx")).summary
+    assert set(found["totals"]) == {"unfiltered", "blind"}
+    assert found["training"]["pixels"] == 0
+    assert found["frames"]["evaluated"] == 15
+
+
+def test_a_network_alone_runs_on_a_drive_without_truth(folder, tmp_path):
+    outcome = run(folder / "bare.mcap", tmp_path, alone(folder / "red.onnx"))
+    assert outcome.summary["frames"]["trained_on"] == 0
+    assert outcome.summary["training"]["source"] == "none"
+    recording = roadeval.Recording(outcome.recording)
+    assert recording.layer("unfiltered", "net", 0)[20, 10] == 1
+
+
+def test_a_model_that_knows_nothing_of_the_network_serves_the_rest(folder, tmp_path):
+    roadeval.train([folder / "drive.mcap"], tmp_path / "m.model", settings(train_frames=4))
+    config = with_network(folder / "red.onnx", model=tmp_path / "m.model")
+    assert "mine" in run(folder / "drive.mcap", tmp_path, config).summary["totals"]
+
+
+def test_a_model_can_be_trained_beside_a_network(folder, tmp_path):
+    config = with_network(folder / "red.onnx", train_frames=4)
+    model = roadeval.train([folder / "drive.mcap"], tmp_path / "m.model", config)
+    assert model.parameters["mine"] == {}
+    again = with_network(folder / "red.onnx", model=tmp_path / "m.model")
+    assert "mine" in run(folder / "drive.mcap", tmp_path, again).summary["totals"]
+
+
+def test_a_notebook_runs_a_network_on_an_image(folder):
+    config = with_network(folder / "red.onnx")
+    image = np.full((48, 64, 3), 30, np.uint8)
+    image[24:] = 200
+    result = roadeval.run_frame(image, None, config, variant="mine")
+    assert [stage.stage for stage in result.stages] == ["net", "post"]
+    assert result.final()[30:].all()
+    assert not result.final()[:20].any()
+
+
+def test_a_fleet_replays_a_drive_again_when_the_network_has_changed(folder, tmp_path):
+    from tests.e2e.test_fleet import Here
+
+    network_file = red_network(tmp_path / "n.onnx")
+
+    def replayed():
+        config = with_network(network_file, train_frames=4)
+        drives = [folder / "drive.mcap"]
+        return roadeval.replay_fleet(drives, tmp_path / "fleet", config, executor=Here()).replayed
+
+    assert [replayed(), replayed()] == [1, 0]
+    red_network(network_file, bias=-120)
+    assert [replayed(), replayed()] == [1, 0]
+
+
+# --- Networks that go wrong -----------------------------------------------------------------------
+
+
+def test_a_network_that_never_says_road_is_told_of(folder, tmp_path):
+    path = red_network(tmp_path / "never.onnx", bias=-1000)
+    outcome = run(folder / "drive.mcap", tmp_path, with_network(path))
+    assert "mine: its final mask is road nowhere, on every frame" in outcome.warnings
+    assert outcome.summary["totals"]["mine"]["post"]["FNR"] == 1
+
+
+def test_a_frame_on_which_the_network_fails_is_lost_and_accounted_for(folder, tmp_path):
+    path = red_network(tmp_path / "nan.onnx", bias=float("nan"))
+    outcome = run(folder / "drive.mcap", tmp_path, with_network(path))
+    assert outcome.summary["frames"]["skipped"]["failed in a stage"] == 26
+    assert outcome.losses[0] == f"frame 0: net: {path}: gives numbers that are none (NaN)"
+    assert json.loads((tmp_path / "reports" / "summary.json").read_text())["losses"]

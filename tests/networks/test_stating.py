@@ -1,0 +1,178 @@
+"""What is read from a network's file, and what is asked for."""
+
+import numpy as np
+import pytest
+from onnx import TensorProto
+
+from roadeval.networks.errors import NetworkError
+from roadeval.networks.network import Network
+from roadeval.networks.settings import NetSettings
+from tests.networks.making import network
+from tests.networks.test_onnx_file import with_weights_beside
+
+IMAGE = np.zeros((24, 32, 3), np.uint8)
+CITY = {"names": "{0: 'road', 1: 'sidewalk', 2: 'sky'}", "license": "MIT"}
+
+
+@pytest.fixture(params=["onnxruntime", "opencv"])
+def backend(request):
+    return request.param
+
+
+def read(path, **settings) -> NetSettings:
+    return Network.of(NetSettings(file=str(path), **settings)).settings
+
+
+def asked(path, **settings) -> str:
+    with pytest.raises(NetworkError) as caught:
+        read(path, **settings)
+    said = str(caught.value)
+    assert said.startswith(f"{path}: ")
+    assert "\n" not in said
+    return said
+
+
+def test_everything_is_stated_of_a_network_of_two_classes(backend, tmp_path):
+    found = read(network(tmp_path / "n.onnx"), backend=backend)
+    assert (found.size, found.layout, found.channels) == ((16, 12), "NCHW", "rgb")
+    assert (found.scale, found.mean, found.deviation) == (1 / 255, (0.0,), (1.0,))
+    assert (found.outputs, found.road, found.decide) == (("road",), (1,), "argmax")
+    assert found.activation == "softmax"
+    assert found.backend == backend
+
+
+def test_stated_settings_stay_as_they_are(backend, tmp_path):
+    found = read(network(tmp_path / "n.onnx"), backend=backend)
+    assert Network.of(found).settings == found
+
+
+def test_another_file_than_the_stated_one_is_refused(tmp_path):
+    found = read(network(tmp_path / "n.onnx"))
+    network(tmp_path / "n.onnx", last="Softmax")
+    with pytest.raises(NetworkError, match="another network than was asked for"):
+        Network.of(found)
+
+
+@pytest.mark.parametrize(
+    ("classes", "last", "activation", "decide"),
+    [
+        (1, None, "sigmoid", "threshold"),
+        (1, "Sigmoid", "none", "threshold"),
+        (2, None, "softmax", "argmax"),
+        (2, "Softmax", "none", "argmax"),
+    ],
+)
+def test_what_an_output_means_follows_from_its_classes_and_what_makes_it(
+    classes, last, activation, decide, tmp_path
+):
+    found = read(network(tmp_path / "n.onnx", classes=classes, last=last))
+    assert (found.activation, found.decide) == (activation, decide)
+
+
+def test_a_class_named_road_is_road(tmp_path):
+    assert read(network(tmp_path / "n.onnx", classes=3, metadata=CITY)).road == (0,)
+
+
+@pytest.mark.parametrize("names", ['["sky", "verge", "Road"]', '{"2": "drivable area"}'])
+def test_names_are_read_in_the_forms_that_exporters_write(names, tmp_path):
+    path = network(tmp_path / "n.onnx", classes=3, metadata={"names": names})
+    assert read(path).road == (2,)
+
+
+def test_classes_can_be_named(tmp_path):
+    path = network(tmp_path / "n.onnx", classes=3, metadata=CITY)
+    assert read(path, road=("sidewalk", 0)).road == (1, 0)
+
+
+def test_onnx_tells_of_channels_and_range(tmp_path):
+    told = {"Image.BitmapPixelFormat": "Bgr8", "Image.NominalPixelRange": "Normalized_1_1"}
+    found = read(network(tmp_path / "n.onnx", metadata=told))
+    assert (found.channels, found.scale, found.mean) == ("bgr", 2 / 255, (1.0,))
+
+
+def test_results_tell_licence_inputs_outputs_and_road(tmp_path):
+    path = network(tmp_path / "n.onnx", classes=3, metadata=CITY)
+    facts = Network.of(NetSettings(file=str(path))).facts()
+    assert facts["licence"] == "MIT"
+    assert facts["road"] == ["road"]
+    assert facts["inputs"] == ["image float32 (1, 3, 12, 16)"]
+
+
+def test_weights_beside_the_file_are_used(backend, tmp_path):
+    path = with_weights_beside(tmp_path)
+    found = Network.of(NetSettings(file=str(path), backend=backend))
+    whole = Network.of(NetSettings(file=str(tmp_path / "whole.onnx"), backend=backend))
+    assert np.array_equal(found.road(IMAGE).codes, whole.road(IMAGE).codes)
+
+
+# --- What is asked for ----------------------------------------------------------------------------
+
+
+def test_a_size_that_is_left_open(tmp_path):
+    path = network(tmp_path / "n.onnx", input_shape=("n", 3, "h", "w"))
+    said = asked(path)
+    assert "`net.size`" in said
+    assert "image float32 (?, 3, ?, ?)" in said
+    assert read(path, size=(32, 24)).size == (32, 24)
+
+
+def test_a_size_that_the_network_does_not_take(tmp_path):
+    assert "takes no input of 20x20" in asked(network(tmp_path / "n.onnx"), size=(20, 20))
+
+
+def test_which_of_several_outputs_tells_of_road(tmp_path):
+    said = asked(network(tmp_path / "n.onnx", spare=True))
+    assert "`net.outputs`" in said
+    assert "r1 float32" in said
+
+
+def test_an_output_that_is_not_there(tmp_path):
+    assert "has no output 'seg'" in asked(network(tmp_path / "n.onnx"), outputs=("seg",))
+
+
+def test_which_of_three_classes_are_road(backend, tmp_path):
+    assert "which classes of its 3 are road" in asked(
+        network(tmp_path / "n.onnx", classes=3), backend=backend
+    )
+
+
+def test_which_labels_are_road(backend, tmp_path):
+    path = network(tmp_path / "n.onnx", last="ArgMax")
+    assert "`net.road`" in asked(path, backend=backend)
+
+
+def test_a_class_that_is_not_there(tmp_path):
+    assert "has no class 2, but 2 from 0" in asked(network(tmp_path / "n.onnx"), road=(2,))
+    path = network(tmp_path / "c.onnx", classes=3, metadata=CITY)
+    assert "it has 0 road, 1 sidewalk, 2 sky" in asked(path, road=("street",))
+
+
+def test_one_class_beats_no_other(tmp_path):
+    said = asked(network(tmp_path / "n.onnx", classes=1), decide="argmax")
+    assert "`net.decide`" in said
+
+
+@pytest.mark.parametrize("shape", [(4, 3, 12, 16), (1, 5, 12, 16)])
+def test_an_input_that_takes_no_image(shape, tmp_path):
+    assert "inputs: image" in asked(network(tmp_path / "n.onnx", input_shape=shape))
+
+
+def test_an_operator_that_is_not_known(backend, tmp_path):
+    said = asked(network(tmp_path / "n.onnx", operator="Unheard"), backend=backend)
+    assert "cannot run the network" in said
+    assert "Unheard" in said
+
+
+def test_an_output_that_is_no_map(tmp_path):
+    path = network(tmp_path / "n.onnx", last="GlobalAveragePool")
+    assert "is no map of the image" in asked(path)
+
+
+def test_a_type_of_numbers_that_no_image_has(tmp_path):
+    path = network(tmp_path / "n.onnx", dtype=TensorProto.INT64)
+    assert "takes no image" in asked(path)
+
+
+def test_no_file(tmp_path):
+    with pytest.raises(NetworkError, match=r"net\.file"):
+        Network.of(NetSettings())
