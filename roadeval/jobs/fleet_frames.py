@@ -13,7 +13,7 @@ import numpy as np
 
 from roadeval.data import BASELINE, ERRORS, FrameResult, Role, Tally
 from roadeval.evaluation.light import Light, light_of
-from roadeval.report.images import LayerImage, jpeg
+from roadeval.report.images import LayerImage, jpeg, shrink
 from roadeval.results.fleet.record import PICTURES
 from roadeval.runtime.files import put
 
@@ -78,8 +78,10 @@ class FrameGatherer:
             bound = max(bound, min(w.err for w in rest))
         if math.isnan(err) or err <= bound:
             return
-        errors = result.errors[tally.variant]
-        picture = jpeg(LayerImage("", frame.image, ERRORS, errors.array), WIDTH).content
+        # Painted when they are small: most are soon replaced by a worse frame's.
+        image, errors = shrink(frame.image, WIDTH), result.errors[tally.variant].array
+        small = shrink(errors.astype(np.uint8, copy=False), WIDTH, labels=True)
+        picture = jpeg(LayerImage("", image, ERRORS, small), WIDTH).content
         kept = _WorstFrame(frame.number, frame.stamp_ns, tally, light, picture)
         ranked = sorted([*rest, kept], key=lambda w: (-w.err, w.number))
         self._worst = ranked[:WORST]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from typing import Final
 
 from roadeval.data import Change, Counts, FrameResult, Tally, Transition
 from roadeval.evaluation.maps import HeatMap
@@ -16,6 +17,8 @@ from roadeval.evaluation.windows import Window
 
 Row = tuple[str | int | float, ...]
 """A row's cells in the order of the table's columns."""
+_HEAT: Final = "%s,%d,%d,%d,%d,%d,%d\n"
+"""A line of ``heat.csv``."""
 
 
 def lines(result: FrameResult) -> dict[str, str]:
@@ -51,7 +54,7 @@ def sum_lines(sums: DriveSums) -> dict[str, str]:
         "windows": "".join(map(_line, window_rows(sums.windows))),
         "changes": "".join(map(_line, change_rows(sums.changes))),
         # There are tens of thousands of rows, without a rate that may be undefined.
-        "heat": "".join(f"{','.join(map(str, row))}\n" for row in heat_rows(sums.heat)),
+        "heat": "".join(_HEAT % row for row in heat_rows(sums.heat)),
     }
     return {name: text for name, text in texts.items() if text}
 
