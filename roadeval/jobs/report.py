@@ -2,17 +2,44 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from roadeval.jobs.outputs import holding
+from roadeval.jobs.page_frames import browsed, strips_of
 from roadeval.jobs.report_findings import collect
 from roadeval.jobs.report_fleet import collect_fleet
 from roadeval.jobs.result import Result
-from roadeval.report.drive import document
+from roadeval.report.blocks import Document
+from roadeval.report.drive import document, page_document
 from roadeval.report.findings import Commands
 from roadeval.report.fleet.document import document as fleet_document
+from roadeval.report.fleet.document import page_document as fleet_page_document
+from roadeval.report.page.files import Beside, write_page
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.fleet.folder import Fleet, is_fleet
+
+PAGES: Final = (".html", ".htm")
+"""Endings of files that are written as a page."""
+PICTURED: Final = 60
+"""Worst frames of a fleet that a page shows."""
+
+
+@dataclass(frozen=True, slots=True)
+class PageSettings:
+    """What a page is made like.
+
+    Parameters
+    ----------
+    pictures
+        Frames with pictures; by default as many as keep the page of a drive below 10 MB.
+    assets
+        Whether script, style and pictures lie in a folder beside it.
+    """
+
+    pictures: int | None = None
+    assets: bool = False
 
 
 def write_report(
@@ -21,8 +48,9 @@ def write_report(
     *,
     paper: Paper = Paper.A4,
     commands: Commands | None = None,
+    page: PageSettings = PageSettings(),
 ) -> Path:
-    """Write the report of one drive, or of a fleet, as a PDF.
+    """Write the report of one drive, or of a fleet, as a PDF or as a page for a browser.
 
     Parameters
     ----------
@@ -30,11 +58,14 @@ def write_report(
         A recording, whole or partial, or a results folder, or either opened already, or a
         fleet's folder. Without a recording there are no pictures of a single drive.
     output
-        By default ``report.pdf`` in the folder, or ``reports/<recording>.pdf``.
+        By default ``report.pdf`` in the folder, or ``reports/<recording>.pdf``. A name that ends
+        in ``.html`` gives a page.
     paper
         A4 or Letter.
     commands
         What the reader may type for more; none by default.
+    page
+        What a page is made like.
 
     Returns
     -------
@@ -47,16 +78,54 @@ def write_report(
         If there is nothing to read there, or the file cannot be written.
     """
     if not isinstance(result, Result) and is_fleet(result):
-        return _write_fleet(Fleet(result), output, paper)
+        return _write_fleet(Fleet(result), output, paper, commands, page)
     opened = result if isinstance(result, Result) else Result(result)
     beside = opened.path / "report.pdf"
     usual = beside if opened.recording is None else Path("reports", f"{opened.path.stem}.pdf")
     path = Path(output or usual)
     with holding(path, inputs=[opened.path]):
+        if is_page(path):
+            kept = Beside.ALL if page.assets else Beside.NOTHING
+            return write_page(path, drive_page(opened, commands, page.pictures), kept)
         return write_file(path, pdf(document(collect(opened, commands)), paper))
 
 
-def _write_fleet(fleet: Fleet, output: str | Path | None, paper: Paper) -> Path:
+def is_page(path: Path) -> bool:
+    """Return whether a file's name asks for a page."""
+    return path.suffix.lower() in PAGES
+
+
+def drive_page(
+    opened: Result, commands: Commands | None = None, pictures: int | None = None
+) -> Document:
+    """Return the page of a drive as a document.
+
+    Parameters
+    ----------
+    opened
+        The drive's result.
+    commands
+        What the reader may type for more.
+    pictures
+        Frames with pictures, see `roadeval.jobs.page_frames.strips_of`.
+    """
+    inspect = commands.inspect if commands else None
+    strips = strips_of(opened, inspect, pictures)
+    return page_document(collect(opened, commands), browsed(opened, inspect, strips))
+
+
+def _write_fleet(
+    fleet: Fleet,
+    output: str | Path | None,
+    paper: Paper,
+    commands: Commands | None,
+    page: PageSettings,
+) -> Path:
     path = Path(output or fleet.path / "report.pdf")
     with holding(path, inputs=[fleet.path]):
-        return write_file(path, pdf(fleet_document(collect_fleet(fleet)), paper))
+        inspect = commands.inspect if commands else None
+        if is_page(path):
+            found = collect_fleet(fleet, inspect, page.pictures or PICTURED)
+            kept = Beside.ALL if page.assets else Beside.PICTURES
+            return write_page(path, fleet_page_document(found), kept)
+        return write_file(path, pdf(fleet_document(collect_fleet(fleet, inspect)), paper))

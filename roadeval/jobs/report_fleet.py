@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,8 +25,19 @@ _EFFECTS: Final = [
 ]
 
 
-def collect_fleet(fleet: Fleet) -> FleetFindings:
+def collect_fleet(
+    fleet: Fleet, inspect: Callable[[int], str] | None = None, worst: int = WORST
+) -> FleetFindings:
     """Collect what the report of a fleet is made of.
+
+    Parameters
+    ----------
+    fleet
+        The fleet.
+    inspect
+        Returns the command that opens one of the worst frames, by its rank.
+    worst
+        How many of these are shown, at most.
 
     Raises
     ------
@@ -46,7 +57,8 @@ def collect_fleet(fleet: Fleet) -> FleetFindings:
         },
         effects=_effects(fleet),
         scores=_scores(fleet),
-        worst=list(_worst(fleet)),
+        worst=list(_worst(fleet, worst)),
+        inspect=inspect,
     )
 
 
@@ -76,10 +88,10 @@ def _scores(fleet: Fleet) -> list[Row]:
     return rows
 
 
-def _worst(fleet: Fleet) -> Iterator[WorstFrame]:
-    for row in fleet.table("worst").to_pylist()[:WORST]:
+def _worst(fleet: Fleet, count: int) -> Iterator[WorstFrame]:
+    for rank, row in enumerate(fleet.table("worst").to_pylist()[:count], 1):
         rates = {name: row[name] for name in ("ERR", "FPR", "FNR")}
-        yield WorstFrame(row["drive"], row["frame"], rates, _picture(fleet.path, row))
+        yield WorstFrame(rank, row["drive"], row["frame"], rates, _picture(fleet.path, row))
 
 
 def _picture(folder: Path, row: dict[str, Any]) -> ImageFile | None:

@@ -53,6 +53,7 @@ class FramePicker:
         self._recording = result.recording
         self._frames = result.frames
         self._variants = variants_but_baseline(result.frames)
+        self._scored = frozenset(result.rows["frame"].tolist())
         self._causes = {name: scored.causes(result.rows, name) for name in self._variants}
 
     def examples(self, numbers: Sequence[int]) -> list[ExampleFrame]:
@@ -83,6 +84,22 @@ class FramePicker:
                 rows = frames.iloc[places].reset_index().to_dict("records")
                 return [self._notable(row["frame"], row["stamp_ns"], row["ERR"]) for row in rows]
         return []
+
+    def pictured(self, frame: int, stamp_ns: int) -> NotableFrame:
+        """Return any frame whose pictures are there, with all of them; without truth, too."""
+        if self._variants and frame in self._scored:
+            return self._notable(frame, stamp_ns)
+        recording = self._recording
+        assert recording is not None
+        return NotableFrame(
+            frame,
+            stamp_ns,
+            variant="",
+            rates={},
+            notes=recording.notes(frame),
+            images=[LayerImage("camera", recording.image(frame))],
+            layers=list(self._layers(recording, frame)),
+        )
 
     def _notable(self, frame: int, stamp_ns: int, change: float | None = None) -> NotableFrame:
         own = analysis.finals(self._frames[self._frames["frame"] == frame]).set_index("variant")

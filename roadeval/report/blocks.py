@@ -1,6 +1,7 @@
-"""Blocks that a document is made of; `roadeval.report.pdf.typeset` sets them on pages.
+"""Blocks that a document is made of.
 
-Text is text, never markup: the name of a log, a topic or a path is printed as it is.
+`roadeval.report.pdf` sets them on paper, `roadeval.report.page` on a page for a browser. Text is
+text, never markup: the name of a log, a topic or a path is printed as it is.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Final
+
+from roadeval.report.chart import Chart
 
 _SUFFIXES: Final = {b"<?xml": "svg", b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
 
@@ -30,10 +33,15 @@ class ImageFile:
 class Block:
     """A part of a page."""
 
+    @property
+    def kind(self) -> str:
+        """Its name for whoever draws it, as ``heading``."""
+        return type(self).__name__.lower()
+
     def as_json(self) -> dict[str, Any]:
         """Return the block's kind and its fields as JSON has them; an image file by its name."""
         own = {each.name: _as_json(getattr(self, each.name)) for each in fields(self)}
-        return {"kind": type(self).__name__.lower(), **own}
+        return {"kind": self.kind, **own}
 
     def images(self) -> Iterator[ImageFile]:
         """Yield the image files in the block and in those it holds."""
@@ -115,11 +123,21 @@ class Table(Block):
 
 @dataclass(frozen=True, slots=True)
 class Figure(Block):
-    """A picture across ``width`` of the text (0..1), with its caption below."""
+    """A picture across ``width`` of the text (0..1), with its caption below.
+
+    ``charts`` are the same as data, for whoever draws it anew; without any, only the picture is.
+    """
 
     picture: ImageFile
     caption: str
     width: float = 1.0
+    charts: Sequence[Chart] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """Return its fields as JSON has them, without the charts."""
+        return {"kind": self.kind, "caption": self.caption, "width": self.width} | {
+            "picture": self.picture.name
+        }
 
 
 @dataclass(frozen=True, slots=True)

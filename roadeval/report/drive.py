@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from roadeval.report.blocks import Block, Document
 from roadeval.report.findings import Findings
 from roadeval.report.sections import (
+    browse,
     filter_effect,
     frames,
     masks,
@@ -17,16 +18,30 @@ from roadeval.report.sections import (
     stages,
     summary,
 )
+from roadeval.report.sections.browse import BrowsedFrames
 
 
 def document(findings: Findings) -> Document:
     """Return the report of one drive."""
+    return _document(findings, list(_sections(findings)))
+
+
+def page_document(findings: Findings, browsed: BrowsedFrames) -> Document:
+    """Return the page of one drive: its report, with a browser of frames in place of the worst."""
+    scored = (over_drive, filter_effect, regions, stages)
+    blocks = [*summary.section(findings), *browse.section(browsed)]
+    for part in (*(scored if findings.totals else (masks,)), provenance):
+        blocks += part.section(findings)
+    return _document(findings, blocks)
+
+
+def _document(findings: Findings, blocks: Sequence[Block]) -> Document:
     return Document(
         kicker="roadeval report",
         title=findings.drive,
         subtitle=", ".join(_facts(findings, findings.summary["drive"])),
         footer=f"{findings.drive}, {findings.source}",
-        blocks=list(_sections(findings)),
+        blocks=blocks,
         keywords=["road recognition", "evaluation", findings.drive],
     )
 

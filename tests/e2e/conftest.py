@@ -12,6 +12,7 @@ import pytest
 
 from roadeval.logs import LogWriter
 from tests.e2e.commands import CLASSES, DEMO, Replayed, Run, here, replay, roadeval
+from tests.fixtures.browser import browser, watched  # noqa: F401
 from tests.fixtures.make import make
 from tests.training.making import frame
 

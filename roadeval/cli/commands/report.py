@@ -1,4 +1,4 @@
-"""``roadeval report``: the report of a drive or of a fleet as a PDF."""
+"""``roadeval report``: the report of a drive or of a fleet, as a PDF or as a page."""
 
 from __future__ import annotations
 
@@ -17,6 +17,12 @@ if TYPE_CHECKING:
     from roadeval.report.findings import Commands
 
 
+def _ending(path: Path | None) -> Path | None:
+    if path is not None and path.suffix.lower() not in (".pdf", ".html", ".htm", ""):
+        raise typer.BadParameter(f"{path}: end it in .pdf or .html")
+    return path
+
+
 def report(
     result: arguments.Result,
     *,
@@ -25,29 +31,51 @@ def report(
         typer.Option(
             "-o",
             "--output",
-            metavar="FILE.pdf",
-            help="Default: reports/<recording>.pdf, or report.pdf in the folder given.",
+            metavar="FILE.pdf|FILE.html",
+            callback=_ending,
+            help="A page to browse where it ends in .html. Default: reports/<recording>.pdf, or "
+            "report.pdf in the folder given.",
         ),
     ] = None,
     paper: arguments.PaperSize = "a4",
+    pictures: Annotated[
+        int | None,
+        typer.Option(
+            "--pictures",
+            metavar="N",
+            min=0,
+            help="Of a page: frames with pictures. Default: as many as keep it below 10 MB.",
+        ),
+    ] = None,
+    assets: Annotated[
+        bool,
+        typer.Option(
+            "--assets", help="Of a page: script, style and pictures in a folder beside it."
+        ),
+    ] = False,
     quiet: arguments.Quiet = False,
 ) -> int:
-    """Write the report of a drive, or of a fleet, as a PDF.
+    """Write the report of a drive or of a fleet, as a PDF or as a page.
 
     Does the filter help, where are the errors, which stage broke it, and the frames to look at;
-    from the recording alone, or from a results folder, then without pictures.
+    from the recording alone, or from a results folder, then without pictures. A page is one file
+    that needs no network and no server; of a fleet its pictures lie in a folder beside it.
     """
-    from roadeval.jobs.report import write_report
+    from roadeval.jobs.report import PageSettings, is_page, write_report
     from roadeval.jobs.result import Result
     from roadeval.results.fleet.folder import is_fleet
 
     size = arguments.paper_of(paper)
+    if (pictures is not None or assets) and not (output and is_page(output)):
+        raise typer.BadParameter("--pictures and --assets go with a page alone: -o FILE.html")
+    page = PageSettings(pictures, assets)
     warnings: Sequence[str] = ()
     if is_fleet(result):
-        path = write_report(result, output, paper=size)
+        told = _commands_of_fleet(result)
+        path = write_report(result, output, paper=size, commands=told, page=page)
     else:
         read = Result(result)
-        path = write_report(read, output, paper=size, commands=_commands(read))
+        path = write_report(read, output, paper=size, commands=_commands(read), page=page)
         warnings = read.warnings
     if not quiet:
         console.emit(str(path))
@@ -66,6 +94,16 @@ def _commands(result: Result) -> Commands:
         else lambda log: shlex.join(["roadeval", "replay", log, "--config", str(config)]),
         inspect=lambda frame: shlex.join(["roadeval", "inspect", path, "--frame", str(frame)]),
     )
+
+
+def _commands_of_fleet(path: Path) -> Commands:
+    """Return the command that opens one of a fleet's worst frames, by its rank."""
+    from roadeval.report.findings import Commands
+
+    def inspect(rank: int) -> str:
+        return shlex.join(["roadeval", "inspect", str(path), "--worst", str(rank)])
+
+    return Commands(again=None, inspect=inspect)
 
 
 COMMAND: Final = report

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from roadeval.report.figures.figure import FigureData, FigureSpec
 from roadeval.report.figures.rates_over_drive import rates_over_drive
+from roadeval.report.figures.values import over_windows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,5 +20,9 @@ def error_rate(data: FigureData) -> Figure | None:
 
 
 FIGURE = FigureSpec(
-    "fig3a_error_rate", "The paper's figure 3a: error rate.", error_rate, in_report=True
+    "fig3a_error_rate",
+    "The paper's figure 3a: error rate.",
+    error_rate,
+    in_report=True,
+    charts=lambda data: over_windows(data.windows, [*AXES]),
 )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from roadeval.report.figures.figure import FigureData, FigureSpec
 from roadeval.report.figures.rates_over_drive import rates_over_drive
+from roadeval.report.figures.values import over_windows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,4 +28,5 @@ FIGURE = FigureSpec(
     "The paper's figure 3b: false positive and false negative error rates.",
     fp_fn_rate,
     in_report=True,
+    charts=lambda data: over_windows(data.windows, [*AXES]),
 )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from roadeval.data import Mask, Rgb, Truth
+from roadeval.report.chart import Chart
 from roadeval.report.images import shrink
 from roadeval.runtime.discovery import found_in
 
@@ -79,13 +80,16 @@ class FigureSpec:
     draw
         Draws it; returns None where the data has nothing to draw.
     in_report
-        Whether the PDF of a drive shows it, too.
+        Whether the report of a drive shows it, too.
+    charts
+        Returns the same as charts, for a page that shows values; none by default.
     """
 
     name: str
     caption: str
     draw: Callable[[FigureData], Figure | None]
     in_report: bool = False
+    charts: Callable[[FigureData], Sequence[Chart]] = lambda _data: ()
 
 
 def figures() -> tuple[FigureSpec, ...]:

@@ -8,6 +8,7 @@ from roadeval.evaluation.metrics import SHORT
 from roadeval.report.figures import fig3a_error_rate, fig3b_fp_fn_rate
 from roadeval.report.figures.figure import FigureData, FigureSpec
 from roadeval.report.figures.rates_over_drive import rates_over_drive
+from roadeval.report.figures.values import over_windows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,18 +16,24 @@ if TYPE_CHECKING:
 
 def further_rates(data: FigureData) -> Figure | None:
     """Draw every further rate of each variant's final mask over the drive."""
-    drawn = {*fig3a_error_rate.AXES, *fig3b_fp_fn_rate.AXES}
-    # Results that were made before a metric was added do not have it.
-    known = data.windows.dropna(axis="columns", how="all").columns
-    axes = {
-        name: f"{metric.in_words.capitalize()}\n({name})"
-        for name, metric in SHORT.items()
-        if name not in drawn and name in known
-    }
+    axes = {name: f"{SHORT[name].in_words.capitalize()}\n({name})" for name in _names(data)}
     if not axes:
         return None
     title = f"Further rates on {data.drive}"
     return rates_over_drive(title, data.windows, axes, height=1.9 + 2 * len(axes))
 
 
-FIGURE = FigureSpec("further_rates", "Further rates over the drive.", further_rates, in_report=True)
+def _names(data: FigureData) -> list[str]:
+    drawn = {*fig3a_error_rate.AXES, *fig3b_fp_fn_rate.AXES}
+    # Results that were made before a metric was added do not have it.
+    known = data.windows.dropna(axis="columns", how="all").columns
+    return [name for name in SHORT if name not in drawn and name in known]
+
+
+FIGURE = FigureSpec(
+    "further_rates",
+    "Further rates over the drive.",
+    further_rates,
+    in_report=True,
+    charts=lambda data: over_windows(data.windows, _names(data)),
+)

@@ -69,14 +69,14 @@ def _plot(findings: FleetFindings, told: Mapping[str, Any]) -> Iterator[Block]:
 def worst_table(findings: FleetFindings) -> Table:
     """Tabulate the drives on which the first variant has the highest ERR."""
     filters, blinds = (
-        {row["drive"]: row["mean"] for row in _of_kind(findings, kind)}
+        {row["drive"]: row["mean"] for row in by_kind(findings, kind)}
         for kind in ("filter", "blind")
     )
     known = [row for row in findings.scores if row["ERR"] is not None]
     rows = sorted(known, key=lambda row: (-row["ERR"], row["drive"]))[:NAMED]
     columns = {"filter": filters, "against blind": blinds}
     shown = {title: values for title, values in columns.items() if values}
-    tags = {each["drive"]: _tags(each["tags"]) for each in findings.summary["drives"]}
+    tags = {each["drive"]: tags_in_words(each["tags"]) for each in findings.summary["drives"]}
     tagged = any(tags.values())
     titles = ["drive", "frames", "ERR", "FPR", "FNR", *shown, *(["tags"] if tagged else [])]
     return Table(
@@ -98,7 +98,7 @@ def worst_table(findings: FleetFindings) -> Table:
     )
 
 
-def _of_kind(findings: FleetFindings, kind: str) -> Iterator[Row]:
+def by_kind(findings: FleetFindings, kind: str) -> Iterator[Row]:
     """Yield the differences of the first variant, or for the filter of the one that has it."""
     variants = [variant for other, variant in findings.effects if other == kind]
     first = findings.scores[0]["variant"]
@@ -106,6 +106,7 @@ def _of_kind(findings: FleetFindings, kind: str) -> Iterator[Row]:
     yield from findings.effects.get((kind, chosen), ()) if chosen else ()
 
 
-def _tags(tags: Mapping[str, str]) -> str:
+def tags_in_words(tags: Mapping[str, str]) -> str:
+    """Return a drive's tags in one line, cut where they are many."""
     text = ", ".join(f"{key}: {value}" for key, value in tags.items())
     return text if len(text) <= TAGS else f"{text[: TAGS - 1]}\N{HORIZONTAL ELLIPSIS}"

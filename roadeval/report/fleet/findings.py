@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +15,7 @@ Row = Mapping[str, Any]
 class WorstFrame:
     """One of the worst frames over all drives; without a picture where none is left."""
 
+    rank: int
     drive: str
     frame: int
     rates: Mapping[str, float]
@@ -41,6 +42,9 @@ class FleetFindings:
         Rows of ``scores`` of the first variant's final mask, over all labelled pixels.
     worst
         The worst frames over all drives.
+    inspect
+        Returns the command that opens one of them, by its rank; None where the report is not made
+        at a terminal.
     """
 
     name: str
@@ -51,3 +55,4 @@ class FleetFindings:
     effects: Mapping[tuple[str, str], Sequence[Row]]
     scores: Sequence[Row]
     worst: Sequence[WorstFrame] = field(default_factory=tuple)
+    inspect: Callable[[int], str] | None = None

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from roadeval.data.words import percent
-from roadeval.report.blocks import Block, Heading, ImageGrid, Text
+from roadeval.report.blocks import Block, Cell, Heading, ImageGrid, Table, Text
 from roadeval.report.fleet.findings import FleetFindings, WorstFrame
 
 ACROSS = 4
@@ -19,20 +19,41 @@ def section(findings: FleetFindings) -> Iterator[Block]:
         return
     yield Heading("The worst frames over all drives")
     pictures = [
-        (_caption(findings, frame, place), frame.picture)
-        for place, frame in enumerate(findings.worst, 1)
+        (_caption(findings, frame), frame.picture)
+        for frame in findings.worst
         if frame.picture is not None
     ]
     if pictures:
         yield ImageGrid(pictures, ACROSS)
     yield Text(_note(findings, len(pictures)), "note")
+    if findings.inspect is not None:
+        yield commands_table(findings.worst, findings)
 
 
-def _caption(findings: FleetFindings, frame: WorstFrame, place: int) -> str:
+def commands_table(worst: Sequence[WorstFrame], findings: FleetFindings) -> Table:
+    """Tabulate the worst frames with the command that opens each in the viewer."""
+    return Table(
+        ["", "drive", "frame", "ERR, %", "in the viewer"],
+        [
+            [
+                str(frame.rank),
+                findings.names[frame.drive],
+                str(frame.frame),
+                Cell(percent(frame.rates["ERR"]), bold=True),
+                findings.inspect(frame.rank) if findings.inspect else "",
+            ]
+            for frame in worst
+        ],
+        text_columns=(1, 4),
+        small=True,
+    )
+
+
+def _caption(findings: FleetFindings, frame: WorstFrame) -> str:
     name = findings.names[frame.drive]
     if len(name) > LONGEST:
         name = f"{name[: LONGEST // 2]}\N{HORIZONTAL ELLIPSIS}{name[1 - LONGEST // 2 :]}"
-    return f"{place}. {name}, frame {frame.frame}: ERR {percent(frame.rates['ERR'], 1)} %"
+    return f"{frame.rank}. {name}, frame {frame.frame}: ERR {percent(frame.rates['ERR'], 1)} %"
 
 
 def _note(findings: FleetFindings, shown: int) -> str:

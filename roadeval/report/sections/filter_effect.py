@@ -8,6 +8,7 @@ from typing import Any
 from roadeval.data import BASELINE
 from roadeval.data.words import DASH, defined, interval, listing, number, percent, points
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
+from roadeval.report.figures import values
 from roadeval.report.figures.charts import difference
 from roadeval.report.figures.files import svg
 from roadeval.report.findings import Findings, PairedComparison
@@ -50,6 +51,7 @@ def _paired(findings: Findings, pair: PairedComparison) -> Iterator[Block]:
         svg(lambda: difference(pair.frames, pair.treated, pair.control, change)),
         f"ERR of {pair.treated} minus {pair.control}, frame by frame. Dashed: the mean; grey band: "
         "its interval, where one is given.",
+        charts=[values.difference(pair.frames, pair.treated, pair.control)],
     )
 
 

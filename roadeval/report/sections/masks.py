@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from roadeval.report.blocks import Block, Figure, Heading, ImageGrid, Text
+from roadeval.report.figures import values
 from roadeval.report.figures.charts import coverage
 from roadeval.report.figures.figure import variants_of
 from roadeval.report.figures.files import svg
@@ -26,4 +27,5 @@ def section(findings: Findings) -> Iterator[Block]:
         yield Figure(
             svg(lambda: coverage(findings.coverage)),
             "The share of the image that the final masks call road. A jump is worth a look.",
+            charts=[values.coverage(findings.coverage)],
         )

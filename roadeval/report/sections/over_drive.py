@@ -32,7 +32,8 @@ def section(findings: Findings) -> Iterator[Block]:
         yield Text("The paper's figure 2: input and output images, and the truth.", "note")
     for figure in figures():
         if figure.in_report and (picture := svg_of(figure, findings.figure_data)):
-            yield Figure(picture, figure.caption)
+            charts = figure.charts(findings.figure_data)
+            yield Figure(picture, figure.caption, charts=charts)
     yield from _claims(findings)
 
 

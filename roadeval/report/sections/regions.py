@@ -9,6 +9,7 @@ from typing import Final
 from roadeval.data.words import percent
 from roadeval.evaluation.regions import partitions, titles
 from roadeval.report.blocks import Block, Figure, Heading, Table, Text
+from roadeval.report.figures import values
 from roadeval.report.figures.charts import MAPS_SHARE, heatmap
 from roadeval.report.figures.charts import regions as chart
 from roadeval.report.figures.files import svg
@@ -30,6 +31,7 @@ def section(findings: Findings) -> Iterator[Block]:
         svg(lambda: chart(findings.regions, [*findings.finals], names)),
         "Error rate within each region, and the region's share of all wrong pixels beside its "
         "share of all pixels: a mark to the right of the grey bar is more than its share.",
+        charts=values.regions(findings.regions, [*findings.finals], names),
     )
     together = len(findings.finals) <= SIDE_BY_SIDE
     for columns in [[*SHARES]] if together else [[column] for column in SHARES]:

@@ -9,6 +9,7 @@ from roadeval.data.words import DASH, number, percent, points
 from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
 from roadeval.evaluation.scored import FILTER
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
+from roadeval.report.figures import values
 from roadeval.report.figures.charts import stages as chart
 from roadeval.report.figures.files import svg
 from roadeval.report.findings import Findings
@@ -21,6 +22,7 @@ def section(findings: Findings) -> Iterator[Block]:
     yield Figure(
         svg(lambda: chart(findings.totals)),
         f"Rates of each stage's mask, means over the frames. Dotted: {BASELINE}, for scale.",
+        charts=values.stages(findings.totals),
     )
     yield stages_table(findings)
     if len(findings.changes):

@@ -1,0 +1,180 @@
+"""The frames that a page shows: facts of all of them, and pictures of some."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, Health
+from roadeval.evaluation import analysis, scored
+from roadeval.evaluation.health import judge
+from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.settings import EvaluationSettings, settings_of
+from roadeval.jobs.report_frames import FramePicker, evenly, str_keys
+from roadeval.jobs.result import Result
+from roadeval.report.browse import Strip
+from roadeval.report.figures.values import over_frames
+from roadeval.report.sections.browse import BrowsedFrames, FrameFacts, strip
+from roadeval.results.notes import notes
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PICTURED: Final = 24
+"""Frames with pictures, where nobody says how many."""
+BYTES: Final = 5_500_000
+"""Of their pictures, at most, where nobody says how many: a page of them stays below 10 MB."""
+SHADOW: Final = 1 / 3
+"""A frame with much shadow is among this share of the drive's."""
+
+
+def browsed(
+    result: Result, inspect: Callable[[int], str] | None, strips: Sequence[Strip] = ()
+) -> BrowsedFrames:
+    """Collect what a page tells of a result's frames."""
+    frames = result.frames
+    variants = list(dict.fromkeys(frames["variant"])) if len(frames) else []
+    return BrowsedFrames(
+        frames=list(facts_of(result)),
+        variants=variants,
+        pictured=frozenset(result.pictured),
+        strips=strips,
+        charts=over_frames(frames, [*SHORT]) if len(frames) else [],
+        inspect=inspect if result.recording is not None else None,
+    )
+
+
+def facts_of(result: Result) -> Iterator[FrameFacts]:
+    """Yield every frame of the table: those evaluated, or without truth those with pictures."""
+    frames = result.frames
+    if not len(frames):
+        yield from (FrameFacts(number, 0, {}) for number in result.pictured)
+        return
+    settings = settings_of(result.summary)
+    dark = _much_shadow(result)
+    last = analysis.finals(frames)[["frame", "stamp_ns", "variant", *_known(frames)]]
+    for number, own in last.groupby("frame", sort=False):
+        rates = {
+            str(row["variant"]): {name: float(row[name]) for name in _known(frames)}
+            for row in map(str_keys, own.to_dict("records"))
+        }
+        blind = rates.get(BASELINE)
+        others = {name: each for name, each in rates.items() if name != BASELINE}
+        frame = int(str(number))
+        yield FrameFacts(
+            frame,
+            int(own["stamp_ns"].iloc[0]),
+            rates,
+            [*_conditions(others, blind, settings), *(["much shadow"] if frame in dark else [])],
+            notes({name: _with_mirrors(each) for name, each in others.items()}, blind, settings),
+        )
+
+
+def _known(frames: pd.DataFrame) -> list[str]:
+    return [name for name in SHORT if name in frames]
+
+
+def _with_mirrors(rates: Mapping[str, float]) -> dict[str, float]:
+    return {**rates, "TPR": 1 - rates["FNR"]}
+
+
+def _conditions(
+    rates: Mapping[str, Mapping[str, float]],
+    blind: Mapping[str, float] | None,
+    settings: EvaluationSettings,
+) -> Iterator[str]:
+    """Yield what is true of a frame, in words: the first variant's health, and the filter."""
+    first = next(iter(rates))
+    health = judge(rates[first], blind, settings)
+    if health is not Health.OK:
+        yield f"{first} {health}"
+    if FILTERED in rates and UNFILTERED in rates:
+        change = rates[FILTERED]["ERR"] - rates[UNFILTERED]["ERR"]
+        if abs(change) >= settings.noteworthy:
+            yield "the filter harms" if change > 0 else "the filter helps"
+    if blind is not None and rates[first]["ERR"] > blind["ERR"]:
+        yield f"{first} worse than {BASELINE}"
+
+
+def _much_shadow(result: Result) -> set[int]:
+    """Return the frames with the most pixels in shadow, as the filter saw them."""
+    regions = result.regions
+    if not len(regions) or "shadow" not in set(regions["region"]):
+        return set()
+    last = analysis.finals(regions)
+    first = last[last["variant"] == last["variant"].iloc[0]]
+    shadow = first[first["region"] == "shadow"].set_index("frame")["N"]
+    if not len(shadow) or shadow.max() == shadow.min():
+        return set()
+    return {int(str(each)) for each in shadow.index[shadow > shadow.quantile(1 - SHADOW)]}
+
+
+# --- Pictures -------------------------------------------------------------------------------------
+
+
+def strips_of(
+    result: Result, inspect: Callable[[int], str] | None, count: int | None = None
+) -> list[Strip]:
+    """Return frames with their pictures, in the drive's order: the worst, the best, and others.
+
+    Parameters
+    ----------
+    result
+        Of a recording; a folder has no pictures.
+    inspect
+        Returns the command that opens a frame.
+    count
+        How many. By default as many of `PICTURED` as stay below `BYTES`.
+    """
+    if result.recording is None:
+        return []
+    shown: list[Strip] = []
+    room, camera = float(BYTES), StripMaker(result, inspect)
+    for frame in _chosen(result, PICTURED if count is None else count):
+        made = camera.strip(frame)
+        room -= sum(len(image.content) for image in made.images())
+        if count is None and room < 0 and shown:
+            break
+        shown.append(made)
+    return sorted(shown, key=lambda each: each.frame)
+
+
+class StripMaker:
+    """Makes the strip of any pictured frame of a result."""
+
+    def __init__(self, result: Result, inspect: Callable[[int], str] | None) -> None:
+        self._picker = FramePicker(result)
+        self._inspect = inspect
+        frames = result.frames
+        self._variants = list(dict.fromkeys(frames["variant"])) if len(frames) else []
+        stamps: Any = frames.drop_duplicates("frame").set_index("frame")["stamp_ns"]
+        self._stamps: dict[int, int] = stamps.to_dict() if len(frames) else {}
+
+    def strip(self, frame: int) -> Strip:
+        """Return a frame with its pictures."""
+        command = self._inspect(frame) if self._inspect else ""
+        found = self._picker.pictured(frame, self._stamps.get(frame, 0))
+        return strip(found, self._variants, command)
+
+
+def _chosen(result: Result, count: int) -> list[int]:
+    """Return frames to picture, the most telling first: bad, good and evenly spread in turn."""
+    rows = result.rows
+    scored_frames = set(rows["frame"].tolist())
+    there = [number for number in result.pictured if number in scored_frames]
+    pictured = there or [*result.pictured]
+    variants = [name for name in rows.distinct("variant") if name != BASELINE]
+    spread = evenly(pictured, count)
+    if not variants:
+        return spread
+    own = rows.take(np.isin(rows["frame"], pictured))
+    worst = scored.worst(own, variants[0], count)["frame"].tolist()
+    ranked = scored.worst(own, variants[0], len(pictured), 0)["frame"].tolist()
+    best = ranked[::-1]
+    turns: list[int] = []
+    for place in range(count):
+        turns += worst[2 * place : 2 * place + 2]
+        turns += [*best[place : place + 1], *spread[place : place + 1]]
+    return list(dict.fromkeys([*turns, *pictured]))[:count]

@@ -1,0 +1,146 @@
+"""The numbers of a drive's figures as charts, in percent and percentage points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from roadeval.data import BASELINE
+from roadeval.data.words import in_percent
+from roadeval.evaluation.analysis import finals
+from roadeval.evaluation.metrics import METRICS, SHORT
+from roadeval.report.chart import Chart, ChartKind, Series, thinned
+from roadeval.report.figures.style import Look, looks
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from roadeval.report.findings import Totals
+
+
+def over_windows(windows: pd.DataFrame, rates: Sequence[str]) -> list[Chart]:
+    """Return a chart a rate: each variant's final mask, window by window."""
+    if not len(windows):
+        return []
+    final = finals(windows)
+    middle = (final["first_frame"] + final["last_frame"]) / 2
+    return _along(final.assign(x=middle), rates)
+
+
+def over_frames(frames: pd.DataFrame, rates: Sequence[str]) -> list[Chart]:
+    """Return a chart a rate: each variant's final mask, frame by frame."""
+    final = finals(frames)
+    return _along(final.assign(x=final["frame"]), rates)
+
+
+def _along(table: pd.DataFrame, rates: Sequence[str]) -> list[Chart]:
+    names = list(dict.fromkeys(table["variant"]))
+    return [
+        Chart(
+            f"{rate}: {METRICS[rate].in_words}",
+            ChartKind.LINES,
+            [
+                thinned(_series(name, look, own["x"], 100 * own[rate]))
+                for name, look in looks(names).items()
+                for own in [table[table["variant"] == name].sort_values("x")]
+            ],
+            from_zero=not METRICS[rate].higher_is_better,
+        )
+        for rate in rates
+        if rate in table
+    ]
+
+
+def difference(frames: pd.DataFrame, treated: str, control: str) -> Chart:
+    """Return the paired difference of ERR, frame by frame; ``frames`` is indexed by ``frame``."""
+    look = looks([treated, control])
+    change = 100 * frames["ERR"]
+    return Chart(
+        f"ERR of {treated} minus {control}",
+        ChartKind.BARS,
+        [
+            thinned(_series(f"{treated} {word}", look[name], own.index, own))
+            for word, name, own in (
+                ("worse", control, change.where(change > 0)),
+                ("better", treated, change.where(change <= 0)),
+            )
+        ],
+        unit="pp",
+    )
+
+
+def coverage(table: pd.DataFrame) -> Chart:
+    """Return the share of the image that each variant calls road; ``table`` has a row a frame."""
+    return Chart(
+        "Share of the image called road",
+        ChartKind.LINES,
+        [
+            _series(name, look, table.index, 100 * table[name])
+            for name, look in looks(list(table.columns)).items()
+        ],
+    )
+
+
+def stages(totals: Totals) -> list[Chart]:
+    """Return a chart a rate: each stage's mask, a line a variant."""
+    names = list(dict.fromkeys(s for v, own in totals.items() for s in own if v != BASELINE))
+    return [
+        Chart(
+            f"{rate}: {metric.in_words}",
+            ChartKind.LINES,
+            [
+                _of_stages(variant, look, totals[variant], names, rate)
+                for variant, look in looks(list(totals)).items()
+            ],
+            names=names,
+            from_zero=not metric.higher_is_better,
+        )
+        for rate, metric in SHORT.items()
+    ]
+
+
+def _of_stages(
+    variant: str, look: Look, own: Mapping[str, Mapping[str, Any]], names: Sequence[str], rate: str
+) -> Series:
+    """Return a variant's rate by stage; of the baseline, which has no stages, a level."""
+    if variant == BASELINE:
+        (total,) = own.values()
+        return _series(variant, look, range(len(names)), [in_percent(total.get(rate))] * len(names))
+    values = [in_percent(total.get(rate)) for total in own.values()]
+    return _series(variant, look, [names.index(stage) for stage in own], values)
+
+
+def regions(table: pd.DataFrame, variants: Sequence[str], titles: Mapping[str, str]) -> list[Chart]:
+    """Return the error rate in each region, and its share of the errors beside that of pixels."""
+    rows = {name: table[table["variant"] == name].set_index("region") for name in variants}
+    pixels = 100 * rows[variants[0]]["pixels"].reindex([*titles]).to_numpy(float)
+    columns = (
+        ("ERR", "ERR within the region", ()),
+        ("errors", "Share of the wrong pixels", pixels),
+    )
+    return [
+        Chart(
+            title,
+            ChartKind.MARKS,
+            [
+                _series(name, look, range(len(titles)), 100 * rows[name][column].reindex([*titles]))
+                for name, look in looks(variants).items()
+            ],
+            names=[*titles.values()],
+            share=[float(each) for each in share],
+        )
+        for column, title, share in columns
+    ]
+
+
+def _series(name: str, look: Look, x: Any, y: Any) -> Series:
+    return Series(
+        name,
+        look.colour,
+        [float(each) for each in x],
+        [float(each) for each in np.asarray(y, float)],
+        dashed=look.dash != "-",
+        hollow=look.hollow,
+    )

@@ -1,0 +1,64 @@
+"""All drives of a fleet in one table, to sort and to search: a section that only a page has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from roadeval.data.words import DASH, number, percent, points
+from roadeval.report.blocks import Block, Cell, Heading, Table, Text
+from roadeval.report.browse import LongTable
+from roadeval.report.fleet.drives import by_kind, tags_in_words
+from roadeval.report.fleet.findings import FleetFindings, Row
+
+_LIGHT: Final = ("luminance", "contrast", "shadow", "sun")
+_KINDS: Final = {"filter": "filter, pp", "blind": "against blind, pp"}
+"""Differences of the first variant that have a column, with its title."""
+
+
+def section(findings: FleetFindings) -> Iterator[Block]:
+    """Yield the table of all drives."""
+    yield Heading("All drives")
+    yield LongTable(drives_table(findings), "Find drives, tags, states:")
+    yield Text(
+        "Rates of the first variant's final mask in percent; light as it was measured, from 0 to "
+        "1. A click on a title sorts.",
+        "note",
+    )
+
+
+def drives_table(findings: FleetFindings) -> Table:
+    """Tabulate every drive with its state, its rates, its light and its tags."""
+    scores = {row["drive"]: row for row in findings.scores}
+    changes = {kind: {r["drive"]: r["mean"] for r in by_kind(findings, kind)} for kind in _KINDS}
+    shown = {kind: values for kind, values in changes.items() if values}
+    tags = {each["drive"]: tags_in_words(each["tags"]) for each in findings.summary["drives"]}
+    titles = ["drive", "state", "frames", "ERR", "FPR", "FNR", *(_KINDS[kind] for kind in shown)]
+    return Table(
+        [*titles, *_LIGHT, "group", "tags"],
+        [
+            [
+                findings.names[drive],
+                str(row["status"]),
+                number(row["evaluated"] or 0),
+                *_rates(scores.get(drive, {})),
+                *(points(values.get(drive)) for values in shown.values()),
+                *(_light(row[name]) for name in _LIGHT),
+                str(row["group"] or ""),
+                tags.get(drive, ""),
+            ]
+            for drive, row in findings.drives.items()
+        ],
+        text_columns=(0, 1, len(titles) + len(_LIGHT), len(titles) + len(_LIGHT) + 1),
+        small=True,
+    )
+
+
+def _rates(score: Row | Mapping[str, float]) -> Iterator[Cell | str]:
+    for name in ("ERR", "FPR", "FNR"):
+        text = percent(score.get(name))
+        yield Cell(text, bold=True) if name == "ERR" else text
+
+
+def _light(value: float | None) -> str:
+    return DASH if value is None else f"{value:.2f}"

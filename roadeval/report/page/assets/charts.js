@@ -1,0 +1,202 @@
+// Values under the pointer; one range of frames for all charts along the drive.
+
+const SVG = "http://www.w3.org/2000/svg";
+const along = []; // The charts along the drive.
+const range = { whole: null, low: 0, high: 0, onChange: [] };
+
+function svg(name, attributes) {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  return made;
+}
+
+/** The position in rising numbers that is nearest to a value. */
+function nearest(numbers, value) {
+  let [low, high] = [0, numbers.length - 1];
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (numbers[middle] < value) low = middle;
+    else high = middle;
+  }
+  return Math.abs(numbers[low] - value) <= Math.abs(numbers[high] - value) ? low : high;
+}
+
+/** Round numbers in a range, about as many as asked for. */
+function roundNumbers(low, high, count) {
+  const rough = (high - low) / count;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = Math.max(1, power * [1, 2, 5, 10].find((each) => each * power >= rough));
+  const found = [];
+  for (let each = Math.ceil(low / step) * step; each <= high; each += step) found.push(each);
+  return found;
+}
+
+class ChartView {
+  constructor(element, onFrame) {
+    this.element = element;
+    this.values = JSON.parse(element.dataset.values);
+    this.area = element.querySelector(".area");
+    [this.low, this.high] = this.values.x;
+    this.cursor = svg("path", { class: "cursor" });
+    this.here = svg("path", { class: "here" });
+    this.tip = document.createElement("div");
+    this.tip.className = "tip";
+    this.tip.hidden = true;
+    this.area.append(this.here, this.cursor);
+    this.whole = document.createElement("button");
+    this.whole.type = "button";
+    this.whole.className = "whole";
+    this.whole.textContent = "Whole drive";
+    this.whole.hidden = true;
+    this.whole.addEventListener("click", () => zoom(...range.whole));
+    element.append(this.whole);
+    element.append(this.tip);
+    this.area.setAttribute("tabindex", "0");
+    this.listen(onFrame);
+  }
+
+  listen(onFrame) {
+    const { area } = this;
+    let begin = null;
+    area.addEventListener("pointermove", (event) => {
+      const x = this.at(event);
+      pointAt(this, x);
+      if (begin !== null) this.select(begin, x);
+    });
+    area.addEventListener("pointerleave", () => pointAt(this, null));
+    area.addEventListener("blur", () => pointAt(this, null));
+    if (!this.values.frames) return;
+    area.addEventListener("pointerdown", (event) => {
+      if (event.button === 0) begin = this.at(event);
+    });
+    area.addEventListener("pointerup", (event) => {
+      const end = this.at(event);
+      const far = begin !== null && Math.abs(end - begin) > (this.high - this.low) / 60;
+      this.select(null);
+      if (far) zoom(Math.min(begin, end), Math.max(begin, end));
+      else if (begin !== null) onFrame(Math.round(this.snapped(end)));
+      begin = null;
+    });
+    area.addEventListener("pointercancel", () => {
+      begin = null;
+      this.select(null);
+    });
+    area.addEventListener("keydown", (event) => this.key(event, onFrame));
+  }
+
+  key(event, onFrame) {
+    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    const numbers = this.numbers();
+    const place = this.pointed === undefined ? 0 : nearest(numbers, this.pointed);
+    if (step) {
+      const next = Math.min(Math.max(place + step, 0), numbers.length - 1);
+      pointAt(this, numbers[next]);
+    } else if (event.key === "Enter") onFrame(Math.round(numbers[place]));
+    else if (event.key === "Escape") zoom(...range.whole);
+    else return;
+    event.preventDefault();
+    event.stopPropagation();
+  }
+
+  /** All positions that have a value, in order. */
+  numbers() {
+    this.known ??= [...new Set(this.values.series.flatMap((each) => each.x))].sort((a, b) => a - b);
+    return this.known;
+  }
+
+  at(event) {
+    const box = this.area.getBoundingClientRect();
+    return this.low + ((event.clientX - box.left) / box.width) * (this.high - this.low);
+  }
+
+  snapped(x) {
+    const numbers = this.numbers();
+    return numbers.length ? numbers[nearest(numbers, x)] : x;
+  }
+
+  point(x) {
+    this.tip.hidden = true;
+    this.cursor.removeAttribute("d");
+    if (x === null) return;
+    this.pointed = this.snapped(x);
+    this.cursor.setAttribute("d", `M${this.pointed} 0V1000`);
+  }
+
+  tell() {
+    const { series, unit, names, frames } = this.values;
+    const head = document.createElement("p");
+    head.className = "head";
+    head.textContent = frames ? `frame ${Math.round(this.pointed)}` : names[Math.round(this.pointed)];
+    const lines = series.map((each) => {
+      const value = each.x.length ? each.y[nearest(each.x, this.pointed)] : null;
+      const line = document.createElement("p");
+      const dot = svg("svg", { class: "dot", viewBox: "0 0 10 10" });
+      dot.append(svg("circle", { cx: 5, cy: 5, r: 4.4, fill: each.colour }));
+      const bold = document.createElement("b");
+      bold.textContent = value === null ? "\u2013" : `${value.toFixed(2)} ${unit}`;
+      line.append(dot, each.name, bold);
+      return value === null && series.length > 1 && unit === "pp" ? null : line;
+    });
+    this.tip.replaceChildren(head, ...lines.filter(Boolean));
+    this.tip.hidden = false;
+    const share = (this.pointed - this.low) / (this.high - this.low);
+    const [left, width] = [this.area.getBoundingClientRect().left - this.element.getBoundingClientRect().left, this.area.clientWidth];
+    const wanted = left + share * width + (share > 0.6 ? -this.tip.offsetWidth - 10 : 10);
+    this.tip.style.left = `${Math.max(0, Math.min(wanted, this.element.clientWidth - this.tip.offsetWidth))}px`;
+  }
+
+  select(from, to) {
+    this.chosen?.remove();
+    if (from === null) return;
+    this.chosen = svg("rect", { class: "chosen", x: Math.min(from, to), y: 0, width: Math.abs(to - from), height: 1000 });
+    this.area.append(this.chosen);
+  }
+
+  show(low, high) {
+    [this.low, this.high] = [low, high];
+    this.whole.hidden = low === range.whole[0] && high === range.whole[1];
+    this.area.setAttribute("viewBox", `${low} 0 ${high - low} 1000`);
+    const ticks = roundNumbers(low, high, Math.max(2, Math.min(8, this.area.clientWidth / 60)));
+    this.element.querySelector(".xs").replaceChildren(
+      ...ticks.map((each) => {
+        const text = svg("text", { x: `${(100 * (each - low)) / (high - low)}%`, y: 14 });
+        text.textContent = each;
+        return text;
+      }),
+    );
+  }
+
+  mark(frame) {
+    this.here.setAttribute("d", `M${frame} 0V1000`);
+  }
+}
+
+/** Show the values at a position: in this chart as words, in all along the drive as a line. */
+function pointAt(view, x) {
+  const all = view.values.frames ? along : [view];
+  for (const each of all) each.point(x);
+  if (x !== null) view.tell();
+}
+
+function zoom(low, high) {
+  const least = 3;
+  if (high - low < least) [low, high] = [(low + high - least) / 2, (low + high + least) / 2];
+  [range.low, range.high] = [low, high];
+  for (const each of along) each.show(low, high);
+  for (const told of range.onChange) told(low, high);
+}
+
+function startCharts(onFrame) {
+  for (const element of document.querySelectorAll(".chart")) {
+    const view = new ChartView(element, onFrame);
+    if (!view.values.frames) continue;
+    along.push(view);
+    range.whole ??= view.values.x;
+  }
+  if (!along.length) return;
+  const fit = () => {
+    for (const each of along) each.show(each.low, each.high);
+  };
+  addEventListener("resize", fit);
+  fit();
+}

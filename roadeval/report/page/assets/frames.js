@@ -1,0 +1,200 @@
+// The browser of frames: one is looked at, the table tells of all and is filtered.
+
+class Browser {
+  constructor(element) {
+    this.element = element;
+    this.strips = element.querySelector(".strips");
+    this.absent = element.querySelector(".absent");
+    this.rows = [...element.querySelectorAll(".frames tbody tr")];
+    this.byFrame = new Map(this.rows.map((row) => [Number(row.dataset.frame), row]));
+    this.held = new Map([...this.strips.children].map((each) => [Number(each.dataset.frame), each]));
+    this.stage = new Stage(element.querySelector(".stage"), element.dataset.left, element.dataset.right);
+    this.live = element.querySelector("tr.pictured a")?.getAttribute("href").startsWith("#") === false;
+    this.tools();
+    this.filters();
+    for (const row of this.rows) {
+      row.addEventListener("click", (event) => {
+        event.preventDefault();
+        this.show(Number(row.dataset.frame));
+      });
+    }
+    this.strips.addEventListener("click", (event) => {
+      const tile = event.target.closest("img")?.closest(".tile");
+      if (!tile) return;
+      event.stopPropagation();
+      this.stage.choose(tile.dataset.name);
+      this.stage.toggle();
+    });
+    range.onChange.push(() => this.filter());
+    const asked = /^#frame-(\d+)$/.exec(location.hash);
+    const first = asked ? asked[1] : element.dataset.first;
+    if (first !== "") this.show(Number(first), Boolean(asked));
+    else for (const each of this.held.values()) each.hidden = true;
+  }
+
+  tools() {
+    const tools = this.element.querySelector(".tools");
+    this.where = tools.querySelector(".where");
+    this.previous = tools.querySelector(".previous");
+    this.next = tools.querySelector(".next");
+    this.opener = tools.querySelector(".open");
+    tools.hidden = false;
+    this.previous.addEventListener("click", () => this.step(-1));
+    this.next.addEventListener("click", () => this.step(1));
+    this.opener.addEventListener("click", () => this.open());
+    this.opener.hidden = !this.live;
+    document.addEventListener("keydown", (event) => {
+      if (event.altKey || event.ctrlKey || event.metaKey) return;
+      if (event.target.closest("input, select, textarea")) return;
+      const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+      if (!step) return;
+      event.preventDefault();
+      this.step(step);
+    });
+  }
+
+  /** Frames that can be looked at, in the drive's order; of the filtered ones, if any is. */
+  pictured() {
+    const can = (row) => (this.live ? row.classList.contains("pictured") : this.held.has(Number(row.dataset.frame)));
+    const all = this.rows.filter(can);
+    const shown = all.filter((row) => !row.hidden);
+    return (shown.length ? shown : all).map((row) => Number(row.dataset.frame)).sort((a, b) => a - b);
+  }
+
+  step(by) {
+    const frames = this.pictured();
+    const next = by > 0 ? frames.find((each) => each > this.frame) : frames.findLast((each) => each < this.frame);
+    if (next !== undefined) this.show(next, false, true);
+  }
+
+  async show(frame, scroll = false, follow = false) {
+    this.frame = frame;
+    const row = this.byFrame.get(frame);
+    for (const each of this.rows) each.removeAttribute("aria-current");
+    row?.setAttribute("aria-current", "true");
+    if (follow && row) reveal(row);
+    for (const each of along) each.mark(frame);
+    for (const each of this.held.values()) each.hidden = Number(each.dataset.frame) !== frame;
+    this.position();
+    if (!this.held.has(frame) && this.live && row?.classList.contains("pictured")) await this.fetch(frame);
+    if (this.frame !== frame) return;
+    const strip = this.held.get(frame);
+    this.stage.offer(strip ? [...strip.querySelectorAll(".tile")] : []);
+    this.absent.hidden = Boolean(strip);
+    if (!strip) this.tellAbsent(frame);
+    this.opener.disabled = !this.live || !row?.classList.contains("pictured");
+    if (scroll) this.element.querySelector(".viewer").scrollIntoView({ block: "start" });
+  }
+
+  position() {
+    const frames = this.pictured();
+    const place = frames.indexOf(this.frame);
+    this.where.textContent = `Frame ${this.frame}` + (place < 0 ? "" : ` \u00b7 ${place + 1} of ${frames.length}`);
+    this.previous.disabled = !frames.some((each) => each < this.frame);
+    this.next.disabled = !frames.some((each) => each > this.frame);
+  }
+
+  tellAbsent(frame) {
+    const command = this.element.dataset.command.replace("{}", frame);
+    const words = document.createElement("code");
+    words.textContent = command;
+    this.absent.replaceChildren("This page holds no pictures of this frame. ");
+    if (command) this.absent.append("In the viewer: ", words);
+  }
+
+  /** Ask the server for a frame's pictures. */
+  async fetch(frame) {
+    const address = this.byFrame.get(frame).querySelector("a").href;
+    this.where.textContent = `Frame ${frame} \u2026`;
+    const answer = await fetch(`${address}/part`);
+    const made = document.createElement("template");
+    made.innerHTML = await answer.text();
+    const strip = made.content.querySelector(".strip");
+    if (answer.ok && strip) {
+      makeCommands(strip);
+      this.strips.append(strip);
+      this.held.set(frame, strip);
+      strip.hidden = this.frame !== frame;
+    }
+    this.position();
+  }
+
+  async open() {
+    const { opener, frame } = this;
+    const address = this.byFrame.get(frame).querySelector("a").href;
+    const words = opener.textContent;
+    [opener.disabled, opener.textContent] = [true, "Opening \u2026"];
+    const answer = await fetch(`${address}/view`, { method: "POST" });
+    const told = (await answer.text()).trim();
+    [opener.disabled, opener.textContent] = [false, words];
+    if (!answer.ok) {
+      this.absent.hidden = false;
+      this.absent.textContent = told;
+    } else if (told) window.open(told, "rerun");
+  }
+
+  filters() {
+    const form = this.element.querySelector(".filters");
+    this.form = form;
+    this.told = form.querySelector("output");
+    this.columns = [...this.element.querySelectorAll(".frames thead tr:last-child th")];
+    form.hidden = false;
+    form.addEventListener("submit", (event) => event.preventDefault());
+    form.addEventListener("input", () => this.filter());
+    form.addEventListener("reset", () => {
+      setTimeout(() => {
+        if (range.whole) zoom(...range.whole);
+        else this.filter();
+      });
+    });
+  }
+
+  filter() {
+    const wanted = Object.fromEntries(new FormData(this.form));
+    const [least, most] = [wanted.least, wanted.most].map((text) => (text ? Number(text) : NaN));
+    const places = this.columns.flatMap((title, place) => {
+      const { variant, rate } = title.dataset;
+      return rate === wanted.rate && (!wanted.variant || variant === wanted.variant) ? [place] : [];
+    });
+    const fits = (value) => !(value < least) && !(value > most) && !(Number.isNaN(value) && (least >= 0 || most >= 0));
+    const words = (wanted.note ?? "").trim().toLowerCase();
+    for (const row of this.rows) {
+      const frame = Number(row.dataset.frame);
+      const inRate = !places.length || places.some((place) => fits(numberOf(row.cells[place].textContent)));
+      const inRange = !range.whole || (frame >= range.low && frame <= range.high) || range.low === range.high;
+      const note = row.cells[row.cells.length - 1].textContent.toLowerCase();
+      row.hidden = !(inRate && inRange && hasCondition(row, wanted.condition) && note.includes(words));
+    }
+    this.hideColumns(wanted.variant);
+    const shown = this.rows.filter((row) => !row.hidden).length;
+    this.told.textContent = shown === this.rows.length ? "" : `${shown} of ${this.rows.length} frames`;
+    if (this.frame !== undefined) this.position();
+  }
+
+  /** With one variant chosen only its columns are there. */
+  hideColumns(variant) {
+    const table = this.element.querySelector(".frames");
+    for (const [place, title] of this.columns.entries()) {
+      const hidden = Boolean(variant) && title.dataset.variant !== undefined && title.dataset.variant !== variant;
+      title.hidden = hidden;
+      for (const row of this.rows) row.cells[place].hidden = hidden;
+    }
+    const each = new Set(this.columns.map((title) => title.dataset.variant).filter(Boolean)).size;
+    for (const group of table.querySelectorAll(".groups th")) group.colSpan = variant ? 1 : each;
+  }
+}
+
+function hasCondition(row, condition) {
+  if (!condition) return true;
+  if (condition === "pictured") return row.classList.contains("pictured");
+  return (row.dataset.conditions ?? "").split(" ").includes(condition);
+}
+
+/** Scroll a row into sight within its table, and leave the page where it is. */
+function reveal(row) {
+  const box = row.closest(".scroll");
+  const head = row.closest("table").tHead.offsetHeight;
+  const [top, bottom] = [row.offsetTop - head, row.offsetTop + row.offsetHeight];
+  if (top < box.scrollTop) box.scrollTop = top;
+  else if (bottom > box.scrollTop + box.clientHeight) box.scrollTop = bottom - box.clientHeight;
+}

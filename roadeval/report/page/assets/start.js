@@ -1,0 +1,57 @@
+// Everything is there without a script; this makes it answer.
+
+/** Give each command a button that copies it, where the browser lets a page do that. */
+function makeCommands(part) {
+  if (!navigator.clipboard) return;
+  for (const command of part.querySelectorAll(".command")) {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = "Copy";
+    button.addEventListener("click", async () => {
+      await navigator.clipboard.writeText(command.querySelector("code").textContent);
+      button.textContent = "Copied";
+      setTimeout(() => (button.textContent = "Copy"), 1500);
+    });
+    command.append(button);
+  }
+}
+
+/** Mark in the contents the section that is read. */
+function followOutline() {
+  const links = new Map([...document.querySelectorAll(".outline a")].map((a) => [a.hash.slice(1), a]));
+  const titles = [...links.keys()].map((name) => document.getElementById(name)).filter(Boolean);
+  const follow = () => {
+    const above = titles.filter((each) => each.getBoundingClientRect().top < innerHeight / 3);
+    const current = above.at(-1) ?? titles[0];
+    for (const [name, link] of links) {
+      if (name === current?.id) link.setAttribute("aria-current", "true");
+      else link.removeAttribute("aria-current");
+    }
+  };
+  addEventListener("scroll", follow, { passive: true });
+  follow();
+}
+
+document.documentElement.classList.add("scripted-on");
+for (const table of document.querySelectorAll("table")) makeSortable(table);
+for (const long of document.querySelectorAll(".long")) makeSearchable(long);
+makeCommands(document);
+const element = document.querySelector(".browser");
+let browser = null;
+startCharts((frame) => browser?.show(browser.byFrame.has(frame) ? frame : nearestFrame(frame), true));
+if (element) browser = new Browser(element);
+followOutline();
+
+/** The frame of the table that is nearest to a number. */
+function nearestFrame(frame) {
+  const known = [...browser.byFrame.keys()].sort((a, b) => a - b);
+  return known[nearest(known, frame)];
+}
+
+for (const image of document.querySelectorAll(".grid img, figure.picture img")) {
+  image.addEventListener("click", () => enlargePicture(image));
+}
+addEventListener("hashchange", () => {
+  const asked = /^#frame-(\d+)$/.exec(location.hash);
+  if (asked && browser) browser.show(Number(asked[1]), true);
+});

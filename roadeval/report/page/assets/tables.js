@@ -1,0 +1,67 @@
+// Tables that sort by a click on a column's title, and fields that look for words in long ones.
+
+const MOST_ROWS = 3; // Fewer rows need no sorting.
+
+/** The number that a cell's text begins with, as people write it; NaN if it is none. */
+function numberOf(text) {
+  const plain = text.trim().replaceAll(",", "").replaceAll("\u2212", "-");
+  return /^[-+]?[\d.]/.test(plain) ? parseFloat(plain) : NaN;
+}
+
+function compared(a, b) {
+  const [x, y] = [numberOf(a), numberOf(b)];
+  if (!Number.isNaN(x) && !Number.isNaN(y)) return x - y;
+  return a.localeCompare(b, undefined, { numeric: true });
+}
+
+/** Whether a cell says that there is nothing to say; such rows are last in both directions. */
+const isEmpty = (text) => ["", "\u2013", "none given"].includes(text.trim());
+
+function sort(table, column, descending) {
+  const body = table.tBodies[0];
+  const text = (row) => row.cells[column].textContent;
+  const rows = [...body.rows];
+  const totals = rows.filter((row) => row.classList.contains("total"));
+  const others = rows.filter((row) => !row.classList.contains("total"));
+  const known = others.filter((row) => !isEmpty(text(row)));
+  known.sort((a, b) => (descending ? -1 : 1) * compared(text(a), text(b)));
+  body.append(...known, ...others.filter((row) => isEmpty(text(row))), ...totals);
+  for (const row of body.querySelectorAll(".rule:not(.total)")) row.classList.remove("rule");
+  table.classList.add("sorted");
+}
+
+function makeSortable(table) {
+  if (table.tBodies[0].rows.length < MOST_ROWS) return;
+  const titles = [...table.tHead.rows[table.tHead.rows.length - 1].cells];
+  for (const [column, title] of titles.entries()) {
+    if (!title.textContent.trim()) continue;
+    const button = document.createElement("button");
+    button.type = "button";
+    button.append(...title.childNodes);
+    title.append(button);
+    button.addEventListener("click", () => {
+      // Words from a to z at first, numbers from the highest.
+      const first = title.classList.contains("t") || column === 0 ? "ascending" : "descending";
+      const other = first === "ascending" ? "descending" : "ascending";
+      const order = title.getAttribute("aria-sort") === first ? other : first;
+      for (const each of titles) each.removeAttribute("aria-sort");
+      title.setAttribute("aria-sort", order);
+      sort(table, column, order === "descending");
+    });
+  }
+}
+
+function makeSearchable(long) {
+  const [field, told] = [long.querySelector("input"), long.querySelector("output")];
+  const rows = [...long.querySelector("tbody").rows];
+  long.querySelector(".find").hidden = false;
+  field.addEventListener("input", () => {
+    const wanted = field.value.trim().toLowerCase().split(/\s+/);
+    for (const row of rows) {
+      const text = row.textContent.toLowerCase();
+      row.hidden = !wanted.every((word) => text.includes(word));
+    }
+    const shown = rows.filter((row) => !row.hidden).length;
+    told.textContent = shown === rows.length ? "" : `${shown} of ${rows.length}`;
+  });
+}

@@ -1,0 +1,221 @@
+"""The frames of a drive, to sort, to filter and to look at: a section that only a page has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from roadeval.data.words import defined, number, percent, points, timestamp
+from roadeval.evaluation.metrics import SHORT
+from roadeval.report.blocks import Block, Heading, Table
+from roadeval.report.browse import FrameBrowser, FrameRow, Picture, PictureRow, Strip
+from roadeval.report.chart import Chart
+from roadeval.report.findings import NotableFrame
+from roadeval.report.images import LayerImage, jpeg
+from roadeval.report.sections.common import rate_cells, variant_cell
+from roadeval.report.sections.frames import culprit
+
+LARGE: Final = 640
+SMALL: Final = 300
+"""Pixels across the pictures of outcomes and of layers."""
+ROWS: Final = 2000
+"""Frames in the table, at most; of a longer drive those with the highest error rate."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameFacts:
+    """A frame in the table.
+
+    Parameters
+    ----------
+    frame, stamp_ns
+        Which.
+    rates
+        Of each variant's final mask, as short tables show them; none without truth.
+    conditions
+        What is true of it, in words.
+    notes
+        Sentences about it.
+    """
+
+    frame: int
+    stamp_ns: int
+    rates: Mapping[str, Mapping[str, float]]
+    conditions: Sequence[str] = ()
+    notes: Sequence[str] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class BrowsedFrames:
+    """What the section is made of.
+
+    Parameters
+    ----------
+    frames
+        The frames of the drive, in order.
+    variants
+        Those that were scored.
+    pictured
+        Frames whose pictures can be had.
+    strips
+        Frames with their pictures.
+    charts
+        Rates along the drive.
+    inspect
+        Returns the command that opens a frame; None where there is none.
+    """
+
+    frames: Sequence[FrameFacts]
+    variants: Sequence[str]
+    pictured: frozenset[int]
+    strips: Sequence[Strip]
+    charts: Sequence[Chart]
+    inspect: Callable[[int], str] | None
+
+
+def section(browsed: BrowsedFrames) -> Iterator[Block]:
+    """Yield the browser of frames; nothing where there is no frame to show."""
+    if not browsed.frames:
+        return
+    shown = _shown(browsed)
+    conditions = list(dict.fromkeys(each for facts in shown for each in facts.conditions))
+    order = {each: place for place, each in enumerate(conditions)}
+    yield Heading("Frames")
+    yield FrameBrowser(
+        rates=[*SHORT] if browsed.variants else [],
+        variants=browsed.variants,
+        rows=[_row(facts, browsed, order) for facts in shown],
+        conditions=conditions,
+        strips=browsed.strips,
+        charts=browsed.charts,
+        first=_first(browsed),
+        compared=_compared(browsed.variants),
+        command=browsed.inspect(0).replace(" --frame 0", " --frame {}") if browsed.inspect else "",
+        note=_note(browsed, len(shown)),
+    )
+
+
+def _shown(browsed: BrowsedFrames) -> list[FrameFacts]:
+    """Return the frames of the table: all, or of a long drive the worst and the pictured."""
+    if len(browsed.frames) <= ROWS:
+        return [*browsed.frames]
+    wanted = {strip.frame for strip in browsed.strips}
+    ranked = sorted(browsed.frames, key=lambda facts: -_error(facts))
+    wanted |= {facts.frame for facts in ranked[:ROWS]}
+    return [facts for facts in browsed.frames if facts.frame in wanted]
+
+
+def _error(facts: FrameFacts) -> float:
+    first = next(iter(facts.rates.values()), {})
+    error = first.get("ERR", -1.0)
+    return error if defined(error) else -1.0
+
+
+def _row(facts: FrameFacts, browsed: BrowsedFrames, order: Mapping[str, int]) -> FrameRow:
+    return FrameRow(
+        facts.frame,
+        f"{(facts.stamp_ns - browsed.frames[0].stamp_ns) / 1e9:.2f}",
+        [
+            percent(facts.rates.get(variant, {}).get(rate))
+            for rate in (SHORT if browsed.variants else ())
+            for variant in browsed.variants
+        ],
+        [order[each] for each in facts.conditions],
+        " ".join(facts.notes),
+        facts.frame in browsed.pictured,
+    )
+
+
+def _first(browsed: BrowsedFrames) -> int | None:
+    there = [facts for facts in browsed.frames if facts.frame in browsed.pictured]
+    if browsed.strips:
+        held = {strip.frame for strip in browsed.strips}
+        there = [facts for facts in there if facts.frame in held]
+    return max(there, key=_error).frame if there else None
+
+
+def _compared(variants: Sequence[str]) -> tuple[str, str]:
+    """Return the two pictures that tell most: the errors of two variants."""
+    first, *others = [f"{name}: errors" for name in variants] or [""]
+    return first, next(iter(others), "camera")
+
+
+def _note(browsed: BrowsedFrames, shown: int) -> str:
+    told = []
+    if shown < len(browsed.frames):
+        told.append(
+            f"The {number(shown)} of {number(len(browsed.frames))} frames with the highest ERR; "
+            "frames.csv has them all."
+        )
+    if browsed.variants:
+        told.append("Percent.")
+    if len(browsed.strips) < len(browsed.frames) and browsed.strips:
+        told.append(f"{len(browsed.strips)} frames have their pictures on this page.")
+    return " ".join(told)
+
+
+# --- Strips ---------------------------------------------------------------------------------------
+
+
+def strip(
+    frame: NotableFrame, variants: Sequence[str], command: str = "", conditions: Sequence[str] = ()
+) -> Strip:
+    """Return a frame with its pictures.
+
+    Parameters
+    ----------
+    frame
+        The frame; its pictures are encoded here.
+    variants
+        All that were scored, for their colours.
+    command
+        Opens it in the viewer.
+    conditions
+        What is true of it, in words.
+    """
+    names = [*variants]
+    rates = Table(
+        ["final mask, %", *SHORT],
+        [
+            [variant_cell(name, names), *rate_cells(each, bold=name == frame.variant)]
+            for name, each in frame.rates.items()
+        ],
+        small=True,
+    )
+    return Strip(
+        frame.frame,
+        [*_sentences(frame), *(f"{each[0].upper()}{each[1:]}." for each in conditions)],
+        rates if frame.rates else None,
+        list(_rows(frame)),
+        command,
+    )
+
+
+def _sentences(frame: NotableFrame) -> Iterator[str]:
+    yield f"Stamp {timestamp(frame.stamp_ns)}"
+    if len(frame.parts) > 1:
+        first, *rest = frame.parts
+        terms = [f"{first} {percent(frame.parts[first])}"]
+        terms += [f"{name} {points(frame.parts[name])}" for name in rest]
+        yield (
+            f"ERR of {frame.variant}: {', '.join(terms)} pp. Most of it comes from "
+            f"{culprit(frame)}."
+        )
+    yield from frame.notes
+
+
+def _rows(frame: NotableFrame) -> Iterator[PictureRow]:
+    yield PictureRow("", [_picture(image, image.title, LARGE) for image in frame.images])
+    for row in frame.layers:
+        variant = row[0].title.partition(":")[0] if row else ""
+        pictures = [
+            _picture(image, image.title if place == 0 else f"{variant}: {image.title}", SMALL)
+            for place, image in enumerate(row)
+        ]
+        yield PictureRow(variant, pictures)
+
+
+def _picture(image: LayerImage, name: str, width: int) -> Picture:
+    title = image.spec.title if image.spec else image.title
+    return Picture(name, title, jpeg(image, width))

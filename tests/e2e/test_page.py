@@ -1,0 +1,300 @@
+"""``roadeval report -o page.html`` as a reader has it: in a real browser, from a file."""
+
+import json
+import re
+import shutil
+
+import pytest
+
+from tests.e2e.commands import here
+from tests.fixtures.browser import violations
+from tests.results.fleet.making import fleet_of
+
+
+@pytest.fixture(scope="module")
+def drive(demo, tmp_path_factory):
+    """The page of the demo, made where nothing else is at hand."""
+    folder = tmp_path_factory.mktemp("page")
+    shutil.copy(demo.recording, folder / "drive.rrd")
+    run = here("report", "drive.rrd", "-o", "page.html", cwd=folder)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout == "page.html\n"
+    return folder / "page.html"
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
+    """The page of a fleet whose first drives have pictures."""
+    folder = fleet_of(tmp_path_factory.mktemp("fleet") / "week", 24, pictures=6)
+    path = folder.with_name("index.html")
+    run = here("report", folder, "-o", path)
+    assert run.returncode == 0, run.stderr
+    return path
+
+
+def shown(tab, selector):
+    """The texts of what is seen."""
+    return [each.text_content() for each in tab.locator(selector).all() if each.is_visible()]
+
+
+def frame(tab):
+    """The number of the frame that is looked at."""
+    return int(re.match(r"Frame (\d+)", tab.locator(".where").inner_text())[1])
+
+
+# --- A page of one drive --------------------------------------------------------------------------
+
+
+def test_a_page_is_one_file_of_at_most_10_mb_and_asks_for_nothing(drive, watched):
+    assert drive.stat().st_size < 10_000_000
+    assert {each.name for each in drive.parent.iterdir()} == {"page.html", "drive.rrd"}
+    seen = watched(drive.as_uri())
+    assert seen.elsewhere == []
+    assert [url for url in seen.requests if url.startswith("file:")] == [drive.as_uri()]
+    assert seen.complaints == []
+
+
+def test_its_numbers_are_those_of_the_summary(drive, demo, watched):
+    tab = watched(drive.as_uri()).tab
+    table = tab.locator("#summary table").first
+    titles = [each.inner_text().strip() for each in table.locator("thead th").all()]
+    for row in table.locator("tbody tr").all():
+        cells = [each.inner_text().strip() for each in row.locator("th, td").all()]
+        told = dict(zip(titles, cells, strict=True))
+        total = demo.summary["totals"][told["final mask"]]["post"]
+        for rate in ("ERR", "FPR", "FNR", "ACC"):
+            assert told[rate] == f"{100 * total[rate]:.2f}"
+        assert told["pooled ERR"] == f"{100 * total['pooled_ERR']:.2f}"
+    assert tab.locator(".verdict").inner_text() == demo.summary["verdict"]
+
+
+def test_every_evaluated_frame_is_in_the_table_with_its_rates(drive, demo, watched):
+    tab = watched(drive.as_uri()).tab
+    rows = tab.locator(".frames tbody tr")
+    assert rows.count() == demo.summary["frames"]["evaluated"]
+    columns = tab.locator(".frames thead th[data-rate=ERR]").all_inner_texts()
+    assert [each.strip() for each in columns] == ["filtered", "unfiltered", "blind"]
+    values = rows.evaluate_all("rows => rows.map(row => Number(row.cells[2].textContent))")
+    mean = demo.summary["totals"]["filtered"]["post"]["ERR"]
+    assert sum(values) / len(values) == pytest.approx(100 * mean, abs=0.01)
+
+
+def test_a_click_on_a_title_sorts_and_another_one_turns_it_round(drive, watched):
+    tab = watched(drive.as_uri()).tab
+    title = tab.locator(".frames thead th[data-rate=ERR] button").first
+    read = "rows => rows.map(row => Number(row.cells[2].textContent))"
+    title.click()
+    values = tab.locator(".frames tbody tr").evaluate_all(read)
+    assert values == sorted(values, reverse=True)
+    title.press("Enter")
+    assert tab.locator(".frames tbody tr").evaluate_all(read) == sorted(values)
+    assert tab.locator(".frames th[aria-sort]").get_attribute("aria-sort") == "ascending"
+
+
+def test_frames_are_filtered_by_variant_rate_condition_and_note(drive, watched):
+    tab = watched(drive.as_uri()).tab
+    everything = tab.locator(".frames tbody tr").count()
+    tab.select_option("[name=variant]", "unfiltered")
+    assert shown(tab, ".frames thead th[data-variant]") == ["unfiltered"] * 3
+    tab.fill("[name=least]", "20")
+    rates = [float(text) for text in shown(tab, ".frames tbody td:nth-child(4)")]
+    assert 0 < len(rates) < everything
+    assert min(rates) >= 20
+    tab.click(".filters [type=reset]")
+    tab.wait_for_function("document.querySelectorAll('.frames tr[hidden]').length === 0")
+    tab.select_option("[name=condition]", label="the filter helps")
+    notes = shown(tab, ".frames tbody td:last-child")
+    assert 0 < len(notes) < everything
+    assert all("the filter helps" in note for note in notes)
+    tab.click(".filters [type=reset]")
+    tab.fill("[name=note]", "raised ERR")
+    assert all("raised ERR" in note for note in shown(tab, ".frames tbody td:last-child"))
+
+
+def test_the_worst_frame_is_seen_first_and_arrow_keys_go_from_frame_to_frame(drive, watched):
+    tab = watched(drive.as_uri()).tab
+    errors = tab.locator(".frames tr.pictured").evaluate_all(
+        "rows => rows.map(row => [Number(row.cells[2].textContent), Number(row.dataset.frame)])"
+    )
+    first = frame(tab)
+    assert first == max(errors)[1]
+    tab.keyboard.press("ArrowRight")
+    after = frame(tab)
+    assert after > first
+    tab.keyboard.press("ArrowLeft")
+    assert frame(tab) == first
+    assert len(shown(tab, ".strip .two")) == 1
+    assert tab.locator(".frames tr[aria-current]").get_attribute("data-frame") == str(first)
+
+
+def test_a_slider_lies_between_two_variants(drive, watched):
+    tab = watched(drive.as_uri()).tab
+    assert tab.locator("select.left").input_value() == "filtered: errors"
+    assert tab.locator("select.right").input_value() == "unfiltered: errors"
+    above, below = (tab.locator(f".views .{name}") for name in ("above", "below"))
+    assert above.get_attribute("src") != below.get_attribute("src")
+    above.scroll_into_view_if_needed()
+    box = above.bounding_box()
+    tab.mouse.move(box["x"] + box["width"] / 2, box["y"] + 50)
+    tab.mouse.down()
+    tab.mouse.move(box["x"] + box["width"] / 4, box["y"] + 50, steps=4)
+    tab.mouse.up()
+    assert float(tab.locator(".names input").input_value()) == pytest.approx(25, abs=1)
+    assert above.evaluate("each => each.style.clipPath").startswith("inset(0")
+    tab.select_option("select.right", "camera")
+    tab.keyboard.press("Escape")
+    assert "camera" in below.get_attribute("alt")
+    tab.locator(".where").click()
+    tab.keyboard.press("ArrowRight")
+    assert tab.locator("select.right").input_value() == "camera"
+
+
+def test_a_picture_enlarges_and_arrow_keys_go_on_inside(drive, watched):
+    tab = watched(drive.as_uri()).tab
+    first = frame(tab)
+    tab.locator(".strip:not([hidden]) .tile img").nth(1).click()
+    assert tab.locator("dialog .views").is_visible()
+    assert tab.locator("dialog select.left").input_value() == "truth"
+    tab.keyboard.press("ArrowRight")
+    assert frame(tab) > first
+    tab.keyboard.press("Escape")
+    tab.locator("dialog .views").wait_for(state="detached")
+    assert tab.locator(".viewer .views").is_visible()
+
+
+def test_a_click_on_a_chart_shows_its_frame_and_the_pointer_its_values(drive, watched):
+    tab = watched(drive.as_uri()).tab
+    for chart in (tab.locator(".browser .area").first, tab.locator("figure .along .area").last):
+        chart.scroll_into_view_if_needed()
+        box = chart.bounding_box()
+        tab.mouse.move(box["x"] + box["width"] * 0.4, box["y"] + box["height"] / 2)
+        tip = tab.locator(".tip:visible")
+        number = int(re.match(r"frame (\d+)", tip.inner_text())[1])
+        tab.mouse.down()
+        tab.mouse.up()
+        row = tab.locator(f".frames tr[data-frame='{number}']")
+        assert frame(tab) == number
+        assert row.get_attribute("aria-current") == "true"
+    assert tab.locator(".absent").is_visible() or tab.locator(".stage").is_visible()
+
+
+def test_a_part_of_the_drive_is_the_same_part_in_every_chart_and_in_the_table(drive, watched):
+    tab = watched(drive.as_uri()).tab
+    everything = tab.locator(".frames tbody tr").count()
+    chart = tab.locator(".browser .area").first
+    chart.scroll_into_view_if_needed()
+    box = chart.bounding_box()
+    tab.mouse.move(box["x"] + box["width"] * 0.2, box["y"] + 20)
+    tab.mouse.down()
+    tab.mouse.move(box["x"] + box["width"] * 0.5, box["y"] + 20, steps=5)
+    tab.mouse.up()
+    views = tab.locator(".along .area").evaluate_all(
+        "all => all.map(a => a.getAttribute('viewBox'))"
+    )
+    assert len(views) > 4
+    assert len(set(views)) == 1
+    low, _, size, _ = map(float, views[0].split())
+    numbers = [
+        int(each.get_attribute("data-frame"))
+        for each in tab.locator(".frames tbody tr:not([hidden])").all()
+    ]
+    assert 0 < len(numbers) < everything
+    assert low <= min(numbers) <= max(numbers) <= low + size
+    tab.locator(".whole:visible").first.click()
+    assert tab.locator(".frames tbody tr:not([hidden])").count() == everything
+
+
+def test_a_chart_is_read_by_the_keyboard(drive, watched):
+    tab = watched(drive.as_uri()).tab
+    chart = tab.locator(".browser .area").first
+    chart.focus()
+    tab.keyboard.press("ArrowRight")
+    tab.keyboard.press("ArrowRight")
+    number = int(re.match(r"frame (\d+)", tab.locator(".tip:visible").inner_text())[1])
+    tab.keyboard.press("Enter")
+    assert frame(tab) == number
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1440, 390])
+def test_light_and_dark_wide_and_narrow_nothing_runs_over_and_axe_is_content(
+    drive, fleet, scheme, width, watched
+):
+    for path in (drive, fleet):
+        seen = watched(path.as_uri(), width=width, color_scheme=scheme)
+        paper = seen.tab.evaluate("getComputedStyle(document.body).backgroundColor")
+        assert (paper == "rgb(255, 255, 255)") == (scheme == "light")
+        assert seen.tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        assert violations(seen.tab) == []
+        assert seen.complaints == []
+
+
+def test_without_a_script_everything_is_there(drive, watched):
+    tab = watched(drive.as_uri(), java_script_enabled=False).tab
+    assert len(shown(tab, ".strip h3")) > 5
+    assert all(each.is_visible() for each in tab.locator(".strip .tile img").all()[:20])
+    assert shown(tab, ".charts .axis")
+    assert not shown(tab, ".filters, .tools, .stage, .find, .scripted")
+
+
+def test_with_assets_the_script_is_in_a_file_and_works_as_well(demo, tmp_path, watched):
+    run = here("report", demo.recording, "-o", tmp_path / "page.html", "--assets", "--pictures", 3)
+    assert run.returncode == 0, run.stderr
+    text = (tmp_path / "page.html").read_text()
+    assert not re.search(r"<script>|<style>|sha256-|data:image", text)
+    seen = watched((tmp_path / "page.html").as_uri())
+    assert seen.complaints == []
+    assert seen.tab.locator(".strip").count() == 3
+    assert seen.tab.locator(".views .above").evaluate("each => each.naturalWidth") > 0
+    before = frame(seen.tab)
+    seen.tab.keyboard.press("ArrowLeft")
+    seen.tab.keyboard.press("ArrowRight")
+    assert frame(seen.tab) >= before
+
+
+# --- Fleets, folders, what is wrong usage ---------------------------------------------------------
+
+
+def test_a_fleets_page_has_every_drive_and_finds_one(fleet, watched):
+    seen = watched(fleet.as_uri())
+    told = json.loads((fleet.parent / "week" / "fleet.json").read_text())
+    rows = seen.tab.locator("#all-drives tbody tr")
+    assert rows.count() == len(told["drives"]) == 24
+    seen.tab.fill("#all-drives input", "drive_0003")
+    assert len(shown(seen.tab, "#all-drives tbody tr")) == 1
+    pictures = seen.tab.locator(".grid img")
+    assert pictures.count() > 5
+    assert pictures.first.evaluate("each => each.naturalWidth") > 0
+    (folder,) = fleet.parent.glob("index.files-*")
+    assert all(url.startswith((fleet.as_uri(), folder.as_uri())) for url in seen.requests)
+    assert seen.complaints == []
+
+
+def test_a_results_folder_gives_a_page_without_pictures(demo, tmp_path, watched):
+    folder = tmp_path / "results"
+    shutil.copytree(demo.reports, folder)
+    assert here("report", folder, "-o", tmp_path / "page.html").returncode == 0
+    seen = watched((tmp_path / "page.html").as_uri())
+    assert seen.complaints == []
+    assert "Made without pictures" in seen.tab.content()
+    assert seen.tab.locator(".frames tbody tr").count() == demo.summary["frames"]["evaluated"]
+
+
+def test_without_truth_a_page_shows_the_masks(unlabelled, tmp_path, watched):
+    run = here("report", unlabelled.recording, "-o", tmp_path / "page.html")
+    assert run.returncode == 0, run.stderr
+    seen = watched((tmp_path / "page.html").as_uri())
+    assert seen.complaints == []
+    first = frame(seen.tab)
+    seen.tab.keyboard.press("ArrowRight")
+    assert frame(seen.tab) > first
+
+
+@pytest.mark.parametrize(
+    "words", [("-o", "page.txt"), ("--pictures", 3), ("-o", "a.pdf", "--assets")]
+)
+def test_what_goes_with_a_page_alone_is_wrong_usage_elsewhere(words, demo, tmp_path):
+    run = here("report", demo.recording, *words, cwd=tmp_path)
+    assert run.returncode == 2
+    assert len(run.stderr.splitlines()) == 1
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,173 @@
+"""Documents as pages: every block, nothing that is markup, nothing from elsewhere."""
+
+import base64
+import hashlib
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from roadeval.report.blocks import (
+    Block,
+    BulletList,
+    Cell,
+    Command,
+    Figure,
+    Heading,
+    ImageFile,
+    ImageGrid,
+    KeepTogether,
+    PageBreak,
+    Table,
+    TableOfContents,
+    Text,
+    TwoColumns,
+)
+from roadeval.report.browse import FrameBrowser, FrameRow, LongTable, Picture, PictureRow, Strip
+from roadeval.report.chart import Chart, ChartKind, Series
+from roadeval.report.page.files import Beside, write_page
+from roadeval.report.page.render import page
+from tests.report.making import a_document
+
+JPEG = ImageFile(b"\xff\xd8\xff\xe0 not much of a picture")
+HOSTILE = "<script>alert(1)</script>\"'&\x1b[2J javascript:alert(2)"
+CHART = Chart("ERR", ChartKind.LINES, [Series(HOSTILE, "#0072B2", [0, 1], [1.0, 2.0])])
+MARKS = Chart("ERR", ChartKind.MARKS, CHART.series, names=[HOSTILE, "b"], share=[1.0, 2.0])
+
+
+def every_block(text):
+    """One of each kind of block, with a text wherever one has room."""
+    table = Table([text, "n"], [[Cell(text, dot="#0072B2"), text], ["", "1"]], caption=text)
+    strip = Strip(7, [text], table, [PictureRow(text, [Picture(text, text, JPEG)])], text)
+    row = FrameRow(7, "0.00", ["1.00"], [0], text, pictured=True)
+    return [
+        Heading(text),
+        Heading(text, 2),
+        Text(text),
+        Text(text, "title"),
+        Command(text),
+        BulletList(text, [text], "warning"),
+        table,
+        LongTable(table, text),
+        Figure(JPEG, text),
+        Figure(JPEG, text, charts=[CHART, MARKS]),
+        ImageGrid([(text, JPEG)], 4, skip=1),
+        KeepTogether([Text(text)]),
+        TwoColumns([Text(text)], [Text(text)]),
+        PageBreak(),
+        TableOfContents(),
+        FrameBrowser([text], [text], [row], [text], [strip], [CHART], 7, (text, text), text, text),
+    ]
+
+
+class Reader(HTMLParser):
+    """The elements of a page with their attributes, and its text."""
+
+    def __init__(self, content):
+        super().__init__()
+        self.elements = []
+        self.words = []
+        self.feed(content.decode())
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+    def all(self, tag):
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+def rendered(*blocks):
+    return page(a_document(*blocks))
+
+
+def test_every_kind_of_block_is_drawn():
+    kinds = {type(block).__name__ for block in every_block("word")}
+    known = {
+        each.__name__ for each in Block.__subclasses__() if each.__module__.startswith("roadeval")
+    }
+    parts = {"Document", "Cell", "Strip", "Picture", "PictureRow", "FrameRow"}
+    assert known - kinds == parts
+    assert rendered(*every_block("word"))
+
+
+def test_a_block_that_nobody_can_draw_is_no_silent_gap():
+    class Riddle(Block):
+        pass
+
+    with pytest.raises(NotImplementedError, match="riddle"):
+        rendered(Riddle())
+
+
+def test_what_looks_like_markup_is_text_wherever_it_stands():
+    plain, hostile = (Reader(rendered(*every_block(text))) for text in ("word", HOSTILE))
+    assert [tag for tag, _ in plain.elements] == [tag for tag, _ in hostile.elements]
+    assert [set(own) for _, own in plain.elements] == [set(own) for _, own in hostile.elements]
+    assert "\x1b" not in "".join(hostile.words)
+    for _, attributes in hostile.elements:
+        for address in (attributes.get("href"), attributes.get("src")):
+            assert address is None or address.startswith(("#", "data:"))
+
+
+def test_titles_are_text_as_well():
+    made = Reader(page(a_document(title=HOSTILE)))
+    assert len(made.all("script")) == 1
+    assert any("<script>alert(1)</script>" in words for words in made.words)
+
+
+def test_a_page_asks_for_nothing_and_allows_its_own_script_and_style_alone():
+    content = rendered(*every_block("word"))
+    made = Reader(content)
+    (policy,) = [own["content"] for own in made.all("meta") if "http-equiv" in own]
+    assert policy.startswith("default-src 'none'; img-src data:;")
+    for tag, directive in (("style", "style-src"), ("script", "script-src")):
+        (code,) = re.findall(rf"<{tag}>(.*?)</{tag}>", content.decode(), re.S)
+        digest = base64.b64encode(hashlib.sha256(code.encode()).digest()).decode()
+        assert f"{directive} 'sha256-{digest}'" in policy
+    assert not made.all("link")[1:]
+    assert not any(
+        "style" in own or any(n.startswith("on") for n in own) for _, own in made.elements
+    )
+
+
+def test_sections_are_linked_and_titles_of_one_text_have_names_of_their_own():
+    made = Reader(rendered(Heading("Frames"), Heading("Worst", 2), Heading("Frames")))
+    links = [own["href"] for own in made.all("a") if own["href"] != "#content"]
+    assert links == ["#frames", "#worst", "#frames-2"]
+    assert {own["id"] for tag, own in made.elements if tag in ("section", "h3")} >= {
+        *("frames", "worst", "frames-2")
+    }
+
+
+def test_tables_name_their_columns_and_rows_and_fill_in_what_a_row_takes_from_above():
+    table = Table(["variant", "stage", "n"], [["a", "svm", "1"], ["", "post", "2"]], (0, 1))
+    made = Reader(rendered(table))
+    assert [own["scope"] for own in made.all("th")] == ["col"] * 3 + ["row"] * 2
+    text = "".join(made.words)
+    assert text.count("a") > text.count("post")
+    assert len(made.all("caption")) == 1
+
+
+def test_pictures_have_words_for_who_does_not_see_them():
+    made = Reader(rendered(*every_block("word")))
+    pictures = [own for own in made.all("img") if "src" in own]
+    assert len(pictures) == 3
+    assert all(own["alt"] for own in pictures)
+
+
+def test_equal_documents_give_equal_bytes():
+    assert rendered(*every_block("word")) == rendered(*every_block("word"))
+
+
+def test_pictures_and_code_beside_a_page_are_named_by_it_and_replaced_with_it(tmp_path):
+    path = tmp_path / "page.html"
+    write_page(path, a_document(ImageGrid([("a", JPEG)], 1)), Beside.ALL)
+    (folder,) = (each for each in tmp_path.iterdir() if each.is_dir())
+    made = Reader(path.read_bytes())
+    named = [own["src"] for tag in ("img", "script") for own in made.all(tag) if "src" in own]
+    named += [own["href"] for own in made.all("link") if own["rel"] == "stylesheet"]
+    assert {tmp_path / name for name in named} == set(folder.iterdir())
+    write_page(path, a_document(Text("other")), Beside.NOTHING)
+    assert [each.name for each in tmp_path.iterdir()] == ["page.html"]
