@@ -131,7 +131,7 @@ def compare(
 
 
 def write(compared: Compared, path: Path, *, paper: Paper = Paper.A4) -> Path:
-    """Write a comparison as PDF, Markdown or JSON, by the file's ending.
+    """Write a comparison as PDF, page, Markdown or JSON, by the file's ending.
 
     Raises
     ------
@@ -151,6 +151,7 @@ def writer(path: Path) -> Callable[[Compared, Paper], bytes]:
     """
     known: dict[str, Callable[[Compared, Paper], bytes]] = {
         ".pdf": _pdf,
+        ".html": _page,
         ".md": _markdown,
         ".json": lambda compared, _: as_json(compared).encode(),
     }
@@ -163,6 +164,13 @@ def _pdf(compared: Compared, paper: Paper) -> bytes:
     from roadeval.report.comparison import document
 
     return pdf(document(compared.comparison, compared.judgements, compared.windows), paper)
+
+
+def _page(compared: Compared, _: Paper) -> bytes:
+    from roadeval.report.comparison import document
+    from roadeval.report.page.render import page
+
+    return page(document(compared.comparison, compared.judgements, compared.windows))
 
 
 def _markdown(compared: Compared, _: Paper) -> bytes:

@@ -35,6 +35,7 @@ from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.settings import EvaluationSettings, settings_of
 from roadeval.jobs.compare import asked, labels_of
 from roadeval.report.fleet.comparison import document, markdown
+from roadeval.report.page.render import page
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.fleet.comparison import FleetComparison, FleetSide, as_dict, judged
 from roadeval.results.fleet.folder import Fleet, is_fleet
@@ -157,7 +158,7 @@ def compare_fleets(
 
 
 def write(compared: ComparedFleets, path: Path, *, paper: Paper = Paper.A4) -> Path:
-    """Write a comparison as PDF, Markdown or JSON, by the file's ending.
+    """Write a comparison as PDF, page, Markdown or JSON, by the file's ending.
 
     Raises
     ------
@@ -166,6 +167,7 @@ def write(compared: ComparedFleets, path: Path, *, paper: Paper = Paper.A4) -> P
     """
     known: dict[str, Callable[[], bytes]] = {
         ".pdf": lambda: pdf(document(compared.comparison, compared.judgements), paper),
+        ".html": lambda: page(document(compared.comparison, compared.judgements)),
         ".md": lambda: markdown(compared.comparison, compared.judgements).encode(),
         ".json": lambda: as_json(compared).encode(),
     }

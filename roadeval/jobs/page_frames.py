@@ -86,7 +86,9 @@ def _conditions(
     settings: EvaluationSettings,
 ) -> Iterator[str]:
     """Yield what is true of a frame, in words: the first variant's health, and the filter."""
-    first = next(iter(rates))
+    first = next(iter(rates), None)
+    if first is None:
+        return
     health = judge(rates[first], blind, settings)
     if health is not Health.OK:
         yield f"{first} {health}"

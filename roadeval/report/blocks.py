@@ -126,12 +126,14 @@ class Figure(Block):
     """A picture across ``width`` of the text (0..1), with its caption below.
 
     ``charts`` are the same as data, for whoever draws it anew; without any, only the picture is.
+    Their caption is ``of_charts``, where the picture's speaks of what only that has.
     """
 
     picture: ImageFile
     caption: str
     width: float = 1.0
     charts: Sequence[Chart] = ()
+    of_charts: str = ""
 
     def as_json(self) -> dict[str, Any]:
         """Return its fields as JSON has them, without the charts."""

@@ -13,6 +13,7 @@ from roadeval.evaluation.conditions import Judgement
 from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
 from roadeval.evaluation.uncertainty import Difference
 from roadeval.report.blocks import Block, BulletList, Cell, Document, Figure, Heading, Table, Text
+from roadeval.report.figures import row_values
 from roadeval.report.figures.charts import forest, levels
 from roadeval.report.figures.fig3a_error_rate import FIGURE
 from roadeval.report.figures.figure import FigureData
@@ -90,12 +91,15 @@ def _blocks(
         yield Figure(
             svg(lambda: forest(finals)),
             "Change of the final mask's rates against the base; bars are intervals, where given.",
+            charts=row_values.changes(finals),
         )
         yield Heading("Over the drive", 2)
-        if picture := svg_of(FIGURE, FigureData("the common frames", windows)):
-            yield Figure(picture, "")
+        data = FigureData("the common frames", windows)
+        if picture := svg_of(FIGURE, data):
+            yield Figure(picture, "", charts=FIGURE.charts(data))
     else:
-        yield Figure(svg(lambda: levels(finals)), "Rates of the final masks.")
+        charts = row_values.levels(finals)
+        yield Figure(svg(lambda: levels(finals)), "Rates of the final masks.", charts=charts)
     if comparison.moved:
         yield Heading("Frames that changed most", 2)
         yield _moved_table(comparison)

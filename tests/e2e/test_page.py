@@ -298,3 +298,32 @@ def test_what_goes_with_a_page_alone_is_wrong_usage_elsewhere(words, demo, tmp_p
     assert run.returncode == 2
     assert len(run.stderr.splitlines()) == 1
     assert not list(tmp_path.iterdir())
+
+
+# --- Comparisons ----------------------------------------------------------------------------------
+
+
+def test_a_comparison_is_a_page_with_the_changes_and_the_frames_that_changed(
+    demo, tmp_path, watched
+):
+    path = tmp_path / "compared.html"
+    run = here("compare", demo.recording, "-o", path, "--json")
+    assert run.returncode == 0, run.stderr
+    told = json.loads(run.stdout)
+    seen = watched(path.as_uri())
+    assert seen.complaints == []
+    assert seen.elsewhere == []
+    assert seen.tab.locator(".verdict").inner_text() == told["verdict"]
+    rows = seen.tab.locator("#what-changed table").first.locator("tbody tr")
+    assert rows.count() == len(told["changes"])
+    assert violations(seen.tab) == []
+
+
+def test_two_fleets_are_compared_on_a_page(tmp_path, watched):
+    old, new = (fleet_of(tmp_path / name, 12, change=c) for name, c in (("old", 0), ("new", 0.02)))
+    path = tmp_path / "compared.html"
+    assert here("compare", old, new, "-o", path).returncode == 0
+    seen = watched(path.as_uri(), color_scheme="dark")
+    assert seen.complaints == []
+    assert seen.tab.locator(".rows circle").count() >= 10
+    assert violations(seen.tab) == []

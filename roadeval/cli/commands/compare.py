@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 def _ending(paths: list[Path] | None) -> list[Path] | None:
     for path in paths or ():
-        if path.suffix.lower() not in (".pdf", ".md", ".json"):
-            raise typer.BadParameter(f"{path}: end it in .pdf, .md or .json")
+        if path.suffix.lower() not in (".pdf", ".html", ".md", ".json"):
+            raise typer.BadParameter(f"{path}: end it in .pdf, .html, .md or .json")
     return paths
 
 
@@ -49,7 +49,7 @@ Outputs = Annotated[
         "--output",
         metavar="FILE",
         callback=_ending,
-        help="Write it as .pdf, .md or .json, by the ending. Repeatable.",
+        help="Write it as .pdf, .html, .md or .json, by the ending. Repeatable.",
     ),
 ]
 

@@ -11,6 +11,7 @@ from roadeval.report.browse import LongTable
 from roadeval.report.fleet.drives import by_kind, tags_in_words
 from roadeval.report.fleet.findings import FleetFindings, Row
 
+_WORDS: Final = ("drive", "state", "tags", "group")
 _LIGHT: Final = ("luminance", "contrast", "shadow", "sun")
 _KINDS: Final = {"filter": "filter, pp", "blind": "against blind, pp"}
 """Differences of the first variant that have a column, with its title."""
@@ -33,23 +34,23 @@ def drives_table(findings: FleetFindings) -> Table:
     changes = {kind: {r["drive"]: r["mean"] for r in by_kind(findings, kind)} for kind in _KINDS}
     shown = {kind: values for kind, values in changes.items() if values}
     tags = {each["drive"]: tags_in_words(each["tags"]) for each in findings.summary["drives"]}
-    titles = ["drive", "state", "frames", "ERR", "FPR", "FNR", *(_KINDS[kind] for kind in shown)]
+    differences = [_KINDS[kind] for kind in shown]
     return Table(
-        [*titles, *_LIGHT, "group", "tags"],
+        [*_WORDS, "frames", "ERR", "FPR", "FNR", *differences, *_LIGHT],
         [
             [
                 findings.names[drive],
                 str(row["status"]),
+                tags.get(drive, ""),
+                str(row["group"] or ""),
                 number(row["evaluated"] or 0),
                 *_rates(scores.get(drive, {})),
                 *(points(values.get(drive)) for values in shown.values()),
                 *(_light(row[name]) for name in _LIGHT),
-                str(row["group"] or ""),
-                tags.get(drive, ""),
             ]
             for drive, row in findings.drives.items()
         ],
-        text_columns=(0, 1, len(titles) + len(_LIGHT), len(titles) + len(_LIGHT) + 1),
+        text_columns=range(len(_WORDS)),
         small=True,
     )
 

@@ -15,6 +15,10 @@ from roadeval.results.fleet.schema import LIGHT, TAG
 
 STRATA: Final = 30
 """Parts of a fleet that a table has, at most."""
+ROWS_CAPTION: Final = (
+    "A row a drive, with its own interval, the worst above; the group that it belongs to in "
+    "brackets. Below them the mean over drives and its interval."
+)
 _LIGHT: Final = {column.name for column in LIGHT}
 
 

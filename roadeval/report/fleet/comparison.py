@@ -10,9 +10,10 @@ from roadeval.evaluation.drives_comparison_result import TESTED, DriveChange, Fl
 from roadeval.evaluation.drives_conditions import FleetJudgement
 from roadeval.evaluation.metrics import SHORT
 from roadeval.report.blocks import Block, BulletList, Cell, Document, Figure, Heading, Table, Text
+from roadeval.report.figures import row_values
 from roadeval.report.figures.files import svg
 from roadeval.report.figures.forest import ForestMean, ForestRow, forest
-from roadeval.report.fleet.common import MarkedRow, caption, q_value, strata_table
+from roadeval.report.fleet.common import ROWS_CAPTION, MarkedRow, caption, q_value, strata_table
 from roadeval.report.markdown import table as markdown_table
 from roadeval.results.certainty import MARK, correction, stands
 from roadeval.results.fleet.comparison import (
@@ -121,7 +122,12 @@ def _plot(comparison: FleetComparison, change: FleetChange) -> Iterator[Block]:
     ends = (spread.new_low, spread.new_high) if spread else (None, None)
     mean = ForestMean(over.mean, over.low, over.high, *ends)
     label = f"change of {TESTED} of {change.variant}, pp"
-    yield Figure(svg(lambda: forest(rows, mean, label)), caption(rows, mean))
+    yield Figure(
+        svg(lambda: forest(rows, mean, label)),
+        caption(rows, mean),
+        charts=row_values.forest(rows, mean, label.removesuffix(", pp")),
+        of_charts=ROWS_CAPTION,
+    )
 
 
 def _strata(comparison: FleetComparison) -> Iterator[Block]:

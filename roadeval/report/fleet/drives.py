@@ -7,9 +7,10 @@ from typing import Any, Final
 
 from roadeval.data.words import number, percent, points
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
+from roadeval.report.figures import row_values
 from roadeval.report.figures.files import svg
 from roadeval.report.figures.forest import ForestMean, ForestRow, forest
-from roadeval.report.fleet.common import caption
+from roadeval.report.fleet.common import ROWS_CAPTION, caption
 from roadeval.report.fleet.findings import FleetFindings, Row
 
 NAMED: Final = 12
@@ -63,7 +64,12 @@ def _plot(findings: FleetFindings, told: Mapping[str, Any]) -> Iterator[Block]:
     ends = (spread["new_low"], spread["new_high"]) if spread else (None, None)
     mean = ForestMean(told["mean"], told["low"], told["high"], *ends)
     label = f"ERR of {told['variant']} minus that of {told['base']}, pp"
-    yield Figure(svg(lambda: forest(rows, mean, label)), caption(rows, mean))
+    yield Figure(
+        svg(lambda: forest(rows, mean, label)),
+        caption(rows, mean),
+        charts=row_values.forest(rows, mean, label.removesuffix(", pp")),
+        of_charts=ROWS_CAPTION,
+    )
 
 
 def worst_table(findings: FleetFindings) -> Table:

@@ -9,6 +9,8 @@ from roadeval.report.blocks import Block, Cell, Heading, ImageGrid, Table, Text
 from roadeval.report.fleet.findings import FleetFindings, WorstFrame
 
 ACROSS = 4
+LACKING = 12
+"""Frames without a picture that are named."""
 LONGEST = 20
 """Letters of a drive's name below a picture."""
 
@@ -64,10 +66,8 @@ def _note(findings: FleetFindings, shown: int) -> str:
         "grey: ignored."
     )
     if missing:
-        others = ", ".join(
-            f"{findings.names[frame.drive]} frame {frame.frame}"
-            for frame in findings.worst
-            if frame.picture is None
-        )
-        told += f" Pictures of {missing} are not in the folder: {others}."
+        lacking = [frame for frame in findings.worst if frame.picture is None]
+        named = [f"{findings.names[each.drive]} frame {each.frame}" for each in lacking[:LACKING]]
+        more = f" and {missing - LACKING} more" if missing > LACKING else ""
+        told += f" Pictures of {missing} are not in the folder: {', '.join(named)}{more}."
     return told

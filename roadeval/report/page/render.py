@@ -89,9 +89,8 @@ def page(document: Document, place: Place = INSIDE) -> bytes:
         policy=place.policy,
         code_at=place.code,
         home=place.home,
-        # Written by this package, and not by what it reads.
-        style=_trusted(style()),
-        script=_trusted(script()),
+        style=style(),
+        script=script(),
     )
 
 
@@ -122,12 +121,6 @@ def _hash(code: str) -> str:
     return f"'sha256-{digest}'"
 
 
-def _trusted(code: str) -> Any:
-    from markupsafe import Markup
-
-    return Markup(code)
-
-
 def _rendered(template: str, place: Place, document: Document | None, **values: Any) -> bytes:
     span = span_of_frames(_all_charts(document)) if document else None
 
@@ -142,7 +135,7 @@ def _rendered(template: str, place: Place, document: Document | None, **values: 
         filled=_filled,
         unknown=_unknown,
         # A picture inside the page is there already, and paper shows it only if it is loaded.
-        lazily=_trusted("" if place.pictures is None else ' loading="lazy"'),
+        loading="eager" if place.pictures is None else "lazy",
         **values,
     )
     return str(made).encode("utf-8")

@@ -52,6 +52,7 @@ def _paired(findings: Findings, pair: PairedComparison) -> Iterator[Block]:
         f"ERR of {pair.treated} minus {pair.control}, frame by frame. Dashed: the mean; grey band: "
         "its interval, where one is given.",
         charts=[values.difference(pair.frames, pair.treated, pair.control)],
+        of_charts=f"ERR of {pair.treated} minus {pair.control}, frame by frame.",
     )
 
 

@@ -1,0 +1,101 @@
+"""The numbers of figures with a row a drive or a result as charts, in percent and points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from roadeval.data.words import in_percent
+from roadeval.evaluation.comparison_result import MaskComparison
+from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.uncertainty import Difference
+from roadeval.report.chart import Chart, ChartKind, Series
+from roadeval.report.figures.forest import BETTER, NAMED, WORSE, ForestMean, ForestRow
+from roadeval.report.figures.style import FAINT, looks
+
+MEAN: Final = "mean over drives"
+CHANGE: Final = FAINT
+Interval = ForestRow | ForestMean | Difference
+"""A mean, with ends where it has an interval."""
+
+
+def forest(rows: Sequence[ForestRow], mean: ForestMean, label: str) -> list[Chart]:
+    """Return every drive's difference with its interval, the worst above, and their mean.
+
+    None where there are so many drives that the figure does not name them either.
+    """
+    if len(rows) > NAMED:
+        return []
+    ranked = sorted(rows, key=lambda row: (-row.mean, row.name))
+    names = [row.name if row.group is None else f"{row.name} ({row.group})" for row in ranked]
+    worse = [place for place, row in enumerate(ranked) if row.mean > 0]
+    better = [place for place, row in enumerate(ranked) if row.mean <= 0]
+    series = [
+        _intervals(word, colour, places, [ranked[place] for place in places])
+        for word, colour, places in (("worse", WORSE, worse), ("better", BETTER, better))
+    ]
+    series.append(_intervals(MEAN, CHANGE, [len(ranked)], [mean]))
+    return [Chart(label, ChartKind.MARKS, series, names=[*names, MEAN], unit="pp")]
+
+
+def changes(finals: Sequence[MaskComparison]) -> list[Chart]:
+    """Return each result's changes of rates against the base, a chart a rate."""
+    return [
+        Chart(
+            f"Change of {rate}",
+            ChartKind.MARKS,
+            [
+                _intervals(
+                    "change", CHANGE, range(len(finals)), [r.difference[rate] for r in finals]
+                )
+            ],
+            names=[_name(row) for row in finals],
+            unit="pp",
+        )
+        for rate in SHORT
+    ]
+
+
+def levels(finals: Sequence[MaskComparison]) -> list[Chart]:
+    """Return the rates of several results' final masks, a chart a rate."""
+    results = list(dict.fromkeys(row.result for row in finals))
+    variants = list(dict.fromkeys(row.variant for row in finals))
+    return [
+        Chart(
+            rate,
+            ChartKind.MARKS,
+            [
+                Series(
+                    variant,
+                    look.colour,
+                    [results.index(row.result) for row in finals if row.variant == variant],
+                    [in_percent(row.new[rate]) for row in finals if row.variant == variant],
+                    hollow=look.hollow,
+                )
+                for variant, look in looks(variants).items()
+            ],
+            names=results,
+            from_zero=not SHORT[rate].higher_is_better,
+        )
+        for rate in SHORT
+    ]
+
+
+def _intervals(name: str, colour: str, places: Sequence[int], found: Sequence[Interval]) -> Series:
+    return Series(
+        name,
+        colour,
+        [*places],
+        [in_percent(each.mean) for each in found],
+        [_end(each.low) for each in found],
+        [_end(each.high) for each in found],
+    )
+
+
+def _end(value: float | None) -> float:
+    return math.nan if value is None else 100 * value
+
+
+def _name(row: MaskComparison) -> str:
+    return row.result if row.result == row.variant else f"{row.result}: {row.variant}"
