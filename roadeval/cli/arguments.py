@@ -100,9 +100,11 @@ def configuration(given: Given) -> RunConfig:
     with usage():
         whole = config.override(_tables(given) | masks).with_variants(variants)
     whole = whole.with_drives(_drive(*each) for each in given.get("drives", ()))
-    if whole.training.model and {"training.frames", "training.gap"} & given.keys():
+    chosen = {"training.frames", "training.placement", "training.gap"}
+    if whole.training.model and chosen & given.keys():
         raise typer.BadParameter(
-            f"--train-frames and --train-gap do not go with a model ({whole.training.model})"
+            "--train-frames, --train-on and --train-gap do not go with a model "
+            f"({whole.training.model})"
         )
     return whole
 

@@ -161,10 +161,17 @@ OPTIONS: Final = (
         int,
     ),
     Option(
+        "training.placement",
+        ("--train-on",),
+        "WHERE",
+        "The 'first' labelled frames, or some 'spread' along the drive. Default: first.",
+    ),
+    Option(
         "training.gap",
         ("--train-gap",),
         "N",
-        "Frames to leave out after those trained on. Default: 0.",
+        "Frames to leave out after those trained on, or on both sides. Default: 0; spread: a "
+        "quarter of their distance.",
         int,
     ),
     Option(

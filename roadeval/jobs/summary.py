@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Final
 
+from roadeval.config import RunConfig
 from roadeval.data import BASELINE, Role
 from roadeval.jobs.run import Run
 from roadeval.results.verdict import verdict_of
@@ -187,7 +188,7 @@ def _accounting(run: Run) -> dict[str, Any]:
         "failed in a stage": len(run.failures),
         "trained on": roles[Role.TRAINING],
         "copies of training frames": roles[Role.COPY],
-        "gap after training": roles[Role.GAP],
+        _gap(run.config): roles[Role.GAP],
         "unlabelled": roles[Role.UNLABELLED],
     }
     return {
@@ -201,10 +202,15 @@ def _accounting(run: Run) -> dict[str, Any]:
     }
 
 
+def _gap(config: RunConfig) -> str:
+    return f"gap {'after' if config.training.placement == 'first' else 'beside'} training"
+
+
 def _training(run: Run) -> dict[str, Any]:
     return {
         "source": run.model.source,
         "frames": len(run.model.digests),
         "pixels": run.model.pixels,
         "model": run.config.training.model,
+        "placement": None if run.config.training.model else run.config.training.placement,
     }

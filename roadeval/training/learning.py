@@ -1,19 +1,24 @@
-"""Where a run's model comes from: a file, the log's own first frames, or frames of other drives."""
+"""Where a run's model comes from: a file, the log's own frames, or frames of other drives."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain, islice
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final
 
 from roadeval.data import Frame
-from roadeval.errors import RoadevalError
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.pipeline.chain import Pipeline
+from roadeval.training.choice import (
+    Readable,
+    candidates_of,
+    decoded,
+    evenly,
+    from_the_first,
+    spread_out,
+)
 from roadeval.training.fitting import TrainingError, fit
-from roadeval.training.held import HeldFrames
 from roadeval.training.likeness import Likeness
 from roadeval.training.model import Model, kept_model
 from roadeval.training.schedule import Schedule
@@ -22,21 +27,6 @@ from roadeval.training.settings import TrainingSettings
 BY_PATCH: Final = (
     "the model learnt from the reference patch in front of the vehicle, which is a guess"
 )
-
-
-class Readable(Protocol):
-    """A frame of a log that has not been decoded yet."""
-
-    @property
-    def number(self) -> int:
-        """Position in the image topic."""
-
-    @property
-    def labelled(self) -> bool:
-        """Whether it has a truth."""
-
-    def decode(self) -> Frame:
-        """Decode it; a `RoadevalError` if it cannot be."""
 
 
 def from_file(path: Path, pipelines: Mapping[str, Pipeline]) -> tuple[Model, Schedule]:
@@ -59,7 +49,7 @@ def from_log(
     *,
     labelled: bool,
 ) -> tuple[tuple[Model, ...], Schedule]:
-    """Train on the first frames of a log, with each seed of the settings.
+    """Train on some frames of a log, with each seed of the settings.
 
     Parameters
     ----------
@@ -86,13 +76,12 @@ def from_log(
     TrainingError
         If there is nothing to learn from, or nothing left to evaluate.
     """
-    candidates, by_truth = _candidates(frames, labelled=labelled)
+    candidates, by_truth = candidates_of(frames, labelled=labelled)
     if not by_truth and not any(pipeline.learning() for pipeline in pipelines.values()):
         return (untrained(pipelines),), Schedule(frozenset())
-    held, rest = _hold(candidates, settings.frames, on_frame)
-    following = [readable.number for readable in islice(rest, settings.gap + 1)]
-    if by_truth:
-        _require_one_left(len(held.frames), len(following), settings.gap)
+    choose = spread_out if settings.placement == "spread" else from_the_first
+    chosen = choose(candidates, settings, on_frame, by_truth=by_truth)
+    held = chosen.held
     warnings = []
     if held.is_full:
         warnings.append(f"trained on {len(held.frames)} of {settings.frames} frames: {held.full()}")
@@ -100,12 +89,8 @@ def from_log(
     if labelled and not by_truth:
         warnings.append(f"no frame of the range has road truth: {BY_PATCH}")
     models = _with_each_seed(held.frames, pipelines, settings, warnings)
-    return models, Schedule(
-        models[0].digests,
-        gap=frozenset(following[: settings.gap]),
-        first=following[settings.gap] if len(following) > settings.gap else None,
-        sizes=frozenset(len(frame.payload) for frame in held.frames),
-    )
+    sizes = frozenset(len(frame.payload) for frame in held.frames)
+    return models, Schedule(models[0].digests, gap=chosen.gap, first=chosen.first, sizes=sizes)
 
 
 def untrained(pipelines: Mapping[str, Pipeline]) -> Model:
@@ -128,53 +113,6 @@ def _with_each_seed(
         for warning in model.warnings
     ]
     return replace(first, warnings=(*warnings, *first.warnings, *told)), *others
-
-
-def _candidates(
-    frames: Callable[[], Iterable[Readable]], *, labelled: bool
-) -> tuple[Iterator[Readable], bool]:
-    """Return the frames that may train, and whether by their truth: all, where none has one."""
-    if labelled:
-        with_truth = (frame for frame in frames() if frame.labelled)
-        for first in with_truth:
-            return chain([first], with_truth), True
-    return iter(frames()), False
-
-
-def _hold(
-    candidates: Iterator[Readable], count: int, on_frame: Callable[[int], None]
-) -> tuple[HeldFrames, Iterator[Readable]]:
-    """Decode the first ``count`` frames, or as many as can be held; return the others too."""
-    held = HeldFrames()
-    for readable, frame in _decoded(candidates):
-        if not held.add(frame):
-            if not held.frames:
-                raise TrainingError(f"{held.full()}; reduce the frames with `frames.scale`")
-            return held, chain([readable], candidates)
-        on_frame(len(held.frames))
-        if len(held.frames) == count:
-            break
-    return held, candidates
-
-
-def _decoded(frames: Iterable[Readable]) -> Iterator[tuple[Readable, Frame]]:
-    """Decode what can be decoded; a frame that cannot is reported when it is replayed."""
-    for readable in frames:
-        try:
-            frame = readable.decode()
-        except RoadevalError:
-            continue
-        yield readable, frame
-
-
-def _require_one_left(trained: int, following: int, gap: int) -> None:
-    """Raise a `TrainingError` if training and the gap after it leave no frame to evaluate."""
-    if trained and following <= gap:
-        raise TrainingError(
-            f"the range has {trained + following} labelled frames, and training would take "
-            f"{trained} of them and {gap} more as a gap: none is left to evaluate; "
-            "lower `training.frames` or `training.gap`, or give `training.model`"
-        )
 
 
 def from_drives(
@@ -250,7 +188,6 @@ def spread(
     """
     seen = {frame.number: frame.labelled for frame in frames()}
     numbers = [number for number, has_truth in seen.items() if has_truth and labelled] or [*seen]
-    taken = min(count, len(numbers))
-    chosen = frozenset(numbers[i * len(numbers) // taken] for i in range(taken))
-    for _, frame in _decoded(each for each in frames() if each.number in chosen):
+    chosen = frozenset(evenly(numbers, count))
+    for _, frame in decoded(each for each in frames() if each.number in chosen):
         yield frame

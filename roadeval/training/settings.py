@@ -27,11 +27,16 @@ class TrainingSettings:
         ``auto``: the log's truth where it has one, else the reference patch; ``truth`` or
         ``patch`` insists.
     frames
-        The first so many labelled frames of the range (all frames count for ``patch``). They are
-        held decoded, which bounds the number of large ones below the one allowed here.
+        So many labelled frames of the range (all frames count for ``patch``). They are held
+        decoded, which bounds the number of large ones below the one allowed here.
+    placement
+        ``first``: the first ones; ``spread``: at equal distances along the range, so that they
+        show all its light and places. The result then says how the method fares on a drive that
+        was labelled here and there, not on what comes after it.
     gap
-        Frames after them that are not evaluated either: the neighbours of a training frame
-        look like it, and flatter the result.
+        Frames beside them that are not evaluated either: the neighbours of a training frame look
+        like it, and flatter the result. After the ``first`` ones, none by default; on both sides
+        of each that is ``spread``, by default a quarter of the distance between them.
     pixels_per_class
         Road pixels, and non-road pixels, drawn from each training frame.
     max_pixels
@@ -57,7 +62,8 @@ class TrainingSettings:
     model: str | None = None
     source: Literal["auto", "truth", "patch"] = "auto"
     frames: Annotated[int, Field(ge=1, le=1000)] = 10
-    gap: Annotated[int, Field(ge=0, le=1_000_000_000)] = 0
+    placement: Literal["first", "spread"] = "first"
+    gap: Annotated[int, Field(ge=0, le=1_000_000_000)] | None = None
     pixels_per_class: Annotated[int, Field(ge=1, le=1_000_000_000)] = 200
     max_pixels: Annotated[int, Field(ge=2, le=100_000)] = 8000
     seed: Annotated[int, Field(ge=0, le=GREATEST_SEED)] = 0

@@ -116,7 +116,10 @@ def test_a_variant_without_a_file_is_the_preset_of_its_name(asked):
 
 def test_a_model_and_training_frames_do_not_go_together(capsys):
     assert main(["replay", "d.mcap", "--model", "m", "--train-gap", "3"]) == 2
-    assert "--train-frames and --train-gap do not go with a model (m)" in capsys.readouterr().err
+    assert (
+        "--train-frames, --train-on and --train-gap do not go with a model (m)"
+        in capsys.readouterr().err
+    )
 
 
 def test_nor_with_a_model_that_a_file_names(tmp_path, capsys):

@@ -25,6 +25,7 @@ OTHER = {
     ],
     "training.model": "city.model",
     "training.frames": 4,
+    "training.placement": "spread",
     "training.gap": 2,
     "training.seeds": 5,
     "topics.image": "/left/image",

@@ -61,6 +61,37 @@ def test_the_first_labelled_frames_train_and_the_rest_is_evaluated():
     assert roles(frames, schedule) == "ututeeee"
 
 
+def test_frames_spread_along_the_drive_train_and_none_beside_them_is_evaluated():
+    frames = log(18, unlabelled=(1, 9))
+    _, schedule = learn(frames, frames=2, placement="spread", gap=1)
+    assert roles(frames, schedule) == "tugeeeeegutgeeeeee"
+    assert schedule.first == 3
+
+
+@pytest.mark.parametrize(("count", "expected"), [(4, "tgeegtgeegtgeegtgeee"), (1, "tggggg")])
+def test_the_gap_beside_spread_frames_is_a_quarter_of_their_distance(count, expected):
+    frames = log(20)
+    _, schedule = learn(frames, frames=count, placement="spread")
+    assert roles(frames, schedule) == expected.ljust(20, "e")
+
+
+def test_a_spread_frame_that_cannot_be_decoded_leaves_its_neighbours_to_evaluate():
+    frames = log(12, broken=(4,))
+    _, schedule = learn(frames, frames=3, placement="spread", gap=1)
+    assert roles([f for f in frames if not f.broken], schedule) == "tgeeeegtgee"
+
+
+def test_spread_frames_that_leave_nothing_to_evaluate_are_an_error():
+    with pytest.raises(TrainingError, match=r"6 labelled frames, .* take 3 of them and 3 more"):
+        learn(log(6), frames=3, placement="spread", gap=1)
+
+
+def test_without_truth_spread_frames_train_by_the_patch():
+    frames = log(12, unlabelled=tuple(range(12)))
+    model, schedule = learn(frames, frames=3, placement="spread")
+    assert (model.source, roles(frames, schedule)) == ("patch", "tgugtgugtguu")
+
+
 def test_every_further_seed_trains_as_it_would_by_itself():
     frames = log(8)
     models, schedule = with_seeds(frames, frames=3, pixels_per_class=20, seed=5, seeds=3)

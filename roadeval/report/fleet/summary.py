@@ -158,7 +158,7 @@ def _warnings(findings: FleetFindings) -> Iterator[str]:
     scored = [row for row in findings.drives.values() if row["evaluated"]]
     if own := sum(1 for row in scored if row["trained_on"] and not row["model"]):
         yield (
-            f"{_drives(own)} scored by a model trained on the drive's own first frames (none of "
+            f"{_drives(own)} scored by a model trained on the drive's own frames (none of "
             "these is evaluated): the rates say how well it does on a road that it has seen."
         )
     yield from _worse_than_baseline(told)

@@ -119,15 +119,24 @@ def _boundary_width(findings: Findings) -> str:
     return f" Boundary F: the road's edge within {widths.pop()} pixels." if widths else ""
 
 
+def _trained_here(placement: str) -> str:
+    if placement == "spread":
+        return (
+            "Trained on frames spread along this drive (neither they nor those beside them are "
+            "evaluated): the rates say how well it does between frames that were labelled."
+        )
+    return (
+        "Trained on this drive's own first frames (none of them is evaluated): the rates say "
+        "how well it does on a road that it has seen."
+    )
+
+
 def warnings(findings: Findings) -> Iterator[str]:
     """Yield what a reader must know before believing the numbers."""
     yield from map(str, findings.summary.get("warnings", ()))
     training = findings.summary.get("training", {})
     if training.get("source") == "truth" and training.get("model") is None and findings.totals:
-        yield (
-            "Trained on this drive's own first frames (none of them is evaluated): the rates say "
-            "how well it does on a road that it has seen."
-        )
+        yield _trained_here(training.get("placement", "first"))
     yield from _worse_than_baseline(findings)
     yield from _undefined(findings)
     losses = list(findings.summary.get("losses", ()))
