@@ -19,6 +19,8 @@ Truth = npt.NDArray[np.uint8]
 """``(H, W)`` uint8: 0 non-road, 1 road, 255 ignore."""
 Probability = npt.NDArray[np.uint16]
 """``(H, W)`` uint16: codes 0..65535 that span 0..1."""
+Histogram = npt.NDArray[np.uint32]
+"""``(2, 65536)`` uint32: non-road and road pixels by the code of their probability."""
 
 NON_ROAD: Final = 0
 ROAD: Final = 1

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from roadeval.data.counts import Change, Tally, Transition
-from roadeval.data.frame import Frame, Mask, Probability, Rgb, Role
+from roadeval.data.frame import Frame, Histogram, Mask, Probability, Rgb, Role
 from roadeval.data.layer import Layer, LayerSpec
 from roadeval.data.packed import Packed, TruthBits
 
@@ -110,7 +110,8 @@ class FrameResult:
 
     ``tallies`` is empty unless the frame is evaluated. ``truth_bits`` is what the masks were held
     against. ``changes`` are from stage to stage and from final mask to final mask, ``contours``
-    the boundary F of each final mask by variant, and ``oracles`` the counts of what the stages
+    the boundary F of each final mask by variant, ``histograms`` the labelled pixels by how probable
+    road is, for each variant and stage that says so, and ``oracles`` the counts of what the stages
     made once one was replaced by the truth, by that one; ``repeats`` those of other trainings, by
     their seed. ``notes`` are sentences for a person.
     """
@@ -125,6 +126,7 @@ class FrameResult:
     truth_bits: TruthBits | None = None
     changes: Mapping[Transition, Change] = field(default_factory=dict)
     contours: Mapping[str, float] = field(default_factory=dict)
+    histograms: Mapping[tuple[str, str], Histogram] = field(default_factory=dict)
     oracles: Mapping[str, tuple[Tally, ...]] = field(default_factory=dict)
     repeats: Mapping[int, tuple[Tally, ...]] = field(default_factory=dict)
 

@@ -25,6 +25,7 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.maps import Name
 from roadeval.evaluation.region import LabelledFrame
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.thresholds import histogram
 
 K = TypeVar("K", str, int)
 """What further masks are of: the stage that was replaced by the truth, or a training's seed."""
@@ -78,6 +79,12 @@ def score_frame(
         truth_bits=truth,
         changes=maps.changes(list(masks), bits, truth),
         contours=contours.boundary_f(final_bits, truth, settings.boundary_width),
+        histograms={
+            (variant.variant, each.stage): histogram(each.output.probability, frame.truth)
+            for variant in variants
+            for each in variant.stages
+            if each.output.probability is not None
+        },
         oracles=_tallies({v.variant: v.oracles for v in variants}, truth),
         repeats=_tallies({v.variant: v.repeats for v in variants}, truth),
     )

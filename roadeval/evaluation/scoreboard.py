@@ -21,6 +21,7 @@ from roadeval.data import (
 from roadeval.evaluation import windows
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.claims import evidence
+from roadeval.evaluation.curves import Curves
 from roadeval.evaluation.differences import DriveDifferences, drive_differences
 from roadeval.evaluation.edges_and_flicker import EdgesAndFlicker
 from roadeval.evaluation.frame_counts import FrameCounts, GrowingCounts, sum_up
@@ -28,15 +29,20 @@ from roadeval.evaluation.maps import HeatMap, Maps, Name
 from roadeval.evaluation.repeats import Repeats
 from roadeval.evaluation.score import score_frame
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.thresholds import Sums
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DriveSums:
-    """The content of the drive's tables of sums: windows, changes of masks, and heat maps."""
+    """The content of the drive's tables of sums.
+
+    Windows, changes of masks, heat maps, and pixels by how probable road is.
+    """
 
     windows: Sequence[windows.Window]
     changes: Mapping[Transition, Change]
     heat: Mapping[str, HeatMap]
+    probabilities: Mapping[Name, Sums]
 
 
 class Scoreboard:
@@ -69,6 +75,7 @@ class Scoreboard:
         )
         self._repeats: Final = Repeats()
         self._maps: Final = Maps()
+        self._curves: Final = Curves()
         self._beyond: Final = EdgesAndFlicker(settings.boundary_width)
         self._seconds: Final[defaultdict[Name, float]] = defaultdict(float)
         self._runs: Final[Counter[Name]] = Counter()
@@ -97,6 +104,7 @@ class Scoreboard:
                 self._oracles[tally.variant, oracle, tally.stage].append(position, tally.counts)
         self._repeats.add(position, result)
         self._maps.add(result.errors, result.changes)
+        self._curves.add(result.histograms)
         self._frames.append(result.frame.number)
 
     def lose(self) -> None:
@@ -105,7 +113,8 @@ class Scoreboard:
 
     def sums(self) -> DriveSums:
         """Sum up the drive for its tables; nothing without a score."""
-        return DriveSums(tuple(self.windows()), self._maps.changes, self._maps.heat)
+        maps, curves = self._maps, self._curves
+        return DriveSums(tuple(self.windows()), maps.changes, maps.heat, curves.counts)
 
     def roles(self) -> dict[str, int]:
         """Count the frames added so far by role."""
@@ -144,12 +153,18 @@ class Scoreboard:
         return {
             "totals": self.totals(),
             "beyond": self._beyond.totals(),
+            **self._over_thresholds(),
             "oracles": self.oracles(),
             "windows": -(-len(self._frames) // self._settings.window),
             "claims": self._claims(),
             "health": {name: dict(counted) for name, counted in self._health.items()},
             "seconds": self._mean_seconds(),
         }
+
+    def _over_thresholds(self) -> dict[str, Any]:
+        """Return the part ``curves``, where a stage says how probable road is."""
+        found = self._curves.totals()
+        return {"curves": found} if found else {}
 
     def _claims(self) -> dict[str, dict[str, int]]:
         found = evidence(self.windows(), self._settings.window)

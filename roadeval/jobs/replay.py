@@ -20,7 +20,7 @@ from roadeval.jobs.processing import process
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import Run, prepare
 from roadeval.recording import NullRecorder, RecordRule, SelectiveRecorder, recorder_for
-from roadeval.report.figures.figure import ExampleFrame, FigureData
+from roadeval.report.figures.figure import ExampleFrame, FigureData, ThresholdData
 from roadeval.report.figures.files import write_figures
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.lines import sum_lines
@@ -121,7 +121,10 @@ def _written(
         trim()
         if config.output.figures:
             with results.explained():
-                data = FigureData(log.name, results.table("windows"), examples)
+                curves = ThresholdData(
+                    results.table("probabilities"), facts.get("curves", {}), facts["totals"]
+                )
+                data = FigureData(log.name, results.table("windows"), examples, curves)
                 write_figures(results.folder, data)
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
     files = [to.reports / name for name in facts["files"]] + ([to.mcap] if to.mcap else [])

@@ -62,6 +62,7 @@ def collect(result: Result, commands: Commands | None = None) -> Findings:
         ],
         oracles=analysis.oracles(result.extra("oracles"), frames),
         beyond=summary.get("beyond", {}),
+        levels=result.extra("probabilities"),
         sampled=sampled,
         examples=picker.examples(evenly(pictured, EXAMPLES)),
         thumbnails=picker.thumbnails(evenly(pictured, THUMBNAILS)),

@@ -17,6 +17,7 @@ from roadeval.report.sections import (
     regions,
     stages,
     summary,
+    thresholds,
 )
 from roadeval.report.sections.browse import BrowsedFrames
 
@@ -47,7 +48,7 @@ def _document(findings: Findings, blocks: Sequence[Block]) -> Document:
 
 
 def _sections(findings: Findings) -> Iterator[Block]:
-    scored = (over_drive, filter_effect, regions, stages, frames)
+    scored = (over_drive, filter_effect, regions, stages, thresholds, frames)
     for part in (summary, *(scored if findings.totals else (masks,)), provenance):
         yield from part.section(findings)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.report.figures.figure import ExampleFrame, FigureData
+from roadeval.report.figures.figure import ExampleFrame, FigureData, ThresholdData
 from roadeval.report.images import LayerImage
 
 if TYPE_CHECKING:
@@ -139,6 +139,8 @@ class Findings:
         See `roadeval.evaluation.analysis.oracles`; empty if the run counted none.
     beyond
         Boundary F and flicker of each final mask, as in ``summary.json``.
+    levels
+        As ``probabilities.csv``; empty where no stage says how probable road is.
     sampled
         Frames that ``heatmaps`` and ``changes`` were counted on; 0 if there are none.
     examples
@@ -168,6 +170,7 @@ class Findings:
     heatmaps: Sequence[ErrorHeatmap]
     oracles: pd.DataFrame
     beyond: Mapping[str, Mapping[str, Any]]
+    levels: pd.DataFrame
     sampled: int
     examples: Sequence[ExampleFrame]
     thumbnails: Sequence[LayerImage]
@@ -184,7 +187,8 @@ class Findings:
     @property
     def figure_data(self) -> FigureData:
         """The data that the figures of the results folder are drawn from."""
-        return FigureData(self.drive, self.windows, self.examples)
+        curves = ThresholdData(self.levels, self.summary.get("curves", {}), self.totals)
+        return FigureData(self.drive, self.windows, self.examples, curves)
 
     @property
     def totals(self) -> Totals:

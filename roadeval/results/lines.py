@@ -11,8 +11,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
 from roadeval.data import Change, Counts, FrameResult, Tally, Transition
-from roadeval.evaluation.maps import HeatMap
+from roadeval.evaluation.maps import HeatMap, Name
 from roadeval.evaluation.scoreboard import DriveSums
+from roadeval.evaluation.thresholds import Sums, at_levels
 from roadeval.evaluation.windows import Window
 
 Row = tuple[str | int | float, ...]
@@ -55,6 +56,7 @@ def sum_lines(sums: DriveSums) -> dict[str, str]:
         "changes": "".join(map(_line, change_rows(sums.changes))),
         # There are tens of thousands of rows, without a rate that may be undefined.
         "heat": "".join(_HEAT % row for row in heat_rows(sums.heat)),
+        "probabilities": "".join(map(_line, probability_rows(sums.probabilities))),
     }
     return {name: text for name, text in texts.items() if text}
 
@@ -84,6 +86,14 @@ def heat_rows(heat: Mapping[str, HeatMap]) -> Iterator[Row]:
         counted = sums[:, rows, columns].T.tolist()
         for place, counts in zip(places, counted, strict=True):
             yield (variant, *place, side, *counts)
+
+
+def probability_rows(found: Mapping[Name, Sums]) -> Iterator[Row]:
+    """Yield the rows of ``probabilities.csv``, without levels that do not occur."""
+    for name, counts in found.items():
+        other, road = at_levels(counts)
+        for level in (other + road).nonzero()[0].tolist():
+            yield (*name, level, int(road[level]), int(other[level]))
 
 
 def _counts(counts: Counts) -> str:

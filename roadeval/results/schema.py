@@ -165,6 +165,17 @@ TABLES: Final[Mapping[str, TableSchema]] = {
                 Column("FN", Kind.COUNT, "how often one was a false negative"),
             ),
         ),
+        TableSchema(
+            "probabilities",
+            "A row per variant, stage and level of a probability that occurs, for curves over "
+            "thresholds.",
+            (
+                *(VARIANT, STAGE),
+                Column("level", Kind.COUNT, "0 to 255, equally wide, from improbable to certain"),
+                Column("road", Kind.COUNT, "labelled road pixels of the drive at this level"),
+                Column("other", Kind.COUNT, "labelled non-road pixels"),
+            ),
+        ),
     )
 }
 """The tables by name, in the order in which they are written."""

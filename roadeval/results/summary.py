@@ -15,12 +15,13 @@ from roadeval.runtime.text import visible_lines
 FORMAT: Final = {"name": "roadeval-summary", "version": 3}
 SUMMARY: Final = "summary.json"
 PARTS: Final = (
-    *("format", "verdict", "drive", "frames", "totals", "beyond", "difference", "against_blind"),
-    *("seeds", "oracles", "windows", "claims", "health", "training", "seconds", "warnings"),
-    *("losses", "run", "settings", "methods", "versions", "log", "masks", "tables", "files"),
+    *("format", "verdict", "drive", "frames", "totals", "beyond", "curves", "difference"),
+    *("against_blind", "seeds", "oracles", "windows", "claims", "health", "training", "seconds"),
+    *("warnings", "losses", "run", "settings", "methods", "versions", "log", "masks", "tables"),
+    "files",
 )
 """The parts of the summary, in the file's order."""
-LATER: Final = frozenset({"seeds", "claims", "methods", "masks", "tables", "files"})
+LATER: Final = frozenset({"curves", "seeds", "claims", "methods", "masks", "tables", "files"})
 """Parts that not every summary has, so that readers must do without them: earlier versions did not
 write them, a recording has no files, and most runs train with one seed, have no network, and all
 masks in the log."""

@@ -5,6 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from sklearn.metrics import average_precision_score, roc_auc_score
 
 import roadeval
 from roadeval import RoadevalError
@@ -130,6 +131,53 @@ def test_the_summary_says_where_masks_lie_and_how_they_are_read(outcome, places)
     assert stated["other"]["pairing"] == "26 messages, paired by header stamps"
     assert stated["named"]["pairing"] == "26 files, paired by name"
     assert stated["number"]["path"] == str(places / "number")
+
+
+def test_curves_are_counted_on_the_evaluated_frames(outcome, places):
+    recording = roadeval.Recording(outcome.recording)
+    truths, levels = [], []
+    for number in sorted(set(recording.frames["frame"])):
+        truth = recording.truth(number)
+        level = cv2.imread(str(places / "confidence" / f"{number}.png"), 0)
+        truths.append(truth[truth != 255])
+        levels.append(level[truth != 255] / 255)
+    (own,) = outcome.summary["curves"].values()
+    y, p = np.concatenate(truths), np.concatenate(levels)
+    assert own["post"]["AP"] == pytest.approx(average_precision_score(y, p), abs=1e-12)
+    assert own["post"]["AUC"] == pytest.approx(roc_auc_score(y, p), abs=1e-12)
+    assert own["post"]["frames"] == 15
+    assert own["post"]["threshold"] == pytest.approx(155 / 255)
+
+
+def test_curves_are_in_the_tables_the_recording_and_the_figures(outcome):
+    table = roadeval.Recording(outcome.recording).table("probabilities")
+    assert set(table["variant"]) == {"confidence"}
+    assert table["level"].tolist() == [100, 155]
+    recorded = roadeval.Recording(outcome.recording)
+    assert recorded.summary["curves"] == outcome.summary["curves"]
+    assert "## Over thresholds" in recorded.result("overview")
+    assert (outcome.reports / "thresholds.png").exists()
+
+
+def test_workers_make_no_difference_to_curves(places, tmp_path):
+    table = masks(places, net={"path": "confidence", "threshold": 0.5})
+    found = [
+        roadeval.replay(
+            places / "drive.mcap",
+            settings(record="none", jobs=jobs).override({"masks": table}),
+            reports=tmp_path / str(jobs),
+        ).summary["curves"]
+        for jobs in (1, 3)
+    ]
+    assert found[0] == found[1]
+
+
+def test_without_a_probability_there_are_no_curves(places, tmp_path):
+    config = settings(record="none").override({"masks": masks(places, net={"path": "number"})})
+    done = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "reports")
+    assert "curves" not in done.summary
+    assert not (tmp_path / "reports" / "probabilities.csv").exists()
+    assert not (tmp_path / "reports" / "thresholds.png").exists()
 
 
 def refused(places, **table) -> str:

@@ -90,6 +90,7 @@ def some_findings(**changes):
         "heatmaps": [],
         "oracles": pd.DataFrame(),
         "beyond": {},
+        "levels": pd.DataFrame(),
         "sampled": 1200,
         "examples": [],
         "thumbnails": [],

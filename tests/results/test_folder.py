@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from roadeval.data import FrameResult, Role
@@ -36,6 +37,9 @@ def a_board() -> Scoreboard:
 def scored(board: Scoreboard, role: Role = Role.EVALUATED) -> Iterator[FrameResult]:
     variant = a_variant("filtered", {"post": MASK}, {"shadow": MASK})
     variant = replace(variant, oracles={"svm": {"post": Packed.of(MASK)}})
+    (stage,) = variant.stages
+    graded = replace(stage.output, probability=MASK.astype(np.uint16) * 40_000)
+    variant = replace(variant, stages=(replace(stage, output=graded),))
     for number, truth in enumerate(TRUTHS):
         result = board.score(a_frame(truth, number + 5), role, (variant,))
         board.add(result)
@@ -74,6 +78,7 @@ def test_the_columns_are_those_of_the_design(tmp_path: Path) -> None:
         "oracles": "frame,variant,oracle,stage,TP,TN,FP,FN,N,ACC,ERR,TPR,FNR,TNR,FPR",
         "changes": "from_variant,from_stage,to_variant,to_stage,repaired,spoiled,N",
         "heat": "variant,top,left,side,labelled,FP,FN",
+        "probabilities": "variant,stage,level,road,other",
     }
 
 
@@ -86,6 +91,8 @@ def test_lines_by_hand(tmp_path: Path) -> None:
     assert line == f"5,filtered,svm,post,3,2,1,1,7,{rates}"
     line = (tmp_path / "regions.csv").read_text().splitlines()[1]
     assert line == "5,filtered,post,shadow,3,0,1,0,4"
+    lines = (tmp_path / "probabilities.csv").read_text().splitlines()[1:]
+    assert lines == ["filtered,post,0,2,9", "filtered,post,156,5,7"]
 
 
 def test_an_undefined_rate_is_an_empty_cell_and_reads_back_as_undefined(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.cli import console
-from roadeval.cli.screens import seeds, tables
+from roadeval.cli.screens import seeds, tables, thresholds
 from roadeval.cli.screens.tables import Row, marked, percent, points
 from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.data.words import defined
@@ -74,6 +74,9 @@ def _show_scores(summary: Mapping[str, Any], out: Console) -> None:
     if repeats:
         out.print()
         seeds.show(repeats, RATES, out)
+    if curves := summary.get("curves"):
+        out.print()
+        thresholds.show(curves, out)
 
 
 def _why_nothing(frames: Mapping[str, Any]) -> str:

@@ -26,6 +26,7 @@ _NO_TRUTH: Final = """\
 The log has no truth for the road: there is nothing to score, only what was computed.
 """
 _RATES: Final = "In percent: means of the frames' rates; *pooled*: of all pixels."
+_QUOTED: Final = "In percent, of all pixels; the threshold is the one of MaxF."
 _HANDLING: Final = """\
 **Space** plays. The tabs above hold every layer, every number and the results.
 """
@@ -53,6 +54,7 @@ def overview(layout: Layout, summary: Mapping[str, Any]) -> str:
             *_list("Warnings", summary.get("warnings", ())),
             *_list("Lost", summary.get("losses", ())),
             *_table(summary.get("totals", {})),
+            *_curves(summary.get("curves", {})),
             *_list("Frames", _accounts(summary.get("frames", {}))),
             *_list("Provenance", (f"{k}: {v}" for k, v in layout.properties.items())),
             "",
@@ -73,6 +75,21 @@ def _table(totals: Mapping[str, Any]) -> Iterator[str]:
         yield f"|---|---|{'---|' * len(titles)}"
     for variant, stage, total in rows:
         cells = (percent(total.get(name)) for name in titles)
+        yield f"| {' | '.join([as_markdown(variant), stage, *cells])} |"
+
+
+def _curves(curves: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what is quoted of curves over thresholds; the curves' counts are a table beside."""
+    rows = [
+        (variant, stage, own) for variant, stages in curves.items() for stage, own in stages.items()
+    ]
+    names = ("AP", "AUC", "MaxF", "threshold", "ECE")
+    if rows:
+        yield from ("", "## Over thresholds", "", _QUOTED, "")
+        yield f"| {' | '.join(['variant', 'stage', *names])} |"
+        yield f"|---|---|{'---|' * len(names)}"
+    for variant, stage, own in rows:
+        cells = (percent(own.get(name)) for name in names)
         yield f"| {' | '.join([as_markdown(variant), stage, *cells])} |"
 
 

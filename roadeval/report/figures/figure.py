@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data import Mask, Rgb, Truth
 from roadeval.report.chart import Chart
@@ -49,6 +49,25 @@ def variants_of(examples: Sequence[ExampleFrame]) -> list[str]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class ThresholdData:
+    """What is known of probabilities of road.
+
+    Parameters
+    ----------
+    levels
+        As ``probabilities.csv``.
+    quoted
+        As ``curves`` in ``summary.json``.
+    totals
+        As ``totals`` there: every variant.
+    """
+
+    levels: pd.DataFrame
+    quoted: Mapping[str, Mapping[str, Mapping[str, Any]]]
+    totals: Mapping[str, Mapping[str, Mapping[str, Any]]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class FigureData:
     """The results that figures are drawn from.
 
@@ -60,11 +79,14 @@ class FigureData:
         As ``windows.csv``, any number of variants; no row without truth.
     examples
         A few frames.
+    thresholds
+        Of variants that say how probable road is; None where nobody asks for it.
     """
 
     drive: str
     windows: pd.DataFrame
     examples: Sequence[ExampleFrame] = field(default=())
+    thresholds: ThresholdData | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,190 @@
+"""What every threshold on a probability of road would give, from counts of pixels by its code.
+
+A stage that says how probable road is (`roadeval.data.Output.probability`) is one method for each
+threshold: road is what has at least that. All labelled pixels of a drive count alike, as in
+KITTI's road benchmark [1]_. Two integers a code are kept, so nothing here grows with the drive,
+and the order of the frames makes no difference.
+
+References
+----------
+.. [1] J. Fritsch, T. Kuehnl, A. Geiger, A New Performance Measure and Evaluation Benchmark for
+   Road Detection Algorithms, ITSC 2013.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import NON_ROAD, ROAD, Histogram, Probability, Truth
+
+CODES: Final = 1 << 16
+"""Codes of a probability: ``code / 65535`` is from 0 to 1."""
+BINS: Final = 15
+"""Bins of the calibration, equally wide, as many as in [1]_ of `calibration`."""
+LEVELS: Final = 256
+"""Levels of the table: each holds as many codes as it."""
+
+Sums = npt.NDArray[np.int64]
+
+
+def histogram(probability: Probability, truth: Truth) -> Histogram:
+    """Count the labelled pixels by code: ``(2, 65536)`` uint32, non-road and road.
+
+    Parameters
+    ----------
+    probability
+        ``(H, W)`` uint16 codes.
+    truth
+        ``(H, W)`` uint8: 0 non-road, 1 road, 255 ignored.
+    """
+    counts = [np.bincount(probability[truth == each], minlength=CODES) for each in (NON_ROAD, ROAD)]
+    return np.array(counts, np.uint32)
+
+
+def at_levels(counts: Sums) -> Sums:
+    """Return ``(2, 65536)`` counts summed up in levels of 256 codes, ``(2, 256)``."""
+    levels: Sums = counts.reshape(2, LEVELS, -1).sum(axis=2)
+    return levels
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Thresholds:
+    """What each threshold gives, from the highest to the lowest that occurs.
+
+    Parameters
+    ----------
+    codes
+        ``(n,)`` int64: road is what has at least this code, or is at least of this level.
+    tp, fp
+        ``(n,)`` int64: road and non-road pixels that are called road.
+    road, other
+        All road and non-road pixels.
+    """
+
+    codes: Sums
+    tp: Sums
+    fp: Sums
+    road: int
+    other: int
+
+    @classmethod
+    def of(cls, counts: npt.NDArray[Any]) -> Thresholds:
+        """Return the thresholds of ``(2, n)`` counts of non-road and road by code or level."""
+        found = np.flatnonzero(counts.any(axis=0))[::-1]
+        fp, tp = counts[:, found].astype(np.int64).cumsum(axis=1)
+        other, road = counts.sum(axis=1, dtype=np.int64).tolist()
+        return cls(found, tp, fp, road, other)
+
+    @property
+    def precision(self) -> npt.NDArray[np.float64]:
+        """``TP / (TP + FP)``."""
+        return self.tp / (self.tp + self.fp)
+
+    @property
+    def recall(self) -> npt.NDArray[np.float64]:
+        """``TP / (TP + FN)``, the TPR; NaN without road."""
+        return self.tp / (self.road or math.nan)
+
+    @property
+    def fpr(self) -> npt.NDArray[np.float64]:
+        """``FP / (FP + TN)``; NaN without non-road."""
+        return self.fp / (self.other or math.nan)
+
+
+def average_precision(found: Thresholds) -> float:
+    """Compute AP: ``sum (R_k - R_(k-1)) P_k`` over falling thresholds; NaN without road.
+
+    Without interpolation, as scikit-learn's ``average_precision_score``; KITTI's and Pascal VOC's
+    interpolate precision and come out a little higher.
+    """
+    if not found.road:
+        return math.nan
+    steps = np.diff(found.recall, prepend=0.0)
+    return float((steps * found.precision).sum())
+
+
+def roc_auc(found: Thresholds) -> float:
+    """Compute the area under the ROC by the trapezoid rule; NaN without road or non-road.
+
+    It is the chance that of a road and a non-road pixel the road has the higher probability, where
+    equal ones count half.
+    """
+    if not (found.road and found.other):
+        return math.nan
+    x, y = (np.concatenate([[0.0], each]) for each in (found.fpr, found.recall))
+    return float(np.trapezoid(y, x))
+
+
+@dataclass(frozen=True, slots=True)
+class BestF:
+    """The threshold of the greatest F, as a fraction; that F, its precision and its recall."""
+
+    f: float
+    threshold: float
+    precision: float
+    recall: float
+
+
+def max_f(found: Thresholds) -> BestF | None:
+    """Find MaxF: the greatest ``F = 2 TP / (2 TP + FP + FN)`` over thresholds, F1 in [1]_ above.
+
+    Of equal ones the highest threshold; None without road.
+    """
+    if not found.road:
+        return None
+    f = 2 * found.tp / (found.tp + found.fp + found.road)
+    best = int(f.argmax())
+    at = (f[best], found.codes[best] / (CODES - 1), found.precision[best], found.recall[best])
+    return BestF(*map(float, at))
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationBin:
+    """The pixels of a bin: how many, their mean probability, and which share of them is road."""
+
+    pixels: int
+    probability: float
+    road: float
+
+
+def calibration(counts: Sums, bins: int = BINS) -> tuple[CalibrationBin, ...]:
+    """Return the bins of the reliability diagram that hold any pixel, from low to high.
+
+    Bin ``b`` of ``B`` holds probabilities in ``(b / B, (b + 1) / B]``, and the first one 0, too.
+    In [1]_ bins are of the confidence in whichever class is called; here, with two classes, of the
+    probability of road, as in scikit-learn's ``calibration_curve``.
+
+    Parameters
+    ----------
+    counts
+        ``(2, 65536)``: non-road and road.
+    bins
+        How many there are.
+
+    References
+    ----------
+    .. [1] C. Guo, G. Pleiss, Y. Sun, K. Weinberger, On Calibration of Modern Neural Networks,
+       ICML 2017.
+    """
+    codes = np.arange(CODES)
+    places = np.maximum(codes * bins - 1, 0) // (CODES - 1)
+    pixels, road = (np.bincount(places, each, bins) for each in (counts.sum(axis=0), counts[1]))
+    sums = np.bincount(places, counts.sum(axis=0) * codes, bins)
+    return tuple(
+        CalibrationBin(int(n), total / n / (CODES - 1), own / n)
+        for n, total, own in zip(pixels.tolist(), sums.tolist(), road.tolist(), strict=True)
+        if n
+    )
+
+
+def expected_calibration_error(bins: Sequence[CalibrationBin]) -> float:
+    """Compute ECE: ``sum n_b / N |road_b - probability_b|`` over bins; NaN without a pixel."""
+    total = sum(each.pixels for each in bins)
+    gaps = sum(each.pixels * abs(each.road - each.probability) for each in bins)
+    return gaps / total if total else math.nan

@@ -1,0 +1,148 @@
+"""Curves over thresholds, held against scikit-learn's on the same pixels."""
+
+import math
+
+import numpy as np
+import pytest
+from sklearn.calibration import calibration_curve
+from sklearn.metrics import (
+    average_precision_score,
+    f1_score,
+    precision_recall_curve,
+    roc_auc_score,
+    roc_curve,
+)
+
+from roadeval.evaluation.curves import Curves
+from roadeval.evaluation.thresholds import (
+    CODES,
+    Thresholds,
+    at_levels,
+    average_precision,
+    calibration,
+    expected_calibration_error,
+    histogram,
+    max_f,
+    roc_auc,
+)
+
+TOP = CODES - 1
+
+
+def drawn(seed, levels=CODES, share=0.3, size=(40, 50)):
+    """Codes of so many levels that tell something of the truth; some pixels are ignored."""
+    rng = np.random.default_rng(seed)
+    truth = (rng.random(size) < share).astype(np.uint8)
+    told = 1 / (1 + np.exp(-(2 * truth - 1 + rng.normal(size=size))))
+    codes = (np.rint(told * (levels - 1)) * (TOP // (levels - 1))).astype(np.uint16)
+    truth[:3] = 255
+    return codes, truth
+
+
+def flat(codes, truth):
+    known = truth != 255
+    return truth[known], codes[known] / TOP
+
+
+CASES = [(0, CODES), (1, CODES), (2, 256), (3, 4), (4, 2)]
+
+
+@pytest.mark.parametrize(("seed", "levels"), CASES)
+def test_areas_and_f_are_scikit_learns(seed, levels):
+    codes, truth = drawn(seed, levels)
+    found, (y, p) = Thresholds.of(histogram(codes, truth)), flat(codes, truth)
+    assert average_precision(found) == pytest.approx(average_precision_score(y, p), abs=1e-12)
+    assert roc_auc(found) == pytest.approx(roc_auc_score(y, p), abs=1e-12)
+    best = max_f(found)
+    assert best.f == pytest.approx(f1_score(y, p >= best.threshold), abs=1e-12)
+    assert 2 / (1 / best.precision + 1 / best.recall) == pytest.approx(best.f)
+
+
+@pytest.mark.parametrize(("seed", "levels"), CASES)
+def test_curves_are_scikit_learns(seed, levels):
+    codes, truth = drawn(seed, levels)
+    found, (y, p) = Thresholds.of(histogram(codes, truth)), flat(codes, truth)
+    precision, recall, thresholds = precision_recall_curve(y, p)
+    np.testing.assert_allclose(found.precision[::-1], precision[:-1])
+    np.testing.assert_allclose(found.recall[::-1], recall[:-1])
+    np.testing.assert_allclose(found.codes[::-1] / TOP, thresholds)
+    fpr, tpr, _ = roc_curve(y, p, drop_intermediate=False)
+    np.testing.assert_allclose(found.fpr, fpr[1:])
+    np.testing.assert_allclose(found.recall, tpr[1:])
+
+
+def test_maxf_is_the_greatest_of_all_thresholds():
+    codes, truth = drawn(2, 256)
+    y, p = flat(codes, truth)
+    best = max_f(Thresholds.of(histogram(codes, truth)))
+    assert best.f == pytest.approx(max(f1_score(y, p >= t) for t in np.unique(p)), abs=1e-12)
+
+
+@pytest.mark.parametrize("bins", [10, 15])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_calibration_error_is_that_of_a_plain_loop(seed, bins):
+    codes, truth = drawn(seed)
+    y, p = flat(codes, truth)
+    expected = 0.0
+    for place in range(bins):
+        low, high = place / bins, (place + 1) / bins
+        inside = (p > low) & (p <= high) | ((p == 0) & (place == 0))
+        if inside.any():
+            expected += inside.sum() / len(p) * abs(y[inside].mean() - p[inside].mean())
+    found = calibration(histogram(codes, truth), bins)
+    assert expected_calibration_error(found) == pytest.approx(expected, abs=1e-12)
+    road, probability = calibration_curve(y, p, n_bins=bins)
+    np.testing.assert_allclose([each.road for each in found], road)
+    np.testing.assert_allclose([each.probability for each in found], probability)
+
+
+def test_the_edges_of_bins_belong_to_the_lower_one():
+    """Codes 0, 1/15 and 2/15 of the greatest one, and what comes right after them."""
+    counts = np.zeros((2, CODES), np.int64)
+    for code, pixels in ((0, 1), (TOP // 15, 2), (TOP // 15 + 1, 4), (2 * TOP // 15, 8), (TOP, 16)):
+        counts[0, code] = pixels
+    assert [each.pixels for each in calibration(counts)] == [3, 12, 16]
+
+
+def test_a_perfect_probability():
+    truth = np.array([[0, 0, 1, 1, 255]], np.uint8)
+    codes = np.array([[0, 0, TOP, TOP, TOP]], np.uint16)
+    found = Thresholds.of(histogram(codes, truth))
+    assert (average_precision(found), roc_auc(found), max_f(found).f) == (1, 1, 1)
+    assert expected_calibration_error(calibration(histogram(codes, truth))) == 0
+
+
+def test_one_probability_for_all_pixels_knows_nothing():
+    truth = np.array([[0, 0, 0, 1]], np.uint8)
+    counts = histogram(np.full((1, 4), 30_000, np.uint16), truth)
+    found = Thresholds.of(counts)
+    assert (average_precision(found), roc_auc(found)) == (0.25, 0.5)
+    assert max_f(found).recall == 1
+
+
+@pytest.mark.parametrize("value", [0, 1, 255])
+def test_what_has_no_road_or_nothing_else_is_undefined(value):
+    counts = histogram(np.full((2, 2), 30_000, np.uint16), np.full((2, 2), value, np.uint8))
+    found = Thresholds.of(counts)
+    assert math.isnan(roc_auc(found))
+    assert (max_f(found) is None) == (value != 1)
+    assert math.isnan(average_precision(found)) == (value != 1)
+
+
+def test_levels_hold_256_codes_each():
+    counts = np.zeros((2, CODES), np.int64)
+    counts[1, [0, 255, 256, TOP]] = 1, 2, 4, 8
+    levels = at_levels(counts)
+    assert levels.shape == (2, 256)
+    assert levels[1, [0, 1, 255]].tolist() == [3, 4, 8]
+
+
+def test_frames_add_up_in_any_order():
+    frames = [{("net", "post"): histogram(*drawn(seed))} for seed in range(3)]
+    one, other = Curves(), Curves()
+    for each in frames:
+        one.add(each)
+    for each in reversed(frames):
+        other.add(each)
+    assert one.totals() == other.totals()
+    assert one.totals()["net"]["post"]["frames"] == 3

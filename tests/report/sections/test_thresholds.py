@@ -1,0 +1,65 @@
+"""Over thresholds: curves, and what is quoted of them beside the mask as it is."""
+
+import pandas as pd
+
+from roadeval.data.words import DASH
+from roadeval.report.blocks import Figure, Table
+from roadeval.report.sections.thresholds import section
+from tests.report.making import plain_rows, some_findings
+
+BINS = [
+    {"pixels": 10, "probability": 0.1, "road": 0.2},
+    {"pixels": 5, "probability": 0.9, "road": 0.7},
+]
+QUOTED = {
+    "frames": 8,
+    "AP": 0.91,
+    "AUC": 0.92,
+    "MaxF": 0.93,
+    "threshold": 0.4,
+    "precision": 0.95,
+    "recall": 0.96,
+    "ECE": 0.07,
+    "bins": BINS,
+}
+LEVELS = [("filtered", "post", 20, 2, 8), ("filtered", "post", 230, 4, 1)]
+
+
+def findings(**quoted):
+    made = some_findings(
+        levels=pd.DataFrame(LEVELS, columns=["variant", "stage", "level", "road", "other"]),
+        overlap={"filtered": {"post": {"F1": 0.81, "precision": 0.82, "IoU": 0.7}}},
+    )
+    counts = {"TP": 6, "TN": 6, "FP": 2, "FN": 1, "pooled_TPR": 0.83, "pooled_FPR": 0.25}
+    for stages in made.summary["totals"].values():
+        for total in stages.values():
+            total.update(counts)
+    made.summary["curves"] = {"filtered": {"post": QUOTED | quoted}}
+    return made
+
+
+def test_what_is_quoted_stands_beside_the_mask_as_it_is():
+    (table,) = (block for block in section(findings()) if isinstance(block, Table))
+    assert plain_rows(table) == [
+        [
+            *("filtered", "post", "8", "91.00", "92.00", "7.00", "93.00", "40.00", "95.00"),
+            *("96.00", "81.00", "82.00", "83.00"),
+        ]
+    ]
+    assert sum(columns for _, columns in table.groups) == len(table.columns)
+
+
+def test_the_curves_are_drawn():
+    (figure,) = (block for block in section(findings()) if isinstance(block, Figure))
+    picture = figure.picture.content.decode()
+    assert all(word in picture for word in ("recall, %", "TPR, %", "probability, %", "filtered"))
+
+
+def test_what_is_undefined_is_a_dash():
+    undefined = dict.fromkeys(("AP", "AUC", "MaxF", "threshold", "precision", "recall"))
+    (table,) = (b for b in section(findings(**undefined)) if isinstance(b, Table))
+    assert plain_rows(table)[0].count(DASH) == 6
+
+
+def test_without_a_probability_there_is_no_section():
+    assert list(section(some_findings())) == []
