@@ -14,6 +14,7 @@ from roadeval.config import OutputSettings, RunConfig, load_config
 from roadeval.errors import RoadevalError
 from roadeval.fleet.remote import staged
 from roadeval.fleet.urls import is_url
+from roadeval.jobs.fleet_models import model_path
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.replay import Outcome, replay
 from roadeval.results.fleet.folder import Fleet
@@ -149,7 +150,7 @@ def recording_of(
             f"{source}: has gone, and no recording of it was kept; bring the log back, or see "
             f"{fleet.path / 'pictures' / drive}"
         )
-    config = _configuration(fleet, drive)
+    config = _configuration(fleet, drive, row["fold"])
     on_replay(f"{drive}: no recording was kept, so it is replayed from {source}")
     outcome = _replayed(source, config, recording, on_progress)
     changed = outcome.summary["log"]["sha256"] != row["sha256"]
@@ -159,7 +160,7 @@ def recording_of(
 
 def _row(fleet: Fleet, drive: str) -> dict[str, Any]:
     """Return a drive's row of ``drives``."""
-    columns = ["drive", "name", "source", "status", "reason", "sha256"]
+    columns = ["drive", "name", "source", "status", "reason", "sha256", "fold"]
     rows: list[dict[str, Any]] = fleet.table("drives", columns).to_pylist()
     for row in rows:
         if row["drive"] == drive:
@@ -169,12 +170,15 @@ def _row(fleet: Fleet, drive: str) -> dict[str, Any]:
     raise RoadevalError(f"{fleet.path}: no drive {drive}{hint}; `drives.parquet` names all")
 
 
-def _configuration(fleet: Fleet, drive: str) -> RunConfig:
-    """Return what a drive was replayed with."""
+def _configuration(fleet: Fleet, drive: str, fold: int | None) -> RunConfig:
+    """Return what a drive was replayed with; the model of its fold as it lies in the folder now."""
     path = fleet.path / RESULTS / drive / RUN
     if not path.exists():
         raise RoadevalError(f"{path}: is not there; run the fleet's command again")
-    return load_config(path)
+    config = load_config(path)
+    if fold is None:
+        return config
+    return config.override({"training": {"model": str(model_path(fleet.path, fold))}})
 
 
 def _replayed(source: str, config: RunConfig, recording: Path, on_progress: OnProgress) -> Outcome:

@@ -25,6 +25,11 @@ from roadeval.training.held import HeldFrames
 MODELS = "models"
 
 
+def model_path(folder: Path, fold: int) -> Path:
+    """Return the file of a fold's model in a fleet's folder."""
+    return folder / MODELS / f"fold_{fold}.model"
+
+
 @dataclass(frozen=True, slots=True)
 class FoldTask:
     """The task of a worker that trains the model of a fold.
@@ -49,7 +54,7 @@ class FoldTask:
     @property
     def path(self) -> Path:
         """The model file."""
-        return self.folder / MODELS / f"fold_{self.fold}.model"
+        return model_path(self.folder, self.fold)
 
     @property
     def about(self) -> Path:

@@ -13,6 +13,7 @@ import roadeval
 from roadeval import logs
 from roadeval.cli.app import main
 from roadeval.errors import RoadevalError
+from roadeval.jobs.fleet_inspect import recording_of, worst_frames
 from roadeval.logs import LogWriter
 from roadeval.results.fleet.record import record_path, recording_path
 from tests.e2e.commands import here
@@ -211,6 +212,18 @@ def test_no_drive_is_scored_by_a_model_that_saw_it(drives, tmp_path):
         assert not own & {*model["training_frames"]}
         others = [digests(Path(r["source"])) for r in rows if r is not row]
         assert {*model["training_frames"]} <= set.union(*others)
+
+
+def test_a_folder_with_folds_that_has_moved_is_looked_at_with_its_own_models(tmp_path):
+    for number, name in enumerate("xy"):
+        write(tmp_path / "logs" / f"{name}.mcap", 100 * number)
+    run(tmp_path / "logs", tmp_path / "before", executor=ThreadTasks(), folds=2)
+    (tmp_path / "before").rename(tmp_path / "after")
+    moved = roadeval.Fleet(tmp_path / "after")
+    recording, warnings = recording_of(moved, worst_frames(moved)[0].drive)
+    assert recording.is_relative_to(moved.path)
+    assert recording.exists()
+    assert not warnings
 
 
 class ThreadTasks(ThreadPoolExecutor):
