@@ -52,7 +52,7 @@ def test_what_failed_was_lost_and_trained_on_itself_is_warned_of(findings):
     said = " ".join(summary.warnings(findings))
     assert "1 of 12 drives failed" in said
     assert "1 drive was scored without what is lost" in said
-    assert "10 drives were scored by a model trained on the drive's own first frames" in said
+    assert "10 drives were scored by a model trained on the drive's own frames" in said
 
 
 def test_two_plots_and_the_worst_drives(findings):
