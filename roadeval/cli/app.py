@@ -20,7 +20,19 @@ from roadeval.runtime.discovery import found_in
 from roadeval.runtime.text import visible_lines
 
 FIRST = (
-    *("replay", "fleet", "report", "inspect", "compare", "info", "train", "config", "pack", "demo"),
+    *(
+        "replay",
+        "fleet",
+        "report",
+        "serve",
+        "inspect",
+        "compare",
+        "info",
+        "train",
+        "config",
+        "pack",
+        "demo",
+    ),
 )
 """The order of the commands in the help; others follow by their names."""
 LIGHT: Final = frozenset({"info", "config", "pack"})

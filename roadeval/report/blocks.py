@@ -83,11 +83,24 @@ class BulletList(Block):
 
 @dataclass(frozen=True, slots=True)
 class Cell(Block):
-    """A table's cell: its text, whether it is bold, and the colour of a dot before it."""
+    """A table's cell.
+
+    Parameters
+    ----------
+    text
+        What it says.
+    bold
+        Whether it is bold.
+    dot
+        Colour of a dot before it.
+    opens
+        Address below that of a served page at which its frame is opened in the viewer; or empty.
+    """
 
     text: str
     bold: bool = False
     dot: str | None = None
+    opens: str = ""
 
 
 @dataclass(frozen=True, slots=True)

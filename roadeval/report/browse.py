@@ -123,3 +123,10 @@ class LongTable(Block):
 
     table: Table
     label: str
+
+
+@dataclass(frozen=True, slots=True)
+class LinkList(Block):
+    """Titles with the addresses that they lead to, which a server made."""
+
+    links: Sequence[tuple[str, str]]

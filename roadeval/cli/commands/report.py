@@ -71,11 +71,11 @@ def report(
     page = PageSettings(pictures, assets)
     warnings: Sequence[str] = ()
     if is_fleet(result):
-        told = _commands_of_fleet(result)
+        told = commands_of(result)
         path = write_report(result, output, paper=size, commands=told, page=page)
     else:
         read = Result(result)
-        path = write_report(read, output, paper=size, commands=_commands(read), page=page)
+        path = write_report(read, output, paper=size, commands=commands_of(read), page=page)
         warnings = read.warnings
     if not quiet:
         console.emit(str(path))
@@ -84,7 +84,12 @@ def report(
     return ExitCode.DONE
 
 
-def _commands(result: Result) -> Commands:
+def commands_of(result: Result | Path) -> Commands:
+    """Return what to type for more about a drive's result, or about a fleet's folder."""
+    return _of_fleet(result) if isinstance(result, Path) else _of_drive(result)
+
+
+def _of_drive(result: Result) -> Commands:
     from roadeval.report.findings import Commands
 
     path, config = str(result.path), result.configuration
@@ -96,7 +101,7 @@ def _commands(result: Result) -> Commands:
     )
 
 
-def _commands_of_fleet(path: Path) -> Commands:
+def _of_fleet(path: Path) -> Commands:
     """Return the command that opens one of a fleet's worst frames, by its rank."""
     from roadeval.report.findings import Commands
 

@@ -79,7 +79,7 @@ def served(
     layout
         Of the recording by whose views all are arranged.
     by
-        The fact that the table is sorted by, from the highest on.
+        The fact that the table is sorted by, from the highest on; by the name where it is empty.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def _arrange(dataset: Any, folder: Path, layout: Layout, facts: Sequence[str], b
     table.TableBlueprint(
         table_layout=table.TableLayout(columns=[*shown, *hidden]),
         default_layout="table",
-        sort_by=table.SortBy(_column(by), direction="Descending"),
+        sort_by=table.SortBy(_column(by or "drive"), direction="Descending" if by else "Ascending"),
     ).save(at.APPLICATION, columns)
     dataset.register_blueprint(_uri(columns), segment_table=True)
 

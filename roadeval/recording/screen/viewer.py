@@ -11,8 +11,8 @@ import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Final
 
@@ -55,8 +55,8 @@ def show(recording: Path, frame: int | None = None) -> None:
             "no screen to open a window on; take a screenshot instead, or open "
             f"{recording} on another machine"
         )
-    with _viewer(recording, []) as (process, client):
-        _go(client, frame)
+    with opened(recording) as (process, client):
+        go(client, frame)
         process.wait()
 
 
@@ -97,8 +97,8 @@ def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int 
     # The viewer reads a user's own settings from these folders; a screenshot has none.
     with tempfile.TemporaryDirectory() as home:
         surroundings = {**_driver(), "XDG_DATA_HOME": home, "XDG_RUNTIME_DIR": home}
-        with _viewer(recording, options, **surroundings) as (_, client):
-            shown = _go(client, frame)
+        with opened(recording, options, **surroundings) as (_, client):
+            shown = go(client, frame)
             time.sleep(_SETTLING_S)
             png = client.take_screenshot()
     try:
@@ -109,8 +109,8 @@ def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int 
 
 
 @contextmanager
-def _viewer(
-    recording: Path, options: list[str], **environment: str
+def opened(
+    recording: Path, options: Sequence[str] = (), **environment: str
 ) -> Iterator[tuple[subprocess.Popen[bytes], ViewerClient]]:
     """Start the viewer on a recording; it ends with the block."""
     port = _free_port()
@@ -123,7 +123,7 @@ def _viewer(
 
 @contextmanager
 def _process(
-    what: str, port: int, options: list[str], log: IO[bytes], **environment: str
+    what: str, port: int, options: Sequence[str], log: IO[bytes], **environment: str
 ) -> Iterator[subprocess.Popen[bytes]]:
     """Start the viewer's process on a file or an address; it ends with the block."""
     address = ["--bind", "127.0.0.1", "--port", str(port), "--hide-welcome-screen"]
@@ -139,6 +139,37 @@ def _process(
     finally:
         process.terminate()
         process.wait()
+
+
+@contextmanager
+def hosted(address: str) -> Iterator[str]:
+    """Host the viewer's web build for a catalogue's address, on 127.0.0.1, until the block ends.
+
+    Yields where its files are.
+
+    Raises
+    ------
+    RecordingError
+        If it does not come up.
+    """
+    port = _free_port()
+    options = ["--serve-web", "--web-viewer-port", str(port)]
+    with (
+        tempfile.TemporaryFile() as log,
+        _process(address, _free_port(), options, log) as process,
+    ):
+        _wait_for(process, port, log.fileno())
+        yield f"http://127.0.0.1:{port}/"
+
+
+def _wait_for(process: subprocess.Popen[bytes], port: int, log: int) -> None:
+    """Wait until a process listens on a port."""
+    deadline = time.monotonic() + _LOADING_S
+    while time.monotonic() < deadline and process.poll() is None:
+        with suppress(OSError), socket.create_connection(("127.0.0.1", port), _POLL_S):
+            return
+        time.sleep(_POLL_S)
+    raise RecordingError(f"the web viewer did not start: {_reason(log)}")
 
 
 def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerClient:
@@ -158,7 +189,7 @@ def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerCli
     raise RecordingError(f"the viewer did not load the recording within {_LOADING_S:.0f} s")
 
 
-def _go(client: ViewerClient, frame: int | None) -> int | None:
+def go(client: ViewerClient, frame: int | None) -> int | None:
     """Move the viewer to a frame; return the frame that it then reports."""
     if frame is not None:
         client.set_time(at.FRAME, sequence=frame, play_state="paused")

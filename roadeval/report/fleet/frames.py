@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 
 from roadeval.data.words import percent
 from roadeval.report.blocks import Block, Cell, Heading, ImageGrid, Table, Text
@@ -29,10 +29,10 @@ def section(findings: FleetFindings) -> Iterator[Block]:
         yield ImageGrid(pictures, ACROSS)
     yield Text(_note(findings, len(pictures)), "note")
     if findings.inspect is not None:
-        yield commands_table(findings.worst, findings)
+        yield commands_table(findings, findings.inspect)
 
 
-def commands_table(worst: Sequence[WorstFrame], findings: FleetFindings) -> Table:
+def commands_table(findings: FleetFindings, inspect: Callable[[int], str]) -> Table:
     """Tabulate the worst frames with the command that opens each in the viewer."""
     return Table(
         ["", "drive", "frame", "ERR, %", "in the viewer"],
@@ -42,9 +42,9 @@ def commands_table(worst: Sequence[WorstFrame], findings: FleetFindings) -> Tabl
                 findings.names[frame.drive],
                 str(frame.frame),
                 Cell(percent(frame.rates["ERR"]), bold=True),
-                findings.inspect(frame.rank) if findings.inspect else "",
+                Cell(inspect(frame.rank), opens=f"worst/{frame.rank}"),
             ]
-            for frame in worst
+            for frame in findings.worst
         ],
         text_columns=(1, 4),
         small=True,

@@ -134,6 +134,7 @@ def _rendered(template: str, place: Place, document: Document | None, **values: 
         frame_link=lambda frame: _frame_link(frame, place),
         filled=_filled,
         unknown=_unknown,
+        is_live=place.frames is not None,
         # A picture inside the page is there already, and paper shows it only if it is loaded.
         loading="eager" if place.pictures is None else "lazy",
         **values,

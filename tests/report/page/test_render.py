@@ -23,7 +23,15 @@ from roadeval.report.blocks import (
     Text,
     TwoColumns,
 )
-from roadeval.report.browse import FrameBrowser, FrameRow, LongTable, Picture, PictureRow, Strip
+from roadeval.report.browse import (
+    FrameBrowser,
+    FrameRow,
+    LinkList,
+    LongTable,
+    Picture,
+    PictureRow,
+    Strip,
+)
 from roadeval.report.chart import Chart, ChartKind, Series
 from roadeval.report.page.files import Beside, write_page
 from roadeval.report.page.render import page
@@ -54,6 +62,7 @@ def every_block(text):
         ImageGrid([(text, JPEG)], 4, skip=1),
         KeepTogether([Text(text)]),
         TwoColumns([Text(text)], [Text(text)]),
+        LinkList([(text, "0/")]),
         PageBreak(),
         TableOfContents(),
         FrameBrowser([text], [text], [row], [text], [strip], [CHART], 7, (text, text), text, text),
@@ -108,7 +117,7 @@ def test_what_looks_like_markup_is_text_wherever_it_stands():
     assert "\x1b" not in "".join(hostile.words)
     for _, attributes in hostile.elements:
         for address in (attributes.get("href"), attributes.get("src")):
-            assert address is None or address.startswith(("#", "data:"))
+            assert address is None or address.startswith(("#", "data:", "0/"))
 
 
 def test_titles_are_text_as_well():

@@ -122,15 +122,9 @@ class Browser {
   async open() {
     const { opener, frame } = this;
     const address = this.byFrame.get(frame).querySelector("a").href;
-    const words = opener.textContent;
-    [opener.disabled, opener.textContent] = [true, "Opening \u2026"];
-    const answer = await fetch(`${address}/view`, { method: "POST" });
-    const told = (await answer.text()).trim();
-    [opener.disabled, opener.textContent] = [false, words];
-    if (!answer.ok) {
-      this.absent.hidden = false;
-      this.absent.textContent = told;
-    } else if (told) window.open(told, "rerun");
+    const problem = await openInViewer(opener, `${address}/view`);
+    this.absent.hidden = !problem;
+    this.absent.textContent = problem;
   }
 
   filters() {
@@ -182,6 +176,23 @@ class Browser {
     const each = new Set(this.columns.map((title) => title.dataset.variant).filter(Boolean)).size;
     for (const group of table.querySelectorAll(".groups th")) group.colSpan = variant ? 1 : each;
   }
+}
+
+/** Ask the server to show a frame in the viewer; the answer is what went wrong, or empty. */
+async function openInViewer(button, address) {
+  const words = button.textContent;
+  [button.disabled, button.textContent] = [true, "Opening \u2026"];
+  let told = "The server has ended.";
+  try {
+    const answer = await fetch(address, { method: "POST" });
+    told = (await answer.text()).trim();
+    if (answer.ok && told) window.open(told, "rerun");
+    if (answer.ok) told = "";
+  } catch {
+    // It is told below.
+  }
+  [button.disabled, button.textContent] = [false, words];
+  return told;
 }
 
 function hasCondition(row, condition) {

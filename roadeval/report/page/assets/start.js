@@ -48,6 +48,14 @@ function nearestFrame(frame) {
   return known[nearest(known, frame)];
 }
 
+for (const button of document.querySelectorAll(".opens")) {
+  button.hidden = false;
+  button.addEventListener("click", async () => {
+    const problem = await openInViewer(button, `${button.dataset.open}/view`);
+    button.title = problem;
+    if (problem) button.textContent = problem;
+  });
+}
 for (const image of document.querySelectorAll(".grid img, figure.picture img")) {
   image.addEventListener("click", () => enlargePicture(image));
 }

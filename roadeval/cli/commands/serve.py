@@ -1,0 +1,45 @@
+"""``roadeval serve``: results as pages on this machine, with the viewer a click away."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from roadeval.cli import console, messages
+from roadeval.cli.commands.report import commands_of
+from roadeval.cli.exit_codes import ExitCode
+
+
+def serve(
+    results: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RESULT...",
+            show_default=False,
+            help="Recordings (.rrd), results folders, or fleets' folders.",
+        ),
+    ],
+    *,
+    web: Annotated[
+        bool,
+        typer.Option("--web", help="Frames open in the browser, not in the viewer's own window."),
+    ] = False,
+) -> int:
+    """Serve results as pages to browse, on 127.0.0.1 alone.
+
+    Every frame has its pictures, and a button that opens the viewer there. The address that is
+    printed holds a token; without it nothing is answered. Ctrl-C ends the server and the viewer.
+    """
+    from roadeval.jobs.serve import serving
+
+    with serving(results, web=web, commands=commands_of) as server:
+        console.emit(server.address)
+        console.flush()
+        messages.note("open that address in a browser; Ctrl-C ends")
+        server.serve()
+    return ExitCode.DONE
+
+
+COMMAND: Final = serve

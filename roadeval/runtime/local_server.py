@@ -1,0 +1,205 @@
+"""A web server for the browsers of this machine's user alone.
+
+It listens on 127.0.0.1, and answers only who knows the token in its address. A page of another
+origin that asks the browser to ask, also under a name of its own for 127.0.0.1 (DNS rebinding), is
+refused by what the browser tells of it. It has no folder: whatever it gives comes from one
+function, so that no path of a request is ever a path on the disk.
+
+The standard library's server is enough for that: few requests, no bodies, one function.
+"""
+
+from __future__ import annotations
+
+import hmac
+import re
+import secrets
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Final
+from urllib.parse import urlsplit
+
+HOST: Final = "127.0.0.1"
+_SEGMENT: Final = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
+"""A part of a path: it begins with no dot."""
+_HEADERS: Final = {
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    # With "no-referrer" a form's own origin would be hidden, too.
+    "Referrer-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin-allow-popups",
+}
+TEXT: Final = "text/plain; charset=utf-8"
+PAGE: Final = "text/html; charset=utf-8"
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What is asked for.
+
+    Parameters
+    ----------
+    parts
+        Of the path below the token, without empty ones.
+    acts
+        Whether it asks that something be done (POST), not only for something to see.
+    folder
+        Whether the path ends with a slash.
+    """
+
+    parts: tuple[str, ...]
+    acts: bool
+    folder: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """What is answered.
+
+    Parameters
+    ----------
+    content
+        The body.
+    media
+        Its media type.
+    status
+        The status.
+    headers
+        More than every answer has.
+    kept
+        Whether the browser may keep it: under this address there will never be anything else.
+    """
+
+    content: bytes
+    media: str = TEXT
+    status: HTTPStatus = HTTPStatus.OK
+    headers: Mapping[str, str] = field(default_factory=dict)
+    kept: bool = False
+
+
+def told(status: HTTPStatus, sentence: str) -> Response:
+    """Return a sentence as an answer."""
+    return Response(f"{sentence}\n".encode(), status=status)
+
+
+NOT_FOUND: Final = told(HTTPStatus.NOT_FOUND, "There is nothing at this address.")
+_REFUSED: Final = told(
+    HTTPStatus.FORBIDDEN, "Refused: open the address that the terminal shows, token included."
+)
+_NO_BODY: Final = told(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "Nothing is taken here.")
+Answer = Callable[[Request], Response]
+
+
+class LocalServer:
+    """The server; what it gives comes from ``answer``, which several threads may call at once.
+
+    Parameters
+    ----------
+    answer
+        Returns what is answered.
+    port
+        0 for any that is free.
+
+    Raises
+    ------
+    OSError
+        If the port is taken.
+    """
+
+    def __init__(self, answer: Answer, port: int = 0) -> None:
+        self._token: Final = secrets.token_urlsafe(24)
+        handler = partial(_Handler, answer=answer, token=self._token)
+        self._server: Final = ThreadingHTTPServer((HOST, port), handler)
+        self._server.daemon_threads = True
+
+    @property
+    def address(self) -> str:
+        """The address to open, with the token."""
+        return f"http://{HOST}:{self._server.server_port}/{self._token}/"
+
+    def serve(self) -> None:
+        """Answer until the process is told to end, or `stop` is called by another thread."""
+        self._server.serve_forever(poll_interval=0.1)
+
+    def stop(self) -> None:
+        """Answer no more."""
+        self._server.shutdown()
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._server.server_close()
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """A connection."""
+
+    protocol_version = "HTTP/1.1"
+    server_version = "roadeval"
+    sys_version = ""
+    timeout = 30
+
+    def __init__(self, *args: object, answer: Answer, token: str) -> None:
+        self._answer = answer
+        self._token = token
+        super().__init__(*args)  # type: ignore[arg-type]
+
+    def do_GET(self) -> None:
+        """Answer what only asks."""
+        self._respond(acts=False)
+
+    def do_POST(self) -> None:
+        """Answer what asks that something be done."""
+        self._respond(acts=True)
+
+    def log_message(self, *_: object) -> None:
+        """Say nothing: the terminal is for people."""
+
+    def _respond(self, *, acts: bool) -> None:
+        if self.headers.get("Content-Length", "0") != "0" or "Transfer-Encoding" in self.headers:
+            self.close_connection = True  # a body would be taken for the next request
+            self._send(_NO_BODY)
+        elif not self._is_ours(acts=acts) or (request := self._request(acts=acts)) is None:
+            self._send(_REFUSED)
+        else:
+            self._send(self._answer(request))
+
+    def _is_ours(self, *, acts: bool) -> bool:
+        """Return whether the request comes from a page of this server, or from the user."""
+        server = self.server
+        assert isinstance(server, ThreadingHTTPServer)
+        hosts = {f"{name}:{server.server_port}" for name in (HOST, "localhost")}
+        host, origin = self.headers.get("Host"), self.headers.get("Origin")
+        site = self.headers.get("Sec-Fetch-Site", "same-origin")
+        if host not in hosts or site not in ("same-origin", "none"):
+            return False
+        return origin == f"http://{host}" if acts or origin is not None else True
+
+    def _request(self, *, acts: bool) -> Request | None:
+        """Return what is asked for; None without the token."""
+        path = urlsplit(self.path).path
+        _, token, *parts = path.split("/") if path.startswith("/") else ("", "")
+        if not hmac.compare_digest(token.encode(), self._token.encode()):
+            return None
+        folder = bool(parts) and parts[-1] == ""
+        named = tuple(parts[:-1] if folder else parts)
+        if not all(map(_SEGMENT.fullmatch, named)):
+            return None
+        return Request(named, acts, folder)
+
+    def _send(self, response: Response) -> None:
+        self.send_response(response.status)
+        age = "private, max-age=3600, immutable" if response.kept else "no-store"
+        sent = {
+            **_HEADERS,
+            "Content-Type": response.media,
+            "Content-Length": str(len(response.content)),
+            "Cache-Control": age,
+            **response.headers,
+        }
+        for name, value in sent.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(response.content)

@@ -1,0 +1,151 @@
+"""``roadeval serve``: pages on this machine alone, with pictures on demand and the viewer."""
+
+import re
+import signal
+import subprocess
+import urllib.error
+import urllib.request
+from contextlib import contextmanager
+from importlib.util import find_spec
+
+import pytest
+
+from tests.e2e.commands import ROADEVAL, here
+from tests.fixtures.browser import violations
+from tests.results.fleet.making import fleet_of
+
+
+@contextmanager
+def serving(*words):
+    """Run the command until the block ends; yields its address and its process."""
+    command = [str(word) for word in (ROADEVAL, "serve", *words)]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as run:
+        try:
+            yield run.stdout.readline().strip(), run
+        finally:
+            run.send_signal(signal.SIGINT)
+            run.wait(20)
+
+
+@pytest.fixture(scope="module")
+def address(demo, tmp_path_factory):
+    fleet = fleet_of(tmp_path_factory.mktemp("fleet") / "week", 8, pictures=3)
+    with serving(demo.recording, demo.reports, fleet) as (address, _):
+        yield address
+
+
+def frame(tab):
+    return int(re.match(r"Frame (\d+)", tab.locator(".where").inner_text())[1])
+
+
+def test_every_result_is_listed_and_a_click_away(address, watched):
+    seen = watched(address)
+    links = seen.tab.locator(".links a")
+    assert links.count() == 3
+    for place, title in enumerate(["demo", "demo", "week"]):
+        seen.tab.goto(address)
+        links.nth(place).click()
+        assert seen.tab.locator("h1").inner_text() == title
+    assert seen.complaints == []
+    assert all(url.startswith(address) for url in seen.elsewhere)
+
+
+def test_every_frame_has_its_pictures_when_it_is_asked_for(address, demo, watched):
+    seen = watched(f"{address}0/")
+    rows = seen.tab.locator(".frames tr.pictured")
+    assert rows.count() == demo.summary["frames"]["evaluated"]
+    seen.tab.locator(".stage").wait_for()
+    for place in (3, 40):
+        rows.nth(place).locator("td").first.click()
+        number = int(rows.nth(place).get_attribute("data-frame"))
+        seen.tab.locator(f"#frame-{number} .tile img").first.wait_for()
+        assert frame(seen.tab) == number
+        loaded = "each => each.complete && each.naturalWidth > 0"
+        seen.tab.wait_for_function(f"({loaded})(document.querySelector('.views .above'))")
+    seen.tab.keyboard.press("ArrowRight")
+    seen.tab.locator(f"#frame-{number + 1} .tile").first.wait_for()
+    assert seen.complaints == []
+    assert violations(seen.tab) == []
+
+
+def test_without_a_script_a_frame_is_a_page_of_its_own(address, watched):
+    tab = watched(f"{address}0/", java_script_enabled=False).tab
+    tab.locator(".frames tr.pictured a").first.click()
+    assert tab.locator(".strip .tile img").first.evaluate("each => each.naturalWidth") > 0
+
+
+def test_where_there_is_no_screen_the_page_says_what_to_do_instead(demo, watched, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with serving(demo.recording) as (address, _):
+        seen = watched(address)
+        seen.tab.locator(".stage").wait_for()
+        seen.tab.locator(".open").click()
+        seen.tab.locator(".absent").wait_for()
+        assert "No screen" in seen.tab.locator(".absent").inner_text()
+
+
+def test_a_fleets_frame_whose_recording_was_not_kept_says_so(address, watched):
+    tab = watched(f"{address}2/").tab
+    tab.locator(".opens").first.click()
+    tab.get_by_text("was kept").wait_for()
+
+
+def status(address, *, method="GET", **headers):
+    """The status of an answer, asked for as no browser would."""
+    asked = urllib.request.Request(address, method=method, headers=headers)
+    try:
+        with urllib.request.urlopen(asked, timeout=20) as answer:
+            return answer.status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def test_only_the_results_named_can_be_reached(address, demo):
+    assert status(f"{address}0/frame/40/part") == 200
+    for path in ("3/", "0/frame/99999/part", "0/pictures/summary.json", "0/frame.csv", "x"):
+        assert status(address + path) == 404
+    for path in ("0/../../..", "../", f"0/pictures/..{demo.recording}", "%2e%2e/"):
+        assert status(address + path) == 403
+    assert status(re.sub(r"/[^/]+/$", "/", address)) == 403
+    view = f"{address}0/frame/40/view"
+    assert status(view) == 404
+    assert status(view, method="POST") == 403
+    assert status(view, method="POST", Origin="http://evil.example") == 403
+    assert status(address, Host="evil.example") == 403
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_at_once_and_its_port_is_free(number, demo):
+    with serving(demo.recording) as (address, run):
+        assert status(f"{address}0/frame/40/part") == 200
+        run.send_signal(number)
+        assert run.wait(10) == {signal.SIGINT: 130, signal.SIGTERM: 143}[number]
+        assert "Traceback" not in run.stderr.read()
+    with pytest.raises(OSError, match="refused"):
+        urllib.request.urlopen(address, timeout=5)
+
+
+def test_what_is_no_result_is_one_line(tmp_path):
+    run = here("serve", tmp_path / "missing.rrd")
+    assert run.returncode == 1
+    assert len(run.stderr.splitlines()) == 1
+
+
+@pytest.mark.skipif(find_spec("datafusion") is None, reason="needs roadeval[catalogue]")
+def test_the_web_viewer_opens_beside_the_page_at_that_frame_and_asks_nobody_else(demo, watched):
+    with serving("--web", demo.recording) as (address, _):
+        seen = watched(address)
+        seen.tab.locator(".stage").wait_for()
+        asked = []
+        seen.tab.context.on("request", lambda request: asked.append(request.url))
+        with seen.tab.expect_popup() as opened:
+            seen.tab.locator(".open").click()
+        viewer = opened.value
+        viewer.wait_for_url("**/viewer/?url=*")
+        assert f"when%3Dframe%40{frame(seen.tab)}" in viewer.url
+        viewer.wait_for_function("document.querySelector('canvas.visible')", timeout=60_000)
+        assert all(url.startswith(("http://127.0.0.1:", "data:", "blob:")) for url in asked)
+        assert any(url.endswith("re_viewer_bg.wasm") for url in asked)

@@ -1,0 +1,122 @@
+"""A server for this machine alone: who is answered, and who is not."""
+
+import http.client
+import socket
+import threading
+from urllib.parse import urlsplit
+
+import pytest
+
+from roadeval.runtime.local_server import NOT_FOUND, LocalServer, Response
+
+
+def echo(request):
+    """Answer with what was asked for."""
+    if request.parts == ("nothing",):
+        return NOT_FOUND
+    return Response(repr((request.parts, request.acts, request.folder)).encode())
+
+
+@pytest.fixture(scope="module")
+def server():
+    made = LocalServer(echo)
+    thread = threading.Thread(target=made.serve)
+    thread.start()
+    yield made
+    made.stop()
+    thread.join()
+    made.close()
+
+
+def ask(server, path="", method="GET", *, whole=False, body=None, **headers):
+    """Send a request below the token, or as the path says; return status, headers and text."""
+    address = urlsplit(server.address)
+    connection = http.client.HTTPConnection(address.hostname, address.port, timeout=5)
+    wanted = path if whole else address.path + path
+    given = {name.replace("_", "-"): value for name, value in headers.items()}
+    connection.request(method, wanted, body=body, headers=given)
+    answer = connection.getresponse()
+    found = answer.status, answer.headers, answer.read().decode()
+    connection.close()
+    return found
+
+
+def origin(server):
+    return server.address[: -len(urlsplit(server.address).path)]
+
+
+def test_who_knows_the_address_is_answered(server):
+    status, headers, text = ask(server, "0/frame/84")
+    assert (status, text) == (200, "(('0', 'frame', '84'), False, False)")
+    assert headers["X-Content-Type-Options"] == "nosniff"
+    assert headers["Cache-Control"] == "no-store"
+    assert "Python" not in headers["Server"]
+
+
+def test_it_listens_on_127_0_0_1_alone(server):
+    address = urlsplit(server.address)
+    assert address.hostname == "127.0.0.1"
+    others = {each[4][0] for each in socket.getaddrinfo(socket.gethostname(), None)}
+    for other in others - {"127.0.0.1"}:
+        with pytest.raises(OSError, match=r"."):
+            socket.create_connection((other, address.port), 1).close()
+
+
+@pytest.mark.parametrize("path", ["/", "/0/", "/wrong/0/", "//0/", "/%2e%2e/0/", "*", "/TOKEN"])
+def test_without_the_token_nothing_is_told(server, path):
+    status, _, text = ask(server, path, whole=True)
+    assert status == 403
+    assert "token" in text
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Host": "evil.example"},
+        {"Host": "127.0.0.1"},
+        {"Host": "127.0.0.1:1"},
+        {"Origin": "http://evil.example"},
+        {"Origin": "null"},
+        {"Sec_Fetch_Site": "cross-site"},
+        {"Sec_Fetch_Site": "same-site"},
+    ],
+)
+@pytest.mark.parametrize("method", ["GET", "POST"])
+def test_what_another_page_asks_for_is_refused(server, headers, method):
+    own = {"Origin": origin(server)} if method == "POST" else {}
+    status, _, text = ask(server, "0/", method, **{**own, **headers})
+    assert status == 403
+    assert "0" not in text
+
+
+def test_to_act_takes_the_pages_own_origin(server):
+    assert ask(server, "0/view", "POST")[0] == 403
+    status, _, text = ask(server, "0/view", "POST", Origin=origin(server))
+    assert (status, text) == (200, "(('0', 'view'), True, False)")
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["../", "0/../../etc/passwd", "0/%2e%2e/x", "0//x", "0/.hidden", "0/a%2fb", "0/a\\..\\b", "~"],
+)
+def test_no_path_leads_anywhere_else(server, path):
+    assert ask(server, path)[0] == 403
+
+
+def test_a_body_is_taken_by_nobody(server):
+    status, _, _ = ask(server, "0/", "POST", body=b"x" * 100, Origin=origin(server))
+    assert status == 413
+
+
+def test_other_methods_are_not_known(server):
+    assert ask(server, "0/", "PUT")[0] == 501
+
+
+def test_what_is_not_there_is_told(server):
+    assert ask(server, "nothing")[0] == 404
+
+
+def test_every_server_has_a_token_of_its_own(server):
+    other = LocalServer(echo)
+    assert urlsplit(other.address).path != urlsplit(server.address).path
+    other.close()
