@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import traceback
 from collections.abc import Callable, Sequence
 from functools import wraps
@@ -17,7 +15,6 @@ from roadeval.cli.options import with_flags
 from roadeval.errors import RoadevalError
 from roadeval.runtime import memory
 from roadeval.runtime.discovery import found_in
-from roadeval.runtime.text import visible_lines
 
 FIRST = (
     *(
@@ -103,7 +100,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Words after the program's name; those of the process if None.
     """
     if arguments is None:
-        streams.take_over(debug=_debug())
+        streams.take_over(debug=messages.debug())
     try:
         with signals.raised():
             code = app(args=arguments, prog_name=messages.PROGRAM, standalone_mode=False)
@@ -118,8 +115,7 @@ def explain(error: BaseException) -> int:
 
     With ``ROADEVAL_DEBUG=1`` in the environment the traceback stands above the line.
     """
-    if _debug():
-        sys.stderr.write(visible_lines("".join(traceback.format_exception(error))))
+    messages.traceback("".join(traceback.format_exception(error)))
     match error:
         case signals.Stopped() | KeyboardInterrupt():
             messages.interrupted(_with_notes("stopped before the end", error))
@@ -152,10 +148,6 @@ def _known(error: BaseException) -> tuple[bool, str]:
                 f"{what} (a defect of {messages.PROGRAM}, not of your input: run again with "
                 "ROADEVAL_DEBUG=1 to see where, and please report it)"
             )
-
-
-def _debug() -> bool:
-    return os.environ.get("ROADEVAL_DEBUG") == "1"
 
 
 def _with_notes(sentence: str, error: BaseException) -> str:

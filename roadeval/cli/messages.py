@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from typing import Final
@@ -10,7 +11,7 @@ from roadeval import kernels
 from roadeval.cli import console
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import with_flags
-from roadeval.runtime.text import visible
+from roadeval.runtime.text import visible, visible_lines
 
 PROGRAM: Final = "roadeval"
 
@@ -38,6 +39,17 @@ def losses(sentences: Sequence[str]) -> ExitCode:
     for sentence in sentences:
         _write("lost", "bold yellow", with_flags(sentence))
     return ExitCode.LOSS if sentences else ExitCode.DONE
+
+
+def debug() -> bool:
+    """Return whether tracebacks are asked for, by ``ROADEVAL_DEBUG=1`` in the environment."""
+    return os.environ.get("ROADEVAL_DEBUG") == "1"
+
+
+def traceback(text: str) -> None:
+    """Write a traceback, where they are asked for."""
+    if debug():
+        sys.stderr.write(visible_lines(text))
 
 
 def loops_missing() -> None:

@@ -11,7 +11,8 @@ from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin, 
 from roadeval.config.run import RunConfig
 from roadeval.config.settings import SECTIONS
 from roadeval.config.toml import without_none
-from roadeval.pipeline.chain import STAGES, Pipeline
+from roadeval.pipeline import stages
+from roadeval.pipeline.chain import Pipeline
 
 WIDTH: Final = 100
 _BOUNDS: Final = {"ge": "at least {}", "gt": "above {}", "le": "at most {}", "lt": "below {}"}
@@ -38,12 +39,12 @@ def documented(config: RunConfig) -> str:
 
 
 def _chain(pipeline: Pipeline) -> Iterator[str]:
-    yield from _comment(f"The stages in the order they run; there are {', '.join(STAGES)}.")
+    yield from _comment(f"The stages in the order they run; there are {', '.join(stages.names())}.")
     yield f"chain = [{', '.join(f'{name!r}' for name in pipeline.chain)}]".replace("'", '"')
 
 
 def _stages(pipeline: Pipeline, prefix: str) -> list[str]:
-    return [_table(f"{prefix}{name}", pipeline.settings[name]) for name in pipeline.chain]
+    return [_table(f"{prefix}{name}", own) for name, own in pipeline.settings.items()]
 
 
 def _table(name: str, settings: Any) -> str:

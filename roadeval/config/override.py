@@ -69,6 +69,9 @@ def override(settings: Any, tables: Mapping[str, Any], table: str, where: str = 
         return settings
     values = {FORMER.get(key, key): value for key, value in values.items()}
     merged = _merged(dataclasses.asdict(settings), values)
+    known = [entry.name for entry in dataclasses.fields(settings)]
+    for key in merged.keys() - {*known}:
+        raise ConfigError(named(table, (key,), where) + _unknown(known))
     for path, text in _texts(merged):
         if not is_utf8(text):
             raise ConfigError(named(table, path, where) + NOT_UTF8)
@@ -121,7 +124,7 @@ def _first(error: ValidationError, settings: Any) -> tuple[tuple[str | int, ...]
         for part in keys[:-1]:
             settings = getattr(settings, str(part))
         names = [entry.name for entry in dataclasses.fields(settings)]
-        return keys, f"there is no such setting; choose {either(names)}"
+        return keys, _unknown(names)
     if problem["type"] == "value_error":
         message = problem["msg"].removeprefix("Value error, ")
     else:
@@ -129,6 +132,10 @@ def _first(error: ValidationError, settings: Any) -> tuple[tuple[str | int, ...]
     given = problem["input"]
     shown = "" if not keys or isinstance(given, Mapping) else f" (given: {quoted(given)})"
     return keys, f"{message}{shown}"
+
+
+def _unknown(names: Iterable[str]) -> str:
+    return f"there is no such setting; choose {either(names)}" if names else "it has no settings"
 
 
 def quoted(value: Any) -> str:

@@ -164,7 +164,7 @@ class RunConfig:
         """
         pipeline = pipeline_of(self.pipeline, tables, where)
         check_tables(
-            tables, ("chain", *pipeline.chain, "variants", "masks", "drives", *SECTIONS), where
+            tables, ("chain", *pipeline.settings, "variants", "masks", "drives", *SECTIONS), where
         )
         try:
             return replace(

@@ -38,7 +38,7 @@ def read_tables(path: str | Path) -> dict[str, Any]:
     A `ConfigError` if there are none to read.
     """
     try:
-        return tomllib.loads(_text(Path(path)))
+        tables = tomllib.loads(_text(Path(path)))
     except FileNotFoundError as error:
         raise ConfigError(f"{path}: there is no such configuration file") from error
     except OSError as error:
@@ -47,6 +47,23 @@ def read_tables(path: str | Path) -> dict[str, Any]:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: not valid TOML: {error}") from error
+    if Path(path).suffix == ".rrd":
+        _refuse_code(tables, path)
+    return tables
+
+
+def _refuse_code(tables: Mapping[str, Any], path: str | Path) -> None:
+    """Refuse, as a `ConfigError`, a recording's chain that names a module: it may be anybody's."""
+    variants = tables.get("variants", {})
+    asked = [tables, *(variants.values() if isinstance(variants, Mapping) else ())]
+    for each in asked:
+        chain = each.get("chain", ()) if isinstance(each, Mapping) else ()
+        for name in chain if isinstance(chain, list) else ():
+            if isinstance(name, str) and ":" in name:
+                raise ConfigError(
+                    f"{path}: its chain names code, {visible(name)}, which no recording may load; "
+                    "give the run.toml of its results folder, or a file of your own"
+                )
 
 
 def _text(path: Path) -> str:

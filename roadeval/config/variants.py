@@ -11,8 +11,9 @@ from roadeval.config.names import check_variant_name
 from roadeval.config.override import either, override
 from roadeval.config.presets import PRESETS
 from roadeval.config.settings import SECTIONS
-from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED, VariantLayout
-from roadeval.pipeline.chain import STAGES, Pipeline
+from roadeval.data import ERRORS, FILTERED, FINAL_STAGE, UNFILTERED, VariantLayout
+from roadeval.pipeline import stages
+from roadeval.pipeline.chain import Pipeline
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +42,13 @@ class Variant:
                     f"{_prefix(where)}[{section}] holds for the whole run: it belongs in the "
                     "configuration of the run"
                 )
-        check_tables(rest, ("chain", *_chain(rest.get("chain", base.chain), where)), where)
-        return cls(name, pipeline_of(base, rest, where), preset)
+        pipeline = pipeline_of(base, rest, where)
+        check_tables(rest, ("chain", *pipeline.settings), where)
+        return cls(name, pipeline, preset)
 
     def layout(self) -> VariantLayout:
         """Describe the variant as recording and tables need to know it beforehand."""
-        titles = [STAGES[n].title for n in self.pipeline.chain if STAGES[n].is_filter]
+        titles = [stage.title for stage in self.pipeline.stages() if stage.is_filter]
         return VariantLayout(
             self.name,
             f"with {', '.join(titles)}" if titles else "without the filter",
@@ -104,26 +106,36 @@ def pipeline_of(base: Pipeline | None, tables: Mapping[str, Any], where: str) ->
     chain = _chain(tables.get("chain", base.chain if base else ()), where)
     current = {} if base is None else base.settings
     settings = {
-        name: override(current.get(name) or STAGES[name].settings(), tables, name, where)
-        for name in chain
+        each.name: override(current.get(each.name) or each.settings(), tables, each.name, where)
+        for each in stages.stages_of(chain)
     }
-    return Pipeline(chain, settings)
+    pipeline = Pipeline(chain, settings)
+    layers = [spec.name for spec in (*pipeline.layers(), ERRORS)]
+    for name in layers:
+        if layers.count(name) > 1:
+            raise ConfigError(f"{_prefix(where)}chain: two layers are called {name}")
+    return pipeline
 
 
 def _chain(names: Any, where: str) -> tuple[str, ...]:
     """Check a chain: known stages, each once, one mask of a name, and the final one last."""
     begin = f"{_prefix(where)}chain"
     if not isinstance(names, list | tuple) or not names:
-        raise ConfigError(f"{begin} must be a list of stages; choose {either(STAGES)}")
+        raise ConfigError(f"{begin} must be a list of stages; choose {either(stages.names())}")
     for name in names:
-        if not isinstance(name, str) or name not in STAGES:
-            raise ConfigError(f"{begin}: there is no stage {name!r}; choose {either(STAGES)}")
-    if len(set(names)) < len(names):
+        if not isinstance(name, str):
+            choice = either(stages.names())
+            raise ConfigError(f"{begin}: there is no stage {name!r}; choose {choice}")
+    try:
+        found = stages.stages_of(names)
+    except stages.UnknownStageError as error:
+        raise ConfigError(f"{begin}: {error}") from error
+    if len({stage.name for stage in found}) < len(found):
         raise ConfigError(f"{begin}: a stage can occur only once")
-    masks = [STAGES[name].reported for name in names if STAGES[name].yields_mask]
+    masks = [stage.reported for stage in found if stage.yields_mask]
     if len(set(masks)) < len(masks):
         twice = next(mask for mask in masks if masks.count(mask) > 1)
-        both = [name for name in names if STAGES[name].reported == twice]
+        both = [stage.name for stage in found if stage.reported == twice]
         raise ConfigError(f"{begin}: {' and '.join(both)} both make the mask {twice}")
     if names[-1] != FINAL_STAGE:
         raise ConfigError(f"{begin} must end with {FINAL_STAGE}, whose mask is the answer")

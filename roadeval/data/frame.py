@@ -27,6 +27,14 @@ ROAD: Final = 1
 IGNORE: Final = 255
 
 
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """When an image was taken: its ``number`` and ``stamp_ns``, as in `Frame`."""
+
+    number: int
+    stamp_ns: int
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
     """One camera image with its times and, if the log has one, its truth.
@@ -63,6 +71,11 @@ class Frame:
     shadow_truth: Truth | None = None
     external: Mapping[str, Mask] = field(default_factory=dict)
     probabilities: Mapping[str, Probability] = field(default_factory=dict)
+
+    @property
+    def moment(self) -> Moment:
+        """When it was taken."""
+        return Moment(self.number, self.stamp_ns)
 
     def digest(self) -> str:
         """Hash of the image as logged: equal for equal images, whatever log they lie in."""

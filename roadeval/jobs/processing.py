@@ -72,7 +72,7 @@ def _process(
     use = run.schedule.use(frame)
     known = (frame.truth, frame.shadow_truth) if use.role is Role.EVALUATED else (None, None)
     shared: dict[Any, Any] = {}
-    view = View.of(frame.image)
+    view = View.of(frame.image, frame.moment)
     try:
         variants = [
             one_frame.run_variant(
@@ -87,7 +87,7 @@ def _process(
             for name, chain in run.chains.items()
         ]
     except StageError as error:
-        run.failures[frame.number] = error
+        run.failures.add(frame.number, error)
         return None
     variants += [
         one_frame.external_variant(name, mask, frame.probabilities.get(name))

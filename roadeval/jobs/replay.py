@@ -38,7 +38,10 @@ def pass_by(_result: FrameResult) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The result of a replay: where it lies, and the content of ``summary.json``."""
+    """The result of a replay: where it lies, and the content of ``summary.json``.
+
+    ``tracebacks`` tell where in their code stages failed that are among the ``losses``.
+    """
 
     recording: Path | None
     reports: Path | None
@@ -46,6 +49,7 @@ class Outcome:
     warnings: tuple[str, ...]
     losses: tuple[str, ...]
     files: tuple[Path, ...]
+    tracebacks: tuple[str, ...] = ()
 
 
 def replay(
@@ -115,6 +119,7 @@ def _written(
         results.append(sums)
         facts = summary.of(run) | {"tables": results.tables}
         warnings, losses = summary.warnings(run), summary.losses(run)
+        tracebacks = tuple(run.failures.tracebacks.values())
         recorder.finish(_texts(run, facts, sums))
         sidecar.finish()
         del run  # figures take the room of its frames and models
@@ -128,7 +133,7 @@ def _written(
                 write_figures(results.folder, data)
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
     files = [to.reports / name for name in facts["files"]] + ([to.mcap] if to.mcap else [])
-    return Outcome(to.recording, to.reports, facts, warnings, losses, tuple(files))
+    return Outcome(to.recording, to.reports, facts, warnings, losses, tuple(files), tracebacks)
 
 
 def _record(

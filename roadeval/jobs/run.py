@@ -15,10 +15,11 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.jobs import frame
+from roadeval.jobs.failures import Failures
 from roadeval.jobs.identity import identity
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.pipeline.chain import Chain
-from roadeval.pipeline.stage import MisfitError, StageError
+from roadeval.pipeline.stage import MisfitError
 from roadeval.recording import Layout
 from roadeval.results.schema import streamed
 from roadeval.runtime.memory import trim
@@ -57,7 +58,7 @@ class Run:
     beside
         The training frames of a model file that show a place of this drive, so far.
     failures
-        Why a stage failed on frames, by their numbers: so far, from any thread.
+        The frames on which a stage failed, so far.
     """
 
     log: logs.Log
@@ -72,7 +73,7 @@ class Run:
     layouts: tuple[VariantLayout, ...]
     board: Scoreboard
     beside: set[int] = field(default_factory=set)
-    failures: dict[int, StageError] = field(default_factory=dict)
+    failures: Failures = field(default_factory=Failures)
 
     def layout(self) -> Layout:
         """Describe the recording before its first frame."""

@@ -77,8 +77,7 @@ def warnings(run: Run) -> tuple[str, ...]:
 
 def losses(run: Run) -> tuple[str, ...]:
     """List the parts of the log that were lost, and the frames on which a stage failed."""
-    failed = (f"frame {number}: {error}" for number, error in sorted(run.failures.items()))
-    return (*run.log.losses, *run.frames.accounting.losses, *failed)
+    return (*run.log.losses, *run.frames.accounting.losses, *run.failures.sentences())
 
 
 def _sizes(run: Run) -> tuple[str, ...]:
@@ -185,7 +184,7 @@ def _accounting(run: Run) -> dict[str, Any]:
         "outside the range": seen.in_log - seen.in_range,
         "not read (stride or limit)": seen.in_range - seen.read,
         "undecodable": len(seen.undecodable),
-        "failed in a stage": len(run.failures),
+        "failed in a stage": len(run.failures.reasons),
         "trained on": roles[Role.TRAINING],
         "copies of training frames": roles[Role.COPY],
         _gap(run.config): roles[Role.GAP],

@@ -6,22 +6,20 @@ import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
-from typing import Any, Final
+from typing import Any
 
 from roadeval.data import LayerSpec, Output, Packed, Rgb, Truth
-from roadeval.pipeline import beyond, paper
 from roadeval.pipeline.stage import Stage, View, perfect_mask
-from roadeval.runtime.discovery import by_name, found_in
-
-STAGES: Final[Mapping[str, Stage[Any, Any]]] = by_name(
-    (*found_in(beyond, "STAGE"), *found_in(paper, "STAGE"))
-)
-"""Every stage that a configuration's ``chain`` may name, found by its folder."""
+from roadeval.pipeline.stages import stages_of
 
 
 @dataclass(frozen=True, slots=True)
 class Pipeline:
-    """Stages in the order they run, by their names in `STAGES`, and the settings of each."""
+    """Stages in the order they run, and the settings of each.
+
+    ``chain`` names them as `roadeval.pipeline.stages.stages_of` finds them, which need not be the
+    names that they bear themselves; ``settings`` are by the latter.
+    """
 
     chain: tuple[str, ...]
     settings: Mapping[str, Any]
@@ -29,11 +27,11 @@ class Pipeline:
     @classmethod
     def default(cls, chain: Sequence[str]) -> Pipeline:
         """Return a pipeline of these stages with their default settings."""
-        return cls(tuple(chain), {name: STAGES[name].settings() for name in chain})
+        return cls(tuple(chain), {stage.name: stage.settings() for stage in stages_of(chain)})
 
     def stages(self) -> tuple[Stage[Any, Any], ...]:
         """Return the stages, in order."""
-        return tuple(STAGES[name] for name in self.chain)
+        return stages_of(self.chain)
 
     def layers(self) -> tuple[LayerSpec, ...]:
         """Return the layers that the stages will hand out, in order."""
@@ -52,8 +50,17 @@ class Pipeline:
 
     def without_filter(self) -> Pipeline:
         """Return the pipeline without its filters."""
-        chain = tuple(stage.name for stage in self.stages() if not stage.is_filter)
-        return Pipeline(chain, {name: self.settings[name] for name in chain})
+        return self._of(lambda stage: not stage.is_filter)
+
+    def alone(self, name: str) -> Pipeline:
+        """Return the pipeline of one of its stages."""
+        return self._of(lambda stage: stage.name == name)
+
+    def _of(self, chosen: Callable[[Stage[Any, Any]], bool]) -> Pipeline:
+        pairs = zip(self.chain, self.stages(), strict=True)
+        kept = [(name, stage) for name, stage in pairs if chosen(stage)]
+        settings = {stage.name: self.settings[stage.name] for _, stage in kept}
+        return Pipeline(tuple(name for name, _ in kept), settings)
 
     def learning(self) -> tuple[str, ...]:
         """Return the names of the stages that learn."""
@@ -106,7 +113,7 @@ class Pipeline:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the chain and its settings as plain data, in the shape of a TOML file."""
-        settings = {name: dataclasses.asdict(self.settings[name]) for name in self.chain}
+        settings = {name: dataclasses.asdict(own) for name, own in self.settings.items()}
         return {"chain": list(self.chain), **settings}
 
     def bind(self, parameters: Mapping[str, Any]) -> Chain:

@@ -30,7 +30,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from roadeval.data import ROAD, LayerSpec, Output, Packed, Rgb, Truth
+from roadeval.data import ROAD, LayerSpec, Moment, Output, Packed, Rgb, Truth
 from roadeval.data.arrays import Planes
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.channels import split
@@ -66,25 +66,28 @@ class View:
         Red, green and blue of ``image``, ``(H, W)`` uint8 each.
     mask
         The previous stage's road mask, if there was one.
+    moment
+        When the image was taken; None for one that belongs to no drive.
     """
 
     original: Rgb
     image: Rgb
     planes: Planes = field(repr=False)
     mask: Packed | None = None
+    moment: Moment | None = None
 
     @classmethod
-    def of(cls, image: Rgb) -> View:
+    def of(cls, image: Rgb, moment: Moment | None = None) -> View:
         """Return what the first stage sees of an ``(H, W, 3)`` uint8 RGB image."""
         image = np.ascontiguousarray(image)
-        return cls(image, image, split(image))
+        return cls(image, image, split(image), moment=moment)
 
     def after(self, output: Output) -> View:
         """Return what the next stage sees."""
         image = self.image if output.image is None else output.image
         planes = self.planes if image is self.image else split(image)
         mask = self.mask if output.mask is None else output.mask
-        return View(self.original, image, planes, mask)
+        return View(self.original, image, planes, mask, self.moment)
 
 
 @dataclass(frozen=True, slots=True)

@@ -126,7 +126,7 @@ def _fit_stages(training_set: TrainingSet, pipeline: Pipeline) -> dict[str, Any]
         if stage.fit is not None:
             parameters[stage.name] = stage.fit(training_set, pipeline.settings[stage.name])
         if not stage.yields_mask:
-            only = Pipeline((stage.name,), pipeline.settings).bind(parameters)
+            only = pipeline.alone(stage.name).bind(parameters)
             filtered = tuple(only.filtered(image) for image in training_set.images)
             training_set = dataclasses.replace(training_set, images=filtered)
     return parameters

@@ -34,7 +34,8 @@ def from_file(path: Path, pipelines: Mapping[str, Pipeline]) -> tuple[Model, Sch
 
     Whether what it learnt fits their settings turns out when they are bound.
     """
-    model = kept_model(path)
+    stages = (stage for pipeline in pipelines.values() for stage in pipeline.stages())
+    model = kept_model(path, tuple(dict.fromkeys(stages)))
     for name, pipeline in pipelines.items():
         model.require(name, pipeline, path)
     known = None if model.fingerprints is None else Likeness(model.fingerprints)

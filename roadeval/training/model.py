@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from io import BytesIO
@@ -17,8 +17,10 @@ from pydantic import Field, ValidationError
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.errors import RoadevalError
-from roadeval.pipeline.chain import STAGES, Pipeline
+from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.parameters import check_arrays, check_range
+from roadeval.pipeline.stage import Stage
+from roadeval.pipeline.stages import STAGES
 from roadeval.runtime.files import check_input, put
 from roadeval.training.likeness import SIDE
 
@@ -153,8 +155,16 @@ def save_model(model: Model, path: Path) -> None:
         raise ModelError(f"{path}: cannot write the model: {error.strerror}") from error
 
 
-def load_model(path: Path) -> Model:
+def load_model(path: Path, stages: Iterable[Stage[Any, Any]] = ()) -> Model:
     """Read a model file; it holds data alone, so a file from elsewhere runs no code.
+
+    Parameters
+    ----------
+    path
+        The file.
+    stages
+        Those besides roadeval's own that it may hold parameters of, as
+        ``config.pipelines()["mine"].stages()``. A file loads none by itself.
 
     Raises
     ------
@@ -173,12 +183,12 @@ def load_model(path: Path) -> Model:
             f"{path}: model format {version}, this version reads {VERSION}; train it again"
         )
     try:
-        return _model(header, arrays)
+        return _model(header, arrays, {**STAGES, **{stage.name: stage for stage in stages}})
     except ValueError as error:
         raise ModelError(f"{path}: a damaged model file: {_line(error)}; train it again") from error
 
 
-def kept_model(path: Path) -> Model:
+def kept_model(path: Path, stages: tuple[Stage[Any, Any], ...] = ()) -> Model:
     """Read a model file as `load_model` does, or return the one read before: a fleet has one.
 
     What a stage computes from a model alone is kept with it, as the SVM's table of colours.
@@ -187,12 +197,14 @@ def kept_model(path: Path) -> Model:
         there = path.stat()
     except OSError:
         return load_model(path)  # which says what is wrong
-    return _kept(path, there.st_ino, there.st_size, there.st_mtime_ns)
+    return _kept(path, stages, there.st_ino, there.st_size, there.st_mtime_ns)
 
 
 @lru_cache(maxsize=2)
-def _kept(path: Path, _node: int, _size: int, _time: int) -> Model:
-    return load_model(path)
+def _kept(
+    path: Path, stages: tuple[Stage[Any, Any], ...], _node: int, _size: int, _time: int
+) -> Model:
+    return load_model(path, stages)
 
 
 def _content(path: Path) -> tuple[Any, dict[str, npt.NDArray[Any]]]:
@@ -225,7 +237,11 @@ class _Header:
     warnings: tuple[str, ...]
 
 
-def _model(content: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) -> Model:
+def _model(
+    content: Mapping[str, Any],
+    arrays: Mapping[str, npt.NDArray[Any]],
+    known: Mapping[str, Stage[Any, Any]],
+) -> Model:
     """Return the model of a file; a ValueError if a part is missing, or is not what it must be."""
     names = [entry.name for entry in dataclasses.fields(_Header)]
     given: dict[str, Any] = {name: content.get(name) for name in names}
@@ -240,26 +256,31 @@ def _model(content: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) -
             raise ValueError(f"array {name} belongs to no variant")
         parts[variant].setdefault(stage, {})[entry] = arrays[name]
     parameters = {
-        variant: {stage: _parameters(variant, stage, each) for stage, each in stages.items()}
+        variant: {
+            stage: _parameters(f"{variant}/{stage}", known.get(stage), each)
+            for stage, each in stages.items()
+        }
         for variant, stages in parts.items()
     }
     prior, prints = (arrays.get(name) for name in OWN)
     return Model(parameters, **vars(header), prior=prior, fingerprints=prints)
 
 
-def _parameters(variant: str, stage: str, arrays: Mapping[str, npt.NDArray[Any]]) -> Any:
-    kind = STAGES[stage].parameters if stage in STAGES else None
+def _parameters(
+    where: str, stage: Stage[Any, Any] | None, arrays: Mapping[str, npt.NDArray[Any]]
+) -> Any:
+    kind = None if stage is None else stage.parameters
     if kind is None:
-        raise ValueError(f"{variant}/{stage} is no stage that learns")
+        raise ValueError(f"{where} is no stage that learns")
     names = {entry.name for entry in dataclasses.fields(kind)}
     if names != arrays.keys():
         wrong = ", ".join(sorted(names ^ arrays.keys()))
-        raise ValueError(f"arrays of {variant}/{stage} are missing or unknown: {wrong}")
+        raise ValueError(f"arrays of {where} are missing or unknown: {wrong}")
     values = {name: array if array.ndim else array.item() for name, array in arrays.items()}
     try:
         return kind(**values)
     except ValueError as error:
-        raise ValueError(f"{variant}/{stage}: {error}") from error
+        raise ValueError(f"{where}: {error}") from error
 
 
 def _line(error: ValueError) -> str:

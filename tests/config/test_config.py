@@ -7,7 +7,7 @@ import pytest
 from roadeval.config import PRESETS, ConfigError, RunConfig, Variant, configure, load_config
 from roadeval.config.settings import SECTIONS
 from roadeval.data import RESERVED
-from roadeval.pipeline.chain import STAGES
+from roadeval.pipeline.stages import STAGES
 
 
 def write(folder: Path, text: str) -> Path:

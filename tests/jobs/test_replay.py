@@ -199,7 +199,7 @@ def test_the_same_journey_at_another_rate_is_warned_of(of_five, tmp_path):
 
 def test_a_model_without_fingerprints_is_told_of(of_five, tmp_path, monkeypatch):
     known = replace(roadeval.load_model(of_five), fingerprints=None)
-    monkeypatch.setattr(learning, "kept_model", lambda path: known)
+    monkeypatch.setattr(learning, "kept_model", lambda path, stages: known)
     log = write_log(tmp_path / "again.mcap", tail=b"another byte", numbers=range(4))
     outcome = run(log, tmp_path, model=of_five, record="none")
     assert outcome.summary["frames"]["evaluated"] == 4

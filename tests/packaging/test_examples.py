@@ -6,6 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pandas as pd
+import pytest
+from pypdf import PdfReader
+
+import roadeval
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -26,3 +32,28 @@ def test_the_tour_of_the_api_runs(tmp_path):
     out = tmp_path / "reports" / "api"
     wanted = {"demo.rrd", "frames.csv", "errors.png", "layers.png", "demo.model"}
     assert wanted <= {path.name for path in out.iterdir()}
+
+
+def test_the_example_method_is_installed_and_replayed_by_its_entry_point(tmp_path):
+    pytest.importorskip("setuptools", minversion="77", reason="builds the example")
+    shutil.copytree(ROOT / "examples" / "method", tmp_path / "method")  # a build leaves files
+    _run("-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--no-index",
+         "--target", tmp_path / "site", tmp_path / "method")  # fmt: skip
+    environment = os.environ | {"PYTHONPATH": str(tmp_path / "site")}
+    drive = ROOT / "recordings" / "demo.mcap"
+    _run("-m", "roadeval", "replay", drive, "--variant", f"mine={tmp_path / 'method/smooth.toml'}",
+         "--max-frames", "12", "--save", "out.rrd", "--reports", "reports",
+         cwd=tmp_path, env=environment)  # fmt: skip
+    rows = pd.read_csv(tmp_path / "reports" / "frames.csv").query("variant == 'mine'")
+    assert set(rows.stage) == {"smooth", "post"}
+    assert roadeval.Recording(tmp_path / "out.rrd").layer("mine", "texture", 11).any()
+    _run("-m", "roadeval", "report", "out.rrd", "-o", "report.pdf", cwd=tmp_path)
+    pages = PdfReader(tmp_path / "report.pdf").pages
+    assert any("smooth" in page.extract_text() for page in pages)
+
+
+def _run(*words, **options):
+    done = subprocess.run(
+        [sys.executable, *map(str, words)], capture_output=True, text=True, check=False, **options
+    )
+    assert done.returncode == 0, done.stderr

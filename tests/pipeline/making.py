@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from roadeval.pipeline.chain import STAGES, Pipeline
+from roadeval.pipeline.chain import Pipeline
+from roadeval.pipeline.stages import STAGES
 from roadeval.pipeline.training_set import TrainingSet
 from tests.pipeline.images import noise
 

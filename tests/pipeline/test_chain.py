@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from roadeval.pipeline import beyond, paper
-from roadeval.pipeline.chain import STAGES, Pipeline
+from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import View
+from roadeval.pipeline.stages import STAGES
 from tests.pipeline.images import IMAGES, noise
 from tests.pipeline.making import NAMES, SETTINGS, chain_of
 

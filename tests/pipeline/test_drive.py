@@ -9,8 +9,9 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory as Protobuf
 from mcap_ros2.decoder import DecoderFactory as Ros2
 
-from roadeval.pipeline.chain import STAGES, Pipeline
+from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import TrainingSet, View
+from roadeval.pipeline.stages import STAGES
 from tests.fixtures.shared import shared
 from tests.pipeline import reference
 from tests.pipeline.making import SETTINGS

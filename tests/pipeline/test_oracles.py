@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from roadeval.data.packed import Packed
-from roadeval.pipeline.chain import STAGES
 from roadeval.pipeline.paper import compensation
 from roadeval.pipeline.stage import Output, View
+from roadeval.pipeline.stages import STAGES
 from tests.pipeline.images import noise
 from tests.pipeline.making import NAMES, SETTINGS, chain_of
 

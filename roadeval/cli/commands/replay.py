@@ -35,6 +35,8 @@ def replay(
         console.emit(summary_text(found.summary).rstrip())
     elif not quiet:
         screen.show(found, console.results())
+    for text in found.tracebacks:
+        messages.traceback(text)
     messages.loops_missing()
     for warning in found.warnings:
         messages.warning(warning)

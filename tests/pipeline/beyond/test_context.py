@@ -11,8 +11,9 @@ from roadeval.kernels import KERNELS
 from roadeval.pipeline.beyond import context
 from roadeval.pipeline.beyond.context import ContextSettings
 from roadeval.pipeline.beyond.context_features import at_samples, features
-from roadeval.pipeline.chain import STAGES, Pipeline
+from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import TrainingSet, View
+from roadeval.pipeline.stages import STAGES
 
 PLAIN = ContextSettings(planes=32, spare=0, smoothing=1)
 

@@ -5,9 +5,10 @@ import pytest
 
 from roadeval.pipeline.beyond import exposure
 from roadeval.pipeline.beyond.exposure import ExposureSettings
-from roadeval.pipeline.chain import STAGES, Pipeline
+from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.reference_patch import patch_mask
 from roadeval.pipeline.stage import View
+from roadeval.pipeline.stages import STAGES
 
 
 def scene(road, elsewhere=(10, 200, 90), shape=(40, 60)):

@@ -7,8 +7,9 @@ import pytest
 from roadeval.pipeline.beyond import gated, road_light
 from roadeval.pipeline.beyond.road_light import RoadLight
 from roadeval.pipeline.beyond.shadow_gates import VERDICTS, GatedSettings, components, judge, look
-from roadeval.pipeline.chain import STAGES, Pipeline
+from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import TrainingSet, View
+from roadeval.pipeline.stages import STAGES
 
 HEIGHT, WIDTH = 120, 160
 ROAD = np.array([120, 120, 120])

@@ -1,0 +1,90 @@
+"""A method of one's own in a run: tables, frames that it loses, models, and recordings."""
+
+from importlib import import_module
+
+import pandas as pd
+import pytest
+
+import roadeval
+from roadeval.cli.app import main
+from tests.jobs.making import settings, write_log
+
+
+def somebodys(name):
+    return {"chain": [f"tests.pipeline.somebody:{name}", "post"]}
+
+
+@pytest.fixture(autouse=True)
+def _no_figures(monkeypatch):
+    monkeypatch.setattr(import_module("roadeval.jobs.replay"), "write_figures", lambda *given: [])
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    return write_log(tmp_path_factory.mktemp("log") / "drive.mcap")
+
+
+def run(drive, to, **values):
+    return roadeval.replay(drive, settings(**values), save=to / "o.rrd", reports=to / "reports")
+
+
+def test_it_stands_in_tables_and_recording(drive, tmp_path):
+    run(drive, tmp_path, variants={"mine": somebodys("LEARNS")})
+    rows = pd.read_csv(tmp_path / "reports" / "frames.csv").query("variant == 'mine'")
+    assert set(rows.stage) == {"bright", "post"}
+    assert rows.ERR.max() < 0.05
+    assert roadeval.Recording(tmp_path / "o.rrd").layer("mine", "level", 15).shape
+
+
+def test_a_frame_on_which_it_fails_is_lost_and_the_rest_is_scored(drive, tmp_path):
+    outcome = run(drive, tmp_path, variants={"mine": somebodys("fails_on_13")})
+    assert outcome.losses == ("frame 13: stage fails_on_13 failed: ZeroDivisionError: no road",)
+    frames = outcome.summary["frames"]
+    assert frames["evaluated"] == 14
+    assert frames["skipped"]["failed in a stage"] == 1
+    assert frames["evaluated"] + sum(frames["skipped"].values()) == frames["in_log"]
+    assert len(outcome.tracebacks) == 1
+    assert "somebody.py" in outcome.tracebacks[0]
+
+
+def test_where_it_fails_on_every_frame_nothing_is_scored(drive, tmp_path):
+    outcome = run(drive, tmp_path, variants={"mine": somebodys("always_fails")})
+    assert outcome.summary["frames"]["evaluated"] == 0
+    assert len(outcome.losses) == 26
+    assert len(outcome.tracebacks) == 1
+
+
+def test_one_that_cannot_learn_is_named(drive, tmp_path):
+    with pytest.raises(roadeval.RoadevalError, match="stage unfit cannot learn: ValueError"):
+        run(drive, tmp_path, variants={"mine": somebodys("UNFIT")})
+
+
+def test_what_it_learns_stands_in_a_model_file(drive, tmp_path):
+    path, variants = tmp_path / "m.model", {"mine": somebodys("LEARNS")}
+    config = settings(variants=variants, train_frames=4)
+    model = roadeval.train([drive], path, config)
+    outcome = run(drive, tmp_path, variants=variants, model=path)
+    assert outcome.summary["totals"]["mine"]["post"]["ERR"] < 0.05
+    with pytest.raises(roadeval.RoadevalError, match="mine/bright is no stage that learns"):
+        roadeval.load_model(path)  # a file by itself loads nobody's code
+    own = config.pipelines()["mine"].stages()
+    assert roadeval.load_model(path, own).parameters["mine"] == model.parameters["mine"]
+
+
+def test_a_recording_loads_no_code(drive, tmp_path):
+    run(drive, tmp_path, variants={"mine": somebodys("lower_half")})
+    with pytest.raises(roadeval.RoadevalError, match="which no recording may load"):
+        roadeval.load_config(tmp_path / "o.rrd")
+    again = roadeval.load_config(tmp_path / "reports" / "run.toml")
+    assert "mine" in again.pipelines()
+
+
+@pytest.mark.parametrize("debug", ["0", "1"])
+def test_its_traceback_is_shown_where_it_is_asked_for(debug, drive, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("ROADEVAL_DEBUG", debug)
+    (tmp_path / "mine.toml").write_text('chain = ["tests.pipeline.somebody:fails_on_13", "post"]\n')
+    words = ("--variant", f"mine={tmp_path / 'mine.toml'}", "--reports", tmp_path / "reports")
+    assert main(["replay", str(drive), "-q", "--record", "none", *map(str, words)]) == 3
+    said = capsys.readouterr().err
+    assert "roadeval: lost: frame 13: stage fails_on_13 failed" in said
+    assert ("Traceback" in said) == (debug == "1")

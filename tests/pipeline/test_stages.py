@@ -1,0 +1,115 @@
+"""Stages of somebody else: found by their names, and guarded."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from roadeval.config import ConfigError, configure
+from roadeval.data import Moment
+from roadeval.pipeline.chain import Pipeline
+from roadeval.pipeline.stage import StageError, View
+from roadeval.pipeline.stages import UnknownStageError, names, stages_of
+from tests.pipeline.images import noise
+
+IMAGE = noise(8, 6)
+
+
+def somebodys(name: str) -> str:
+    return f"tests.pipeline.somebody:{name}"
+
+
+def output_of(name, moment=None, **settings):
+    (stage,) = stages_of([somebodys(name)])
+    return stage.bind(stage.settings(**settings), None)(View.of(IMAGE, moment))
+
+
+@pytest.mark.parametrize("name", ["lower_half", "an_object"])
+def test_a_function_is_a_stage(name):
+    mask = output_of(name).mask.pixels()
+    assert mask.tolist() == [[0] * 6] * 4 + [[1] * 6] * 4
+
+
+def test_a_functions_settings_are_those_of_its_default():
+    assert output_of("below").mask.area() == 6 * 6
+    assert output_of("below", top=0.5).mask.area() == 4 * 6
+
+
+def test_floats_are_probabilities():
+    found = output_of("gradual")
+    assert found.probability[:, 0].tolist() == [round(65535 * row / 7) for row in range(8)]
+    assert np.array_equal(found.mask.pixels(), found.probability > 32768)
+
+
+def test_a_function_can_ask_for_the_moment():
+    assert output_of("fails_on_13", Moment(12, 0)).mask.area() == 24
+    with pytest.raises(StageError, match="stage fails_on_13 failed: ZeroDivisionError: no road"):
+        output_of("fails_on_13", Moment(13, 0))
+
+
+def test_an_error_names_the_stage_and_keeps_its_cause():
+    with pytest.raises(StageError, match="stage always_fails failed: KeyError") as caught:
+        output_of("always_fails")
+    assert isinstance(caught.value.__cause__, KeyError)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("wrong_size", r"its mask is \(2, 2\)"), ("LAYERS", "a layer 'level' that it does not")],
+)
+def test_an_output_that_cannot_be_is_an_error(name, said):
+    with pytest.raises(StageError, match=said):
+        output_of(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        (somebodys("nothing"), "has no attribute 'nothing'"),
+        (somebodys("wrong_argument"), "its argument frame is none of image, moment, settings"),
+        (somebodys("Callable"), "neither a Stage nor a function"),
+        (somebodys("TAKEN"), "'svm' is that of a stage of roadeval"),
+        (somebodys("UNNAMEABLE"), "must be of letters, digits"),
+        ("no_such_module:road", "there is no module no_such_module: install it"),
+        ("pickle:loads", "its argument data is none of image"),
+        ("blur", "there is no stage 'blur'; choose"),
+        (":", "cannot be used"),
+    ],
+)
+def test_what_is_no_stage_is_named_with_the_reason(name, said):
+    with pytest.raises(UnknownStageError, match=said):
+        stages_of([name])
+    with pytest.raises(ConfigError, match=said):
+        configure({"chain": [name, "post"]})
+
+
+def test_its_settings_stand_in_a_table_of_its_own_name():
+    config = configure({"chain": [somebodys("below"), "post"], "below": {"top": 0.75}})
+    assert config.pipeline.settings["below"].top == 0.75
+    assert configure(config.as_dict()) == config
+    with pytest.raises(ConfigError, match=r"`below\.tip`: there is no such setting; choose top"):
+        configure({"chain": [somebodys("below"), "post"], "below": {"tip": 1}})
+    with pytest.raises(ConfigError, match=r"`below\.top`: must be a number"):
+        configure({"chain": [somebodys("below"), "post"], "below": {"top": "high"}})
+
+
+def test_two_layers_of_one_name_are_refused():
+    chain = [somebodys("LEARNS"), somebodys("LAYERS"), "post"]
+    with pytest.raises(ConfigError, match="two layers are called bright"):
+        configure({"chain": chain})
+
+
+def test_a_configuration_with_it_travels_to_another_process():
+    config = configure({"chain": [somebodys("below"), "post"], "below": {"top": 0.75}})
+    assert pickle.loads(pickle.dumps(config)) == config
+
+
+def test_without_installed_packages_only_our_own_have_names():
+    assert "similarity" in names()
+    assert not [name for name in names() if ":" in name]
+
+
+def test_a_pipeline_keeps_the_names_of_its_chain():
+    pipeline = Pipeline.default(("shadow", somebodys("lower_half"), "post"))
+    assert pipeline.without_filter().chain == (somebodys("lower_half"), "post")
+    assert pipeline.masks() == ("lower_half", "post")
