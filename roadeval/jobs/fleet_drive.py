@@ -202,13 +202,13 @@ def _begun(task: DriveTask) -> int:
         return 0
 
 
-def _is_full(error: BaseException | None) -> bool:
-    """Whether it is the fleet's disk that fails, which would fail every drive."""
+def _full(error: BaseException | None) -> str | None:
+    """Return why the fleet's disk fails, which would fail every drive; None if it does not."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in _FULL:
-            return True
+            return error.strerror
         error = error.__cause__
-    return False
+    return None
 
 
 @contextmanager
@@ -234,8 +234,11 @@ def _made(task: DriveTask) -> Record:
     try:
         return _replayed(task)
     except Exception as error:
-        if _is_full(error):
-            raise FleetError(" ".join(str(error).split())) from error
+        if reason := _full(error):
+            raise FleetError(
+                f"{task.folder}: cannot be written: {reason}; what is done is kept, and the same "
+                "command again does the rest"
+            ) from error
         known = isinstance(error, RoadevalError) or memory.is_lacking(error)
         said = memory.LACKING if memory.is_lacking(error) else " ".join(str(error).split())
         reason = said if known else f"{type(error).__name__}: {said} (a defect of roadeval)"

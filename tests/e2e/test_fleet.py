@@ -266,6 +266,25 @@ def test_a_folder_without_drives_is_one_line(tmp_path, capsys):
     assert not (tmp_path / "f").exists()
 
 
+def test_a_full_disk_ends_the_run_and_what_was_done_before_stays(
+    drives, ran, tmp_path, monkeypatch
+):
+    folder = copied(ran, tmp_path)
+    drive = next(d["drive"] for d in ran.summary["drives"] if d["name"] == "a")
+    shutil.rmtree(folder / "results" / drive)
+
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as on_a_full_disk:
+        on_a_full_disk.setattr("roadeval.results.folder.ResultsWriter.append", fail)
+        with pytest.raises(RoadevalError, match=r"f: cannot be written: No space left on device; "):
+            run(drives, folder)
+    _, submitted = run(drives, folder, keep="worst:1")
+    assert submitted == ["a"]
+    assert tables(folder) == tables(ran.folder)
+
+
 def test_a_damaged_record_is_made_again(drives, ran, tmp_path):
     folder = copied(ran, tmp_path)
     drive = next(d["drive"] for d in ran.summary["drives"] if d["name"] == "a")
