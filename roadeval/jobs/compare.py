@@ -20,6 +20,7 @@ from roadeval.evaluation.conditions import Condition, Judgement, judge
 from roadeval.evaluation.settings import settings_of
 from roadeval.evaluation.windows import Window
 from roadeval.jobs.result import Result
+from roadeval.report.blocks import Document
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.comparison import as_dict, judged
 from roadeval.results.lines import window_rows
@@ -36,6 +37,10 @@ ASKED: Final = {
     "frames": ("every", "scale"),
 }
 """Settings that change a frame's numbers, or which frames are seen."""
+Inspect = Callable[[Path, int], str]
+"""Returns the command that opens a frame of a recording."""
+Writer = Callable[["Compared", Paper, Inspect | None], bytes]
+"""Returns a comparison as the content of a file."""
 ROWS: Final = 60
 """Points of the figure over the drive, at most."""
 
@@ -52,11 +57,14 @@ class Compared:
         Of the conditions, see `roadeval.evaluation.conditions.judge`.
     sides
         The results.
+    recordings
+        By the results' labels; a results folder has none.
     """
 
     comparison: Comparison
     judgements: tuple[Judgement, ...]
     sides: tuple[Side, ...]
+    recordings: Mapping[str, Path]
 
     @property
     def windows(self) -> pd.DataFrame:
@@ -127,21 +135,40 @@ def compare(
     cut = [EndMissing(name) for name, each in zip(names, opened, strict=True) if not each.complete]
     found = replace(found, notes=(*cut, *found.notes))
     judgements = judge(found, conditions, settings)
-    return Compared(found, judgements, tuple(sides))
+    held = opened * len(sides) if across else opened
+    recordings = {
+        side.label: result.path
+        for side, result in zip(sides, held, strict=True)
+        if result.recording is not None
+    }
+    return Compared(found, judgements, tuple(sides), recordings)
 
 
-def write(compared: Compared, path: Path, *, paper: Paper = Paper.A4) -> Path:
+def write(
+    compared: Compared, path: Path, *, paper: Paper = Paper.A4, inspect: Inspect | None = None
+) -> Path:
     """Write a comparison as PDF, page, Markdown or JSON, by the file's ending.
+
+    Parameters
+    ----------
+    compared
+        The comparison.
+    path
+        The file.
+    paper
+        Of a PDF.
+    inspect
+        Returns the command that opens a frame of a recording, for the reader to type.
 
     Raises
     ------
     RoadevalError
         If the ending is another, or the file cannot be written.
     """
-    return write_file(path, writer(path)(compared, paper))
+    return write_file(path, writer(path)(compared, paper, inspect))
 
 
-def writer(path: Path) -> Callable[[Compared, Paper], bytes]:
+def writer(path: Path) -> Writer:
     """Choose what writes a file by its ending.
 
     Raises
@@ -149,31 +176,49 @@ def writer(path: Path) -> Callable[[Compared, Paper], bytes]:
     RoadevalError
         If nothing does.
     """
-    known: dict[str, Callable[[Compared, Paper], bytes]] = {
+    known: dict[str, Writer] = {
         ".pdf": _pdf,
         ".html": _page,
         ".md": _markdown,
-        ".json": lambda compared, _: as_json(compared).encode(),
+        ".json": lambda compared, *_: as_json(compared).encode(),
     }
     if path.suffix.lower() not in known:
         raise RoadevalError(f"{path}: a comparison is written as {', '.join(known)}")
     return known[path.suffix.lower()]
 
 
-def _pdf(compared: Compared, paper: Paper) -> bytes:
-    from roadeval.report.comparison import document
-
-    return pdf(document(compared.comparison, compared.judgements, compared.windows), paper)
+def _pdf(compared: Compared, paper: Paper, inspect: Inspect | None) -> bytes:
+    return pdf(_document(compared, inspect), paper)
 
 
-def _page(compared: Compared, _: Paper) -> bytes:
-    from roadeval.report.comparison import document
+def _page(compared: Compared, _: Paper, inspect: Inspect | None) -> bytes:
+    from roadeval.jobs.page_comparison import browsed
     from roadeval.report.page.render import page
+    from roadeval.report.sections import browse
 
-    return page(document(compared.comparison, compared.judgements, compared.windows))
+    made = _document(compared, inspect)
+    if not compared.comparison.same_drive:
+        return page(made)
+    frames = browsed(compared.comparison, compared.sides, compared.recordings, inspect)
+    return page(replace(made, blocks=[*made.blocks, *browse.section(frames)]))
 
 
-def _markdown(compared: Compared, _: Paper) -> bytes:
+def _document(compared: Compared, inspect: Inspect | None) -> Document:
+    from roadeval.report.comparison import document
+
+    def command(result: str, frame: int) -> str:
+        path = compared.recordings.get(result)
+        return inspect(path, frame) if inspect and path else ""
+
+    return document(
+        compared.comparison,
+        compared.judgements,
+        compared.windows,
+        command if inspect and compared.recordings else None,
+    )
+
+
+def _markdown(compared: Compared, *_: object) -> bytes:
     from roadeval.report.comparison import markdown
 
     return markdown(compared.comparison, compared.judgements).encode()

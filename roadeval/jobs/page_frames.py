@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 PICTURED: Final = 24
 """Frames with pictures, where nobody says how many."""
-BYTES: Final = 5_500_000
-"""Of their pictures, at most, where nobody says how many: a page of them stays below 10 MB."""
+BYTES: Final = 9_900_000
+"""Of a page, at most, where nobody says how many frames have pictures."""
 SHADOW: Final = 1 / 3
 """A frame with much shadow is among this share of the drive's."""
 
@@ -117,7 +117,10 @@ def _much_shadow(result: Result) -> set[int]:
 
 
 def strips_of(
-    result: Result, inspect: Callable[[int], str] | None, count: int | None = None
+    result: Result,
+    inspect: Callable[[int], str] | None,
+    count: int | None = None,
+    taken: int = 0,
 ) -> list[Strip]:
     """Return frames with their pictures, in the drive's order: the worst, the best, and others.
 
@@ -128,16 +131,19 @@ def strips_of(
     inspect
         Returns the command that opens a frame.
     count
-        How many. By default as many of `PICTURED` as stay below `BYTES`.
+        How many. By default as many of `PICTURED` as keep the page below `BYTES`.
+    taken
+        Bytes of the page without them.
     """
     if result.recording is None:
         return []
     shown: list[Strip] = []
-    room, camera = float(BYTES), StripMaker(result, inspect)
+    room, maker = BYTES - taken, StripMaker(result, inspect)
     for frame in _chosen(result, PICTURED if count is None else count):
-        made = camera.strip(frame)
-        room -= sum(len(image.content) for image in made.images())
-        if count is None and room < 0 and shown:
+        made = maker.strip(frame)
+        # As text, and with the words around each.
+        room -= sum(len(image.content) * 4 // 3 + 400 for image in made.images())
+        if count is None and room < 0:
             break
         shown.append(made)
     return sorted(shown, key=lambda each: each.frame)

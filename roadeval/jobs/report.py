@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -12,11 +12,12 @@ from roadeval.jobs.report_findings import collect
 from roadeval.jobs.report_fleet import collect_fleet
 from roadeval.jobs.result import Result
 from roadeval.report.blocks import Document
-from roadeval.report.drive import document, page_document
+from roadeval.report.drive import document, page_document, with_frames
 from roadeval.report.findings import Commands
 from roadeval.report.fleet.document import document as fleet_document
 from roadeval.report.fleet.document import page_document as fleet_page_document
 from roadeval.report.page.files import Beside, write_page
+from roadeval.report.page.render import page
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.fleet.folder import Fleet, is_fleet
 
@@ -48,7 +49,7 @@ def write_report(
     *,
     paper: Paper = Paper.A4,
     commands: Commands | None = None,
-    page: PageSettings = PageSettings(),
+    as_page: PageSettings = PageSettings(),
 ) -> Path:
     """Write the report of one drive, or of a fleet, as a PDF or as a page for a browser.
 
@@ -64,7 +65,7 @@ def write_report(
         A4 or Letter.
     commands
         What the reader may type for more; none by default.
-    page
+    as_page
         What a page is made like.
 
     Returns
@@ -78,15 +79,15 @@ def write_report(
         If there is nothing to read there, or the file cannot be written.
     """
     if not isinstance(result, Result) and is_fleet(result):
-        return _write_fleet(Fleet(result), output, paper, commands, page)
+        return _write_fleet(Fleet(result), output, paper, commands, as_page)
     opened = result if isinstance(result, Result) else Result(result)
     beside = opened.path / "report.pdf"
     usual = beside if opened.recording is None else Path("reports", f"{opened.path.stem}.pdf")
     path = Path(output or usual)
     with holding(path, inputs=[opened.path]):
         if is_page(path):
-            kept = Beside.ALL if page.assets else Beside.NOTHING
-            return write_page(path, drive_page(opened, commands, page.pictures), kept)
+            kept = Beside.ALL if as_page.assets else Beside.NOTHING
+            return write_page(path, drive_page(opened, commands, as_page.pictures), kept)
         return write_file(path, pdf(document(collect(opened, commands)), paper))
 
 
@@ -110,8 +111,11 @@ def drive_page(
         Frames with pictures, see `roadeval.jobs.page_frames.strips_of`.
     """
     inspect = commands.inspect if commands else None
-    strips = strips_of(opened, inspect, pictures)
-    return page_document(collect(opened, commands), browsed(opened, inspect, strips))
+    findings, frames = collect(opened, commands), browsed(opened, inspect)
+    without = page_document(findings, frames)
+    taken = len(page(without)) if pictures is None else 0
+    strips = strips_of(opened, inspect, pictures, taken)
+    return with_frames(without, replace(frames, strips=strips))
 
 
 def _write_fleet(
@@ -119,13 +123,13 @@ def _write_fleet(
     output: str | Path | None,
     paper: Paper,
     commands: Commands | None,
-    page: PageSettings,
+    as_page: PageSettings,
 ) -> Path:
     path = Path(output or fleet.path / "report.pdf")
     with holding(path, inputs=[fleet.path]):
         inspect = commands.inspect if commands else None
         if is_page(path):
-            found = collect_fleet(fleet, inspect, page.pictures or PICTURED)
-            kept = Beside.ALL if page.assets else Beside.PICTURES
+            found = collect_fleet(fleet, inspect, as_page.pictures or PICTURED)
+            kept = Beside.ALL if as_page.assets else Beside.PICTURES
             return write_page(path, fleet_page_document(found), kept)
         return write_file(path, pdf(fleet_document(collect_fleet(fleet, inspect)), paper))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
@@ -27,12 +27,17 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Rows = Sequence[MaskComparison] | Sequence[MovedFrame]
+Inspect = Callable[[str, int], str]
+_COMMAND: Final = ("in the viewer",)
 OTHERS: Final = tuple(name for name in SHORT if name != "ERR")
 """The rates of short tables without ERR, which has columns of its own."""
 
 
 def document(
-    comparison: Comparison, judgements: Sequence[Judgement], windows: pd.DataFrame
+    comparison: Comparison,
+    judgements: Sequence[Judgement],
+    windows: pd.DataFrame,
+    inspect: Inspect | None = None,
 ) -> Document:
     """Return a comparison as a document.
 
@@ -44,6 +49,8 @@ def document(
         Of the limits that were set.
     windows
         The rows over the drive, with each result as a variant; may be empty.
+    inspect
+        Returns the command that opens a frame of a result, by its label; None: no commands.
     """
     labels = [each.label for each in comparison.results]
     return Document(
@@ -53,7 +60,7 @@ def document(
             f"{each.label}: {each.frames} frames of {each.drive}" for each in comparison.results
         ),
         footer=f"comparison of {listing(labels)}",
-        blocks=list(_blocks(comparison, judgements, windows)),
+        blocks=list(_blocks(comparison, judgements, windows, inspect)),
         keywords=["road recognition", "comparison"],
     )
 
@@ -75,7 +82,10 @@ def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
 
 
 def _blocks(
-    comparison: Comparison, judgements: Sequence[Judgement], windows: pd.DataFrame
+    comparison: Comparison,
+    judgements: Sequence[Judgement],
+    windows: pd.DataFrame,
+    inspect: Inspect | None,
 ) -> Iterator[Block]:
     yield Heading("What changed")
     yield Text(verdict(comparison), "verdict")
@@ -102,7 +112,7 @@ def _blocks(
         yield Figure(svg(lambda: levels(finals)), "Rates of the final masks.", charts=charts)
     if comparison.moved:
         yield Heading("Frames that changed most", 2)
-        yield _moved_table(comparison)
+        yield _moved_table(comparison, inspect)
 
 
 def _legend(comparison: Comparison) -> Iterator[str]:
@@ -180,12 +190,12 @@ def _levels_table(rows: Sequence[MaskComparison]) -> Table:
     )
 
 
-def _moved_table(comparison: Comparison) -> Table:
-    """Tabulate the frames whose error rate changed most."""
+def _moved_table(comparison: Comparison, inspect: Inspect | None = None) -> Table:
+    """Tabulate the frames whose error rate changed most, with what opens each of the new result."""
     rows = comparison.moved
     names = _naming_columns(rows)
     return Table(
-        [*names, "frame", "stamp", "ERR base", "new", "difference"],
+        [*names, "frame", "stamp", "ERR base", "new", "difference", *_COMMAND[: bool(inspect)]],
         [
             [
                 *_named(row, names),
@@ -194,10 +204,11 @@ def _moved_table(comparison: Comparison) -> Table:
                 percent(row.base),
                 percent(row.new),
                 Cell(points(row.change), bold=True),
+                *([inspect(row.result, row.frame)] if inspect else []),
             ]
             for row in rows
         ],
-        text_columns=[*range(len(names)), len(names) + 1],
+        text_columns=[*range(len(names)), len(names) + 1, len(names) + 5],
         breaks=_breaks(rows),
         small=True,
     )

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from roadeval.report.blocks import Block, Document
+from roadeval.report.browse import FrameBrowser
 from roadeval.report.findings import Findings
 from roadeval.report.sections import (
     browse,
@@ -34,6 +36,13 @@ def page_document(findings: Findings, browsed: BrowsedFrames) -> Document:
     for part in (*(scored if findings.totals else (masks,)), provenance):
         blocks += part.section(findings)
     return _document(findings, blocks)
+
+
+def with_frames(page: Document, browsed: BrowsedFrames) -> Document:
+    """Return a page of one drive with another browser of frames; nothing is drawn again."""
+    own = iter(block for block in browse.section(browsed) if isinstance(block, FrameBrowser))
+    blocks = [next(own) if isinstance(each, FrameBrowser) else each for each in page.blocks]
+    return replace(page, blocks=blocks)
 
 
 def _document(findings: Findings, blocks: Sequence[Block]) -> Document:

@@ -21,7 +21,8 @@ from tests.jobs.making import NS
 from tests.training.making import frame
 
 ESCAPES = "\x1b[2J\x1b]0;owned\x07\r\nroadeval: error: fake\x9b31m\N{RIGHT-TO-LEFT OVERRIDE}"
-MARKUP = '$x_{1$ #panic() [red]b[/] **c** `d.e` =cmd() <b> | "\\u0041" @team ../../f'
+SCRIPT = "<script>alert(1)</script>"
+MARKUP = f'$x_{{1$ #panic() [red]b[/] **c** `d.e` =cmd() <b> | "\\u0041" @team ../../f {SCRIPT}'
 CAMERA = f"/cam {ESCAPES}{MARKUP}{'y' * 10_000}"
 TRUTH = f"/truth/road {ESCAPES}{MARKUP}"
 MASKS = f"/net/road_mask {ESCAPES}"
@@ -58,9 +59,10 @@ def told(folder):
         "inspect": ("inspect", f"recordings/{name}.rrd", "--list"),
         "inspect --json": ("inspect", f"reports/{name}", "--list", "--json"),
         "report": ("report", f"reports/{name}"),
+        "page": ("report", f"recordings/{name}.rrd", "-o", "page.html"),
         "compare": (
             *("compare", f"recordings/{name}.rrd", f"reports/{name}"),
-            *("-o", "two.md", "-o", "two.pdf", "-o", "two.json"),
+            *("-o", "two.md", "-o", "two.pdf", "-o", "two.json", "-o", "two.html"),
         ),
         "config": ("config", *topics),
         "config of a run": ("config", "--config", f"reports/{name}/run.toml"),
@@ -94,6 +96,7 @@ def test_the_results_are_files_of_visible_text_in_the_folders_they_belong_to(tol
     made = [path.relative_to(folder) for path in folder.rglob("*")]
     assert {path.parts[0] for path in made} == {
         *("recordings", "reports", f"{DRIVE}.mcap", "two.md", "two.pdf", "two.json"),
+        *("page.html", "two.html"),
     }
     texts = [path for path in made if path.suffix in (".csv", ".json", ".toml", ".md")]
     assert len(texts) >= 8
@@ -136,3 +139,15 @@ def test_a_variant_cannot_have_such_a_name(name, tmp_path):
     assert done.returncode == 2
     assert "a name is made of letters" in done.stderr
     assert len(done.stderr) < 400
+
+
+def test_a_page_shows_them_as_text(folder, told, watched):
+    for name in ("page.html", "two.html"):
+        seen = watched((folder / name).as_uri())
+        assert not re.search(r"[\x00-\x09\x0b-\x1f\x9b\u202e]", (folder / name).read_text())
+        assert seen.tab.locator("script").count() == 1
+        assert seen.tab.locator("main img[src=x], main a[href^=javascript]").count() == 0
+        assert seen.complaints == []
+    tab = watched((folder / "page.html").as_uri()).tab
+    assert tab.locator("h1").inner_text() == visible(DRIVE)
+    assert SCRIPT in tab.locator("main").inner_text()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from roadeval.cli import arguments, console, messages
+from roadeval.cli.commands.report import inspect_command
 from roadeval.cli.exit_codes import ExitCode
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ def _results(
 
     compared = comparing.compare(results, variants=variants, fail_if=conditions)
     for path in outputs:
-        comparing.write(compared, path, paper=paper)
+        comparing.write(compared, path, paper=paper, inspect=inspect_command)
     return _Shown(compared.content, compared.held, lambda: comparing.as_json(compared), screen.show)
 
 

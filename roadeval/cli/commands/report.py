@@ -72,10 +72,10 @@ def report(
     warnings: Sequence[str] = ()
     if is_fleet(result):
         told = commands_of(result)
-        path = write_report(result, output, paper=size, commands=told, page=page)
+        path = write_report(result, output, paper=size, commands=told, as_page=page)
     else:
         read = Result(result)
-        path = write_report(read, output, paper=size, commands=commands_of(read), page=page)
+        path = write_report(read, output, paper=size, commands=commands_of(read), as_page=page)
         warnings = read.warnings
     if not quiet:
         console.emit(str(path))
@@ -89,15 +89,20 @@ def commands_of(result: Result | Path) -> Commands:
     return _of_fleet(result) if isinstance(result, Path) else _of_drive(result)
 
 
+def inspect_command(path: Path, frame: int) -> str:
+    """Return the command that opens a frame of a recording in the viewer."""
+    return shlex.join(["roadeval", "inspect", str(path), "--frame", str(frame)])
+
+
 def _of_drive(result: Result) -> Commands:
     from roadeval.report.findings import Commands
 
-    path, config = str(result.path), result.configuration
+    config = result.configuration
     return Commands(
         again=None
         if config is None
         else lambda log: shlex.join(["roadeval", "replay", log, "--config", str(config)]),
-        inspect=lambda frame: shlex.join(["roadeval", "inspect", path, "--frame", str(frame)]),
+        inspect=lambda frame: inspect_command(result.path, frame),
     )
 
 

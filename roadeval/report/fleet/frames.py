@@ -46,7 +46,7 @@ def commands_table(findings: FleetFindings, inspect: Callable[[int], str]) -> Ta
             ]
             for frame in findings.worst
         ],
-        text_columns=(1, 4),
+        text_columns=(0, 1, 4),
         small=True,
     )
 

@@ -80,6 +80,27 @@ def test_headings_are_the_outline_and_the_table_of_contents():
     assert "1 / 2" in contents.extract_text()
 
 
+def test_who_listens_to_a_document_is_told_what_each_part_is_and_what_pictures_show():
+    table = Table(["variant", "ERR"], [["filtered", "1.00"]], caption="Rates")
+    made = reader(pdf(a_document(Heading("One"), table, Figure(a_png(), "What it shows"))))
+    root = made.trailer["/Root"]
+    assert root["/MarkInfo"]["/Marked"]
+    assert root["/Lang"] == "en"
+    kinds = list(parts(root["/StructTreeRoot"]))
+    assert {"/H1", "/Table", "/TH", "/TD", "/Figure"} <= {kind for kind, _ in kinds}
+    assert ("/Figure", "What it shows") in kinds
+
+
+def parts(element):
+    """The parts of a document's structure: what each is, and the words for a picture."""
+    element = element.get_object()
+    yield element.get("/S"), element.get("/Alt")
+    inner = element.get("/K", [])
+    for each in inner if isinstance(inner, list) else [inner]:
+        if hasattr(each.get_object(), "keys") and "/S" in each.get_object():
+            yield from parts(each)
+
+
 @pytest.mark.parametrize(("paper", "width"), [(Paper.A4, 595), (Paper.LETTER, 612)])
 def test_paper_has_its_size(paper, width):
     (page,) = reader(pdf(a_document(Text("x")), paper)).pages

@@ -1,0 +1,163 @@
+"""The frames of compared results on a page: what each result makes of them, beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from roadeval.data import BASELINE, ERRORS, TRUTH
+from roadeval.evaluation.comparison import Side
+from roadeval.evaluation.comparison_result import Comparison
+from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.scored import final_stages
+from roadeval.jobs.page_frames import PICTURED
+from roadeval.jobs.report_frames import str_keys
+from roadeval.jobs.result import Result
+from roadeval.recording import Recording
+from roadeval.report.browse import Strip
+from roadeval.report.figures.values import over_frames
+from roadeval.report.findings import NotableFrame
+from roadeval.report.images import LayerImage
+from roadeval.report.sections.browse import BrowsedFrames, FrameFacts, strip
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Inspect = Callable[[Path, int], str]
+"""Returns the command that opens a frame of a recording."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Mask:
+    """A final mask that is compared: of which result and variant, and what the page calls it."""
+
+    name: str
+    result: str
+    variant: str
+
+
+def browsed(
+    comparison: Comparison,
+    sides: Sequence[Side],
+    recordings: Mapping[str, Path],
+    inspect: Inspect | None,
+) -> BrowsedFrames:
+    """Collect the frames that all results have, the base's mask and the new ones' side by side.
+
+    Parameters
+    ----------
+    comparison
+        Of one drive.
+    sides
+        The results.
+    recordings
+        By the results' labels, where there are any.
+    inspect
+        Returns the command that opens a frame.
+    """
+    masks = list(_masks(sides))
+    table = _table(masks, {side.label: side for side in sides})
+    facts = list(_facts(table, masks, comparison.settings.noteworthy))
+    album = _Album(masks, recordings, facts, inspect)
+    wanted = dict.fromkeys(moved.frame for moved in comparison.moved)
+    strips = [made for frame in [*wanted][:PICTURED] if (made := album.strip(frame))]
+    return BrowsedFrames(
+        frames=facts,
+        variants=[mask.name for mask in masks],
+        pictured=frozenset(each.frame for each in strips),
+        strips=sorted(strips, key=lambda each: each.frame),
+        charts=over_frames(table, [*SHORT]),
+        inspect=album.command if inspect and album.newest else None,
+    )
+
+
+def _masks(sides: Sequence[Side]) -> Iterator[_Mask]:
+    """Yield the final masks that all results have, one result after the other for each variant."""
+    if all(side.frames.distinct("variant") == [side.label] for side in sides):
+        yield from (_Mask(side.label, side.label, side.label) for side in sides)
+        return
+    for variant in sides[0].frames.distinct("variant"):
+        if variant != BASELINE and all(variant in s.frames.distinct("variant") for s in sides):
+            yield from (_Mask(f"{s.label}: {variant}", s.label, variant) for s in sides)
+
+
+def _table(masks: Sequence[_Mask], sides: Mapping[str, Side]) -> pd.DataFrame:
+    """Return the rows of the masks on the frames that all have, each under its name as variant."""
+    import pandas as pd
+
+    parts = []
+    for mask in masks:
+        rows = sides[mask.result].frames.of_variant(mask.variant)
+        rows = rows.take(rows["stage"] == final_stages(rows)[mask.variant])
+        known = {name: rows[name] for name in ("frame", "stamp_ns", *SHORT) if name in rows.columns}
+        parts.append(pd.DataFrame(known).assign(variant=mask.name, stage="final"))
+    whole = pd.concat(parts)
+    common = whole.groupby("frame")["variant"].nunique() == len(masks)
+    return whole[whole["frame"].isin(common.index[common])].sort_values("frame", kind="stable")
+
+
+def _facts(table: pd.DataFrame, masks: Sequence[_Mask], noteworthy: float) -> Iterator[FrameFacts]:
+    """Yield each frame with the masks' rates, and whether the first of them got worse or better."""
+    base, new = masks[0].name, masks[1].name
+    for number, own in table.groupby("frame"):
+        rates = {
+            str(row["variant"]): {name: float(row[name]) for name in SHORT if name in row}
+            for row in map(str_keys, own.to_dict("records"))
+        }
+        change = rates[new]["ERR"] - rates[base]["ERR"]
+        said = [f"{new} {'worse' if change > 0 else 'better'}"] if abs(change) >= noteworthy else []
+        yield FrameFacts(int(str(number)), int(own["stamp_ns"].iloc[0]), rates, said)
+
+
+class _Album:
+    """The pictures of frames as every result has them."""
+
+    def __init__(
+        self,
+        masks: Sequence[_Mask],
+        recordings: Mapping[str, Path],
+        facts: Sequence[FrameFacts],
+        inspect: Inspect | None,
+    ) -> None:
+        self._masks: Final = [mask for mask in masks if mask.result in recordings]
+        self._paths: Final = recordings
+        self._facts: Final = {each.frame: each for each in facts}
+        self._inspect: Final = inspect
+        opened = {path: Result(path) for path in dict.fromkeys(recordings.values())}
+        self._opened: Final = {label: opened[path] for label, path in recordings.items()}
+        self.newest: Final = recordings.get(masks[-1].result) if masks else None
+
+    def command(self, frame: int) -> str:
+        """Return the command that opens a frame of the newest result."""
+        assert self._inspect is not None
+        assert self.newest is not None
+        return self._inspect(self.newest, frame)
+
+    def strip(self, frame: int) -> Strip | None:
+        """Return a frame with its pictures; None where a result has none of it."""
+        found = self._opened.values()
+        facts = self._facts.get(frame)
+        if facts is None or not found or not all(frame in each.pictured for each in found):
+            return None
+        names = [mask.name for mask in self._masks]
+        made = NotableFrame(
+            frame, facts.stamp_ns, names[-1], facts.rates, images=list(self._images(frame))
+        )
+        command = self.command(frame) if self._inspect and self.newest else ""
+        return strip(made, list(facts.rates), command)
+
+    def _images(self, frame: int) -> Iterator[LayerImage]:
+        first = self._recording(self._masks[0])
+        image = first.image(frame)
+        yield LayerImage("camera", image)
+        yield LayerImage("truth", image, TRUTH, first.truth(frame))
+        for mask in self._masks:
+            errors: Any = self._recording(mask).layer(mask.variant, ERRORS.name, frame)
+            yield LayerImage(f"{mask.name}: errors", image, ERRORS, errors)
+
+    def _recording(self, mask: _Mask) -> Recording:
+        recording = self._opened[mask.result].recording
+        assert recording is not None
+        return recording
