@@ -113,7 +113,7 @@ def test_a_damaged_table_is_named_in_one_line(command, kept, worse, tmp_path):
     ("words", "code", "said"),
     [
         (["--fail-if", "ERR > 1"], 2, "is no condition"),
-        (["-o", "change.docx"], 2, "end it in .pdf, .md or .json"),
+        (["-o", "change.docx"], 2, "end it in .pdf, .html, .md or .json"),
         (["--fail-if", "post.net.ERR > 1pp"], 1, "nothing compared is called post.net"),
         (["--variant", "net"], 1, "no variant net"),
     ],

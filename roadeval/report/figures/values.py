@@ -141,6 +141,7 @@ def _series(name: str, look: Look, x: Any, y: Any) -> Series:
         look.colour,
         [float(each) for each in x],
         [float(each) for each in np.asarray(y, float)],
-        dashed=look.dash != "-",
+        # With few dashes a page is read with ease; its values tell the rest.
+        dashed=look.hollow or name == BASELINE,
         hollow=look.hollow,
     )
