@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import pandas as pd
 import pytest
 
 from roadeval.jobs import report_findings
@@ -16,3 +17,15 @@ def test_a_long_drive_has_longer_windows_instead_of_more(frames, size, rows):
     assert found == size
     assert len(windows) == rows
     assert windows["frames"].sum() == frames
+
+
+def test_what_a_stage_changed_is_a_share_of_the_labelled_pixels():
+    row = {"from_variant": "filtered", "to_variant": "filtered", "repaired": 1, "spoiled": 0}
+    stages = {"from_stage": "svm", "to_stage": "post"}
+    other = {"to_variant": "unfiltered"}
+    changes = pd.DataFrame(
+        [row | stages | {"N": 1}, row | stages | {"N": 0}, row | stages | {"N": 5} | other]
+    )
+    (found,) = report_findings._stage_changes(changes).to_dict("records")
+    assert (found["variant"], found["before"], found["after"]) == ("filtered", "svm", "post")
+    assert (found["repaired"], found["spoiled"]) == (1, 0)

@@ -22,6 +22,13 @@ def test_rates_stand_in_a_table_in_percent_and_undefined_ones_as_a_dash():
     assert "| filtered | post | 25.00 | \N{EN DASH} | 50.00 | 20.00 |" in text
 
 
+def test_what_is_quoted_of_curves_stands_in_a_table_in_percent():
+    own = {"AP": 0.91, "AUC": 0.92, "MaxF": 0.93, "threshold": 0.44, "ECE": 0.05, "bins": []}
+    text = guide.overview(layout(), {"curves": {"net": {"net": own}}})
+    assert "| variant | stage | AP | AUC | MaxF | threshold | ECE |" in text
+    assert "| net | net | 91.00 | 92.00 | 93.00 | 44.00 | 5.00 |" in text
+
+
 def test_warnings_and_lost_parts_of_the_log_are_told():
     text = guide.overview(layout(), {"warnings": ["It collapsed."], "losses": ["3 s are lost."]})
     assert "- It collapsed." in text

@@ -53,6 +53,7 @@ def test_a_region_has_its_error_rate_left_and_its_share_of_the_errors_right():
     assert left.lines[0].get_xdata() == pytest.approx([10])
     assert right.lines[0].get_xdata() == pytest.approx([30])
     assert right.patches[0].get_width() == pytest.approx(50)
+    assert left.get_xlim()[0] == right.get_xlim()[0] == 0
 
 
 def test_each_rate_of_the_stages_has_its_own_axes_and_the_baseline_is_a_level():
@@ -108,3 +109,11 @@ def test_a_comparison_shows_changes_with_their_intervals_and_levels_without():
     assert [line.get_xdata()[0] for line in levels] == pytest.approx([10, 20, 30])
     # The mark of a rate of 0 lies on the edge of its axes, which must not cut it in two.
     assert not any(line.get_clip_on() for line in levels)
+
+
+def test_each_result_has_a_line_of_its_own_from_top_to_bottom():
+    rates = {"ERR": 0.1, "FPR": 0.2, "FNR": 0.3}
+    rows = [MaskComparison(n, "filtered", "post", True, 12, {}, rates, {}) for n in ("old", "new")]
+    first = charts.levels(rows).axes[0]
+    assert first.get_ylim() == (1.5, -0.5)
+    assert [label.get_text() for label in first.get_yticklabels()] == ["old", "new"]

@@ -117,6 +117,12 @@ def test_a_variant_without_post_is_shown_by_its_last_stage() -> None:
     assert "svm" in texts(error_rate(FigureData("drive", table)))
 
 
+def test_the_axes_of_two_rates_are_close_and_do_not_touch() -> None:
+    upper, lower = (ax.get_position() for ax in drawn(fp_fn_rate(FigureData("d", a_table(3)))).axes)
+    gap = (upper.y0 - lower.y1) / upper.height
+    assert 0.1 < gap < 0.2
+
+
 def test_the_title_names_the_drive() -> None:
     for figure in (
         error_rate(FigureData("my_drive", a_table(2))),

@@ -1,8 +1,10 @@
 """Rates over the drive: which number stands where, and which figures are shown."""
 
+import numpy as np
 import pandas as pd
 
-from roadeval.report.blocks import Figure, Table, Text
+from roadeval.report.blocks import Figure, ImageGrid, Table, Text
+from roadeval.report.figures.figure import ExampleFrame
 from roadeval.report.sections.over_drive import section
 from tests.report.making import plain_rows, rates, some_findings, the
 
@@ -39,6 +41,20 @@ def test_each_window_has_the_final_masks_rates_and_the_last_line_is_the_whole():
             *("12.00", "17.00", "14.00", "90.00", "85.00", "88.00"),
         ],
     ]
+
+
+def test_the_table_of_all_masks_and_rates_is_small_and_ruled_off_before_the_whole():
+    table = the(Table, section(some_findings(windows=windows())))
+    assert table.small
+    assert table.breaks == [2]
+
+
+def test_a_row_of_example_pictures_is_the_camera_the_truth_and_a_mask_each():
+    image, mask = np.zeros((2, 3, 3), np.uint8), np.zeros((2, 3), np.uint8)
+    example = ExampleFrame(7, image, mask, {"filtered": mask, "unfiltered": mask})
+    grid = the(ImageGrid, section(some_findings(examples=[example, example])))
+    assert grid.columns == 4
+    assert len(grid.pictures) == 8
 
 
 def test_many_variants_have_a_table_a_rate():

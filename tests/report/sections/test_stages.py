@@ -26,6 +26,7 @@ def test_each_stage_has_its_rates_and_what_it_repaired_and_spoiled():
     ]
     assert [cell.bold for cell in column(table, "ERR")] == [False, True, False, True, True]
     assert table.breaks == [2, 4]
+    assert list(table.text_columns) == [0, 1]
 
 
 def test_the_parts_of_the_error_add_up_to_it():
