@@ -18,16 +18,18 @@ import numpy.typing as npt
 
 from roadeval.data import BASELINE, UNFILTERED, Rows
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import scored
+from roadeval.evaluation import scored, where
 from roadeval.evaluation.comparison_result import (
     ComparedResult,
     Comparison,
+    Disagreement,
     DrivesDiffer,
     FramesLeftOut,
     LogUnknown,
     MaskComparison,
     MovedFrame,
     Note,
+    RegionComparison,
     SettingsDiffer,
     TruthDiffers,
 )
@@ -60,6 +62,8 @@ class Side:
     asked
         What was asked of the log, by the settings' names as ``frames.scale``; empty where the
         result does not know it.
+    regions, disagreements
+        The rows of the tables of these names; None where nobody asks for them.
     """
 
     label: str
@@ -67,19 +71,17 @@ class Side:
     digest: str | None
     frames: Rows
     asked: Mapping[str, Any] = field(default_factory=dict)
+    regions: Rows | None = None
+    disagreements: Rows | None = None
 
 
-def variants_as_sides(
-    frames: Rows, drive: str, digest: str | None, chosen: Sequence[str] | None = None
-) -> list[Side]:
+def variants_as_sides(whole: Side, chosen: Sequence[str] | None = None) -> list[Side]:
     """Return the variants of one result as results of their own, the base first.
 
     Parameters
     ----------
-    frames
-        The result's table.
-    drive, digest
-        As in `Side`.
+    whole
+        The result.
     chosen
         Variants in order; all but the baseline by default, ``unfiltered`` first.
 
@@ -88,6 +90,7 @@ def variants_as_sides(
     ComparisonError
         If a variant is not there, or fewer than two are.
     """
+    frames, drive = whole.frames, whole.drive
     there = frames.distinct("variant")
     pipelines = sorted((n for n in there if n != BASELINE), key=lambda name: name != UNFILTERED)
     names = list(chosen or pipelines)
@@ -98,7 +101,7 @@ def variants_as_sides(
         raise ComparisonError(
             f"{drive}: {len(names)} variant to compare; two are needed, or a second result"
         )
-    return [Side(name, drive, digest, frames.of_variant(name)) for name in names]
+    return [replace(whole, label=name, frames=frames.of_variant(name)) for name in names]
 
 
 def compare(
@@ -135,6 +138,8 @@ def compare(
         changes=_corrected([row for pair in pairs for row in pair.changes()]),
         levels=tuple(row for side in others for row in _levels(side)),
         moved=tuple(frame for pair in pairs for frame in pair.moved()),
+        regions=_corrected_regions([row for pair in pairs for row in pair.regions()]),
+        disagreements=tuple(frame for pair in pairs for frame in pair.disagreements()),
         notes=tuple(note for pair in pairs for note in pair.notes()),
         settings=settings,
     )
@@ -147,6 +152,12 @@ def _corrected(rows: Sequence[MaskComparison]) -> tuple[MaskComparison, ...]:
         replace(row, difference={**row.difference, "ERR": change})
         for row, change in zip(rows, found, strict=True)
     )
+
+
+def _corrected_regions(rows: Sequence[RegionComparison]) -> tuple[RegionComparison, ...]:
+    """Correct the changes of ERR in regions for how many they are."""
+    found = holm([row.difference for row in rows])
+    return tuple(replace(row, difference=each) for row, each in zip(rows, found, strict=True))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,6 +189,7 @@ class _Pair:
         self, base: Side, new: Side, settings: EvaluationSettings, *, across_variants: bool
     ) -> None:
         self._base, self._new, self._settings = base, new, settings
+        self._across = across_variants
         self._common = _common(base.frames, new.frames, new.label if across_variants else None)
         if not self._common:
             raise ComparisonError(
@@ -221,6 +233,27 @@ class _Pair:
                     new=was + change,
                     change=change,
                 )
+
+    def regions(self) -> Iterator[RegionComparison]:
+        """Yield what changed in each region, of the final masks that look at the image."""
+        base, new = self._base.regions, self._new.regions
+        if base is None or new is None:
+            return
+        for mask in self._common:
+            if mask.stage == self._finals[mask.variant] and mask.variant != BASELINE:
+                own = self._base.label if self._across else mask.variant
+                before = where.region_counts(base, own, mask.stage, mask.before["frame"])
+                after = where.region_counts(new, mask.variant, mask.stage, mask.after["frame"])
+                yield from where.by_region(
+                    before, after, self._settings, result=self._new.label, variant=mask.variant
+                )
+
+    def disagreements(self) -> Iterator[Disagreement]:
+        """Yield the frames on which two variants of a run disagree most."""
+        table = self._new.disagreements
+        if table is not None and self._across:
+            frames = next(mask.after for mask in self._common)
+            yield from where.disagreements(table, frames, self._base.label, self._new.label)
 
     def notes(self) -> Iterator[Note]:
         """Yield what was left out, and what makes the two less comparable than they look."""

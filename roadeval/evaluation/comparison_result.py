@@ -69,6 +69,39 @@ class MovedFrame:
 
 
 @dataclass(frozen=True, slots=True)
+class RegionComparison:
+    """The final mask of a variant of a new result within a region, whose ``title`` is for people.
+
+    ``base`` and ``new`` are mean ERR over the ``frames`` on which both have labelled pixels there.
+    """
+
+    result: str
+    variant: str
+    region: str
+    title: str
+    frames: int
+    base: float
+    new: float
+    difference: Difference
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """A frame on which two final masks disagree much.
+
+    ``base_right`` and ``new_right`` are the shares of its labelled pixels that the base's mask, or
+    the new one's, alone has right.
+    """
+
+    result: str
+    variant: str
+    frame: int
+    stamp_ns: int
+    base_right: float
+    new_right: float
+
+
+@dataclass(frozen=True, slots=True)
 class FramesLeftOut:
     """Frames that a result evaluated, and that another lacks or trained on."""
 
@@ -136,8 +169,12 @@ class Comparison:
     levels
         The same on all of its own frames, whatever the base lacks; of different drives those of
         every result.
+    regions
+        The final masks of each new result, region by region.
     moved
         The frames that changed most.
+    disagreements
+        The frames on which final masks of one run disagree most.
     notes
         What was left out, and what makes the results less comparable than they look.
     settings
@@ -151,3 +188,5 @@ class Comparison:
     moved: tuple[MovedFrame, ...]
     notes: tuple[Note, ...]
     settings: EvaluationSettings
+    regions: tuple[RegionComparison, ...] = ()
+    disagreements: tuple[Disagreement, ...] = ()

@@ -100,8 +100,9 @@ def compare(
     results
         Recordings or results folders. Of a single one the variants are compared.
     variants
-        Of several results: only these. Of a single one: these, the first being the base;
-        by default all, ``unfiltered`` first.
+        Of several results: only these, where ``a=b`` holds the base's ``a`` against the others'
+        ``b``. Of a single one: these, the first being the base; by default all, ``unfiltered``
+        first.
     fail_if
         Conditions, see `roadeval.evaluation.conditions`.
 
@@ -117,19 +118,11 @@ def compare(
     if across:
         (only,) = opened
         names = [only.name]
-        sides = comparison.variants_as_sides(only.rows, only.name, _digest(only), variants)
+        sides = comparison.variants_as_sides(_side(only.name, only, only.rows), variants)
     else:
         names = labels_of([each.path for each in opened])
-        sides = [
-            Side(
-                name,
-                each.name,
-                _digest(each),
-                _chosen(each, variants),
-                asked(each.summary),
-            )
-            for name, each in zip(names, opened, strict=True)
-        ]
+        sides = _sides(names, opened, variants)
+        names = [side.label for side in sides]
     settings = settings_of(opened[0].summary)
     found = comparison.compare(sides, settings, across_variants=across)
     cut = [EndMissing(name) for name, each in zip(names, opened, strict=True) if not each.complete]
@@ -240,20 +233,55 @@ def asked(summary: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+def _sides(
+    labels: Sequence[str], opened: Sequence[Result], variants: Sequence[str] | None
+) -> list[Side]:
+    """Return several results, each with those of its variants that are compared."""
+    pairs = [name.partition("=")[::2] for name in variants or ()]
+    of_base = {own: other or own for own, other in pairs}
+    of_others = {name: name for name in of_base.values()}
+    renamed = ", ".join(own for own, other in of_base.items() if own != other)
+    sides = []
+    for place, (label, each) in enumerate(zip(labels, opened, strict=True)):
+        whole = _side(label, each, each.rows)
+        if pairs:
+            whole = _chosen(whole, of_others if place else of_base)
+        if renamed and not place:
+            whole = replace(whole, label=f"{label} ({renamed})")
+        sides.append(whole)
+    return sides
+
+
+def _chosen(side: Side, names: Mapping[str, str]) -> Side:
+    """Return a result with these variants alone, each under its new name."""
+    there = side.frames.distinct("variant")
+    if not set(names) & set(there):
+        wanted, known = ", ".join(names), ", ".join(there)
+        raise RoadevalError(f"{side.label}: no variant {wanted}; there are {known}")
+    regions = None if side.regions is None else _under(side.regions, names)
+    return replace(side, frames=_under(side.frames, names), regions=regions)
+
+
+def _under(rows: Rows, names: Mapping[str, str]) -> Rows:
+    own = rows.take(np.isin(rows["variant"], [*names]))
+    return own.replace(variant=np.array([names[name] for name in own["variant"].tolist()], str))
+
+
+def _side(label: str, opened: Result, rows: Rows) -> Side:
+    return Side(
+        label,
+        opened.name,
+        _digest(opened),
+        rows,
+        asked(opened.summary),
+        opened.table("regions"),
+        opened.table("disagreements"),
+    )
+
+
 def _digest(opened: Result) -> str | None:
     digest = opened.summary.get("log", {}).get("sha256")
     return str(digest) if digest else None
-
-
-def _chosen(opened: Result, variants: Sequence[str] | None) -> Rows:
-    rows = opened.rows
-    if not variants:
-        return rows
-    chosen = rows.take(np.isin(rows["variant"], variants))
-    if not len(chosen):
-        there = ", ".join(rows.distinct("variant"))
-        raise RoadevalError(f"{opened.path}: no variant {', '.join(variants)}; there are {there}")
-    return chosen
 
 
 def labels_of(paths: Sequence[Path]) -> list[str]:

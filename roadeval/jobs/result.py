@@ -80,7 +80,11 @@ class Result:
     @cached_property
     def rows(self) -> Rows:
         """The rows of ``frames.csv``, without pandas."""
-        rows = self._tables.rows("frames")
+        return self.table("frames")
+
+    def table(self, name: str) -> Rows:
+        """Return the rows of a table that grew frame by frame, without pandas."""
+        rows = self._tables.rows(name)
         return rows.take(np.isin(rows["frame"], self._both)) if self._may_be_cut(rows) else rows
 
     @cached_property

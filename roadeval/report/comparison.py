@@ -4,29 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
-from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
-from roadeval.data.words import interval, listing, number, percent, points, timestamp
-from roadeval.evaluation.comparison_result import Comparison, MaskComparison, MovedFrame
+from roadeval.data.words import listing, number, percent, points, timestamp
+from roadeval.evaluation.comparison_result import Comparison, MaskComparison
 from roadeval.evaluation.conditions import Judgement
 from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
-from roadeval.evaluation.uncertainty import Difference
 from roadeval.report.blocks import Block, BulletList, Cell, Document, Figure, Heading, Table, Text
+from roadeval.report.comparison_rows import breaks, interval_of, named, naming_columns
+from roadeval.report.comparison_where import disagreement_table, where
 from roadeval.report.figures import row_values
 from roadeval.report.figures.charts import forest, levels
 from roadeval.report.figures.fig3a_error_rate import FIGURE
 from roadeval.report.figures.figure import FigureData
 from roadeval.report.figures.files import svg, svg_of
 from roadeval.report.markdown import table as markdown_table
-from roadeval.results.certainty import MARK, correction, stands, too_few
+from roadeval.results.certainty import correction, too_few
 from roadeval.results.comparison import judged, verdict, warnings
+from roadeval.results.comparison import where as told_where
 from roadeval.runtime.text import as_markdown
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Rows = Sequence[MaskComparison] | Sequence[MovedFrame]
 Inspect = Callable[[str, int], str]
 _COMMAND: Final = ("in the viewer",)
 OTHERS: Final = tuple(name for name in SHORT if name != "ERR")
@@ -74,6 +74,10 @@ def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     ]
     lines += ["", *markdown_table(_rates_table(comparison)), ""]
     lines += [line for legend in _legend(comparison) for line in (as_markdown(legend), "")]
+    lines += [*(f"- {as_markdown(sentence)}" for sentence in told_where(comparison)), ""]
+    if comparison.disagreements:
+        table = disagreement_table(comparison)
+        lines += ["Frames on which they disagree most:", "", *markdown_table(table), ""]
     if comparison.moved:
         lines += ["Frames that changed most:", "", *markdown_table(_moved_table(comparison)), ""]
     lines += [f"- {as_markdown(warning)}" for warning in warnings(comparison)]
@@ -93,7 +97,7 @@ def _blocks(
     yield _rates_table(comparison)
     yield Text(_unit(comparison), "note")
     yield from (Text(legend, "note") for legend in _legend(comparison))
-    yield from _why_no_interval(comparison.changes)
+    yield from _why_nointerval_of(comparison.changes)
     if comparison.notes:
         yield BulletList("Beware", warnings(comparison), "warning")
     finals = [row for row in comparison.changes if row.final]
@@ -110,6 +114,7 @@ def _blocks(
     else:
         charts = row_values.levels(finals)
         yield Figure(svg(lambda: levels(finals)), "Rates of the final masks.", charts=charts)
+    yield from where(comparison)
     if comparison.moved:
         yield Heading("Frames that changed most", 2)
         yield _moved_table(comparison, inspect)
@@ -150,23 +155,23 @@ def _rates_table(comparison: Comparison) -> Table:
 
 
 def _changes_table(rows: Sequence[MaskComparison]) -> Table:
-    names = _naming_columns(rows)
+    names = naming_columns(rows)
     return Table(
         [*names, "stage", "base", "new", "difference", "interval", *OTHERS],
         [
             [
-                *_named(row, names),
+                *named(row, names),
                 row.stage,
                 percent(row.base["ERR"]),
                 percent(row.new["ERR"]),
                 Cell(points(row.difference["ERR"].mean), bold=row.final),
-                _interval(row.difference["ERR"]),
+                interval_of(row.difference["ERR"]),
                 *(points(row.new[rate] - row.base[rate]) for rate in OTHERS),
             ]
             for row in rows
         ],
         text_columns=range(len(names) + 1),
-        breaks=_breaks(rows),
+        breaks=breaks(rows),
         groups=[("", len(names) + 1), ("ERR", 4), ("difference", len(OTHERS))],
         small=True,
     )
@@ -185,7 +190,7 @@ def _levels_table(rows: Sequence[MaskComparison]) -> Table:
             for row in rows
         ],
         text_columns=range(3),
-        breaks=_breaks(rows),
+        breaks=breaks(rows),
         small=True,
     )
 
@@ -193,12 +198,12 @@ def _levels_table(rows: Sequence[MaskComparison]) -> Table:
 def _moved_table(comparison: Comparison, inspect: Inspect | None = None) -> Table:
     """Tabulate the frames whose error rate changed most, with what opens each of the new result."""
     rows = comparison.moved
-    names = _naming_columns(rows)
+    names = naming_columns(rows)
     return Table(
         [*names, "frame", "stamp", "ERR base", "new", "difference", *_COMMAND[: bool(inspect)]],
         [
             [
-                *_named(row, names),
+                *named(row, names),
                 str(row.frame),
                 timestamp(row.stamp_ns),
                 percent(row.base),
@@ -209,31 +214,15 @@ def _moved_table(comparison: Comparison, inspect: Inspect | None = None) -> Tabl
             for row in rows
         ],
         text_columns=[*range(len(names)), len(names) + 1, len(names) + 5],
-        breaks=_breaks(rows),
+        breaks=breaks(rows),
         small=True,
     )
-
-
-def _naming_columns(rows: Rows) -> tuple[str, ...]:
-    """Return the columns that name a row; without the result's, where the variants are that."""
-    alone = all(row.result == row.variant for row in rows)
-    return ("variant",) if alone else ("result", "variant")
-
-
-def _named(row: MaskComparison | MovedFrame, names: Sequence[str]) -> list[str]:
-    return [{"result": row.result, "variant": row.variant}[name] for name in names]
-
-
-def _breaks(rows: Rows) -> list[int]:
-    """Return the rows at which another result begins."""
-    results = [row.result for row in rows]
-    return [place for place, (above, own) in enumerate(pairwise(results), 1) if above != own]
 
 
 # --- Sentences ------------------------------------------------------------------------------------
 
 
-def _why_no_interval(rows: Sequence[MaskComparison]) -> Iterator[Text]:
+def _why_nointerval_of(rows: Sequence[MaskComparison]) -> Iterator[Text]:
     """Yield the reason why there is no interval, once for each result and variant."""
     reasons = [
         f"{_name(row)}: no interval for ERR, because {too_few(change.frames)}."
@@ -241,12 +230,6 @@ def _why_no_interval(rows: Sequence[MaskComparison]) -> Iterator[Text]:
         if row.final and (change := row.difference.get("ERR")) and change.low is None
     ]
     yield from (Text(reason, "note") for reason in dict.fromkeys(reasons))
-
-
-def _interval(change: Difference) -> str:
-    """Return an interval, with a mark where the change stands after correction."""
-    mark = f" {MARK}" if stands(change.p_holm, change.confidence) else ""
-    return interval(change.low, change.high) + mark
 
 
 def _name(row: MaskComparison) -> str:

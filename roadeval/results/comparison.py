@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any, Final
 
@@ -21,7 +21,7 @@ from roadeval.evaluation.comparison_result import (
 )
 from roadeval.evaluation.conditions import Judgement
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.certainty import Degree, degree_of, too_few, what_would_tell
+from roadeval.results.certainty import Degree, degree_of, stands, too_few, what_would_tell
 
 FORMAT: Final = {"name": "roadeval-comparison", "version": 1}
 
@@ -36,6 +36,7 @@ def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dic
     return {
         "format": FORMAT,
         "verdict": verdict(comparison),
+        "where": where(comparison),
         **facts,
         "notes": notes,
         "warnings": warnings(comparison),
@@ -53,6 +54,37 @@ def verdict(comparison: Comparison) -> str:
     base, settings = comparison.results[0].label, comparison.settings
     changes = "; ".join(_change(row, settings) for row in told)
     return f"Against {base}: {changes} ({percent(settings.confidence, 0)} % intervals)."
+
+
+def where(comparison: Comparison) -> list[str]:
+    """Return in which regions final masks are surely better or worse, and where they disagree."""
+    masks = dict.fromkeys((row.result, row.variant) for row in comparison.regions)
+    return [
+        *(_by_region(comparison, *mask) for mask in masks),
+        *_disagreements(comparison),
+    ]
+
+
+def _by_region(comparison: Comparison, result: str, variant: str) -> str:
+    rows = [r for r in comparison.regions if (r.result, r.variant) == (result, variant)]
+    sure = [r for r in rows if stands(r.difference.p_holm, r.difference.confidence)]
+    parts = []
+    for word, sign in (("better", -1), ("worse", 1)):
+        names = [r.title for r in sure if sign * r.difference.mean > 0]
+        if len(names) == len(rows):
+            parts.append(f"{word} in every region")
+        elif names:
+            parts.append(f"{word} ({'; '.join(names)})")
+    name = result if result == variant else f"{variant} of {result}"
+    return f"{name} by region: {', '.join(parts) or 'no change is sure in any'}"
+
+
+def _disagreements(comparison: Comparison) -> Iterator[str]:
+    for result in dict.fromkeys(each.result for each in comparison.disagreements):
+        first, *rest = (each for each in comparison.disagreements if each.result == result)
+        most = percent(first.base_right + first.new_right, 1)
+        frames = [f"{first.frame} ({most} % of the pixels)", *(str(each.frame) for each in rest)]
+        yield f"{result} disagrees most on frames {', '.join(frames)}"
 
 
 def warnings(comparison: Comparison) -> list[str]:

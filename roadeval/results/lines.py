@@ -45,8 +45,23 @@ def lines(result: FrameResult) -> dict[str, str]:
             for oracle, tallies in result.oracles.items()
             for tally in tallies
         ),
+        "disagreements": "".join(
+            f"{frame.number},{one},{other},{change.repaired},{change.spoiled},{change.labelled}\n"
+            for one, other, change in _pairs(result.changes)
+        ),
     }
     return {name: text for name, text in texts.items() if text}
+
+
+def _pairs(changes: Mapping[Transition, Change]) -> Iterator[tuple[str, str, Change]]:
+    """Yield each pair of variants once, with what their final masks differ in."""
+    seen: set[str] = set()
+    for (one, _, other, _), change in changes.items():
+        if one == other:
+            continue
+        seen.add(one)
+        if other not in seen:
+            yield one, other, change
 
 
 def sum_lines(sums: DriveSums) -> dict[str, str]:

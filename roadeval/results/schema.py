@@ -128,6 +128,19 @@ TABLES: Final[Mapping[str, TableSchema]] = {
             streamed=True,
         ),
         TableSchema(
+            "disagreements",
+            "A row per evaluated frame and pair of final masks.",
+            (
+                FRAME,
+                Column("from_variant", Kind.NAME, "whose final mask"),
+                Column("to_variant", Kind.NAME, "whose other one"),
+                Column("repaired", Kind.COUNT, "pixels that only the second has right"),
+                Column("spoiled", Kind.COUNT, "pixels that only the first has right"),
+                LABELLED,
+            ),
+            streamed=True,
+        ),
+        TableSchema(
             "windows",
             "A row per window of consecutive evaluated frames, variant and stage.",
             (

@@ -135,7 +135,7 @@ def test_variants_of_one_result_are_compared_with_unfiltered():
     frames = rows_of(
         a_table({(name, "post"): [10 + place] * 12 for place, name in enumerate(names)})
     )
-    sides = variants_as_sides(frames, "street", "d1")
+    sides = variants_as_sides(Side("street", "street", "d1", frames))
     assert [side.label for side in sides] == ["unfiltered", "filtered", "other"]
     found = compare(sides, SETTINGS, across_variants=True)
     told = {row.variant: row.difference["ERR"].mean for row in found.changes}
@@ -144,12 +144,12 @@ def test_variants_of_one_result_are_compared_with_unfiltered():
 
 def test_chosen_variants_keep_their_order_and_must_be_there():
     frames = rows_of(a_table({("filtered", "post"): [1], ("unfiltered", "post"): [2]}))
-    sides = variants_as_sides(frames, "street", "d1", ["filtered", "unfiltered"])
+    sides = variants_as_sides(Side("street", "street", "d1", frames), ["filtered", "unfiltered"])
     assert [side.label for side in sides] == ["filtered", "unfiltered"]
     with pytest.raises(ComparisonError, match="no variant net; there are filtered, unfiltered"):
-        variants_as_sides(frames, "street", "d1", ["net", "filtered"])
+        variants_as_sides(Side("street", "street", "d1", frames), ["net", "filtered"])
     with pytest.raises(ComparisonError, match="two are needed"):
-        variants_as_sides(frames, "street", "d1", ["filtered"])
+        variants_as_sides(Side("street", "street", "d1", frames), ["filtered"])
 
 
 def test_a_condition_is_judged_on_every_new_result():

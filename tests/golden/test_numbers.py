@@ -504,6 +504,11 @@ def test_the_conditions_are_judged_by_the_same_numbers(told):
     assert told.texts["compare"]["code"] == 4
 
 
+def changed_most(path):
+    """The lines of a comparison's last table."""
+    return path.read_text().partition("Frames that changed most")[2].splitlines()
+
+
 @pytest.mark.parametrize("name", ["compared", "variants"])
 def test_the_comparison_names_the_frames_that_changed_most(name, told):
     paper, printed = (finals(told, run)["ERR"] for run in RUNS)
@@ -515,7 +520,7 @@ def test_the_comparison_names_the_frames_that_changed_most(name, told):
     wanted = apart(change[change > 0][::-1], 5) + apart(change[change < 0], 5)
     rows = [
         [cell.strip() for cell in line.strip("|").split("|")]
-        for line in (told.folder / f"{name}.md").read_text().splitlines()
+        for line in changed_most(told.folder / f"{name}.md")
         if " UTC " in line
     ]
     rows = [row for row in rows if "filtered" in row]

@@ -180,6 +180,39 @@ def test_without_a_probability_there_are_no_curves(places, tmp_path):
     assert not (tmp_path / "reports" / "thresholds.png").exists()
 
 
+def test_variants_are_compared_where_they_differ(outcome):
+    found = roadeval.compare([outcome.reports], variants=["inside", "unfiltered"])
+    regions = {row.region for row in found.comparison.regions}
+    assert {"shadow", "lit", "boundary", "band_0"} <= regions
+    (first, *_) = found.comparison.disagreements
+    recording = roadeval.Recording(outcome.recording)
+    truth = recording.truth(first.frame)
+    inside, unfiltered = (
+        recording.layer(name, "post", first.frame) == truth for name in ("inside", "unfiltered")
+    )
+    known = truth != 255
+    assert first.base_right == pytest.approx((inside & ~unfiltered & known).sum() / known.sum())
+    assert first.new_right == pytest.approx((unfiltered & ~inside & known).sum() / known.sum())
+    table = roadeval.Recording(outcome.recording).table("disagreements")
+    pairs = set(zip(table["from_variant"], table["to_variant"], strict=True))
+    assert len(pairs) == 13 * 12 // 2
+    assert not {(one, other) for other, one in pairs} & pairs
+
+
+def test_a_variant_of_one_result_is_held_against_another_of_another(outcome, places, tmp_path):
+    roadeval.replay(places / "drive.mcap", settings(record="none"), reports=tmp_path / "reports")
+    with pytest.raises(RoadevalError, match="no variant inside"):
+        roadeval.compare([tmp_path / "reports", outcome.reports], variants=["inside"])
+    found = roadeval.compare([outcome.reports, outcome.reports], variants=["inside=unfiltered"])
+    alone = roadeval.compare([outcome.reports], variants=["inside", "unfiltered"])
+    (change,), (same,) = found.comparison.changes, alone.comparison.changes
+    assert (change.variant, change.difference) == ("unfiltered", same.difference)
+    assert [r.difference.mean for r in found.comparison.regions] == [
+        r.difference.mean for r in alone.comparison.regions
+    ]
+    assert "(inside)" in found.comparison.results[0].label
+
+
 def refused(places, **table) -> str:
     config = settings().override({"masks": {"net": table}})
     with pytest.raises(RoadevalError) as caught:

@@ -76,6 +76,7 @@ def test_the_columns_are_those_of_the_design(tmp_path: Path) -> None:
         "pooled_ACC,pooled_ERR,pooled_TPR,pooled_FNR,pooled_TNR,pooled_FPR",
         "regions": "frame,variant,stage,region,TP,TN,FP,FN,N",
         "oracles": "frame,variant,oracle,stage,TP,TN,FP,FN,N,ACC,ERR,TPR,FNR,TNR,FPR",
+        "disagreements": "frame,from_variant,to_variant,repaired,spoiled,N",
         "changes": "from_variant,from_stage,to_variant,to_stage,repaired,spoiled,N",
         "heat": "variant,top,left,side,labelled,FP,FN",
         "probabilities": "variant,stage,level,road,other",

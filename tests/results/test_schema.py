@@ -7,7 +7,7 @@ from roadeval.results.schema import TABLES, Kind, documentation, streamed
 
 
 def test_the_tables_that_grow_frame_by_frame():
-    assert list(streamed()) == ["frames", "regions", "oracles"]
+    assert list(streamed()) == ["frames", "regions", "oracles", "disagreements"]
 
 
 @pytest.mark.parametrize("name", ["frames", "oracles", "windows"])

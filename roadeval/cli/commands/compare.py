@@ -39,8 +39,9 @@ Variants = Annotated[
     list[str] | None,
     typer.Option(
         "--variant",
-        metavar="NAME",
-        help="Only this one; of a single result the first is the base. Repeatable.",
+        metavar="NAME|BASE'S=NEW'S",
+        help="Only this one; of a single result the first is the base. Of two results, one may be "
+        "held against another: a=b. Repeatable.",
     ),
 ]
 Outputs = Annotated[

@@ -40,6 +40,8 @@ def show(content: Mapping[str, Any], out: Console) -> None:
                 out.print(f"{change['variant']}: {_unsure(told)}", soft_wrap=True)
         out.print()
     out.print(content["verdict"])
+    for sentence in content["where"]:
+        out.print(sentence)
     for condition in content["conditions"]:
         if not condition["holds"]:
             out.print(condition["sentence"], soft_wrap=True)

@@ -26,6 +26,7 @@ def shown(rows):
     out = Console(file=io.StringIO(), width=80)
     results = [{"label": "base"}]
     content = {"results": results, "changes": rows, "same_drive": True, "conditions": []}
+    content["where"] = ["new by region: worse in shadow"]
     content["verdict"] = "Against base: it is worse."
     changes.show(content, out)
     return out.file.getvalue()
@@ -43,8 +44,9 @@ def test_the_variants_of_a_single_result_stand_together():
     assert told.count("no interval: 4 frames are too few") == 2
 
 
-def test_the_screen_ends_with_the_verdict():
-    assert shown([row("new", "filtered")]).endswith("\n\nAgainst base: it is worse.\n")
+def test_the_screen_ends_with_the_verdict_and_where_it_holds():
+    told = shown([row("new", "filtered")])
+    assert told.endswith("\n\nAgainst base: it is worse.\nnew by region: worse in shadow\n")
 
 
 def test_final_masks_have_every_rate_and_others_err():

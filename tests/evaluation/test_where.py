@@ -1,0 +1,127 @@
+"""Where one of two masks is better: by region, and on which frames they disagree."""
+
+import numpy as np
+import pytest
+
+from roadeval.data import Rows
+from roadeval.evaluation.comparison import Side, compare, variants_as_sides
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.where import disagreements, region_counts
+from tests.evaluation.making import a_table, rows_of
+
+SETTINGS = EvaluationSettings()
+
+
+def regions(wrong):
+    """Rows of regions of 100 pixels: wrong pixels by variant and region, frame by frame."""
+    cells = [
+        (frame, variant, "post", region, 50, 50 - errors, errors, 0, 100 if errors >= 0 else 0)
+        for (variant, region), own in wrong.items()
+        for frame, errors in enumerate(own)
+    ]
+    names = ("frame", "variant", "stage", "region", "TP", "TN", "FP", "FN", "N")
+    return Rows(
+        {
+            name: np.array(column)
+            for name, column in zip(names, zip(*cells, strict=True), strict=True)
+        }
+    )
+
+
+def pairs(rows):
+    names = ("frame", "from_variant", "to_variant", "repaired", "spoiled", "N")
+    return Rows(
+        {
+            name: np.array(column)
+            for name, column in zip(names, zip(*rows, strict=True), strict=True)
+        }
+    )
+
+
+def test_errors_are_of_the_frames_asked_for_in_their_order():
+    rows = regions({("a", "lit"): [1, 2, 3], ("a", "shadow"): [4, -1, 6], ("b", "lit"): [7, 8, 9]})
+    found = region_counts(rows, "a", "post", np.array([2, 0]))
+    assert found["lit"].err.tolist() == [0.03, 0.01]
+    assert found["shadow"].err.tolist() == [0.06, 0.04]
+
+
+def test_a_frame_without_a_labelled_pixel_in_a_region_has_no_error_there():
+    found = region_counts(regions({("a", "lit"): [1, -1]}), "a", "post", np.array([0, 1]))
+    assert np.isnan(found["lit"].err).tolist() == [False, True]
+
+
+def a_run(first, second, **more):
+    table = a_table({("first", "post"): first, ("second", "post"): second})
+    return Side("street", "street", "d1", rows_of(table), **more)
+
+
+def test_a_mask_may_be_better_in_one_region_and_worse_in_another():
+    count = 40
+    rows = regions(
+        {
+            ("first", "lit"): [10 + n % 3 for n in range(count)],
+            ("first", "shadow"): [10 + n % 2 for n in range(count)],
+            ("second", "lit"): [30 + n % 5 for n in range(count)],
+            ("second", "shadow"): [2 + n % 2 for n in range(count)],
+        }
+    )
+    run = a_run([10] * count, [16] * count, regions=rows)
+    found = compare(variants_as_sides(run, ["first", "second"]), SETTINGS, across_variants=True)
+    shadow, lit = found.regions
+    assert (shadow.region, lit.region) == ("shadow", "lit")
+    assert shadow.difference.high < 0 < lit.difference.low
+    assert (shadow.base, shadow.new) == (pytest.approx(0.105), pytest.approx(0.025))
+    assert shadow.difference.comparisons == 2
+    assert (lit.variant, lit.frames) == ("second", count)
+
+
+def test_of_two_results_the_same_variant_is_compared():
+    rows = regions({("first", "lit"): [10] * 20, ("second", "lit"): [20] * 20})
+    base = a_run([10] * 20, [20] * 20, regions=rows)
+    worse = regions({("first", "lit"): [15] * 20, ("second", "lit"): [20] * 20})
+    found = compare([base, a_run([15] * 20, [20] * 20, regions=worse)], SETTINGS)
+    assert [(row.variant, row.difference.mean) for row in found.regions] == [
+        ("first", pytest.approx(0.05)),
+        ("second", 0),
+    ]
+
+
+def test_a_region_of_other_pixels_is_left_out():
+    base = regions({("first", "lit"): [10] * 20, ("first", "shadow"): [10] * 20})
+    fewer = np.where(base["region"] == "shadow", 60, base["N"])
+    other = base.replace(N=fewer)
+    run = a_run([10] * 20, [20] * 20, regions=base)
+    found = compare([run, a_run([10] * 20, [20] * 20, regions=other)], SETTINGS)
+    assert [row.region for row in found.regions] == ["lit"]
+
+
+def test_bands_keep_their_place_where_one_is_left_out():
+    rows = {("first", f"band_{n}"): [10 if n != 1 else -1] * 20 for n in range(3)}
+    run = a_run([10] * 20, [20] * 20, regions=regions(rows))
+    found = compare([run, run], SETTINGS)
+    assert [row.title for row in found.regions] == [
+        *("image rows, band 0, the top", "image rows, band 2, the bottom")
+    ]
+
+
+def test_frames_of_most_disagreement_tell_who_is_right():
+    table = pairs([(0, "a", "b", 1, 2, 100), (40, "a", "b", 30, 5, 100), (80, "a", "b", 0, 0, 100)])
+    stamps = Rows({"frame": np.array([0, 40, 80]), "stamp_ns": np.array([0, 4, 8]) * 10**9})
+    first, second = disagreements(table, stamps, "a", "b")
+    assert (first.frame, first.stamp_ns) == (40, 4 * 10**9)
+    assert (first.new_right, first.base_right) == (0.30, 0.05)
+    assert second.frame == 0
+    (turned, _) = disagreements(table, stamps, "b", "a")
+    assert (turned.new_right, turned.base_right) == (0.05, 0.30)
+
+
+def test_neighbours_disagree_alike_and_only_one_is_named():
+    rows = [(frame, "a", "b", 10 + frame, 0, 100) for frame in range(30)]
+    stamps = Rows({"frame": np.arange(30), "stamp_ns": np.arange(30) * 10**9})
+    table = pairs([*rows, (30, "a", "b", 90, 0, 100)])
+    near = Rows({"frame": np.arange(31), "stamp_ns": np.array([*range(30), 29.5]) * 10**9})
+    near = Rows({name: near[name].astype(np.int64) for name in near.columns})
+    assert next(disagreements(pairs(rows), stamps, "a", "b")).frame == 29
+    named = [each.frame for each in disagreements(table, near, "a", "b")]
+    assert 30 in named
+    assert 29 not in named
