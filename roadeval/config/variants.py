@@ -48,13 +48,18 @@ class Variant:
 
     def layout(self) -> VariantLayout:
         """Describe the variant as recording and tables need to know it beforehand."""
-        titles = [stage.title for stage in self.pipeline.stages() if stage.is_filter]
         return VariantLayout(
-            self.name,
-            f"with {', '.join(titles)}" if titles else "without the filter",
-            self.pipeline.masks(),
-            self.pipeline.layers(),
+            self.name, self._title(), self.pipeline.masks(), self.pipeline.layers()
         )
+
+    def _title(self) -> str:
+        """Say in a few words what tells the variant from others."""
+        found = self.pipeline.stages()
+        if filters := [stage.title for stage in found if stage.is_filter]:
+            return f"with {', '.join(filters)}"
+        if any(stage.fit is not None and stage.name in stages.STAGES for stage in found):
+            return "without the filter"
+        return ", ".join(stage.title for stage in found if stage.name != FINAL_STAGE)
 
 
 def variants_of(pipeline: Pipeline, extra: Iterable[Variant]) -> tuple[Variant, ...]:

@@ -73,7 +73,7 @@ class OnnxRuntime:
         source = str(file.path) if file.content is None else file.content
         with _explained(file, f"onnxruntime {self.version}"):
             self._session = onnxruntime.InferenceSession(
-                source, options, providers=["CPUExecutionProvider"]
+                source, options, providers=["CPUExecutionProvider"], enable_fallback=0
             )
 
     def run(self, values: Array, outputs: Sequence[str]) -> list[Array]:

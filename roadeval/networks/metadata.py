@@ -11,12 +11,16 @@ import json
 from collections.abc import Mapping
 from typing import Any, Final, Literal
 
+from roadeval.runtime.text import visible
+
 NAMES: Final = ("names", "class_names", "classes", "labels")
 LICENCES: Final = ("license", "licence")
 ROAD_NAMES: Final = frozenset({"road", "drivable", "drivable area", "driveable area", "roadway"})
 """Names of classes that are road."""
 LONGEST: Final = 100_000
 """Letters of a list of class names."""
+QUOTED: Final = 1000
+"""Letters of a licence that results quote."""
 _ORDERS: Final[Mapping[str, Literal["rgb", "bgr", "grey"]]] = {
     "rgb8": "rgb",
     "bgr8": "bgr",
@@ -53,8 +57,11 @@ def pixel_range(metadata: Mapping[str, str]) -> tuple[float, float] | None:
 
 
 def licence(metadata: Mapping[str, str]) -> str | None:
-    """Return what the file says of its licence."""
-    return next((metadata[key] for key in LICENCES if metadata.get(key)), None)
+    """Return what the file says of its licence, in one line; None where it says nothing."""
+    for key in LICENCES:
+        if text := " ".join(metadata.get(key, "").split()):
+            return visible(text if len(text) <= QUOTED else f"{text[:QUOTED]}...")
+    return None
 
 
 def _read(text: str) -> Any:
@@ -74,4 +81,4 @@ def _numbered(value: Any) -> dict[int, str]:
         value = dict(enumerate(value))
     if not isinstance(value, dict):
         return {}
-    return {int(key): str(name) for key, name in value.items() if str(key).isdecimal()}
+    return {int(key): visible(str(name)) for key, name in value.items() if str(key).isdecimal()}

@@ -9,18 +9,13 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
 from roadeval.networks.errors import NetworkError
-from roadeval.networks.onnx_schema import model_class
+from roadeval.networks.onnx_schema import TYPES, model_class
+from roadeval.networks.wholeness import is_whole, weights_of
 from roadeval.runtime.files import check_input
 from roadeval.runtime.text import visible
 
 LARGEST: Final = (1 << 31) - 1
 """Bytes that a protobuf file can have; larger weights lie in files beside it."""
-_NAMES: Final = (
-    *("", "float32", "uint8", "int8", "uint16", "int16", "int32", "int64", "string", "bool"),
-    *("float16", "float64", "uint32", "uint64"),
-)
-TYPES: Final[Mapping[int, str]] = {code: name for code, name in enumerate(_NAMES) if name}
-"""Types of numbers, as NumPy calls them, by ONNX's codes."""
 PASSING: Final = frozenset(
     {"Cast", "Identity", "Reshape", "Resize", "Slice", "Squeeze", "Transpose", "Unsqueeze"}
 )
@@ -98,13 +93,13 @@ def read_onnx(path: Path) -> OnnxFile:
         model.ParseFromString(content)
     except Exception as error:  # the parser's own, which is of another class in each version
         raise _no_onnx(path) from error
-    if not model.ir_version or not model.graph.input or not model.graph.output:
+    if not model.ir_version or not is_whole(model.graph):
         raise _no_onnx(path)
     beside = sorted({_text(name) for name in _external(model.graph)})
     digest = hashlib.sha256(content)
     for name in beside:
         _add(digest, path, name)
-    weights = {tensor.name for tensor in model.graph.initializer}
+    weights = set(weights_of(model.graph))
     return OnnxFile(
         path,
         digest.hexdigest(),

@@ -1,7 +1,7 @@
 """The part of ONNX's protobuf schema that tells what a network takes and gives.
 
-Weights, operators' attributes and all else are fields that this part does not know: the parser
-passes over them. Texts are bytes here, for a file from elsewhere may hold any.
+Attributes' values and all else are fields that this part does not know: the parser passes over
+them. Texts are bytes here, for a file from elsewhere may hold any, and so are weights.
 """
 
 from __future__ import annotations
@@ -25,9 +25,26 @@ MESSAGES: Final[Mapping[str, Mapping[str, tuple[int, str, bool]]]] = {
         "initializer": (5, "Tensor", True),
         "input": (11, "Value", True),
         "output": (12, "Value", True),
+        "sparse_initializer": (15, "SparseTensor", True),
     },
-    "Node": {"input": (1, _TEXT, True), "output": (2, _TEXT, True), "op_type": (4, _TEXT, False)},
-    "Tensor": {"name": (8, _TEXT, False), "external_data": (13, "Entry", True)},
+    "Node": {
+        "input": (1, _TEXT, True),
+        "output": (2, _TEXT, True),
+        "name": (3, _TEXT, False),
+        "op_type": (4, _TEXT, False),
+        "attribute": (5, "Attribute", True),
+        "domain": (7, _TEXT, False),
+    },
+    "Attribute": {"name": (1, _TEXT, False)},
+    "Tensor": {
+        "dims": (1, _INTEGER, True),
+        "data_type": (2, _INTEGER, False),
+        **{f"data_{number}": (number, _TEXT, False) for number in (4, 5, 6, 7, 10, 11)},
+        "name": (8, _TEXT, False),
+        "raw_data": (9, _TEXT, False),
+        "external_data": (13, "Entry", True),
+    },
+    "SparseTensor": {"values": (1, "Tensor", False)},
     "Value": {"name": (1, _TEXT, False), "type": (2, "Type", False)},
     "Type": {"tensor_type": (1, "TensorType", False)},
     "TensorType": {"elem_type": (1, _INTEGER, False), "shape": (2, "Shape", False)},
@@ -35,6 +52,12 @@ MESSAGES: Final[Mapping[str, Mapping[str, tuple[int, str, bool]]]] = {
     "Dimension": {"dim_value": (1, _INTEGER, False), "dim_param": (2, _TEXT, False)},
 }
 """By message and field: its number in onnx.proto, its type, and whether it is repeated."""
+_NAMES: Final = (
+    *("", "float32", "uint8", "int8", "uint16", "int16", "int32", "int64", "string", "bool"),
+    *("float16", "float64", "uint32", "uint64"),
+)
+TYPES: Final[Mapping[int, str]] = {code: name for code, name in enumerate(_NAMES) if name}
+"""Types of numbers, as NumPy calls them, by ONNX's codes."""
 
 
 @cache

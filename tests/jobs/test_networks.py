@@ -7,6 +7,7 @@ from importlib import import_module
 import numpy as np
 import pandas as pd
 import pytest
+from pypdf import PdfReader
 
 import roadeval
 from roadeval.config import network_variant
@@ -72,6 +73,24 @@ def test_results_tell_who_ran_which_network_and_how_long_it_took(once, folder):
     assert told["version"]
     assert outcome.summary["seconds"]["mine"]["net"] > 0
     assert outcome.summary["settings"]["mine"]["net"]["sha256"] == told["sha256"]
+
+
+def test_the_report_tells_the_same(once, tmp_path):
+    to, outcome = once
+    roadeval.write_report(to / "out.rrd", tmp_path / "report.pdf")
+    text = "\n".join(page.extract_text() for page in PdfReader(tmp_path / "report.pdf").pages)
+    told = outcome.summary["methods"]["mine"]["net"]
+    for fact in ("mine: net", told["sha256"], "CC0: made by hand", "ms a frame"):
+        assert fact in text
+
+
+def test_it_is_called_a_network_where_others_are_with_and_without_the_filter():
+    titles = {each.name: each.layout().title for each in with_network("n.onnx").variants()}
+    assert titles == {
+        "filtered": "with Phase 2: shadow filter",
+        "unfiltered": "without the filter",
+        "mine": "Network",
+    }
 
 
 def test_mask_and_probability_are_layers_of_the_recording(once):

@@ -10,6 +10,7 @@ IMAGE = "image"
 ROAD = "road"
 SIZE = (16, 12)
 """Width and height of the input."""
+WIDE = {"kernel_shape": [3, 3], "pads": [1] * 4, "strides": [2, 2]}
 
 
 def weights(classes: int = 2, seed: int = 0) -> dict[str, np.ndarray]:
@@ -46,9 +47,9 @@ def network(
     scores = "scores" if last or channels_last else ROAD
     nodes = [
         *layout,
-        helper.make_node("Conv", [source, "w1", "b1"], ["c1"], pads=[1] * 4, strides=[2, 2]),
+        helper.make_node("Conv", [source, "w1", "b1"], ["c1"], **WIDE),
         helper.make_node(operator, ["c1"], ["r1"]),
-        helper.make_node("Conv", ["r1", "w2", "b2"], [scores]),
+        helper.make_node("Conv", ["r1", "w2", "b2"], [scores], kernel_shape=[1, 1]),
     ]
     if last:
         axis = {"axis": 1} if last in ("Softmax", "ArgMax") else {}
@@ -104,7 +105,7 @@ def red_network(path: Path, size: tuple[int, int] = (32, 24), bias: float = -105
     shape = (1, 3, size[1], size[0])
     graph = helper.make_graph(
         [
-            helper.make_node("Conv", [IMAGE, "w", "b"], ["s"]),
+            helper.make_node("Conv", [IMAGE, "w", "b"], ["s"], kernel_shape=[1, 1]),
             helper.make_node("Sigmoid", ["s"], [ROAD]),
         ],
         "red",

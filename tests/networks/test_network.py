@@ -67,6 +67,16 @@ def test_of_three_classes_road_is_where_it_beats_the_others(backend, tmp_path):
     assert np.array_equal(road.mask, cv2.resize(1 / (1 + np.exp(-margin)), SIZE) > 0.5)
 
 
+@pytest.mark.parametrize("last", [None, "Softmax"])
+def test_the_probability_of_road_is_the_sum_over_its_classes(backend, last, tmp_path):
+    values = balanced(IMAGE, 3)
+    path = network(tmp_path / "n.onnx", classes=3, values=values, last=last)
+    road = opened(path, backend, road=(0, 2), decide="threshold").road(IMAGE)
+    shares = softmax(scores(values, IMAGE.transpose(2, 0, 1) / 255))
+    expected = cv2.resize((shares[0] + shares[2]).astype(np.float32), SIZE)
+    assert np.abs(road.codes / FULL - expected).max() < 1e-4
+
+
 def test_two_classes_can_be_road_together(backend, tmp_path):
     path = network(tmp_path / "n.onnx", classes=3, values=balanced(IMAGE, 3))
     both = opened(path, backend, road=(0, 2)).road(IMAGE)

@@ -76,6 +76,25 @@ def test_a_file_that_was_cut(tmp_path):
     assert "not an ONNX file" in refused(path)
 
 
+@pytest.mark.parametrize(
+    ("there", "other"),
+    [
+        (b"Relu", b"Rel\xb4"),
+        (b"strides", b"strid\xffs"),
+        (b"w1", b"w\xb1"),
+        (b"c1", b"c7"),
+        (b"B\x02w1J", b"B\x02w1\n"),
+    ],
+    ids=["operator", "attribute", "weights", "a tensor that nothing makes", "no numbers"],
+)
+def test_a_file_that_is_damaged_inside(there, other, tmp_path):
+    path = network(tmp_path / "n.onnx")
+    content = path.read_bytes()
+    assert there in content
+    path.write_bytes(content.replace(there, other, 1))
+    assert "not an ONNX file, or a damaged one" in refused(path)
+
+
 def test_missing_weights_beside_the_file(tmp_path):
     path = with_weights_beside(tmp_path)
     (tmp_path / "n.data").unlink()

@@ -25,6 +25,7 @@ def section(findings: Findings) -> Iterator[Block]:
         told = ((name, value) for name, value in findings.properties.items() if name != "input")
         known = {name: value for name, value in told if value != ""}
         yield Text("; ".join(f"{name}: {value}" for name, value in known.items()), "note")
+    yield from _methods(summary)
     yield from _versions_and_seconds(summary)
     if summary.get("settings"):
         yield _settings(summary["settings"], summary["run"])
@@ -36,6 +37,17 @@ def _log(log: Mapping[str, Any], commands: Commands | None) -> Iterator[Block]:
     if commands and commands.again:
         yield Command(commands.again(log["path"]))
         yield Text("The same log, configuration and versions give the same numbers.", "note")
+
+
+def _methods(summary: Mapping[str, Any]) -> Iterator[Block]:
+    """Yield what stages tell of themselves, as networks do, with the time that each takes."""
+    for variant, stages in summary.get("methods", {}).items():
+        for stage, told in stages.items():
+            seconds = summary.get("seconds", {}).get(variant, {}).get(stage)
+            time = {} if seconds is None else {"ms a frame": f"{1e3 * seconds:.2f}"}
+            facts = {name: value for name, value in flattened(told) if value != "none"} | time
+            rows = [[name, value] for name, value in facts.items()]
+            yield KeepTogether([Heading(f"{variant}: {stage}", 2), _words(["what", "value"], rows)])
 
 
 def _settings(variants: Mapping[str, Mapping[str, Any]], run: Mapping[str, Any]) -> Block:
