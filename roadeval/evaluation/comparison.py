@@ -64,6 +64,8 @@ class Side:
         result does not know it.
     regions, disagreements
         The rows of the tables of these names; None where nobody asks for them.
+    own_names
+        What the result itself calls its variants, where they are compared under other names.
     """
 
     label: str
@@ -73,6 +75,7 @@ class Side:
     asked: Mapping[str, Any] = field(default_factory=dict)
     regions: Rows | None = None
     disagreements: Rows | None = None
+    own_names: Mapping[str, str] = field(default_factory=dict)
 
 
 def variants_as_sides(whole: Side, chosen: Sequence[str] | None = None) -> list[Side]:

@@ -259,7 +259,8 @@ def _chosen(side: Side, names: Mapping[str, str]) -> Side:
         wanted, known = ", ".join(names), ", ".join(there)
         raise RoadevalError(f"{side.label}: no variant {wanted}; there are {known}")
     regions = None if side.regions is None else _under(side.regions, names)
-    return replace(side, frames=_under(side.frames, names), regions=regions)
+    own = {name: each for each, name in names.items()}
+    return replace(side, frames=_under(side.frames, names), regions=regions, own_names=own)
 
 
 def _under(rows: Rows, names: Mapping[str, str]) -> Rows:

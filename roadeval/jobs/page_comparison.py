@@ -31,11 +31,15 @@ Inspect = Callable[[Path, int], str]
 
 @dataclass(frozen=True, slots=True)
 class _Mask:
-    """A final mask that is compared: of which result and variant, and what the page calls it."""
+    """A final mask that is compared: of which result and variant, and what the page calls it.
+
+    ``own`` is what the result itself calls the variant.
+    """
 
     name: str
     result: str
     variant: str
+    own: str
 
 
 def browsed(
@@ -61,7 +65,10 @@ def browsed(
     table = _table(masks, {side.label: side for side in sides})
     facts = list(_facts(table, masks, comparison.settings.noteworthy))
     album = _Album(masks, recordings, facts, inspect)
-    wanted = dict.fromkeys(moved.frame for moved in comparison.moved)
+    wanted = dict.fromkeys(
+        [each.frame for each in comparison.moved]
+        + [each.frame for each in comparison.disagreements]
+    )
     strips = [made for frame in [*wanted][:PICTURED] if (made := album.strip(frame))]
     return BrowsedFrames(
         frames=facts,
@@ -76,11 +83,13 @@ def browsed(
 def _masks(sides: Sequence[Side]) -> Iterator[_Mask]:
     """Yield the final masks that all results have, one result after the other for each variant."""
     if all(side.frames.distinct("variant") == [side.label] for side in sides):
-        yield from (_Mask(side.label, side.label, side.label) for side in sides)
+        yield from (_Mask(side.label, side.label, side.label, side.label) for side in sides)
         return
     for variant in sides[0].frames.distinct("variant"):
         if variant != BASELINE and all(variant in s.frames.distinct("variant") for s in sides):
-            yield from (_Mask(f"{s.label}: {variant}", s.label, variant) for s in sides)
+            for side in sides:
+                own = side.own_names.get(variant, variant)
+                yield _Mask(f"{side.label}: {variant}", side.label, variant, own)
 
 
 def _table(masks: Sequence[_Mask], sides: Mapping[str, Side]) -> pd.DataFrame:
@@ -154,7 +163,7 @@ class _Album:
         yield LayerImage("camera", image)
         yield LayerImage("truth", image, TRUTH, first.truth(frame))
         for mask in self._masks:
-            errors: Any = self._recording(mask).layer(mask.variant, ERRORS.name, frame)
+            errors: Any = self._recording(mask).layer(mask.own, ERRORS.name, frame)
             yield LayerImage(f"{mask.name}: errors", image, ERRORS, errors)
 
     def _recording(self, mask: _Mask) -> Recording:

@@ -213,6 +213,18 @@ def test_a_variant_of_one_result_is_held_against_another_of_another(outcome, pla
     assert "(inside)" in found.comparison.results[0].label
 
 
+def test_a_page_shows_both_variants_under_their_own_names(outcome, tmp_path):
+    recording = tmp_path / "other.rrd"
+    drive = outcome.summary["log"]["path"]
+    roadeval.replay(drive, settings(), save=recording, reports=tmp_path / "reports")
+    run = here(
+        *("compare", outcome.recording, recording, "--variant", "confidence=unfiltered"),
+        *("-o", tmp_path / "page.html", "-q"),
+    )
+    assert (run.returncode, run.stderr) == (0, "")
+    assert "unfiltered: errors" in (tmp_path / "page.html").read_text()
+
+
 def refused(places, **table) -> str:
     config = settings().override({"masks": {"net": table}})
     with pytest.raises(RoadevalError) as caught:
