@@ -221,7 +221,7 @@ def test_a_page_shows_both_variants_under_their_own_names(outcome, tmp_path):
         *("compare", outcome.recording, recording, "--variant", "confidence=unfiltered"),
         *("-o", tmp_path / "page.html", "-q"),
     )
-    assert (run.returncode, run.stderr) == (0, "")
+    assert run.returncode == 0
     assert "unfiltered: errors" in (tmp_path / "page.html").read_text()
 
 
