@@ -53,6 +53,9 @@ class Run:
         The same for each further seed of the training, by the seed.
     layouts
         Every variant that is scored, those included whose masks the log carries.
+    methods
+        What stages tell of themselves beside their settings, by variant and stage. It is read
+        before the first frame: a file that they name may be gone after the last.
     board
         The score so far.
     beside
@@ -71,6 +74,7 @@ class Run:
     chains: Mapping[str, Chain]
     repeats: Mapping[int, Mapping[str, Chain]]
     layouts: tuple[VariantLayout, ...]
+    methods: Mapping[str, Mapping[str, Any]]
     board: Scoreboard
     beside: set[int] = field(default_factory=set)
     failures: Failures = field(default_factory=Failures)
@@ -141,6 +145,7 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress) -> Run:
         chains,
         dict(enumerate(repeats, training.seed + 1)),
         layouts,
+        {each.name: told for each in variants if (told := each.pipeline.about())},
         board,
     )
 

@@ -29,7 +29,6 @@ def of(run: Run) -> dict[str, Any]:
     found, differences = run.board.summary(), run.board.differences()
     repeats = run.board.repeats()
     seeds = {"seeds": [run.config.training.seed, *run.repeats], **repeats} if repeats else None
-    methods = {each.name: told for each in run.variants if (told := each.pipeline.about())}
     return found | {
         "verdict": verdict_of(found["totals"], differences, run.config.evaluation),
         **differences.as_dict(),
@@ -41,7 +40,7 @@ def of(run: Run) -> dict[str, Any]:
         "losses": list(losses(run)),
         "run": run.config.as_dict(),
         "settings": {each.name: each.pipeline.as_dict() for each in run.variants},
-        **({"methods": methods} if methods else {}),
+        **({"methods": run.methods} if run.methods else {}),
         "versions": versions(),
         "log": {"path": str(run.log.path), "sha256": run.log.sha256},
         **({"masks": masks} if (masks := _masks(run)) else {}),

@@ -112,6 +112,14 @@ def test_the_run_is_repeated_by_its_run_toml(once, folder, tmp_path):
         assert (tmp_path / "reports" / name).read_text() == (to / "reports" / name).read_text()
 
 
+def test_a_network_may_be_gone_once_it_runs(folder, tmp_path):
+    path = red_network(tmp_path / "n.onnx")
+    config = with_network(path)
+    gone = lambda _result: path.unlink(missing_ok=True)  # noqa: E731
+    outcome = roadeval.replay(folder / "drive.mcap", config, reports=tmp_path / "r", on_frame=gone)
+    assert outcome.summary["methods"]["mine"]["net"]["file"] == "n.onnx"
+
+
 def test_a_network_that_has_changed_since_is_refused(once, folder, tmp_path):
     to, _ = once
     text = (to / "reports" / "run.toml").read_text()
