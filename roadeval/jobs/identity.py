@@ -42,7 +42,8 @@ def asked(
     """Return a digest of the settings, the version and the SHA-256 of a model file, in hexadecimal.
 
     With ``of``, the SHA-256 of a log, and what tells the content of masks that lie beside it, it is
-    that of all that decides what a run finds.
+    that of all that decides what a run finds. Of stages that are not roadeval's own it holds the
+    code of the file that defines them.
     """
     plain = {name: replace(each, path="", images=None) for name, each in config.masks.items()}
     training = replace(config.training, model=None)
@@ -50,4 +51,6 @@ def asked(
     parts = [VERSION, of, json.dumps(settings.as_dict(), sort_keys=True), model]
     if masks:
         parts.append(json.dumps(masks, sort_keys=True))
+    stages = (stage for pipeline in config.pipelines().values() for stage in pipeline.stages())
+    parts += sorted({stage.code for stage in stages if stage.code})
     return hashlib.blake2b("\n".join(parts).encode(), digest_size=16).hexdigest()

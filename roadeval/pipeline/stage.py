@@ -138,6 +138,9 @@ class Stage(Generic[S, P]):
     about
         ``about(settings)`` returns what results tell of the stage beside its settings, as plain
         data by name.
+    code
+        SHA-256 of the file that defines a stage of somebody else's; empty for roadeval's own, whose
+        version tells.
     """
 
     name: str
@@ -156,6 +159,7 @@ class Stage(Generic[S, P]):
     resolve: Callable[[S], S] | None = None
     places: tuple[str, ...] = ()
     about: Callable[[S], Mapping[str, Any]] | None = None
+    code: str = ""
 
     @property
     def yields_mask(self) -> bool:

@@ -6,10 +6,14 @@ Code of somebody else runs only where its name stands in a ``chain``: as an entr
 
 from __future__ import annotations
 
+import hashlib
+import inspect
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import Any, Final
 
 from roadeval.data import is_plain
@@ -50,6 +54,7 @@ def _somebodys(name: str) -> Stage[Any, Any]:
     try:
         found = _imported(name)
         default = name.partition(":")[2].rpartition(".")[2] if ":" in name else name
+        file = _file(found)
         if callable(found) and not isinstance(found, type):
             found = stage_of_function(default, found)
         if not isinstance(found, Stage):
@@ -60,7 +65,28 @@ def _somebodys(name: str) -> Stage[Any, Any]:
     except Exception as error:  # whatever somebody's module raises
         said = visible(" ".join(f"{type(error).__name__}: {error}".split()))
         raise UnknownStageError(f"stage {name!r} cannot be used: {said}") from error
-    return guarded(found)
+    return _told(guarded(found), name, file)
+
+
+def _file(found: Any) -> Path | None:
+    """Return the file that defines a function or a stage; None where there is none."""
+    module = inspect.getmodule(found.bind if isinstance(found, Stage) else found)
+    path = getattr(module, "__file__", None)
+    return Path(path) if path else None
+
+
+def _told(stage: Stage[Any, Any], name: str, file: Path | None) -> Stage[Any, Any]:
+    """Return a stage that tells results where its code comes from."""
+    if file is None:
+        return stage
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    told = {"stage": name, "file": file.name, "sha256": digest}
+    own = stage.about
+
+    def about(settings: Any) -> Mapping[str, Any]:
+        return told if own is None else {**told, **own(settings)}
+
+    return replace(stage, about=about, code=digest)
 
 
 def _imported(name: str) -> Any:

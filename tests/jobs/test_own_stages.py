@@ -1,13 +1,20 @@
 """A method of one's own in a run: tables, frames that it loses, models, and recordings."""
 
+import hashlib
+import importlib
+import sys
 from importlib import import_module
+from pathlib import Path
 
 import pandas as pd
 import pytest
 
 import roadeval
 from roadeval.cli.app import main
+from roadeval.jobs.identity import asked
+from roadeval.pipeline import stages
 from tests.jobs.making import settings, write_log
+from tests.pipeline import somebody
 
 
 def somebodys(name):
@@ -69,6 +76,25 @@ def test_what_it_learns_stands_in_a_model_file(drive, tmp_path):
         roadeval.load_model(path)  # a file by itself loads nobody's code
     own = config.pipelines()["mine"].stages()
     assert roadeval.load_model(path, own).parameters["mine"] == model.parameters["mine"]
+
+
+def test_results_tell_the_code_and_are_known_by_it(drive, tmp_path, monkeypatch):
+    outcome = run(drive, tmp_path, variants={"mine": somebodys("lower_half")})
+    told = outcome.summary["methods"]["mine"]["lower_half"]
+    assert told["stage"] == "tests.pipeline.somebody:lower_half"
+    assert told["sha256"] == hashlib.sha256(Path(somebody.__file__).read_bytes()).hexdigest()
+
+    def known_by(text):
+        stages._somebodys.cache_clear()
+        (tmp_path / "changing.py").write_text(text)
+        sys.modules.pop("changing", None)
+        importlib.invalidate_caches()
+        return asked(settings(chain=["changing:road", "post"]), "")
+
+    monkeypatch.syspath_prepend(tmp_path)
+    one = "def road(image): return image[..., 0] > 1\n"
+    other = "def road(image): return image[..., 0] > 20\n"
+    assert known_by(one) == known_by(one) != known_by(other)
 
 
 def test_a_recording_loads_no_code(drive, tmp_path):
