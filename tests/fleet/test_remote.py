@@ -74,6 +74,11 @@ def test_a_path_and_a_file_url_are_themselves(tmp_path):
         assert path.exists()
 
 
+def test_a_file_url_may_name_this_machine(tmp_path):
+    with staged(f"file://localhost{tmp_path}/a.mcap") as path:
+        assert path == tmp_path / "a.mcap"
+
+
 def test_a_url_is_a_copy_until_the_block_ends(server, tmp_path):
     with staged(server.url("whole/Monday%20rain.mcap"), tmp_path / "stage") as copy:
         assert copy.read_bytes() == CONTENT

@@ -75,7 +75,10 @@ def test_metrics_are_json_with_a_schema_and_undefined_rates_are_null(tmp_path: P
     assert schema is not None
     assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
     fields = json.loads(message.data)
-    assert set(json.loads(schema.data)["properties"]) == set(fields)
+    properties = json.loads(schema.data)["properties"]
+    assert set(properties) == set(fields)
+    # Foxglove takes what has this title for a time.
+    assert properties["timestamp"]["title"] == "time"
     assert fields["timestamp"] == {"sec": STAMP // 10**9, "nsec": 5}
     assert (fields["TP"], fields["FP"], fields["N"]) == (1, 1, 2)
     assert (fields["ERR"], fields["TNR"]) == (0.5, None)

@@ -77,6 +77,13 @@ def test_one_huge_interval_does_not_hide_the_rest_and_is_counted():
     assert cut(many, MEAN) == 1
 
 
+def test_a_cut_interval_does_not_widen_the_axes_when_it_is_drawn():
+    many = [*rows(20), ForestRow("huge", None, 0.0, -0.9, 0.9)]
+    ax, _ = drawn(forest(many, MEAN, "x"))
+    ax.autoscale_view()
+    assert ax.get_xlim() == limits(many, MEAN)
+
+
 def test_thousands_of_drives_make_a_small_picture():
     rng = np.random.default_rng(0)
     many = [
