@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from roadeval.jobs.report_frames import FramePicker, evenly, str_keys
 from roadeval.jobs.result import Result
 from roadeval.report.browse import Strip
 from roadeval.report.figures.values import over_frames
-from roadeval.report.sections.browse import BrowsedFrames, FrameFacts, strip
+from roadeval.report.sections.browse import SMALL, BrowsedFrames, FrameFacts, strip
 from roadeval.results.notes import notes
 
 if TYPE_CHECKING:
@@ -43,14 +43,22 @@ def browsed(
         strips=strips,
         charts=over_frames(frames, [*SHORT]) if len(frames) else [],
         inspect=inspect if result.recording is not None else None,
+        masks=_final_masks(result),
     )
+
+
+def _final_masks(result: Result) -> list[str]:
+    """Name the pictures of the variants' final masks, as `StripMaker` does."""
+    known = result.recording.variants if result.recording else ()
+    return [f"{variant.name}: {variant.stages[-1]}" for variant in known]
 
 
 def facts_of(result: Result) -> Iterator[FrameFacts]:
     """Yield every frame of the table: those evaluated, or without truth those with pictures."""
     frames = result.frames
     if not len(frames):
-        yield from (FrameFacts(number, 0, {}) for number in result.pictured)
+        stamps = result.recording.stamps if result.recording else {}
+        yield from (FrameFacts(number, stamps[number], {}) for number in result.pictured)
         return
     settings = settings_of(result.summary)
     dark = _much_shadow(result)
@@ -150,21 +158,33 @@ def strips_of(
 
 
 class StripMaker:
-    """Makes the strip of any pictured frame of a result."""
+    """Makes the strip of any pictured frame of a result.
 
-    def __init__(self, result: Result, inspect: Callable[[int], str] | None) -> None:
+    Parameters
+    ----------
+    result
+        Of a recording.
+    inspect
+        Returns the command that opens a frame.
+    layers
+        Pixels across the pictures of layers, at most.
+    """
+
+    def __init__(
+        self, result: Result, inspect: Callable[[int], str] | None, layers: int = SMALL
+    ) -> None:
+        self._layers: Final = layers
         self._picker = FramePicker(result)
         self._inspect = inspect
         frames = result.frames
         self._variants = list(dict.fromkeys(frames["variant"])) if len(frames) else []
-        stamps: Any = frames.drop_duplicates("frame").set_index("frame")["stamp_ns"]
-        self._stamps: dict[int, int] = stamps.to_dict() if len(frames) else {}
+        self._stamps: Final = result.recording.stamps if result.recording else {}
 
     def strip(self, frame: int) -> Strip:
         """Return a frame with its pictures."""
         command = self._inspect(frame) if self._inspect else ""
-        found = self._picker.pictured(frame, self._stamps.get(frame, 0))
-        return strip(found, self._variants, command)
+        found = self._picker.pictured(frame, self._stamps[frame])
+        return strip(found, self._variants, command, self._layers)
 
 
 def _chosen(result: Result, count: int) -> list[int]:

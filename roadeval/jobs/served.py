@@ -24,6 +24,7 @@ from roadeval.report.drive import page_document
 from roadeval.report.findings import Commands
 from roadeval.report.fleet.document import page_document as fleet_page_document
 from roadeval.report.page.render import Place, page, part
+from roadeval.report.sections.browse import LARGE
 from roadeval.results.fleet.folder import Fleet
 from roadeval.runtime.local_server import NOT_FOUND, PAGE, Request, Response, told
 
@@ -115,7 +116,8 @@ class ServedDrive:
 
     @cached_property
     def _maker(self) -> StripMaker:
-        return StripMaker(self._result, self._commands.inspect if self._commands else None)
+        inspect = self._commands.inspect if self._commands else None
+        return StripMaker(self._result, inspect, LARGE)
 
     def _picture(self, name: str) -> Response:
         with self._lock:

@@ -285,6 +285,8 @@ def test_without_truth_a_page_shows_the_masks(unlabelled, tmp_path, watched):
     assert run.returncode == 0, run.stderr
     seen = watched((tmp_path / "page.html").as_uri())
     assert seen.complaints == []
+    assert seen.tab.locator("select.left").input_value() == "filtered: post"
+    assert seen.tab.locator("select.right").input_value() == "unfiltered: post"
     first = frame(seen.tab)
     seen.tab.keyboard.press("ArrowRight")
     assert frame(seen.tab) > first

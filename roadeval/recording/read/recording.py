@@ -88,6 +88,19 @@ class Recording:
         batches = self._file.batches(at.CAMERA, _CAMERA, static=False)
         return tuple(frame for batch in batches for frame in batch.column(at.FRAME).to_pylist())
 
+    @cached_property
+    def stamps(self) -> dict[int, int]:
+        """The header stamps of the frames whose images are there, in nanoseconds."""
+        batches = self._file.batches(at.CAMERA, _CAMERA, static=False)
+        return {
+            frame: stamp
+            for batch in batches
+            for frame, stamp in zip(
+                *(batch.column(name).cast("int64").to_pylist() for name in (at.FRAME, at.STAMP)),
+                strict=True,
+            )
+        }
+
     @property
     def unsure(self) -> tuple[int, ...]:
         """The last frames of a partial recording, of which a killed run may lack some layers."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from roadeval.data import BASELINE
 from roadeval.data.words import defined, number, percent, points, timestamp
 from roadeval.evaluation.metrics import SHORT
 from roadeval.report.blocks import Block, Heading, Table
@@ -64,6 +65,8 @@ class BrowsedFrames:
         Rates along the drive.
     inspect
         Returns the command that opens a frame; None where there is none.
+    masks
+        Names of the pictures of final masks, which are compared where there is no truth.
     """
 
     frames: Sequence[FrameFacts]
@@ -72,6 +75,7 @@ class BrowsedFrames:
     strips: Sequence[Strip]
     charts: Sequence[Chart]
     inspect: Callable[[int], str] | None
+    masks: Sequence[str] = ()
 
 
 def section(browsed: BrowsedFrames) -> Iterator[Block]:
@@ -90,7 +94,7 @@ def section(browsed: BrowsedFrames) -> Iterator[Block]:
         strips=browsed.strips,
         charts=browsed.charts,
         first=_first(browsed),
-        compared=_compared(browsed.variants),
+        compared=_compared(browsed),
         command=browsed.inspect(0).replace(" --frame 0", " --frame {}") if browsed.inspect else "",
         note=_note(browsed, len(shown)),
     )
@@ -135,9 +139,10 @@ def _first(browsed: BrowsedFrames) -> int | None:
     return max(there, key=_error).frame if there else None
 
 
-def _compared(variants: Sequence[str]) -> tuple[str, str]:
-    """Return the two pictures that tell most: the errors of two variants."""
-    first, *others = [f"{name}: errors" for name in variants] or [""]
+def _compared(browsed: BrowsedFrames) -> tuple[str, str]:
+    """Return the two pictures that tell most: the errors of two variants, or else their masks."""
+    errors = [f"{name}: errors" for name in browsed.variants if name != BASELINE]
+    first, *others = errors or [*browsed.masks] or ["camera"]
     return first, next(iter(others), "camera")
 
 
@@ -159,7 +164,7 @@ def _note(browsed: BrowsedFrames, shown: int) -> str:
 
 
 def strip(
-    frame: NotableFrame, variants: Sequence[str], command: str = "", conditions: Sequence[str] = ()
+    frame: NotableFrame, variants: Sequence[str], command: str = "", layers: int = SMALL
 ) -> Strip:
     """Return a frame with its pictures.
 
@@ -171,8 +176,8 @@ def strip(
         All that were scored, for their colours.
     command
         Opens it in the viewer.
-    conditions
-        What is true of it, in words.
+    layers
+        Pixels across the pictures of layers, at most.
     """
     names = [*variants]
     rates = Table(
@@ -185,9 +190,9 @@ def strip(
     )
     return Strip(
         frame.frame,
-        [*_sentences(frame), *(f"{each[0].upper()}{each[1:]}." for each in conditions)],
+        list(_sentences(frame)),
         rates if frame.rates else None,
-        list(_rows(frame)),
+        list(_rows(frame, layers)),
         command,
     )
 
@@ -205,13 +210,15 @@ def _sentences(frame: NotableFrame) -> Iterator[str]:
     yield from frame.notes
 
 
-def _rows(frame: NotableFrame) -> Iterator[PictureRow]:
+def _rows(frame: NotableFrame, layers: int) -> Iterator[PictureRow]:
     yield PictureRow("", [_picture(image, image.title, LARGE) for image in frame.images])
     for row in frame.layers:
         variant = row[0].title.partition(":")[0] if row else ""
+        # Without truth the last mask is what is looked at.
+        widths = [*([layers] * (len(row) - 1)), layers if frame.rates else LARGE]
         pictures = [
-            _picture(image, image.title if place == 0 else f"{variant}: {image.title}", SMALL)
-            for place, image in enumerate(row)
+            _picture(image, image.title if place == 0 else f"{variant}: {image.title}", width)
+            for place, (image, width) in enumerate(zip(row, widths, strict=True))
         ]
         yield PictureRow(variant, pictures)
 

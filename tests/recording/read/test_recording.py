@@ -132,6 +132,11 @@ def test_notes_belong_to_their_frame(recording):
     assert recording.notes(6) == ()
 
 
+def test_stamps_are_known_for_every_frame_also_without_truth(recording):
+    shown = [frame(number) for number in range(19)]
+    assert recording.stamps == {each.number: each.stamp_ns for each in shown}
+
+
 def test_roles_are_known_for_every_frame(recording):
     assert recording.frame_numbers == tuple(range(19))
     assert recording.roles[1] == Role.TRAINING
