@@ -24,8 +24,8 @@ def test_a_strip_has_the_outcomes_first_and_then_a_row_of_layers_a_variant():
             [],
         ],
     )
-    found = strip(frame, ["filtered"], "open it", ["dark"])
-    assert [*found.sentences] == ["Stamp 12.345 s", "A note.", "Dark."]
+    found = strip(frame, ["filtered"], "open it")
+    assert [*found.sentences] == ["Stamp 12.345 s", "A note."]
     assert plain_rows(found.rates) == [["filtered", "40.00", "30.00", "20.00"]]
     assert [(row.title, [each.name for each in row.pictures]) for row in found.rows] == [
         ("", ["camera", "filtered: errors"]),
