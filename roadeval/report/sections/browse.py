@@ -214,11 +214,14 @@ def _rows(frame: NotableFrame, layers: int) -> Iterator[PictureRow]:
     yield PictureRow("", [_picture(image, image.title, LARGE) for image in frame.images])
     for row in frame.layers:
         variant = row[0].title.partition(":")[0] if row else ""
+        names = [
+            image.title if p == 0 else f"{variant}: {image.title}" for p, image in enumerate(row)
+        ]
         # Without truth the last mask is what is looked at.
-        widths = [*([layers] * (len(row) - 1)), layers if frame.rates else LARGE]
+        last = row[-1] if row and not frame.rates else None
         pictures = [
-            _picture(image, image.title if place == 0 else f"{variant}: {image.title}", width)
-            for place, (image, width) in enumerate(zip(row, widths, strict=True))
+            _picture(image, name, LARGE if image is last else layers)
+            for name, image in zip(names, row, strict=True)
         ]
         yield PictureRow(variant, pictures)
 
