@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
+from threading import Lock
 from typing import Any, Final, Literal, Protocol
 
 import cv2
@@ -23,6 +24,7 @@ Array = npt.NDArray[Any]
 
 BackendName = Literal["onnxruntime", "opencv"]
 EXTRA: Final = "pip install 'roadeval[onnx]'"
+_ONE_AT_A_TIME: Final = Lock()
 QUOTED: Final = 240
 """Letters of a library's complaint that a message quotes."""
 
@@ -106,7 +108,7 @@ class OpenCv:
         return [found[self._place(name, known)] for name in outputs]
 
     def _read(self) -> Any:
-        with self._explained():
+        with _quiet(), self._explained():
             if self._file.content is None:
                 return cv2.dnn.readNetFromONNX(str(self._file.path))
             return cv2.dnn.readNetFromONNX(np.frombuffer(self._file.content, np.uint8))
@@ -123,6 +125,19 @@ class OpenCv:
         hint = "" if find_spec("onnxruntime") else f"; onnxruntime may, {EXTRA}"
         with _explained(self._file, f"OpenCV {self.version}", hint):
             yield
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep OpenCV from writing to the process's streams what it throws as well."""
+    log = cv2.utils.logging
+    with _ONE_AT_A_TIME:
+        before = log.getLogLevel()
+        log.setLogLevel(log.LOG_LEVEL_SILENT)
+        try:
+            yield
+        finally:
+            log.setLogLevel(before)
 
 
 @contextmanager

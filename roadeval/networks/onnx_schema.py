@@ -1,7 +1,7 @@
 """The part of ONNX's protobuf schema that tells what a network takes and gives.
 
-Attributes' values and all else are fields that this part does not know: the parser passes over
-them. Texts are bytes here, for a file from elsewhere may hold any, and so are weights.
+Most of the attributes' values, and all else, are fields that this part does not know: the parser
+passes over them. Texts are bytes here, for a file from elsewhere may hold any, and so are weights.
 """
 
 from __future__ import annotations
@@ -35,7 +35,11 @@ MESSAGES: Final[Mapping[str, Mapping[str, tuple[int, str, bool]]]] = {
         "attribute": (5, "Attribute", True),
         "domain": (7, _TEXT, False),
     },
-    "Attribute": {"name": (1, _TEXT, False)},
+    "Attribute": {
+        "name": (1, _TEXT, False),
+        "i": (3, _INTEGER, False),
+        "ints": (8, _INTEGER, True),
+    },
     "Tensor": {
         "dims": (1, _INTEGER, True),
         "data_type": (2, _INTEGER, False),

@@ -12,12 +12,16 @@ from roadeval.networks.onnx_schema import TYPES
 
 MOST_LENGTHS: Final = 16
 """Lengths that the shape of weights may have."""
+DIVISORS: Final = frozenset({b"dilations", b"group", b"kernel_shape", b"strides"})
+"""Attributes by which sizes are divided."""
 _OTHER_DATA: Final = ("data_4", "data_5", "data_6", "data_7", "data_10", "data_11")
 """Where a tensor's numbers may stand in place of ``raw_data``."""
 
 
 def is_whole(graph: Any) -> bool:
     """Return whether names are text, tensors are made before they are used, and weights are there.
+
+    And whether what sizes are divided by is above 0.
 
     Parameters
     ----------
@@ -32,6 +36,8 @@ def is_whole(graph: Any) -> bool:
         known.update(node.output)
         texts.update((node.name, node.op_type, node.domain))
         texts.update(each.name for each in node.attribute)
+        if not all(map(_divides, node.attribute)):
+            return False
     outputs = [each.name for each in graph.output]
     return (
         bool(graph.input and outputs)
@@ -52,6 +58,14 @@ def _are_text(names: Iterable[bytes]) -> bool:
         return all(name.decode() is not None for name in names)
     except UnicodeDecodeError:
         return False
+
+
+def _divides(attribute: Any) -> bool:
+    """Return whether an attribute, where sizes are divided by it, is above 0."""
+    if attribute.name not in DIVISORS:
+        return True
+    least: int = min(attribute.ints or [attribute.i])
+    return least > 0
 
 
 def _has_its_numbers(tensor: Any) -> bool:

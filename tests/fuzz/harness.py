@@ -16,7 +16,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Final
 
-NAMES: Final = ("logs", "damage", "images", "results", "models", "configurations")
+NAMES: Final = ("logs", "damage", "images", "results", "models", "networks", "configurations")
 """The harnesses, each a module in `tests.fuzz.harnesses`."""
 
 SLOW: Final = 10.0

@@ -84,8 +84,16 @@ def test_a_file_that_was_cut(tmp_path):
         (b"w1", b"w\xb1"),
         (b"c1", b"c7"),
         (b"B\x02w1J", b"B\x02w1\n"),
+        (b"strides@\x02", b"strides@\x00"),
     ],
-    ids=["operator", "attribute", "weights", "a tensor that nothing makes", "no numbers"],
+    ids=[
+        "operator",
+        "attribute",
+        "weights",
+        "a tensor that nothing makes",
+        "no numbers",
+        "a stride of 0",
+    ],
 )
 def test_a_file_that_is_damaged_inside(there, other, tmp_path):
     path = network(tmp_path / "n.onnx")
