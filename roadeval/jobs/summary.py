@@ -103,12 +103,12 @@ def _sizes(run: Run) -> tuple[str, ...]:
 def _missing(run: Run) -> Iterator[str]:
     """Tell where masks of other systems are missing, or belong to no frame."""
     seen, elsewhere = run.frames.accounting, run.selection.elsewhere
+    totals = run.board.totals()
     for name in (*run.selection.masks, *elsewhere):
         if missing := seen.read - seen.masks[name]:
-            yield (
-                f"{name}: {missing} of the {seen.read} frames read have no mask of it: it is "
-                "scored on the others alone"
-            )
+            without = f"{name}: {missing} of the {seen.read} frames read have no mask of it"
+            rest = "it is scored on the others alone" if name in totals else "it has no score"
+            yield f"{without}: {rest}"
         if name in elsewhere and (unused := elsewhere[name].pairing.unused):
             yield f"{name}: {unused} files of {elsewhere[name].where} belong to no frame"
 

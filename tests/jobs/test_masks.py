@@ -117,8 +117,15 @@ def test_a_frame_without_a_mask_is_left_out_of_its_variant_and_told(outcome):
     assert "13 of the 26 frames read have no mask" in told
 
 
-def test_a_variant_with_few_masks_is_not_called_the_best(outcome):
-    assert not outcome.summary["verdict"].startswith("half ")
+def test_masks_of_training_frames_alone_give_no_score(places, tmp_path):
+    (tmp_path / "few").mkdir()
+    for number in range(3):
+        name = f"frame_{number:04d}.png"
+        (tmp_path / "few" / name).write_bytes((places / "number" / name).read_bytes())
+    config = settings(record="none").override({"masks": {"few": {"path": str(tmp_path / "few")}}})
+    done = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "reports")
+    assert "few" not in done.summary["totals"]
+    assert "few: 23 of the 26 frames read have no mask of it: it has no score" in done.warnings
 
 
 def test_a_report_shows_frames_without_a_mask(outcome, tmp_path):

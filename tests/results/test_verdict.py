@@ -116,6 +116,13 @@ def test_without_a_filter_the_best_variant_is_held_against_the_baseline() -> Non
     assert told == f"unfiltered is worse than {BLIND}: its ERR is 8.0 pp higher [7.1, 11.0]."
 
 
+def test_a_variant_without_masks_of_some_frames_is_not_called_the_best() -> None:
+    few = replace(HARM, mean=-0.5, frames=40)
+    against = {"half": {"ERR": few}, "unfiltered": {"ERR": HARM}}
+    told = a_verdict(DriveDifferences({}, against), "half", "unfiltered", "blind")
+    assert told.startswith("unfiltered is worse than blind")
+
+
 def test_without_anything_to_compare_with_the_rates_are_told() -> None:
     assert a_verdict(DriveDifferences({}, {}), "net") == (
         "ERR is 5.4 % with net; no frame with truth was trained on, so blind is unknown."

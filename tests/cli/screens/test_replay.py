@@ -78,6 +78,11 @@ def test_a_variant_is_named_when_it_is_the_best():
     assert outcome.best(totals) == "Lowest ERR: unfiltered, 8.47 %"
 
 
+def test_a_variant_without_masks_of_some_frames_wins_nothing():
+    totals = TOTALS | {"half": {"post": total(0.001) | {"frames": 40}}}
+    assert outcome.best(totals) == "Lowest ERR: blind, which never looks at the image, 7.21 %"
+
+
 def test_an_undefined_rate_wins_nothing_and_is_a_dash():
     totals = {"filtered": {"post": total(math.nan)}, "unfiltered": {"post": total(0.3)}}
     assert outcome.best(totals) == "Lowest ERR: unfiltered, 30.00 %"

@@ -7,6 +7,11 @@ from roadeval.images import Limits
 from roadeval.logs import LogError, MaskSettings
 from roadeval.logs.masks.elsewhere import log_and_topic
 from roadeval.logs.masks.folder import open_folder
+from roadeval.logs.masks.npy import npy_picture
+from roadeval.logs.messages.pictures import CompressedPicture
+from roadeval.logs.topics.confidence import Confidence
+from tests.logs.making import png
+from tests.logs.masks.test_npy import file_of
 
 
 def folder(tmp_path, *names):
@@ -104,12 +109,6 @@ def test_a_topic_of_a_log_is_told_from_a_folder(path, expected):
 
 
 def test_confidences_of_eight_and_sixteen_bits_and_fractions_are_the_same(tmp_path):
-    from roadeval.logs.masks.npy import npy_picture
-    from roadeval.logs.messages.pictures import CompressedPicture
-    from roadeval.logs.topics.confidence import Confidence
-    from tests.logs.making import png
-    from tests.logs.masks.test_npy import file_of
-
     levels = np.arange(256, dtype=np.uint8).reshape(16, 16)
     confidence = Confidence(0.5)
     pictures = [
@@ -122,3 +121,8 @@ def test_confidences_of_eight_and_sixteen_bits_and_fractions_are_the_same(tmp_pa
         codes = confidence.read(picture, Limits())
         np.testing.assert_array_equal(codes, levels.astype(np.uint16) * 257)
     np.testing.assert_array_equal(confidence.road(codes), levels / 255 >= 0.5)
+
+
+def test_a_confidence_at_the_threshold_is_road():
+    codes = np.array([[50, 51, 52]], np.uint16) * 257
+    assert Confidence(0.2).road(codes).tolist() == [[0, 1, 1]]
