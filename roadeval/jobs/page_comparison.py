@@ -13,7 +13,7 @@ from roadeval.evaluation.comparison_result import Comparison
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.scored import final_stages
 from roadeval.jobs.page_frames import PICTURED
-from roadeval.jobs.report_frames import str_keys
+from roadeval.jobs.report_frames import rates_by_frame
 from roadeval.jobs.result import Result
 from roadeval.recording import Recording
 from roadeval.report.browse import Strip
@@ -110,14 +110,11 @@ def _table(masks: Sequence[_Mask], sides: Mapping[str, Side]) -> pd.DataFrame:
 def _facts(table: pd.DataFrame, masks: Sequence[_Mask], noteworthy: float) -> Iterator[FrameFacts]:
     """Yield each frame with the masks' rates, and whether the first of them got worse or better."""
     base, new = masks[0].name, masks[1].name
-    for number, own in table.groupby("frame"):
-        rates = {
-            str(row["variant"]): {name: float(row[name]) for name in SHORT if name in row}
-            for row in map(str_keys, own.to_dict("records"))
-        }
+    names = [name for name in SHORT if name in table]
+    for frame, stamp, rates in rates_by_frame(table, names):
         change = rates[new]["ERR"] - rates[base]["ERR"]
         said = [f"{new} {'worse' if change > 0 else 'better'}"] if abs(change) >= noteworthy else []
-        yield FrameFacts(int(str(number)), int(own["stamp_ns"].iloc[0]), rates, said)
+        yield FrameFacts(frame, stamp, rates, said)
 
 
 class _Album:

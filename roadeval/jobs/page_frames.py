@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -12,15 +12,12 @@ from roadeval.evaluation import analysis, scored
 from roadeval.evaluation.health import judge
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.settings import EvaluationSettings, settings_of
-from roadeval.jobs.report_frames import FramePicker, evenly, str_keys
+from roadeval.jobs.report_frames import FramePicker, evenly, rates_by_frame
 from roadeval.jobs.result import Result
 from roadeval.report.browse import Strip
 from roadeval.report.figures.values import over_frames
 from roadeval.report.sections.browse import SMALL, BrowsedFrames, FrameFacts, strip
 from roadeval.results.notes import notes
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 PICTURED: Final = 24
 """Frames with pictures, where nobody says how many."""
@@ -62,26 +59,17 @@ def facts_of(result: Result) -> Iterator[FrameFacts]:
         return
     settings = settings_of(result.summary)
     dark = _much_shadow(result)
-    last = analysis.finals(frames)[["frame", "stamp_ns", "variant", *_known(frames)]]
-    for number, own in last.groupby("frame", sort=False):
-        rates = {
-            str(row["variant"]): {name: float(row[name]) for name in _known(frames)}
-            for row in map(str_keys, own.to_dict("records"))
-        }
+    names = [name for name in SHORT if name in frames]
+    for frame, stamp, rates in rates_by_frame(analysis.finals(frames), names):
         blind = rates.get(BASELINE)
         others = {name: each for name, each in rates.items() if name != BASELINE}
-        frame = int(str(number))
         yield FrameFacts(
             frame,
-            int(own["stamp_ns"].iloc[0]),
+            stamp,
             rates,
             [*_conditions(others, blind, settings), *(["much shadow"] if frame in dark else [])],
             notes({name: _with_mirrors(each) for name, each in others.items()}, blind, settings),
         )
-
-
-def _known(frames: pd.DataFrame) -> list[str]:
-    return [name for name in SHORT if name in frames]
 
 
 def _with_mirrors(rates: Mapping[str, float]) -> dict[str, float]:

@@ -45,6 +45,25 @@ def str_keys(values: Mapping[Any, Any]) -> dict[str, Any]:
     return {str(name): value for name, value in values.items()}
 
 
+def rates_by_frame(
+    table: pd.DataFrame, names: Sequence[str]
+) -> Iterator[tuple[int, int, dict[str, dict[str, float]]]]:
+    """Yield each frame's number and stamp, and the rates of its rows by variant.
+
+    Parameters
+    ----------
+    table
+        ``frame``, ``stamp_ns``, ``variant`` and the rates; one row a frame and variant.
+    names
+        Of the rates.
+    """
+    found: dict[tuple[int, int], dict[str, dict[str, float]]] = {}
+    columns = [table[name].tolist() for name in ("frame", "stamp_ns", "variant", *names)]
+    for frame, stamp, variant, *values in zip(*columns, strict=True):
+        found.setdefault((frame, stamp), {})[variant] = dict(zip(names, values, strict=True))
+    yield from ((*key, rates) for key, rates in found.items())
+
+
 class FramePicker:
     """Picks frames of a result and collects their pictures and facts."""
 

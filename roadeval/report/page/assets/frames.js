@@ -69,6 +69,7 @@ class Browser {
 
   async show(frame, scroll = false, follow = false) {
     this.frame = frame;
+    this.element.querySelector(".viewer").hidden = false;
     const row = this.byFrame.get(frame);
     for (const each of this.rows) each.removeAttribute("aria-current");
     row?.setAttribute("aria-current", "true");
