@@ -66,8 +66,8 @@ class WindowViewer:
         """Show a frame, as `SteeredViewer.show`."""
         if not has_screen():
             raise RecordingError(
-                "No screen to open a window on: serve with --web, or type the command on a machine "
-                "that has one."
+                "No screen to open a window on: take the web viewer, or type the command on a "
+                "machine that has one."
             )
         with self._lock:
             go(self._client(recording), frame)
