@@ -13,7 +13,7 @@ from roadeval.runtime.files import check_input
 from roadeval.runtime.text import visible, visible_lines
 
 
-def load_config(path: str | Path, preset: str | None = None) -> RunConfig:
+def load_config(path: str | Path, preset: str | None = None, *, trusted: bool = True) -> RunConfig:
     """Read the configuration of a run from a TOML file.
 
     Parameters
@@ -22,6 +22,9 @@ def load_config(path: str | Path, preset: str | None = None) -> RunConfig:
         The file, in the shape that `roadeval.config.run` describes.
     preset
         The preset to start from where the file names none; ``paper`` otherwise.
+    trusted
+        Whether the user has named the file; one that came with results, or lies in a recording,
+        loads no code.
 
     Raises
     ------
@@ -29,13 +32,14 @@ def load_config(path: str | Path, preset: str | None = None) -> RunConfig:
         If the file is missing, no TOML, or holds a key or a value that cannot be used.
     """
     base = {} if preset is None else {"preset": preset}
-    return configure({**base, **read_tables(path)}, where=str(path))
+    return configure({**base, **read_tables(path, trusted=trusted)}, where=str(path))
 
 
-def read_tables(path: str | Path) -> dict[str, Any]:
+def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
     """Read the tables of a TOML file, or of the ``run.toml`` that a recording holds.
 
-    A `ConfigError` if there are none to read.
+    A `ConfigError` if there are none to read, or they name code that may not be loaded: see
+    `load_config`.
     """
     try:
         tables = tomllib.loads(_text(Path(path)))
@@ -47,13 +51,13 @@ def read_tables(path: str | Path) -> dict[str, Any]:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: not valid TOML: {error}") from error
-    if Path(path).suffix == ".rrd":
+    if not trusted or Path(path).suffix == ".rrd":
         _refuse_code(tables, path)
     return tables
 
 
 def _refuse_code(tables: Mapping[str, Any], path: str | Path) -> None:
-    """Refuse, as a `ConfigError`, a recording's chain that names a module: it may be anybody's."""
+    """Refuse, as a `ConfigError`, a chain that names a module: the file may be anybody's."""
     variants = tables.get("variants", {})
     asked = [tables, *(variants.values() if isinstance(variants, Mapping) else ())]
     for each in asked:
@@ -61,8 +65,8 @@ def _refuse_code(tables: Mapping[str, Any], path: str | Path) -> None:
         for name in chain if isinstance(chain, list) else ():
             if isinstance(name, str) and ":" in name:
                 raise ConfigError(
-                    f"{path}: its chain names code, {visible(name)}, which no recording may load; "
-                    "give the run.toml of its results folder, or a file of your own"
+                    f"{path}: its chain names code, {visible(name)}, which is loaded only from a "
+                    "TOML file that you give: replay the drive with the run.toml of its results"
                 )
 
 

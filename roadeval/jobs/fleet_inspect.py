@@ -175,7 +175,7 @@ def _configuration(fleet: Fleet, drive: str, fold: int | None) -> RunConfig:
     path = fleet.path / RESULTS / drive / RUN
     if not path.exists():
         raise RoadevalError(f"{path}: is not there; run the fleet's command again")
-    config = load_config(path)
+    config = load_config(path, trusted=False)
     if fold is None:
         return config
     return config.override({"training": {"model": str(model_path(fleet.path, fold))}})

@@ -9,6 +9,7 @@ import pytest
 from roadeval.cli.options import OPTIONS
 from roadeval.config import PRESETS, RunConfig, configure, load_config, network_variant
 from roadeval.config.document import documented
+from roadeval.config.errors import ConfigError
 from roadeval.config.settings import SECTIONS
 from roadeval.config.toml import run_toml
 
@@ -133,3 +134,12 @@ def test_every_setting_is_documented_with_its_range():
 def test_a_file_that_begins_with_a_mark_of_byte_order_is_read(tmp_path):
     (tmp_path / "run.toml").write_text("[frames]\nevery = 2\n", encoding="utf-8-sig")
     assert load_config(tmp_path / "run.toml").frames.every == 2
+
+
+@pytest.mark.parametrize("table", ["", "[variants.theirs]\n"])
+def test_a_file_that_the_user_has_not_named_loads_no_code(tmp_path, table):
+    path = tmp_path / "run.toml"
+    path.write_text(f'{table}chain = ["tests.pipeline.somebody:lower_half", "post"]\n')
+    assert load_config(path)
+    with pytest.raises(ConfigError, match=r"run.toml: its chain names code, tests\.pipeline\.some"):
+        load_config(path, trusted=False)

@@ -169,3 +169,14 @@ def test_the_catalogue_holds_every_drive_with_its_err_and_tells_of_copies(made, 
     for drive, row in rows.items():
         assert row["property:fleet:ERR"][0] == errors[drive]
     assert all(seen["blueprints"])
+
+
+def test_a_fleet_from_elsewhere_loads_no_code(fleet, drawn):
+    first = worst(fleet)
+    (fleet / "recordings" / f"{first.drive}.rrd").unlink()
+    run = fleet / "results" / first.drive / "run.toml"
+    run.write_text(f'{run.read_text()}\n[variants.theirs]\nchain = ["antigravity:fly", "post"]\n')
+    done = drawn(fleet, "--worst", 1)
+    assert done.returncode == 1
+    assert "run.toml: its chain names code, antigravity:fly, which is loaded only" in done.stderr
+    assert done.stderr.count("\n") == 1

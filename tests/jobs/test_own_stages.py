@@ -99,7 +99,7 @@ def test_results_tell_the_code_and_are_known_by_it(drive, tmp_path, monkeypatch)
 
 def test_a_recording_loads_no_code(drive, tmp_path):
     run(drive, tmp_path, variants={"mine": somebodys("lower_half")})
-    with pytest.raises(roadeval.RoadevalError, match="which no recording may load"):
+    with pytest.raises(roadeval.RoadevalError, match="which is loaded only from a"):
         roadeval.load_config(tmp_path / "o.rrd")
     again = roadeval.load_config(tmp_path / "reports" / "run.toml")
     assert "mine" in again.pipelines()
