@@ -15,7 +15,7 @@ FIGURES = [
 ]
 TABLES = [
     *("frames.csv", "windows.csv", "regions.csv", "summary.json", "run.toml"),
-    *("changes.csv", "heat.csv", "oracles.csv"),
+    *("changes.csv", "disagreements.csv", "heat.csv", "oracles.csv"),
 ]
 
 
