@@ -20,6 +20,10 @@ Labels = npt.NDArray[np.int32]
 Runs = npt.NDArray[np.int32]
 """``(n, 4)``: row, first column, column after the last, and label, row after row and from left to
 right in each."""
+Costs = npt.NDArray[np.uint16]
+"""``(H, W)``: what a step of length 1 costs at each pixel."""
+Distances = npt.NDArray[np.int32]
+"""``(H, W)``: what the cheapest path to each pixel costs."""
 Flags = npt.NDArray[np.bool_]
 """``(n,)``: whether something holds of each of something."""
 Sums = npt.NDArray[np.int64]

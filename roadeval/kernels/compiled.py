@@ -16,6 +16,8 @@ import numpy.typing as npt
 from roadeval.data.arrays import (
     Bits,
     CodeTable,
+    Costs,
+    Distances,
     Image,
     Labels,
     Matrix,
@@ -35,6 +37,7 @@ __all__ = [
     "components",
     "count_bits",
     "fill_holes",
+    "geodesics",
     "grow",
     "keep_region",
     "label_runs",
@@ -244,6 +247,17 @@ def add_outcomes(errors: Plane, totals: Image) -> None:
     """See `plain.add_outcomes`."""
     _require(totals, 3, *errors.shape)
     _loops.add_outcomes(errors, errors.size, totals)
+
+
+# --- Paths ----------------------------------------------------------------------------------------
+
+
+def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
+    """See `plain.geodesics`."""
+    shape = _shape(cost, seeds)
+    distance = np.empty(shape, np.int32)
+    _loops.geodesics(cost, seeds, *shape, rounds, distance)
+    return distance
 
 
 # --- Decision -------------------------------------------------------------------------------------

@@ -88,7 +88,8 @@ class Model:
         """Raise a `ModelError` for a variant that this model was not made for.
 
         Settings that what is learnt does not depend on may differ, and a variant that learns
-        nothing needs no model.
+        nothing needs no model. A setting that the model's version did not have yet is taken for
+        its default, which does what was done before.
         """
         if not pipeline.learning():
             return
@@ -98,9 +99,10 @@ class Model:
                 f"{path}: the model has no variant {variant} (it has {known}); "
                 "train one with the same preset and variants"
             )
-        made_for = self.settings[variant]
         # Through JSON, as the file has been: tuples and lists are the same there.
         wanted = json.loads(json.dumps(pipeline.relevant()))
+        usual = json.loads(json.dumps(Pipeline.default(pipeline.chain).relevant()))
+        made_for = _completed(self.settings[variant], usual)
         for name in sorted({*made_for, *wanted}):
             if made_for.get(name) != wanted.get(name):
                 raise ModelError(
@@ -114,6 +116,14 @@ class Model:
                     f"{path}: the model file is incomplete: {name} of variant {variant} has "
                     "learnt nothing; train it again"
                 )
+
+
+def _completed(made_for: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings by stage, with the usual ones where a stage has none of that name."""
+    return {
+        name: {**usual.get(name, {}), **own} if isinstance(own, dict) else own
+        for name, own in made_for.items()
+    }
 
 
 def _difference(made_for: Any, wanted: Any) -> str:

@@ -130,6 +130,7 @@ def test_arrays_that_do_not_fit_together_are_refused():
             np.zeros((1, 3)),
             np.ones((2, 3)),
         ),
+        lambda: fast.geodesics(np.zeros((4, 71), np.uint16), plane, 1),
         lambda: fast.rectified_sum(
             whole.view(np.float32), np.zeros((1, 3), np.float32), value[:1], value
         ),
@@ -278,6 +279,13 @@ def test_bits_grow_alike_and_stay_in_the_image(mask, least, rows, outside):
     grown = fast.grow(*given)
     np.testing.assert_array_equal(grown, plain.grow(*given))
     np.testing.assert_array_equal(grown, pack(unpack(grown, mask.shape[1])))
+
+
+@given(masks(most=30), st.sampled_from([1, 40, 65_535]), st.integers(0, 4), st.integers(0, 10**6))
+def test_paths_are_measured_alike(seeds, greatest, rounds, seed):
+    cost = np.random.default_rng(seed).integers(0, greatest, seeds.shape, np.uint16, endpoint=True)
+    given = cost, seeds, rounds
+    assert_same(fast.geodesics(*given), plain.geodesics(*given))
 
 
 def test_bits_grow_by_the_element():

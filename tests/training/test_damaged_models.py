@@ -193,7 +193,7 @@ def test_a_machine_without_the_features_of_a_window_ends_with_one_line_and_code_
     assert main([*words, "--save", "x.rrd", "--reports", "x"]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("roadeval: error: x.model: the model is damaged: ")
-    assert "is for 9 features, and windows = [5] make 11" in line
+    assert "is for 9 features, and windows = [5] and geodesics = false make 11" in line
     assert [path.name for path in tmp_path.iterdir()] == ["x.model"]
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from contextlib import nullcontext
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -100,6 +101,20 @@ def test_a_threshold_that_is_learnt_or_given_in_its_place_must_agree(tmp_path, t
     model = fit([frame(0)], {"x": made}, TrainingSettings())
     with pytest.raises(RoadevalError, match=r"settings of context .*threshold"):
         model.require("x", wanted, tmp_path / "x.model")
+
+
+@pytest.mark.parametrize(("wanted", "fits"), [(False, True), (True, False)])
+def test_a_setting_that_an_older_model_does_not_know_was_at_its_default(tmp_path, wanted, fits):
+    pipeline = configure({"preset": "robust"}).pipeline
+    model = fit([frame(0)], {"x": pipeline}, TrainingSettings())
+    older = json.loads(json.dumps(model.settings["x"]))
+    del older["context"]["geodesics"], older["context"]["patch"]
+    model = dataclasses.replace(model, settings={"x": older})
+    settings = {**pipeline.settings, "context": ContextSettings(geodesics=wanted)}
+    other = dataclasses.replace(pipeline, settings=settings)
+    told = nullcontext() if fits else pytest.raises(RoadevalError, match="geodesics False there")
+    with told:
+        model.require("x", other, tmp_path / "x.model")
 
 
 def test_a_variant_it_was_not_trained_for_is_refused(path):

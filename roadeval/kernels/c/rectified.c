@@ -54,10 +54,11 @@ LOOP void rectified_sum(
 {
 #define SUM(n) sum_planes(features, n, pixels, planes, bias, weights, plane_count, block, result)
     switch (count) {
-    /* Nine features and two for each window of texture. */
+    /* Nine features and two for each window of texture; or twelve and two. */
     case 9: SUM(9); break;
     case 11: SUM(11); break;
     case 13: SUM(13); break;
+    case 14: SUM(14); break;
     case 15: SUM(15); break;
     case 17: SUM(17); break;
     case 19: SUM(19); break;

@@ -25,14 +25,21 @@ import numpy.typing as npt
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.data import Layer, LayerKind, LayerSpec, Rgb
+from roadeval.data import Layer, LayerKind, LayerSpec
 from roadeval.data.arrays import Floats, Values
 from roadeval.data.packed import Packed
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.beyond.context_features import BARE_FEATURES, at_samples, features
+from roadeval.pipeline.beyond.context_features import (
+    BARE_FEATURES,
+    at_samples,
+    features,
+    number_of_features,
+)
+from roadeval.pipeline.beyond.geodesic_features import GEODESICS, distance_of
 from roadeval.pipeline.beyond.working_image import reduced, stretched
 from roadeval.pipeline.paper.svm import NOT_RUN, SVM, Penalty
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
+from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.stage import (
     MisfitError,
     Output,
@@ -52,6 +59,14 @@ DECISION: Final = LayerSpec(
     "decision", LayerKind.SCALAR, "Decision value (Eq. 16)", value_range=(-2.0, 2.0), exact=False
 )
 
+GEODESIC: Final = LayerSpec(
+    "geodesic",
+    LayerKind.SCALAR,
+    "Geodesic distance from the reference patch, over edges and hues",
+    value_range=(0.0, 10.0),
+    exact=False,
+)
+
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class ContextSettings:
@@ -65,6 +80,11 @@ class ContextSettings:
         Sides of the squares over which texture is averaged, in its pixels. Gravel and leaves show
         in a small one; what a larger one tells of a facade, the columns below it tell as well.
         At most 8: for each number of features there is a loop of its own.
+    geodesics
+        Whether the distances from the reference patch along the cheapest path over edges, hues
+        and colours are features, too (`geodesic_features`): they grow by a step at a kerb.
+    patch
+        The reference patch, where those paths begin.
     planes
         Planes of the feature map. What a decision costs grows with them.
     spare
@@ -83,12 +103,19 @@ class ContextSettings:
 
     width: Annotated[int, Field(ge=32, le=4096)] = 320
     windows: Annotated[tuple[Annotated[int, Field(ge=1, le=255)], ...], Field(max_length=8)] = (5,)
+    geodesics: bool = False
+    patch: ReferencePatch = ReferencePatch()
     planes: Annotated[int, Field(ge=1, le=4096)] = 96
     spare: Annotated[int, Field(ge=0, le=4096)] = 32
     c: Penalty = 1.0
     smoothing: Annotated[int, Field(ge=1, le=255)] = 5
     threshold: Annotated[float, Field(allow_inf_nan=False)] | None = None
     folds: Annotated[int, Field(ge=2, le=100)] = 5
+
+    @property
+    def start(self) -> ReferencePatch | None:
+        """Where geodesic paths begin; None if there are none."""
+        return self.patch if self.geodesics else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,9 +136,11 @@ class RectifiedMachine:
         check_arrays(self, np.float32, planes=("K", "F"), bias=("K",), weights=("K",))
         check_arrays(self, np.float32, offset=(), threshold=())
         check_range("offset", self.offset, -GREATEST, GREATEST)
-        textures = self.planes.shape[1] - BARE_FEATURES
-        if textures < 0 or textures % 2:
-            raise ValueError("planes has not nine columns and two for each window of texture")
+        more = self.planes.shape[1] - BARE_FEATURES
+        if more < 0 or (more % 2 and more < GEODESICS):
+            raise ValueError(
+                "planes has not nine columns and two for each window of texture, or three more"
+            )
 
 
 # --- Learning -------------------------------------------------------------------------------------
@@ -119,7 +148,7 @@ class RectifiedMachine:
 
 def fit(sample: TrainingSet, settings: ContextSettings) -> RectifiedMachine:
     """Draw the planes, solve the linear machine (Eq. 13) on them, and learn the threshold."""
-    values = at_samples(sample, settings.width, settings.windows)
+    values = at_samples(sample, settings.width, settings.windows, settings.start)
     planes, bias = draw_planes(values, settings.planes + settings.spare, sample.seed)
     mapped = np.maximum(values @ planes.T + bias, 0)
     kept, weights, offset = solve(mapped, sample.road, settings)
@@ -256,25 +285,22 @@ def check_fit(machine: RectifiedMachine, settings: ContextSettings) -> None:
 
     Such a model is damaged, or was trained with other settings.
     """
-    given, wanted = machine.planes.shape[1], BARE_FEATURES + 2 * len(settings.windows)
+    given = machine.planes.shape[1]
+    wanted = number_of_features(settings.windows, settings.start)
     if given != wanted:
         raise MisfitError(
             f"the model is damaged: its machine of stage context is for {given} features, and "
-            f"windows = {list(settings.windows)} make {wanted}; train it again"
+            f"windows = {list(settings.windows)} and geodesics = "
+            f"{str(settings.geodesics).lower()} make {wanted}; train it again"
         )
 
 
-def decision(image: Rgb, machine: RectifiedMachine, settings: ContextSettings) -> Values:
-    """Compute the decision value (Eq. 16) of ``(h, w, 3)`` uint8 RGB, ``(h, w)`` float32.
-
-    A `MisfitError` if the machine is for other features than the settings'.
-    """
-    check_fit(machine, settings)
-    planes = features(image, settings.windows)
+def decision(planes: Values, machine: RectifiedMachine, smoothing: int) -> Values:
+    """Compute the decision value (Eq. 16) of `features`, ``(F, h, w)``; ``(h, w)`` float32."""
     values = KERNELS.rectified_sum(
         planes.reshape(len(planes), -1), machine.planes, machine.bias, machine.weights
     )
-    side = (settings.smoothing, settings.smoothing)
+    side = (smoothing, smoothing)
     smooth: Values = cv2.blur(values.reshape(planes.shape[1:]) + np.float32(machine.offset), side)
     return smooth
 
@@ -284,17 +310,22 @@ def bind(settings: ContextSettings, machine: RectifiedMachine) -> Callable[[View
     check_fit(machine, settings)
 
     def run(view: View) -> Output:
-        values = decision(reduced(view.image, settings.width), machine, settings)
-        values = stretched(values, view.image.shape)
+        small, shape = reduced(view.image, settings.width), view.image.shape
+        seen = features(small, settings.windows, settings.start)
+        values = stretched(decision(seen, machine, settings.smoothing), shape)
         road = Packed.of(values > machine.threshold)
-        return Output((Layer(DECISION, values), Layer(SVM, road)), mask=road)
+        shown = [Layer(DECISION, values), Layer(SVM, road)]
+        if settings.geodesics:
+            # Of the three the one with most to see: kerbs and verges.
+            shown.insert(0, Layer(GEODESIC, stretched(distance_of(seen[1 - GEODESICS]), shape)))
+        return Output(tuple(shown), mask=road)
 
     return run
 
 
-def layers(_settings: ContextSettings) -> tuple[LayerSpec, ...]:
+def layers(settings: ContextSettings) -> tuple[LayerSpec, ...]:
     """Return the layers of the machine."""
-    return DECISION, SVM
+    return (GEODESIC, DECISION, SVM) if settings.geodesics else (DECISION, SVM)
 
 
 STAGE: Final = Stage(

@@ -1,5 +1,6 @@
 """The machine on colour, place, the column below and texture."""
 
+from dataclasses import replace
 from unittest.mock import Mock
 
 import cv2
@@ -11,7 +12,9 @@ from roadeval.kernels import KERNELS
 from roadeval.pipeline.beyond import context
 from roadeval.pipeline.beyond.context import ContextSettings
 from roadeval.pipeline.beyond.context_features import at_samples, features
+from roadeval.pipeline.beyond.geodesic_features import distance_of, geodesics
 from roadeval.pipeline.chain import Pipeline
+from roadeval.pipeline.reference_patch import patch_mask
 from roadeval.pipeline.stage import TrainingSet, View
 from roadeval.pipeline.stages import STAGES
 
@@ -30,6 +33,11 @@ def every_pixel(images, truths, seed=0):
     return TrainingSet(tuple(images), frame, row, column, road, seed)
 
 
+def decision(image, machine, settings):
+    seen = features(image, settings.windows, settings.start)
+    return context.decision(seen, machine, settings.smoothing)
+
+
 def fit_and_run(images, truths, image, settings=PLAIN):
     machine = context.fit(every_pixel(images, truths), settings)
     return context.bind(settings, machine)(View.of(image)).mask.pixels()
@@ -38,8 +46,11 @@ def fit_and_run(images, truths, image, settings=PLAIN):
 # --- Features -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("columns", "fits"), [(8, False), (9, True), (10, False), (11, True)])
-def test_a_machine_has_nine_features_and_two_for_each_window(columns, fits):
+@pytest.mark.parametrize(
+    ("columns", "fits"),
+    [(8, False), (9, True), (10, False), (11, True), (12, True), (13, True), (14, True)],
+)
+def test_a_machine_has_nine_features_and_two_for_each_window_and_maybe_three(columns, fits):
     arrays = np.zeros((2, columns), np.float32), np.zeros(2, np.float32), np.zeros(2, np.float32)
     if fits:
         context.RectifiedMachine(*arrays, 0.0, 0.0)
@@ -243,7 +254,7 @@ def test_the_decision_is_the_linear_machines_on_the_written_out_map():
     image = grey(seed=2)
     x = features(image, PLAIN.windows).reshape(11, -1).T.astype(np.float64)
     expected = np.maximum(x @ machine.planes.T + machine.bias, 0) @ machine.weights + machine.offset
-    found = context.decision(image, machine, PLAIN).ravel()
+    found = decision(image, machine, PLAIN).ravel()
     np.testing.assert_allclose(found, expected, atol=1e-3)
 
 
@@ -253,21 +264,25 @@ def test_a_machine_for_other_features_is_refused_before_it_reads_beyond_its_plan
     truth[12:] = 1
     machine = context.fit(every_pixel([grey()], [truth]), PLAIN)
     other = ContextSettings(planes=32, spare=0, windows=windows)
-    wanted = f"for 11 features, and windows = .* make {9 + 2 * len(windows)}"
+    wanted = f"for 11 features, and windows = .* make {9 + 2 * len(windows)};"
     with pytest.raises(ValueError, match=wanted):
         context.bind(other, machine)
-    with pytest.raises(ValueError, match=wanted):
-        context.decision(grey(), machine, other)
+
+
+def test_a_machine_without_geodesics_is_refused_where_they_are_wanted():
+    truth = np.zeros((24, 32), np.uint8)
+    truth[12:] = 1
+    machine = context.fit(every_pixel([grey()], [truth]), PLAIN)
+    with pytest.raises(ValueError, match=r"for 11 features, and .* geodesics = true make 14;"):
+        context.bind(replace(PLAIN, geodesics=True), machine)
 
 
 def test_smoothing_averages_neighbours():
     truth = np.zeros((24, 32), np.uint8)
     truth[12:] = 1
     machine = context.fit(every_pixel([grey()], [truth]), PLAIN)
-    rough = context.decision(grey(seed=2), machine, PLAIN)
-    smooth = context.decision(
-        grey(seed=2), machine, ContextSettings(planes=32, spare=0, smoothing=3)
-    )
+    rough = decision(grey(seed=2), machine, PLAIN)
+    smooth = decision(grey(seed=2), machine, ContextSettings(planes=32, spare=0, smoothing=3))
     np.testing.assert_allclose(smooth[1:-1, 1:-1], cv2.blur(rough, (3, 3))[1:-1, 1:-1], atol=1e-5)
 
 
@@ -278,7 +293,7 @@ def test_a_wide_image_is_decided_at_the_working_width():
     large = cv2.resize(grey(seed=2), (128, 96))
     settings = ContextSettings(width=32, planes=32, spare=0, smoothing=1)
     small = cv2.resize(large, (32, 24), interpolation=cv2.INTER_AREA)
-    expected = cv2.resize(context.decision(small, machine, PLAIN), (128, 96))
+    expected = cv2.resize(decision(small, machine, PLAIN), (128, 96))
     values = context.bind(settings, machine)(View.of(large)).layers[0].array
     np.testing.assert_array_equal(values, expected)
 
@@ -364,6 +379,19 @@ def test_its_mask_is_tabled_as_svm():
     settings = {name: STAGES[name].settings() for name in names}
     assert Pipeline.default(names).masks() == ("similarity", "svm", "post")
     assert [spec.name for spec in Pipeline(("context",), settings).layers()] == ["decision", "svm"]
+
+
+def test_its_geodesic_map_is_a_layer_where_there_is_one():
+    truth = np.zeros((24, 32), np.uint8)
+    truth[12:] = 1
+    settings = replace(PLAIN, geodesics=True)
+    machine = context.fit(every_pixel([grey()], [truth]), settings)
+    image = grey(seed=2)
+    layers = context.bind(settings, machine)(View.of(image)).layers
+    assert [layer.spec for layer in layers] == list(context.layers(settings))
+    assert [layer.spec.name for layer in layers] == ["geodesic", "decision", "svm"]
+    over_edges_and_hues = geodesics(image, patch_mask(24, 32, settings.patch))[1]
+    np.testing.assert_array_equal(layers[0].array, distance_of(over_edges_and_hues))
 
 
 class Another:

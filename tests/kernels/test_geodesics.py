@@ -1,0 +1,96 @@
+"""Geodesic distances: the length of the cheapest path, as Dijkstra and scikit-image find it."""
+
+import heapq
+
+import numpy as np
+import pytest
+from skimage.graph import MCP_Geometric
+
+from roadeval.kernels import KERNELS, plain
+
+AMPLE = 50
+"""Rounds after which nothing changes on these images."""
+
+
+def seeds_of(shape, *places):
+    seeds = np.zeros(shape, np.uint8)
+    seeds[tuple(zip(*places, strict=True))] = 1
+    return seeds
+
+
+def dijkstra(cost, seeds):
+    """Cheapest paths, pixel by pixel; ``cost`` is int64."""
+    found = np.full(cost.shape, plain.FAR)
+    queue = [(0, int(y), int(x)) for y, x in np.argwhere(seeds)]
+    while queue:
+        length, y, x = heapq.heappop(queue)
+        if length >= found[y, x]:
+            continue
+        found[y, x] = length
+        for dy, dx in np.argwhere(np.ones((3, 3))) - 1:
+            to = y + dy, x + dx
+            if (dy or dx) and 0 <= to[0] < cost.shape[0] and 0 <= to[1] < cost.shape[1]:
+                step = plain.ASLANT if dy and dx else plain.STRAIGHT
+                heapq.heappush(queue, (length + step * int(cost[y, x] + cost[to]), *to))
+    return found
+
+
+def test_a_step_costs_both_its_pixels_times_five_or_seven():
+    cost = np.array([[1, 2, 4], [8, 1, 32]], np.uint16)
+    found = KERNELS.geodesics(cost, seeds_of(cost.shape, (0, 0)), 1)
+    assert found.tolist() == [[0, 15, 45], [45, 14, 14 + 5 * 33]]
+
+
+def test_a_path_goes_around_a_wall_by_its_gap():
+    cost = np.ones((5, 5), np.uint16)
+    cost[1:, 2] = 1000
+    found = KERNELS.geodesics(cost, seeds_of(cost.shape, (4, 0)), 2)
+    # Two straight steps and two aslant to the gap at the top, and as many back.
+    assert found[4, 4] == 2 * (2 * 10 + 2 * 14)
+
+
+def test_the_nearest_of_several_seeds_counts():
+    cost = np.ones((1, 9), np.uint16)
+    found = KERNELS.geodesics(cost, seeds_of(cost.shape, (0, 0), (0, 8)), 1)
+    assert found.tolist() == [[0, 10, 20, 30, 40, 30, 20, 10, 0]]
+
+
+def test_without_seeds_everything_is_far():
+    far = KERNELS.geodesics(np.ones((3, 4), np.uint16), np.zeros((3, 4), np.uint8), 3)
+    np.testing.assert_array_equal(far, plain.FAR)
+
+
+@pytest.mark.parametrize("shape", [(0, 0), (0, 3), (3, 0), (1, 1), (1, 7), (7, 1)])
+def test_the_smallest_images_have_distances_too(shape):
+    cost, seeds = np.ones(shape, np.uint16), np.zeros(shape, np.uint8)
+    seeds[-1:, :1] = 1
+    for kernels in (KERNELS, plain):
+        np.testing.assert_array_equal(kernels.geodesics(cost, seeds, 2), dijkstra(cost, seeds))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rounds_enough_find_the_cheapest_paths(seed):
+    rng = np.random.default_rng(seed)
+    cost = rng.choice(np.array([1, 5, 400], np.uint16), (20, 30))
+    seeds = (rng.random(cost.shape) < 0.01).astype(np.uint8)
+    seeds[10, 10] = 1
+    found = KERNELS.geodesics(cost, seeds, AMPLE)
+    np.testing.assert_array_equal(found, dijkstra(cost.astype(np.int64), seeds))
+
+
+def test_distances_are_scikit_images_but_for_the_root_of_two():
+    cost = np.random.default_rng(0).integers(1, 200, (40, 60), np.uint16)
+    seeds = seeds_of(cost.shape, (39, 30), (39, 31))
+    expected, _ = MCP_Geometric(cost.astype(float)).find_costs(np.argwhere(seeds))
+    found = KERNELS.geodesics(cost, seeds, AMPLE) / (2 * plain.STRAIGHT)
+    assert (found <= expected + 1e-6).all()
+    assert (found >= expected * (7 / 5 / np.sqrt(2)) - 1e-6).all()
+
+
+def test_fewer_rounds_never_make_a_path_cheaper():
+    cost = np.random.default_rng(0).choice(np.array([1, 500], np.uint16), (40, 40))
+    seeds = seeds_of(cost.shape, (39, 20))
+    lengths = [KERNELS.geodesics(cost, seeds, rounds) for rounds in (1, 2, AMPLE)]
+    assert (lengths[0] >= lengths[1]).all()
+    assert (lengths[1] >= lengths[2]).all()
+    assert (lengths[0] > lengths[2]).any()
