@@ -5,7 +5,7 @@ python -m benchmarks.tables --write     writes the tables of both anew
 python -m benchmarks.tables --measure   replays the drives and writes the numbers
 
 A drive comes from the folder named for it; see PRESETS.md for where to get them. ``--measure NAME``
-measures one drive, or ``idd``, and leaves the other numbers as they are.
+measures one drive, ``idd`` or ``idd_geodesics``, and leaves the other numbers as they are.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ from benchmarks.tables.measure import (
 from benchmarks.tables.text import DOCUMENTS, NUMBERS, faults, load, written
 from roadeval.version import VERSION
 
-IDD, ELSEWHERE = "idd", "elsewhere"
+IDD, ELSEWHERE, IDD_GEODESICS = "idd", "elsewhere", "idd_geodesics"
+ON_IDD = {IDD: idd.measured, IDD_GEODESICS: idd.with_geodesics}
 
 
 def main() -> int:
@@ -58,12 +59,12 @@ def _measure(options: argparse.Namespace, work: Path) -> None:
     """Measure what was named, or everything; every result is kept at once."""
     work.mkdir(parents=True, exist_ok=True)
     sources = Sources(work, options.logs, options.camvid, options.comma10k)
-    names = options.measure or [*DRIVES, *([] if options.replays else [IDD, ELSEWHERE])]
+    names = options.measure or [*DRIVES, *([] if options.replays else [*ON_IDD, ELSEWHERE])]
     for name in names:
-        if name == IDD:
+        if name in ON_IDD:
             if options.idd is None:
                 sys.exit(f"idd: name the folder idd20k_lite of {idd.SOURCE} (--idd)")
-            _keep(rounded(idd.measured(options.idd, SEEDS)), IDD)
+            _keep(rounded(ON_IDD[name](options.idd, SEEDS)), name)
             continue
         if name == ELSEWHERE:
             for stranger in STRANGERS.values():
@@ -101,7 +102,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--measure",
         nargs="*",
-        choices=(names := [*DRIVES, IDD, ELSEWHERE]),
+        choices=(names := [*DRIVES, *ON_IDD, ELSEWHERE]),
         metavar="NAME",
         help=f"all by default, or some of {', '.join(names)}",
     )

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from benchmarks.tables import idd
 from benchmarks.tables.drives import DRIVES, Drive
-from benchmarks.tables.measure import GATES, STRANGERS, TEACHER, command
+from benchmarks.tables.measure import GATES, REPLAYS, STRANGERS, TEACHER, command
 from roadeval.results.claims import WORDS
 
 Numbers = Mapping[str, Any]
@@ -314,6 +314,28 @@ def gates(numbers: Numbers) -> str:
     )
 
 
+def geodesics(numbers: Numbers) -> str:
+    """Return ERR of `robust` with and without geodesic distances."""
+    rows = []
+    for name in REPLAYS["geodesics"].drives:
+        variants = numbers["drives"][name]["geodesics"]["variants"]
+        errs = [variants[variant]["ERR"] for variant in ("unfiltered", "geodesics")]
+        rows.append([DRIVES[name].title, _percent(_blind(numbers, name)), *map(_spread, errs)])
+    lite = numbers["idd_geodesics"]
+    errs = [lite[variant]["ERR"] for variant in ("robust", "geodesics")]
+    rows.append(["IDD Lite", _percent(numbers["idd"]["blind"]["ERR"]), *map(_spread, errs)])
+    head = ["ERR, %", "`blind`", "`robust`", "`robust` with `geodesics`"]
+    both = [lite[variant] for variant in ("robust", "geodesics")]
+    dark = " and ".join(_spread(each["dark_missed"]) for each in both)
+    lost = " and ".join(_spread(each["not_below_blind"], str) for each in both)
+    words = (
+        f"On IDD the first seed's difference is {_interval(lite['change'])} points; without and "
+        f"with it, {dark} % of the dark road is missed, and {lost} drives of "
+        f"{numbers['idd']['labelled']} are not below `blind`."
+    )
+    return f"{_table(head, rows)}\n\n{textwrap.fill(words, 100)}"
+
+
 def elsewhere(numbers: Numbers) -> str:
     """Return ERR of `robust` where it was trained on another drive."""
     return _table(
@@ -357,6 +379,7 @@ BLOCKS: Final = {
     "claims_by_drive": Block(claims_by_drive, (PAPER,)),
     "idd": Block(idd_lite, (f"{MEASURE} idd",)),
     "gates": Block(gates, (f"{MEASURE} --replays gates",)),
+    "geodesics": Block(geodesics, (f"{MEASURE} --replays geodesics", f"{MEASURE} idd_geodesics")),
     "elsewhere": Block(elsewhere, (f"{MEASURE} elsewhere",)),
     "flicker": Block(flicker, (PAPER, ROBUST)),
 }

@@ -28,12 +28,16 @@ FRAMES: Final = 2
 """Of each drive, evenly spread."""
 DRAWS: Final = 1000
 """Of the bootstrap over drives."""
+GEODESICS: Final = {"context": {"geodesics": True}}
+"""What adds geodesic distances to `robust`."""
 VARIANTS: Final = ("unfiltered", "paper", "gated", "robust")
 TP, TN, FP, FN, DARK, DARK_MISSED = range(6)
 
 Counted = NDArray[np.int64]
 """Outcomes of a variant on each drive, ``(drives, 6)``."""
 Drives = Mapping[str, Sequence[Frame]]
+Fold = tuple[Drives, Drives]
+"""The drives that learn, and those that are scored."""
 
 
 def measured(folder: Path, seeds: int) -> dict[str, Any]:
@@ -46,23 +50,43 @@ def measured(folder: Path, seeds: int) -> dict[str, Any]:
     seeds
         Of the training: 0 and those after it.
     """
-    halves: list[dict[str, list[Frame]]] = [{}, {}]
-    for name, frames in read_drives(folder).items():
-        halves[blake2b(name.encode()).digest()[0] % 2][name] = frames
-    folds = (halves, halves[::-1])
+    folds = both_ways(folder)
     blind = np.concatenate([count_blind(*fold) for fold in folds])
-    trained = {
-        name: [
-            np.concatenate([score(config, seed, *fold) for fold in folds]) for seed in range(seeds)
-        ]
-        for name, config in variants()
-    }
+    trained = {name: with_each_seed(config, seeds, folds) for name, config in variants()}
     return {
         "drives": len(blind),
         "labelled": int(blind[:, :DARK].any(axis=1).sum()),
         "blind": {"ERR": err(blind.sum(axis=0)), "dark_missed": missed(blind.sum(axis=0))},
         "variants": {name: told(found, blind, trained) for name, found in trained.items()},
     }
+
+
+def with_geodesics(folder: Path, seeds: int) -> dict[str, Any]:
+    """Return what `told` does of `robust` with geodesic distances, held against `robust`."""
+    folds = both_ways(folder)
+    blind = np.concatenate([count_blind(*fold) for fold in folds])
+    base, new = (
+        with_each_seed(configure({"preset": "robust", **tables}), seeds, folds)
+        for tables in ({}, GEODESICS)
+    )
+    return {
+        "robust": told(base, blind, {"unfiltered": base}),
+        "geodesics": told(new, blind, {"unfiltered": new}),
+        "change": difference(err, new[0], base[0]),
+    }
+
+
+def both_ways(folder: Path) -> tuple[Fold, Fold]:
+    """Cut the drives in two halves; return each as what learns, and the other as what is scored."""
+    halves: tuple[dict[str, list[Frame]], dict[str, list[Frame]]] = {}, {}
+    for name, frames in read_drives(folder).items():
+        halves[blake2b(name.encode()).digest()[0] % 2][name] = frames
+    return halves, halves[::-1]
+
+
+def with_each_seed(config: RunConfig, seeds: int, folds: Sequence[Fold]) -> list[Counted]:
+    """Train a variant with each seed; return its outcomes on every drive."""
+    return [np.concatenate([score(config, seed, *fold) for fold in folds]) for seed in range(seeds)]
 
 
 def told(

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import roadeval
 from benchmarks.tables.drives import COMMA10K, DRIVES, Drive, Sources
+from benchmarks.tables.idd import GEODESICS
 from roadeval.data import FINAL_STAGE
 
 SEEDS: Final = 5
@@ -71,6 +72,12 @@ REPLAYS: Final[Mapping[str, Replay]] = {
             },
         },
         drives=tuple(name for name in DRIVES if name.startswith("camvid")),
+    ),
+    "geodesics": Replay(
+        {"preset": "robust", "variants": {"geodesics": {"preset": "robust", **GEODESICS}}},
+        drives=tuple(
+            name for name, drive in DRIVES.items() if drive.tuned or name.startswith("synthetic")
+        ),
     ),
 }
 
