@@ -238,7 +238,7 @@ class _Pair:
                 )
 
     def regions(self) -> Iterator[RegionComparison]:
-        """Yield what changed in each region, of the final masks that look at the image."""
+        """Yield what changed by region and shade, of the final masks that look at the image."""
         base, new = self._base.regions, self._new.regions
         if base is None or new is None:
             return
@@ -247,9 +247,10 @@ class _Pair:
                 own = self._base.label if self._across else mask.variant
                 before = where.region_counts(base, own, mask.stage, mask.before["frame"])
                 after = where.region_counts(new, mask.variant, mask.stage, mask.after["frame"])
-                yield from where.by_region(
-                    before, after, self._settings, result=self._new.label, variant=mask.variant
-                )
+                names = {"result": self._new.label, "variant": mask.variant}
+                yield from where.by_region(before, after, self._settings, **names)
+                rates = mask.before, mask.after
+                yield from where.by_shade(before, after, rates, self._settings, **names)
 
     def disagreements(self) -> Iterator[Disagreement]:
         """Yield the frames on which two variants of a run disagree most."""

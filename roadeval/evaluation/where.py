@@ -1,4 +1,4 @@
-"""Where one of two masks is better: region by region, and on which frames they disagree."""
+"""Where one of two masks is better: by region and by shade, and on which frames they disagree."""
 
 from __future__ import annotations
 
@@ -21,6 +21,9 @@ Floats = npt.NDArray[np.float64]
 
 MOST: Final = 5
 """Frames named of those on which two masks disagree."""
+SHADOWS: Final = ("true_shadow", "shadow")
+SHADED: Final = 1 / 3
+"""The share of the frames that are called those with most shadow."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,6 +104,53 @@ def by_region(
             base=float(before[known].mean()),
             new=float(after[known].mean()),
             difference=mean_difference(after, before, settings),
+        )
+
+
+def by_shade(
+    base: Mapping[str, RegionCounts],
+    new: Mapping[str, RegionCounts],
+    rates: tuple[Rows, Rows],
+    settings: EvaluationSettings,
+    *,
+    result: str,
+    variant: str,
+) -> Iterator[RegionComparison]:
+    """Yield what changed on the frames with most shadow, and on the others.
+
+    True shadow counts where the log has it, else what both results detected alike; without either,
+    or where all frames have as much, there is nothing to tell apart.
+
+    Parameters
+    ----------
+    base, new
+        The mask's counts by region.
+    rates
+        Its rows of ``frames.csv`` in both results, on the same frames as the counts.
+    """
+    before, after = rates
+    known = (name for name in SHADOWS if name in base and name in new)
+    alike = [name for name in known if base[name].has_the_pixels_of(new[name])]
+    if not alike:
+        return
+    share = base[alike[0]].pixels / np.maximum(before["N"], 1)
+    much = share >= max(np.sort(share)[-max(round(SHADED * len(share)), 1)], 1e-9)
+    for name, title, here in (
+        ("frames_with_shadow", "frames with most shadow", much),
+        ("other_frames", "the other frames", ~much),
+    ):
+        if not much.any() or much.all():
+            return
+        one, other = before["ERR"][here], after["ERR"][here]
+        yield RegionComparison(
+            result=result,
+            variant=variant,
+            region=name,
+            title=title,
+            frames=int(here.sum()),
+            base=float(one.mean()),
+            new=float(other.mean()),
+            difference=mean_difference(other, one, settings),
         )
 
 

@@ -1,4 +1,4 @@
-"""Where one of two methods is better: by region, and the frames on which they disagree most."""
+"""Where one of two methods is better: by region and shade, and where they disagree most."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ _REGIONS: Final = "ERR of the final masks, percent: means over the frames that l
 _FRAMES: Final = "Percent of the labelled pixels that one of the two final masks has right alone."
 _LEFT_OUT: Final = (
     "A region that is not the same pixels in both, as the shadow that another filter found, is "
-    "left out."
+    "left out. Frames with most shadow are a third, by the share of their pixels in true shadow, "
+    "or in that which both detected."
 )
 
 
@@ -36,7 +37,7 @@ def _region_table(comparison: Comparison) -> Table:
     rows = comparison.regions
     names = naming_columns(rows)
     return Table(
-        [*names, "region", "frames", "base", "new", "difference", "interval"],
+        [*names, "region, or frames", "frames", "base", "new", "difference", "interval"],
         [
             [
                 *named(row, names),

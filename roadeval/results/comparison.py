@@ -57,7 +57,7 @@ def verdict(comparison: Comparison) -> str:
 
 
 def where(comparison: Comparison) -> list[str]:
-    """Return in which regions final masks are surely better or worse, and where they disagree."""
+    """Return where final masks are surely better or worse, and where they disagree."""
     masks = dict.fromkeys((row.result, row.variant) for row in comparison.regions)
     return [
         *(_by_region(comparison, *mask) for mask in masks),
@@ -72,11 +72,11 @@ def _by_region(comparison: Comparison, result: str, variant: str) -> str:
     for word, sign in (("better", -1), ("worse", 1)):
         names = [r.title for r in sure if sign * r.difference.mean > 0]
         if len(names) == len(rows):
-            parts.append(f"{word} in every region")
+            parts.append(f"{word} everywhere")
         elif names:
             parts.append(f"{word} ({'; '.join(names)})")
     name = result if result == variant else f"{variant} of {result}"
-    return f"{name} by region: {', '.join(parts) or 'no change is sure in any'}"
+    return f"{name} by region and shade: {', '.join(parts) or 'no change is sure in any'}"
 
 
 def _disagreements(comparison: Comparison) -> Iterator[str]:

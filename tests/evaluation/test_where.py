@@ -1,4 +1,4 @@
-"""Where one of two masks is better: by region, and on which frames they disagree."""
+"""Where one of two masks is better: by region and shade, and on which frames they disagree."""
 
 import numpy as np
 import pytest
@@ -93,6 +93,41 @@ def test_a_region_of_other_pixels_is_left_out():
     run = a_run([10] * 20, [20] * 20, regions=base)
     found = compare([run, a_run([10] * 20, [20] * 20, regions=other)], SETTINGS)
     assert [row.region for row in found.regions] == ["lit"]
+
+
+def shaded(name, shares, wrong=10):
+    """Rows of a region whose pixels are these shares of 100, and of one that is the rest."""
+    rows = regions({("first", name): [wrong] * len(shares)})
+    return rows.replace(N=np.array(shares), TP=np.array(shares) // 2)
+
+
+@pytest.mark.parametrize("name", ["shadow", "true_shadow"])
+def test_frames_with_most_shadow_are_told_from_the_others(name):
+    shares = [5, 8, 10, 70, 0, 65] * 10
+    much = np.array(shares) > 50
+    rows = shaded(name, shares)
+    base = a_run([10] * 60, [20] * 60, regions=rows)
+    new = a_run(np.where(much, 2 + np.arange(60) % 3, 18).tolist(), [20] * 60, regions=rows)
+    found = {row.region: row for row in compare([base, new], SETTINGS).regions}
+    shadow, others = found["frames_with_shadow"], found["other_frames"]
+    assert (shadow.frames, others.frames) == (20, 40)
+    assert (shadow.base, shadow.new) == (pytest.approx(0.1), pytest.approx(0.03, abs=1e-3))
+    assert shadow.difference.high < 0 < others.difference.low
+    assert others.difference.mean == pytest.approx(0.08)
+    assert shadow.difference.comparisons == 2
+
+
+def test_true_shadow_counts_before_what_was_detected():
+    true, detected = shaded("true_shadow", [80] * 20 + [1] * 40), shaded("shadow", [9] * 60)
+    both = Rows({n: np.concatenate([detected[n], true[n]]) for n in true.columns})
+    run = a_run([10] * 60, [20] * 60, regions=both)
+    found = {row.region: row.frames for row in compare([run, run], SETTINGS).regions}
+    assert (found["frames_with_shadow"], found["other_frames"]) == (20, 40)
+
+
+def test_without_shadow_no_frames_are_told_apart():
+    run = a_run([10] * 30, [20] * 30, regions=shaded("shadow", [0] * 30, 0))
+    assert not compare([run, run], SETTINGS).regions
 
 
 def test_bands_keep_their_place_where_one_is_left_out():
