@@ -82,7 +82,7 @@ class ContextSettings:
         At most 8: for each number of features there is a loop of its own.
     geodesics
         Whether the distances from the reference patch along the cheapest path over edges, hues
-        and colours are features, too (`geodesic_features`): they grow by a step at a kerb.
+        and colours are features, too: they grow by a step at a kerb.
     patch
         The reference patch, where those paths begin.
     planes
