@@ -171,3 +171,13 @@ def test_the_same_result_gives_the_same_file_and_nothing_is_left_beside_nor_fetc
     assert here("report", "drive.rrd", "-o", "again.pdf").returncode == 0
     assert (tmp_path / "again.pdf").read_bytes() == made
     assert {file.name for file in tmp_path.iterdir()} == {"again.pdf", "drive.rrd"}
+
+
+@pytest.mark.parametrize(
+    "words", [("-o", "page.txt"), ("--pictures", 3), ("-o", "a.pdf", "--assets")]
+)
+def test_what_goes_with_a_page_alone_is_wrong_usage_elsewhere(words, demo, tmp_path):
+    run = here("report", demo.recording, *words, cwd=tmp_path)
+    assert run.returncode == 2
+    assert len(run.stderr.splitlines()) == 1
+    assert not list(tmp_path.iterdir())

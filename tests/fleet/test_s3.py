@@ -1,6 +1,7 @@
 """Drives in a bucket: on the S3 server of moto, at 127.0.0.1."""
 
 import os
+from importlib.util import find_spec
 from urllib.request import Request, urlopen
 
 import pytest
@@ -8,6 +9,9 @@ import pytest
 from roadeval.errors import RoadevalError
 from roadeval.fleet import find_drives, staged, stamp
 from tests.fixtures.elsewhere import split_bag, talker
+
+if not all(map(find_spec, ("moto", "flask"))):
+    pytest.skip("moto[s3] and flask are not installed", allow_module_level=True)
 
 LOG = talker(3).bytes()
 LONG = os.urandom(11 << 20)
@@ -29,8 +33,9 @@ OBJECTS = {
 @pytest.fixture(scope="module")
 def bucket():
     """A server's address, with a bucket of drives."""
-    moto = pytest.importorskip("moto.server", reason="moto[s3] and flask are not installed")
-    server = moto.ThreadedMotoServer("127.0.0.1", 0, verbose=False)
+    from moto.server import ThreadedMotoServer
+
+    server = ThreadedMotoServer("127.0.0.1", 0, verbose=False)
     server.start()
     url = "http://{}:{}".format(*server.get_host_and_port())
     urlopen(Request(f"{url}/bucket", method="PUT"), timeout=20).close()
