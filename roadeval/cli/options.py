@@ -324,7 +324,15 @@ def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
     ----------
     settings
         Names of settings in `OPTIONS`, or of whole tables.
+
+    Raises
+    ------
+    ValueError
+        For a name that is none of them.
     """
+    known = {name for o in OPTIONS for name in (o.setting, o.setting.partition(".")[0])}
+    if unknown := {*settings} - known:
+        raise ValueError(f"no option sets {', '.join(sorted(unknown))}")
     chosen = [o for o in OPTIONS if {o.setting, o.setting.partition(".")[0]} & {*settings}]
 
     def decorate(command: Callable[..., int]) -> Callable[..., int]:

@@ -166,6 +166,21 @@ def test_pictures_have_words_for_who_does_not_see_them():
     assert all(own["alt"] for own in pictures)
 
 
+@pytest.mark.parametrize(
+    ("content", "media"),
+    [
+        (b"<?xml version='1.0'?><svg/>", "image/svg+xml"),
+        (b"\x89PNG...", "image/png"),
+        (b"\xff\xd8\xff...", "image/jpeg"),
+    ],
+)
+def test_a_picture_inside_a_page_says_of_which_kind_it_is(content, media):
+    encoded = base64.b64encode(content).decode()
+    address = f"data:{media};base64,{encoded}"
+    made = Reader(rendered(Figure(ImageFile(content), "It.")))
+    assert [own["src"] for own in made.all("img") if "src" in own] == [address]
+
+
 def test_equal_documents_give_equal_bytes():
     assert rendered(*every_block("word")) == rendered(*every_block("word"))
 
