@@ -57,7 +57,7 @@ def loops_missing() -> None:
     if kernels.missing():
         warning(
             "the compiled loops are missing, and a frame takes several times as long: there was "
-            "no C compiler when roadeval was installed"
+            "no C compiler when roadeval was installed, or they are older than it: install it again"
         )
 
 

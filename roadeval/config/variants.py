@@ -53,7 +53,7 @@ class Variant:
         )
 
     def _title(self) -> str:
-        """Say in a few words what tells the variant from others."""
+        """Return in a few words what tells the variant from others."""
         found = self.pipeline.stages()
         if filters := [stage.title for stage in found if stage.is_filter]:
             return f"with {', '.join(filters)}"

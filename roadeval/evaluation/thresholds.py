@@ -55,7 +55,7 @@ def at_levels(counts: Sums) -> Sums:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Thresholds:
-    """What each threshold gives, from the highest to the lowest that occurs.
+    """The outcomes at each threshold, from the highest to the lowest that occurs.
 
     Parameters
     ----------

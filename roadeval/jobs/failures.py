@@ -14,7 +14,7 @@ KEPT: Final = 5
 
 @dataclass(frozen=True, slots=True)
 class Failures:
-    """What failed so far; any thread may add to it.
+    """The frames on which a stage has failed so far; any thread may add to them.
 
     Parameters
     ----------

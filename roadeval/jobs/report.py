@@ -29,7 +29,7 @@ PICTURED: Final = 60
 
 @dataclass(frozen=True, slots=True)
 class PageSettings:
-    """What a page is made like.
+    """The settings of a page.
 
     Parameters
     ----------

@@ -101,7 +101,7 @@ def _sizes(run: Run) -> tuple[str, ...]:
 
 
 def _missing(run: Run) -> Iterator[str]:
-    """Tell where masks of other systems are missing, or belong to no frame."""
+    """Yield a warning where masks of other systems are missing, or belong to no frame."""
     seen, elsewhere = run.frames.accounting, run.selection.elsewhere
     totals = run.board.totals()
     for name in (*run.selection.masks, *elsewhere):

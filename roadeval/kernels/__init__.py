@@ -21,7 +21,7 @@ def pick() -> ModuleType:
         return plain
     try:
         from roadeval.kernels import compiled
-    except ImportError:  # not built, or of another version
+    except ImportError:  # not built, or of an earlier state of the sources
         return plain
     return compiled
 

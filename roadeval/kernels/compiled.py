@@ -52,6 +52,10 @@ __all__ = [
     "transfer",
 ]
 
+if lacking := [name for name in __all__ if not hasattr(_loops, name)]:
+    # A checkout that was updated, and not installed again since.
+    raise ImportError(f"the compiled loops are of an earlier state: no {', '.join(lacking)}")
+
 TABLED: Final = 256
 """As in ``c/compensation.c``: components of more pixels have a table of levels."""
 

@@ -25,7 +25,7 @@ FULL = 65535
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Road:
-    """What a network makes of a frame.
+    """The road mask of a frame by a network, and its probability.
 
     Parameters
     ----------

@@ -129,7 +129,7 @@ class LocalServer:
         self._server.shutdown()
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the socket, so that its port is free."""
         self._server.server_close()
 
 
@@ -155,7 +155,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._respond(acts=True)
 
     def log_message(self, *_: object) -> None:
-        """Say nothing: the terminal is for people."""
+        """Log nothing: the terminal is for people."""
 
     def _respond(self, *, acts: bool) -> None:
         if self.headers.get("Content-Length", "0") != "0" or "Transfer-Encoding" in self.headers:

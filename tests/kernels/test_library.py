@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from importlib.util import find_spec
+from types import ModuleType
 
 import pytest
 
@@ -36,6 +37,16 @@ def test_a_library_that_was_built_is_used(monkeypatch):
 
 
 def test_without_the_library_the_twins_are_used(unbuilt):
+    assert pick() is plain
+    assert kernels.missing()
+
+
+@pytest.mark.skipif(not find_spec("roadeval.kernels._loops"), reason="the loops were not compiled")
+def test_loops_of_an_earlier_state_are_not_used(unbuilt, monkeypatch):
+    earlier = ModuleType("roadeval.kernels._loops")
+    earlier.count_bits = None
+    monkeypatch.setitem(sys.modules, "roadeval.kernels._loops", earlier)
+    monkeypatch.setattr(kernels, "_loops", earlier, raising=False)
     assert pick() is plain
     assert kernels.missing()
 
