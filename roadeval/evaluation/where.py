@@ -14,7 +14,7 @@ from roadeval.evaluation import scored
 from roadeval.evaluation.comparison_result import Disagreement, RegionComparison
 from roadeval.evaluation.regions import titles
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.uncertainty import mean_difference
+from roadeval.evaluation.uncertainty import Difference, mean_difference
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -95,16 +95,9 @@ def by_region(
         known = ~np.isnan(before)
         if not known.any():
             continue
-        yield RegionComparison(
-            result=result,
-            variant=variant,
-            region=name,
-            title=title,
-            frames=int(known.sum()),
-            base=float(before[known].mean()),
-            new=float(after[known].mean()),
-            difference=mean_difference(after, before, settings),
-        )
+        difference = mean_difference(after, before, settings)
+        rates = before[known], after[known]
+        yield _compared(result, variant, name, title, rates=rates, difference=difference)
 
 
 def by_shade(
@@ -142,16 +135,31 @@ def by_shade(
         if not much.any() or much.all():
             return
         one, other = before["ERR"][here], after["ERR"][here]
-        yield RegionComparison(
-            result=result,
-            variant=variant,
-            region=name,
-            title=title,
-            frames=int(here.sum()),
-            base=float(one.mean()),
-            new=float(other.mean()),
-            difference=mean_difference(other, one, settings),
-        )
+        difference = mean_difference(other, one, settings)
+        yield _compared(result, variant, name, title, rates=(one, other), difference=difference)
+
+
+def _compared(
+    result: str,
+    variant: str,
+    region: str,
+    title: str,
+    *,
+    rates: tuple[Floats, Floats],
+    difference: Difference,
+) -> RegionComparison:
+    """Return a row of the ERR of both masks on the same frames, ``(n,)`` each and defined."""
+    base, new = rates
+    return RegionComparison(
+        result=result,
+        variant=variant,
+        region=region,
+        title=title,
+        frames=len(base),
+        base=float(base.mean()),
+        new=float(new.mean()),
+        difference=difference,
+    )
 
 
 def disagreements(table: Rows, frames: Rows, base: str, new: str) -> Iterator[Disagreement]:
