@@ -2,7 +2,7 @@
 
 #include "loops.h"
 
-/* As in plain.py: further than any path is told apart. */
+/* As in plain/geodesics.py: further than any path is told apart. */
 #define FAR (1 << 30)
 
 /* A step costs 5 straight and 7 aslant, times the costs of both its pixels. */

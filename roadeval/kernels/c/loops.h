@@ -1,6 +1,6 @@
 /* What all loops share, and what they are called with.
  *
- * A loop's definition is the function of the same name in roadeval/kernels/plain.py, bit for bit.
+ * A loop's definition is the function of the same name in roadeval/kernels/plain, bit for bit.
  * module.c checks its arrays, and roadeval/kernels/compiled.py allocates what it writes: no loop
  * allocates, fails or keeps anything, so that any number of threads may run them. Arrays are
  * C-contiguous; sizes are in elements. */
@@ -31,7 +31,7 @@
 #define restrict __restrict
 #endif
 
-/* A run is a stretch of a row, [start, end), with its label: see `components` in plain.py. */
+/* A run is a stretch of a row, [start, end), with its label: see `components` in plain/runs.py. */
 typedef struct {
     int32_t row, start, end, label;
 } run_t;

@@ -1,0 +1,35 @@
+"""The kernels as NumPy and OpenCV expressions: their definition, and used where none compile.
+
+Each file holds the twins of the C file of the same name.
+"""
+
+from roadeval.kernels.plain.bits import count_bits, grow
+from roadeval.kernels.plain.colours import look_up_colours, look_up_sum_min, mahalanobis
+from roadeval.kernels.plain.compensation import ring_sums, run_sums, transfer
+from roadeval.kernels.plain.geodesics import ASLANT, FAR, STRAIGHT, geodesics
+from roadeval.kernels.plain.outcomes import add_outcomes, outcomes
+from roadeval.kernels.plain.rectified import rectified_sum
+from roadeval.kernels.plain.runs import components, fill_holes, keep_region, label_runs, paint
+
+__all__ = [
+    "ASLANT",
+    "FAR",
+    "STRAIGHT",
+    "add_outcomes",
+    "components",
+    "count_bits",
+    "fill_holes",
+    "geodesics",
+    "grow",
+    "keep_region",
+    "label_runs",
+    "look_up_colours",
+    "look_up_sum_min",
+    "mahalanobis",
+    "outcomes",
+    "paint",
+    "rectified_sum",
+    "ring_sums",
+    "run_sums",
+    "transfer",
+]
