@@ -10,82 +10,11 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Any, Final
 
-import typer
-
-
-def color(text: str) -> tuple[int, ...]:
-    """Read ``R,G,B``, 0..255 each."""
-    parts = text.split(",")
-    if len(parts) != 3 or not all(part.strip().isdecimal() for part in parts):
-        raise typer.BadParameter(f"{text!r} is not R,G,B (as 128,64,128)")
-    return tuple(int(part) for part in parts)
-
-
-def named(text: str) -> tuple[str, str]:
-    """Read ``NAME=VALUE``."""
-    name, _, value = text.partition("=")
-    if not name or not value:
-        raise typer.BadParameter(f"{text!r} is not NAME=...")
-    return name, value
-
-
-def variant(text: str) -> tuple[str, str | None]:
-    """Read ``NAME=FILE.toml``, or the name of a preset alone."""
-    return named(text) if "=" in text else (text, None)
-
-
-@dataclass(frozen=True, slots=True)
-class Option:
-    """An option of the command line that gives a setting its value.
-
-    Parameters
-    ----------
-    setting
-        ``table.key`` in a run's configuration; ``preset``, ``config``, ``variants``, ``nets``,
-        ``masks`` and ``drives`` are read by `roadeval.cli.arguments`.
-    flags
-        As they are typed; the last one is named in messages.
-    metavar
-        Stands for the value in the help; none for a switch.
-    help
-        One line or two.
-    kind
-        The type of what is typed; a list for an option that can be repeated.
-    read
-        Turns a word of such a list into a value.
-    """
-
-    setting: str
-    flags: tuple[str, ...]
-    metavar: str | None
-    help: str
-    kind: Any = str
-    read: Callable[[str], Any] | None = None
-
-    @property
-    def argument(self) -> str:
-        """The name of the Python argument that receives the value."""
-        return self.setting.replace(".", "_")
-
-    def parameter(self) -> inspect.Parameter:
-        """Return the parameter that Typer makes the option of."""
-        option = typer.Option(*self.flags, metavar=self.metavar, show_default=False, help=self.help)
-        return inspect.Parameter(
-            self.argument,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=None,
-            annotation=Annotated[self.kind | None, option],
-        )
-
-
-def _switch(setting: str, flag: str, text: str) -> Option:
-    return Option(setting, (flag,), None, text, bool)
-
+from roadeval.cli.option import Option, color, named, switch, variant
 
 OPTIONS: Final = (
     Option("output.save", ("--save",), "OUT.rrd", "Recording. Default: recordings/<drive>.rrd"),
@@ -232,7 +161,7 @@ OPTIONS: Final = (
         "How far truth and image may be apart. Default: half a frame period.",
         float,
     ),
-    _switch("topics.resize_truth", "--resize-truth", "Bring truth of another size to the image's."),
+    switch("topics.resize_truth", "--resize-truth", "Bring truth of another size to the image's."),
     Option(
         "frames.scale",
         ("--scale",),
@@ -240,7 +169,7 @@ OPTIONS: Final = (
         "Reduce frames and truth to this share of their size first: quicker, and coarser.",
         float,
     ),
-    _switch("frames.keep_corrupt", "--keep-corrupt", "Use damaged data as far as it goes."),
+    switch("frames.keep_corrupt", "--keep-corrupt", "Use damaged data as far as it goes."),
     Option(
         "frames.max_pixels",
         ("--max-pixels",),

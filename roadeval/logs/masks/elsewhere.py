@@ -16,8 +16,9 @@ from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.messages.pixels import size_of
 from roadeval.logs.settings import MaskSettings
 from roadeval.logs.topics.confidence import Confidence
+from roadeval.logs.topics.label_meaning import understand
 from roadeval.logs.topics.label_reader import LabelPictures, Times, clocks_of
-from roadeval.logs.topics.labels import Meaning, seen_in, understand
+from roadeval.logs.topics.labels import Meaning, seen_in
 from roadeval.logs.topics.mask_source import MaskPairing, MaskSource
 from roadeval.logs.topics.pairing import UNREADABLE
 from roadeval.logs.topics.reader import TopicReader

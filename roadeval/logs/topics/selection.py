@@ -26,7 +26,9 @@ from roadeval.logs.topics.choose import (
     named,
 )
 from roadeval.logs.topics.description import TopicInfo, median_period
-from roadeval.logs.topics.labels import LabelMap, seen_in, understand
+from roadeval.logs.topics.label_map import LabelMap
+from roadeval.logs.topics.label_meaning import understand
+from roadeval.logs.topics.labels import seen_in
 from roadeval.logs.topics.pairing import UNREADABLE
 from roadeval.logs.topics.reader import TopicReader
 

@@ -13,7 +13,8 @@ from roadeval.logs import LabelSettings, LogError
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import CompressedPicture
 from roadeval.logs.messages.pixels import to_labels
-from roadeval.logs.topics.labels import seen_in, understand
+from roadeval.logs.topics.label_meaning import understand
+from roadeval.logs.topics.labels import seen_in
 from tests.images.making import file
 from tests.logs.making import grey, jpeg, png
 
