@@ -7,14 +7,10 @@ a difference between them would mix the scene with the method.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Final
-
-import numpy as np
-import numpy.typing as npt
 
 from roadeval.data import BASELINE, UNFILTERED, Rows
 from roadeval.errors import RoadevalError
@@ -35,6 +31,7 @@ from roadeval.evaluation.comparison_result import (
 )
 from roadeval.evaluation.differences import final_stages
 from roadeval.evaluation.frame_counts import sum_up
+from roadeval.evaluation.matching import common_masks
 from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import holm, mean_difference
@@ -163,28 +160,6 @@ def _corrected_regions(rows: Sequence[RegionComparison]) -> tuple[RegionComparis
     return tuple(replace(row, difference=each) for row, each in zip(rows, found, strict=True))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Common:
-    """A mask's rows in two results, on the frames that both have, in the base's order.
-
-    ``keys`` are the frames' stamps, each with its place among equal ones.
-    """
-
-    variant: str
-    stage: str
-    begins: int
-    keys: list[tuple[int, int]]
-    before: Rows
-    after: Rows
-
-    @property
-    def truth_differs(self) -> npt.NDArray[np.bool_]:
-        """Where the truth's road or labelled pixels differ, ``(n,)``."""
-        before, after = self.before, self.after
-        road = before["TP"] + before["FN"] != after["TP"] + after["FN"]
-        return np.asarray(road | (before["N"] != after["N"]))
-
-
 class _Pair:
     """A base and a new result of the same drive, on the frames that both evaluated."""
 
@@ -193,7 +168,7 @@ class _Pair:
     ) -> None:
         self._base, self._new, self._settings = base, new, settings
         self._across = across_variants
-        self._common = _common(base.frames, new.frames, new.label if across_variants else None)
+        self._common = common_masks(base.frames, new.frames, new.label if across_variants else None)
         if not self._common:
             raise ComparisonError(
                 f"{base.label} and {new.label} have no evaluated frame and stage in common"
@@ -283,38 +258,6 @@ class _Pair:
             if differs
         )
         return len(set(keys))
-
-
-def _common(base: Rows, new: Rows, variant: str | None) -> list[_Common]:
-    """Match the masks of two results, and their frames by stamp; in the base's order.
-
-    With ``variant`` the base's masks are taken for this variant's.
-    """
-    others = {(name, stage): places for name, stage, places in new.masks()}
-    found = []
-    for name, stage, places in base.masks():
-        other = others.get((variant or name, stage))
-        if other is None:
-            continue
-        theirs = dict(zip(_keys(new.take(other)), other.tolist(), strict=True))
-        mine = dict(zip(_keys(base.take(places)), places.tolist(), strict=True))
-        both = [key for key in mine if key in theirs]
-        if both:
-            before = [mine[key] for key in both]
-            after = np.array([theirs[key] for key in both])
-            rows = base.take(np.array(before)), new.take(after)
-            found.append(_Common(variant or name, stage, before[0], both, *rows))
-    return sorted(found, key=lambda mask: mask.begins)
-
-
-def _keys(mask: Rows) -> list[tuple[int, int]]:
-    """Return the stamps of a mask's rows; equal stamps are told apart by their order."""
-    seen: Counter[int] = Counter()
-    keys = []
-    for stamp in mask["stamp_ns"].tolist():
-        keys.append((stamp, seen[stamp]))
-        seen[stamp] += 1
-    return keys
 
 
 def _differing(base: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:

@@ -22,7 +22,7 @@ from roadeval.results.summary import parse_summary
 if TYPE_CHECKING:
     import pandas as pd
 
-    from roadeval.recording.codecs import Codec
+    from roadeval.recording.codecs.codec import Codec
 
 _CAMERA: Final = "EncodedImage:blob"
 

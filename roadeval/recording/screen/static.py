@@ -12,7 +12,7 @@ import rerun as rr
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Health, Role, colours
 from roadeval.data.colours import Colour
 from roadeval.recording import layout as at
-from roadeval.recording.codecs import Codec
+from roadeval.recording.codecs.codec import Codec
 from roadeval.recording.layout import Layout
 from roadeval.recording.screen import guide
 
