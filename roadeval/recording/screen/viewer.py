@@ -11,10 +11,10 @@ import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Final
+from typing import IO, Final, TypeVar
 
 import rerun_cli
 from rerun.experimental import ViewerClient
@@ -33,6 +33,8 @@ _SETTLING_S: Final = 2.0
 """How long to wait for a recording, and for the drawing to settle: after a jump images are decoded
 first."""
 _POLL_S: Final = 0.25
+
+Answer = TypeVar("Answer")
 
 
 def show(recording: Path, frame: int | None = None) -> None:
@@ -89,8 +91,8 @@ def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int 
     Raises
     ------
     RecordingError
-        If there is no graphics driver that works without a screen, or the picture cannot be
-        written.
+        If there is no graphics driver that works without a screen, the viewer does not draw, or
+        the picture cannot be written.
     """
     width, height = SIZE
     options = ["--headless", "--window-size", f"{width}x{height}"]
@@ -100,7 +102,7 @@ def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int 
         with opened(recording, options, **surroundings) as (_, client):
             shown = go(client, frame)
             time.sleep(_SETTLING_S)
-            png = client.take_screenshot()
+            png = asked(client.take_screenshot)
     try:
         files.put(picture, png)
     except OSError as error:
@@ -189,13 +191,42 @@ def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerCli
     raise RecordingError(f"the viewer did not load the recording within {_LOADING_S:.0f} s")
 
 
+def asked(ask: Callable[[], Answer]) -> Answer:
+    """Return what the viewer answers; where it is late, ask again.
+
+    It gives up after 15 seconds by itself, in which a busy machine may not have drawn once.
+
+    Raises
+    ------
+    RecordingError
+        If it does not answer for long, or has ended.
+    """
+    deadline = time.monotonic() + _LOADING_S
+    while True:
+        try:
+            return ask()
+        except TimeoutError as error:
+            if time.monotonic() > deadline:
+                raise RecordingError(
+                    f"the viewer did not answer within {_LOADING_S:.0f} s"
+                ) from error
+        except (OSError, RuntimeError) as error:
+            raise RecordingError(f"the viewer has ended: {error}") from error
+
+
 def go(client: ViewerClient, frame: int | None) -> int | None:
-    """Move the viewer to a frame; return the frame that it then reports."""
+    """Move the viewer to a frame; return the frame that it then reports.
+
+    Raises
+    ------
+    RecordingError
+        If it does not answer, see `asked`.
+    """
     if frame is not None:
-        client.set_time(at.FRAME, sequence=frame, play_state="paused")
+        asked(lambda: client.set_time(at.FRAME, sequence=frame, play_state="paused"))
     deadline = time.monotonic() + _SETTLING_S
     while True:
-        shown = client.get_state().recordings[0]
+        shown = asked(client.get_state).recordings[0]
         stands = shown.current_time if shown.current_timeline == at.FRAME else None
         if frame in (None, stands) or time.monotonic() > deadline:
             return stands

@@ -1,4 +1,4 @@
-"""What the viewer needs from the machine, and what is said where that is missing."""
+"""What the viewer needs from the machine, and what is said where it lacks that or is late."""
 
 import pytest
 
@@ -46,3 +46,33 @@ def test_a_screen_of_either_kind_will_do(screen, fake, tmp_path, monkeypatch):
     monkeypatch.setenv(screen, ":0")
     with pytest.raises(RecordingError, match="the viewer did not start"):
         viewer.show(tmp_path / "x.rrd")
+
+
+def test_a_viewer_that_is_late_is_asked_again():
+    answers = iter([TimeoutError("Deadline expired"), TimeoutError("Deadline expired"), "drawn"])
+
+    def ask():
+        answer = next(answers)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    assert viewer.asked(ask) == "drawn"
+
+
+@pytest.mark.parametrize(
+    ("failure", "said"),
+    [
+        (TimeoutError("Deadline expired"), "the viewer did not answer within 0 s"),
+        (ConnectionError("tcp connect error"), "the viewer has ended: tcp connect error"),
+        (RuntimeError("no window"), "the viewer has ended: no window"),
+    ],
+)
+def test_a_viewer_that_never_answers_or_has_ended_is_told_in_one_line(failure, said, monkeypatch):
+    monkeypatch.setattr(viewer, "_LOADING_S", 0.0)
+
+    def ask():
+        raise failure
+
+    with pytest.raises(RecordingError, match=f"^{said}$"):
+        viewer.asked(ask)
