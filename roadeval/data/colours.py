@@ -40,6 +40,10 @@ FN: Final = PURPLE
 TN: Final = SKY_BLUE
 """In graphs; an error map leaves true negatives clear."""
 
+MOST_ERRORS: Final = (26, 10, 0)
+NEVER_LABELLED: Final = (187, 187, 187)
+"""The darkest shade of a map of errors, and that of what no frame labels."""
+
 ROAD: Final = GREEN
 IGNORE: Final = (128, 128, 128)
 BOUNDARY: Final = YELLOW

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Final
 
-from roadeval.report.chart import Chart
+from roadeval.report.chart import Chart, HeatMap
 
 _SUFFIXES: Final = {b"<?xml": "svg", b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
 
@@ -145,7 +145,7 @@ class Figure(Block):
     picture: ImageFile
     caption: str
     width: float = 1.0
-    charts: Sequence[Chart] = ()
+    charts: Sequence[Chart | HeatMap] = ()
     of_charts: str = ""
 
     def as_json(self) -> dict[str, Any]:
@@ -229,6 +229,8 @@ def _images(value: Any) -> Iterator[ImageFile]:
     match value:
         case ImageFile():
             yield value
+        case HeatMap():
+            yield ImageFile(value.picture)
         case Block():
             yield from value.images()
         case list() | tuple():

@@ -11,16 +11,21 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
+import numpy as np
+import numpy.typing as npt
+
 POINTS: Final = 1500
 """Points of a series along the drive, at most: more do not fit beside each other on a screen."""
 
 
 class ChartKind(StrEnum):
-    """How a chart's numbers are drawn: lines from left to right, bars, or marks in rows."""
+    """How numbers are drawn: lines from left to right, bars, points, marks in rows, or a map."""
 
     LINES = "lines"
     BARS = "bars"
+    POINTS = "points"
     MARKS = "marks"
+    MAP = "map"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +63,16 @@ class Series:
 
 
 @dataclass(frozen=True, slots=True)
+class Level:
+    """A value across a whole chart, as a mean, with the ends of its interval; NaN without one."""
+
+    name: str
+    value: float
+    low: float = math.nan
+    high: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
 class Chart:
     """A chart.
 
@@ -78,6 +93,12 @@ class Chart:
         Whether the axis of values begins at zero.
     share
         A share of the whole at each name, drawn as a pale bar behind the marks; or none.
+    level
+        A value that is drawn across.
+    across
+        What positions are where they are neither frames nor names, as ``recall``; in `unit`.
+    x_range, y_range
+        Ends of the axes; by default as the numbers are.
     """
 
     title: str
@@ -87,11 +108,58 @@ class Chart:
     unit: str = "%"
     from_zero: bool = True
     share: Sequence[float] = ()
+    level: Level | None = None
+    across: str = ""
+    x_range: tuple[float, float] | None = None
+    y_range: tuple[float, float] | None = None
 
     @property
     def of_frames(self) -> bool:
         """Whether positions are numbers of frames."""
-        return not self.names
+        return not self.names and not self.across
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeatMap:
+    """How often something is so in each part of the image.
+
+    Parameters
+    ----------
+    title
+        What is.
+    values
+        ``(rows, columns)`` in ``unit``; NaN where it is not known.
+    top
+        The value of the darkest shade.
+    shades
+        Some colours from that of 0 to that of ``top``, as ``#RRGGBB``.
+    picture
+        A PNG file of a pixel a cell.
+    unit
+        Of the values.
+    """
+
+    title: str
+    values: npt.NDArray[np.float64]
+    top: float
+    shades: Sequence[str]
+    picture: bytes
+    unit: str = "% of the frames"
+
+    @property
+    def kind(self) -> ChartKind:
+        """How it is drawn."""
+        return ChartKind.MAP
+
+    @property
+    def most(self) -> float:
+        """The greatest value that is known."""
+        return float(np.nan_to_num(self.values).max())
+
+    @property
+    def of_frames(self) -> bool:
+        """Whether positions are numbers of frames: they are places in the image."""
+        return False
 
 
 def thinned(series: Series, most: int = POINTS) -> Series:

@@ -31,7 +31,7 @@ def document(findings: Findings) -> Document:
 
 def page_document(findings: Findings, browsed: BrowsedFrames) -> Document:
     """Return the page of one drive: its report, with a browser of frames in place of the worst."""
-    scored = (over_drive, filter_effect, regions, stages)
+    scored = (over_drive, filter_effect, regions, stages, thresholds)
     blocks = [*summary.section(findings), *browse.section(browsed)]
     for part in (*(scored if findings.totals else (masks,)), provenance):
         blocks += part.section(findings)

@@ -1,15 +1,24 @@
 """The report of a drive: which sections it has, and what stands above them."""
 
+from dataclasses import replace
+
 import pandas as pd
 
 from roadeval.report.blocks import Heading
-from roadeval.report.drive import document
+from roadeval.report.drive import document, page_document
+from roadeval.report.sections.browse import BrowsedFrames
 from tests.report.making import VARIANTS, a_pair, some_findings
+from tests.report.sections.test_thresholds import findings as thresholded
+
+OVERLAP = {"F1": 0.81, "precision": 0.82, "IoU": 0.7}
 
 
 def sections(findings):
-    blocks = document(findings).blocks
-    return [block.text for block in blocks if isinstance(block, Heading) and block.level == 1]
+    return headings(document(findings))
+
+
+def headings(made):
+    return [block.text for block in made.blocks if isinstance(block, Heading) and block.level == 1]
 
 
 def test_without_truth_there_are_masks_in_place_of_rates():
@@ -36,6 +45,23 @@ def test_with_truth_the_sections_go_from_the_verdict_to_the_settings():
         "The worst frames",
         "Settings, versions, and how to reproduce this",
     ]
+
+
+def test_a_page_has_the_sections_of_the_report():
+    row = {"variant": "filtered", "region": "lit", "pixels": 1.0, "ERR": 0.1, "errors": 1.0}
+    findings = thresholded()
+    findings = replace(
+        findings,
+        regions=pd.DataFrame([row | {"variant": name} for name in VARIANTS]),
+        error_parts={"filtered": {"svm": 0.2, "post": -0.1}},
+        overlap={
+            variant: dict.fromkeys(stages, OVERLAP) for variant, stages in findings.totals.items()
+        },
+    )
+    frames = BrowsedFrames([], [], frozenset(), [], [], None)
+    paper, page = sections(findings), headings(page_document(findings, frames))
+    assert "Over thresholds" in page
+    assert {*paper} - {*page} == {"The worst frames"}
 
 
 def test_of_a_run_that_was_cut_the_evaluated_frames_are_counted():

@@ -11,6 +11,7 @@ from roadeval.data import BASELINE, colours
 from roadeval.data.words import in_percent
 from roadeval.evaluation.metrics import SHORT
 from roadeval.report.figures.style import FAINT, INK, PALE, Look, looks
+from roadeval.report.figures.values import tops_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,8 +31,6 @@ BARS: Final = 400
 """More frames than this are drawn as means of neighbours."""
 LEAST: Final = 0.1
 """Percentage points on either side of zero that are shown at least: less may be rounding."""
-MOST_ERRORS: Final = "#1A0A00"
-NEVER_LABELLED: Final = "#BBBBBB"
 
 
 def difference(frames: pd.DataFrame, treated: str, control: str, mean: Mapping[str, Any]) -> Figure:
@@ -147,8 +146,11 @@ def _stage_lines(ax: Axes, totals: Totals, names: Sequence[str], rate: str) -> N
             _marks(ax, places, values, look)
 
 
-def heatmap(maps: Sequence[ErrorHeatmap]) -> Figure:
-    """Draw where false positives and false negatives are, a row a variant."""
+def heatmap(maps: Sequence[ErrorHeatmap], among: Sequence[ErrorHeatmap] | None = None) -> Figure:
+    """Draw where false positives and false negatives are, a row a variant.
+
+    Equal shades are equal shares in all maps ``among`` which these are; by default these alone.
+    """
     from matplotlib.colors import LinearSegmentedColormap
     from matplotlib.figure import Figure
 
@@ -161,10 +163,11 @@ def heatmap(maps: Sequence[ErrorHeatmap]) -> Figure:
         ("FP: non-road called road", colours.FP, [each.fp for each in maps]),
         ("FN: road missed", colours.FN, [each.fn for each in maps]),
     )
-    for axes, (title, colour, shares) in zip(grid.T, columns, strict=True):
-        top = max(*(np.nan_to_num(share).max() for share in shares), 0.01)
-        shades = ["white", colours.hex_of(colour), MOST_ERRORS]
-        palette = LinearSegmentedColormap.from_list("", shades).with_extremes(bad=NEVER_LABELLED)
+    tops = tops_of(among or maps)
+    for axes, (title, colour, shares), top in zip(grid.T, columns, tops, strict=True):
+        shades = ["white", colours.hex_of(colour), colours.hex_of(colours.MOST_ERRORS)]
+        bad = colours.hex_of(colours.NEVER_LABELLED)
+        palette = LinearSegmentedColormap.from_list("", shades).with_extremes(bad=bad)
         for ax, share in zip(axes, shares, strict=True):
             drawn = ax.imshow(100 * share, cmap=palette, vmin=0, vmax=100 * top, aspect="auto")
             ax.set_xticks([])

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 from roadeval.data.words import in_percent
 from roadeval.evaluation.comparison_result import MaskComparison
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.uncertainty import Difference
-from roadeval.report.chart import Chart, ChartKind, Series
-from roadeval.report.figures.forest import BETTER, NAMED, WORSE, ForestMean, ForestRow
+from roadeval.report.chart import Chart, ChartKind, Level, Series
+from roadeval.report.figures.forest import (
+    BETTER,
+    NAMED,
+    WORSE,
+    ForestMean,
+    ForestRow,
+    limits,
+)
 from roadeval.report.figures.style import FAINT, looks
 
 MEAN: Final = "mean over drives"
@@ -21,12 +29,10 @@ Interval = ForestRow | ForestMean | Difference
 
 
 def forest(rows: Sequence[ForestRow], mean: ForestMean, label: str) -> list[Chart]:
-    """Return every drive's difference with its interval, the worst above, and their mean.
+    """Return every drive's difference with its interval, the worst first, and their mean.
 
-    None where there are so many drives that the figure does not name them either.
+    Rows with names where the figure names its drives, too; of more drives points side by side.
     """
-    if len(rows) > NAMED:
-        return []
     ranked = sorted(rows, key=lambda row: (-row.mean, row.name))
     names = [row.name if row.group is None else f"{row.name} ({row.group})" for row in ranked]
     worse = [place for place, row in enumerate(ranked) if row.mean > 0]
@@ -35,6 +41,11 @@ def forest(rows: Sequence[ForestRow], mean: ForestMean, label: str) -> list[Char
         _intervals(word, colour, places, [ranked[place] for place in places])
         for word, colour, places in (("worse", WORSE, worse), ("better", BETTER, better))
     ]
+    if len(rows) > NAMED:
+        ends = limits(rows, mean)
+        level = Level(MEAN, *(100 * mean.mean, _end(mean.low), _end(mean.high)))
+        drives = Chart(label, ChartKind.POINTS, series, names=names, unit="pp", level=level)
+        return [replace(drives, y_range=ends)]
     series.append(_intervals(MEAN, CHANGE, [len(ranked)], [mean]))
     return [Chart(label, ChartKind.MARKS, series, names=[*names, MEAN], unit="pp")]
 

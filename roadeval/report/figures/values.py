@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE
+from roadeval.data import BASELINE, colours
 from roadeval.data.words import in_percent
 from roadeval.evaluation.analysis import finals
 from roadeval.evaluation.metrics import METRICS, SHORT
-from roadeval.report.chart import Chart, ChartKind, Series, thinned
+from roadeval.report.chart import Chart, ChartKind, HeatMap, Level, Series, thinned
 from roadeval.report.figures.style import Look, looks
+from roadeval.report.shades import SHADES, palette, shaded
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from roadeval.report.findings import Totals
+    from roadeval.report.findings import ErrorHeatmap, Totals
+
+LEAST_SHARE: Final = 0.01
+"""Of the frames, to which a heat map's shades reach at least."""
+STEPS: Final = 32
+"""Of the scale that is drawn below a heat map."""
 
 
 def over_windows(windows: pd.DataFrame, rates: Sequence[str]) -> list[Chart]:
@@ -53,8 +59,11 @@ def _along(table: pd.DataFrame, rates: Sequence[str]) -> list[Chart]:
     ]
 
 
-def difference(frames: pd.DataFrame, treated: str, control: str) -> Chart:
-    """Return the paired difference of ERR, frame by frame; ``frames`` is indexed by ``frame``."""
+def difference(frames: pd.DataFrame, treated: str, control: str, mean: Mapping[str, Any]) -> Chart:
+    """Return the paired difference of ERR, frame by frame, and its mean with the interval.
+
+    ``frames`` is indexed by ``frame``; ``mean`` is as in ``summary.json``.
+    """
     look = looks([treated, control])
     change = 100 * frames["ERR"]
     return Chart(
@@ -68,6 +77,10 @@ def difference(frames: pd.DataFrame, treated: str, control: str) -> Chart:
             )
         ],
         unit="pp",
+        level=Level(
+            "mean" if mean["low"] is None else "mean and its interval",
+            *(in_percent(mean[name]) for name in ("mean", "low", "high")),
+        ),
     )
 
 
@@ -77,7 +90,7 @@ def coverage(table: pd.DataFrame) -> Chart:
         "Share of the image called road",
         ChartKind.LINES,
         [
-            _series(name, look, table.index, 100 * table[name])
+            thinned(_series(name, look, table.index, 100 * table[name]))
             for name, look in looks(list(table.columns)).items()
         ],
     )
@@ -133,6 +146,40 @@ def regions(table: pd.DataFrame, variants: Sequence[str], titles: Mapping[str, s
         )
         for column, title, share in columns
     ]
+
+
+def heat(maps: Sequence[ErrorHeatmap], among: Sequence[ErrorHeatmap]) -> Iterator[HeatMap]:
+    """Yield where each variant has false positives and negatives; equal shades are equal shares.
+
+    Parameters
+    ----------
+    maps
+        Those to draw.
+    among
+        All that the shades are to be compared with.
+    """
+    tops = tops_of(among)
+    for each in maps:
+        kinds = (("FP", each.fp, colours.FP), ("FN", each.fn, colours.FN))
+        for (outcome, shares, colour), top in zip(kinds, tops, strict=True):
+            known = palette(colour, colours.MOST_ERRORS, colours.NEVER_LABELLED)
+            steps = known[np.linspace(0, SHADES - 1, STEPS).astype(int)]
+            yield HeatMap(
+                f"{outcome} of {each.variant}",
+                100 * shares,
+                100 * top,
+                [f"#{bytes(step).hex()}" for step in steps],
+                shaded(shares, top, known),
+            )
+
+
+def tops_of(maps: Sequence[ErrorHeatmap]) -> tuple[float, float]:
+    """Return the greatest shares of false positives and of false negatives: the darkest shades."""
+    fps, fns = (
+        [float(np.nan_to_num(share).max()) for share in shares]
+        for shares in ([each.fp for each in maps], [each.fn for each in maps])
+    )
+    return max(*fps, LEAST_SHARE), max(*fns, LEAST_SHARE)
 
 
 def _series(name: str, look: Look, x: Any, y: Any) -> Series:

@@ -15,9 +15,13 @@ from roadeval.results.fleet.schema import LIGHT, TAG
 
 STRATA: Final = 30
 """Parts of a fleet that a table has, at most."""
-ROWS_CAPTION: Final = (
+_ROWS: Final = (
     "A row a drive, with its own interval, the worst above; the group that it belongs to in "
     "brackets. Below them the mean over drives and its interval."
+)
+_POINTS: Final = (
+    "A point a drive, with its own interval, the worst on the left. Dashed: the mean over drives; "
+    "grey band: its interval."
 )
 _LIGHT: Final = {column.name for column in LIGHT}
 
@@ -131,6 +135,11 @@ def caption(rows: Sequence[ForestRow], mean: ForestMean) -> str:
     if mean.new_low is not None:
         told.append("Dashed: where a new drive's difference is expected.")
     return " ".join(told)
+
+
+def caption_of_charts(rows: Sequence[ForestRow]) -> str:
+    """Return what the chart of a page shows in place of a forest plot."""
+    return _ROWS if len(rows) <= NAMED else _POINTS
 
 
 def q_value(q: float) -> str:

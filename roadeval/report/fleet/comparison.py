@@ -13,7 +13,13 @@ from roadeval.report.blocks import Block, BulletList, Cell, Document, Figure, He
 from roadeval.report.figures import row_values
 from roadeval.report.figures.files import svg
 from roadeval.report.figures.forest import ForestMean, ForestRow, forest
-from roadeval.report.fleet.common import ROWS_CAPTION, MarkedRow, caption, q_value, strata_table
+from roadeval.report.fleet.common import (
+    MarkedRow,
+    caption,
+    caption_of_charts,
+    q_value,
+    strata_table,
+)
 from roadeval.report.markdown import table as markdown_table
 from roadeval.results.certainty import MARK, correction, stands
 from roadeval.results.fleet.comparison import (
@@ -126,7 +132,7 @@ def _plot(comparison: FleetComparison, change: FleetChange) -> Iterator[Block]:
         svg(lambda: forest(rows, mean, label)),
         caption(rows, mean),
         charts=row_values.forest(rows, mean, label.removesuffix(", pp")),
-        of_charts=ROWS_CAPTION,
+        of_charts=caption_of_charts(rows),
     )
 
 

@@ -10,7 +10,7 @@ from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.figures import row_values
 from roadeval.report.figures.files import svg
 from roadeval.report.figures.forest import ForestMean, ForestRow, forest
-from roadeval.report.fleet.common import ROWS_CAPTION, caption
+from roadeval.report.fleet.common import caption, caption_of_charts
 from roadeval.report.fleet.findings import FleetFindings, Row
 
 NAMED: Final = 12
@@ -68,7 +68,7 @@ def _plot(findings: FleetFindings, told: Mapping[str, Any]) -> Iterator[Block]:
         svg(lambda: forest(rows, mean, label)),
         caption(rows, mean),
         charts=row_values.forest(rows, mean, label.removesuffix(", pp")),
-        of_charts=ROWS_CAPTION,
+        of_charts=caption_of_charts(rows),
     )
 
 

@@ -13,69 +13,27 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from roadeval.report.chart import Chart, ChartKind, Series
+from roadeval.report.chart import Chart, ChartKind, HeatMap, Level, Series
+from roadeval.report.page.heat import HeatDrawing
+from roadeval.report.page.mark_rows import MarkRow, rows_of
+from roadeval.report.page.scales import Span, Tick, short, ticked, ticks
 
 HEIGHT: Final = 1000
 """Of a drawing, in its own units."""
 MARKED: Final = 40
-"""Up to this many points each has a mark."""
+"""Up to this many points of a line each has a mark."""
 _X_TICKS: Final = 8
 _Y_TICKS: Final = 4
-_STEPS: Final = (1, 2, 2.5, 5, 10)
-
-
-@dataclass(frozen=True, slots=True)
-class Span:
-    """A closed range of numbers."""
-
-    low: float
-    high: float
-
-    @property
-    def size(self) -> float:
-        """Its length."""
-        return self.high - self.low
-
-    def percent(self, value: float) -> str:
-        """Return where a value stands in it, from 0 to 100."""
-        return _short(100 * (value - self.low) / self.size)
-
-
-@dataclass(frozen=True, slots=True)
-class Tick:
-    """A number on an axis: where it stands, in percent from the left or the bottom."""
-
-    place: str
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """What is drawn of a series: paths of its line or bars, and of its marks."""
+    """What is drawn of a series: paths of its line or bars, of its marks, and of intervals."""
 
     series: Series
     path: str
     marks: str
-
-
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """A number in a row, in percent from the left, and the ends of its interval."""
-
-    series: Series
-    place: str
-    text: str
-    low: str = ""
-    width: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class MarkRow:
-    """A row of marks below each other's axis."""
-
-    name: str
-    marks: Sequence[Mark]
-    share: str
+    intervals: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +49,7 @@ class Drawing:
     x_ticks, y_ticks
         Numbers on them.
     shapes
-        Of lines and bars, in the units of ``x`` and of `HEIGHT`.
+        Of lines, bars and points, in the units of ``x`` and of `HEIGHT`.
     rows
         Of marks.
     """
@@ -107,57 +65,59 @@ class Drawing:
     @property
     def view(self) -> str:
         """The drawing's ``viewBox``."""
-        return f"{_short(self.x.low)} 0 {_short(self.x.size)} {HEIGHT}"
+        return f"{short(self.x.low)} 0 {short(self.x.size)} {HEIGHT}"
 
     @property
     def zero(self) -> str | None:
         """Where zero is, in percent from the bottom; None where it is the edge, or not there."""
         return self.y.percent(0) if self.y.low < 0 < self.y.high else None
 
+    @property
+    def level(self) -> str | None:
+        """Where the chart's level is, in the units of `HEIGHT`; None where it has none."""
+        level = self.chart.level
+        return short(_height(level.value, self.y)) if level else None
+
+    @property
+    def band(self) -> tuple[str, str] | None:
+        """The top and the height of the level's interval; None where it has none."""
+        level = self.chart.level
+        if level is None or not (math.isfinite(level.low) and math.isfinite(level.high)):
+            return None
+        top = _height(level.high, self.y)
+        return short(top), short(_height(level.low, self.y) - top)
+
     def values(self) -> dict[str, Any]:
         """Return what a script needs to show values: as JSON has it, None where undefined."""
         return {
             "unit": self.chart.unit,
             "frames": self.chart.of_frames,
+            "across": self.chart.across,
             "names": [*self.chart.names],
             "x": [self.x.low, self.x.high],
             "y": [self.y.low, self.y.high],
-            "series": [
-                {
-                    "name": each.name,
-                    "colour": each.colour,
-                    "x": [*each.x],
-                    "y": [round(y, 3) if math.isfinite(y) else None for y in each.y],
-                }
-                for each in self.chart.series
-            ],
+            "level": _told(self.chart.level) if self.chart.level else None,
+            "series": [_values(each) for each in self.chart.series],
         }
 
 
-def drawn(chart: Chart, frames: Span | None = None) -> Drawing:
+def drawn(chart: Chart | HeatMap, frames: Span | None = None) -> Drawing | HeatDrawing:
     """Return a chart as it is drawn; one along the drive over the range of frames given."""
+    if isinstance(chart, HeatMap):
+        return HeatDrawing(chart)
+    y = Span(*chart.y_range) if chart.y_range else _values_span(chart)
     if chart.kind is ChartKind.MARKS:
-        return _in_rows(chart)
-    y = _values_span(chart)
-    if chart.of_frames:
-        x = frames or span_of_frames([chart])
-        x_ticks = [Tick(x.percent(t), f"{t:.0f}") for t in ticks(x, _X_TICKS) if t == int(t)]
-    else:
-        x = Span(-0.3, len(chart.names) - 0.7)
-        x_ticks = [Tick(x.percent(place), name) for place, name in enumerate(chart.names)]
-    return Drawing(
-        chart,
-        x,
-        y,
-        x_ticks,
-        _ticks(y, _Y_TICKS),
-        [_shape(chart.kind, each, y) for each in chart.series],
-    )
+        numbers = ticked(y, _Y_TICKS)
+        return Drawing(chart, y, y, numbers, numbers, rows=rows_of(chart, y))
+    x, x_ticks = _positions(chart, frames)
+    shapes = [_shape(chart.kind, each, y) for each in chart.series]
+    return Drawing(chart, x, y, x_ticks, ticked(y, _Y_TICKS), shapes)
 
 
-def span_of_frames(charts: Iterable[Chart]) -> Span:
+def span_of_frames(charts: Iterable[Chart | HeatMap]) -> Span:
     """Return the range that charts along the drive share."""
-    numbers = [x for chart in charts if chart.of_frames for each in chart.series for x in each.x]
+    along = [chart for chart in charts if isinstance(chart, Chart) and chart.of_frames]
+    numbers = [x for chart in along for each in chart.series for x in each.x]
     if not numbers:
         return Span(0, 1)
     low, high = min(numbers), max(numbers)
@@ -165,22 +125,21 @@ def span_of_frames(charts: Iterable[Chart]) -> Span:
     return Span(low - margin, high + margin)
 
 
-def ticks(span: Span, count: int) -> list[float]:
-    """Return about ``count`` round numbers in a range.
-
-    >>> ticks(Span(0, 9), 4)
-    [0.0, 2.5, 5.0, 7.5]
-    """
-    rough = span.size / max(count, 1)
-    power = 10.0 ** math.floor(math.log10(rough))
-    step = next(each * power for each in _STEPS if each * power >= rough * 0.999)
-    first = math.ceil(span.low / step - 1e-9)
-    last = math.floor(span.high / step + 1e-9)
-    return [round(place * step, 10) for place in range(first, last + 1)]
-
-
-def _ticks(span: Span, count: int) -> list[Tick]:
-    return [Tick(span.percent(each), f"{each:g}") for each in ticks(span, count)]
+def _positions(chart: Chart, frames: Span | None) -> tuple[Span, list[Tick]]:
+    """Return the range of a chart's positions, and what stands at them."""
+    if chart.of_frames:
+        x = frames or span_of_frames([chart])
+        return x, [Tick(x.percent(t), f"{t:.0f}") for t in ticks(x, _X_TICKS) if t == int(t)]
+    if chart.across:
+        numbers = [number for each in chart.series for number in each.x]
+        x = Span(*(chart.x_range or (min(numbers), max(numbers))))
+        return x, ticked(x, _Y_TICKS)
+    if chart.kind is ChartKind.POINTS:
+        # So many names have no room: the pointer tells them.
+        margin = max(len(chart.names) / 80, 0.5)
+        return Span(-margin, len(chart.names) - 1 + margin), []
+    x = Span(-0.3, len(chart.names) - 0.7)
+    return x, [Tick(x.percent(place), name) for place, name in enumerate(chart.names)]
 
 
 def _values_span(chart: Chart) -> Span:
@@ -188,6 +147,8 @@ def _values_span(chart: Chart) -> Span:
     found = [*chart.share]
     for each in chart.series:
         found += [value for value in (*each.y, *each.low, *each.high) if math.isfinite(value)]
+    if level := chart.level:
+        found += [each for each in (level.value, level.low, level.high) if math.isfinite(each)]
     low, high = min(found, default=0.0), max(found, default=1.0)
     if chart.from_zero:
         low, high = min(low, 0.0), max(high, 0.0)
@@ -195,19 +156,38 @@ def _values_span(chart: Chart) -> Span:
     return Span(low - room if low < 0 or not chart.from_zero else low, high + room)
 
 
+def _height(value: float, y: Span) -> float:
+    """Return where a value stands in the units of `HEIGHT`, from the top down."""
+    return HEIGHT * (1 - (value - y.low) / y.size)
+
+
 def _shape(kind: ChartKind, series: Series, y: Span) -> Shape:
-    points = [(x, HEIGHT * (1 - (value - y.low) / y.size)) for x, value in series.points()]
+    points = [(x, _height(value, y)) for x, value in series.points()]
     if kind is ChartKind.BARS:
-        zero = HEIGHT * (1 + y.low / y.size)
-        half = 0.43 * min((b - a for a, b in zip(series.x, series.x[1:], strict=False)), default=1)
-        bars = "".join(
-            f"M{_short(x - half)} {_short(zero)}V{_short(top)}h{_short(2 * half)}V{_short(zero)}z"
-            for x, top in points
-        )
-        return Shape(series, bars, "")
-    few = len(points) <= MARKED
-    marks = "".join(f"M{_short(x)} {_short(top)}h0" for x, top in points) if few else ""
-    return Shape(series, _line(series, y), marks)
+        return Shape(series, _bars(series, points, y), "")
+    marks = "".join(f"M{short(x)} {short(top)}h0" for x, top in points)
+    if kind is ChartKind.POINTS:
+        return Shape(series, "", marks, _intervals(series, y))
+    return Shape(series, _line(series, y), marks if len(points) <= MARKED else "")
+
+
+def _bars(series: Series, points: Sequence[tuple[float, float]], y: Span) -> str:
+    zero = _height(0, y)
+    half = 0.43 * min((b - a for a, b in zip(series.x, series.x[1:], strict=False)), default=1)
+    return "".join(
+        f"M{short(x - half)} {short(zero)}V{short(top)}h{short(2 * half)}V{short(zero)}z"
+        for x, top in points
+    )
+
+
+def _intervals(series: Series, y: Span) -> str:
+    """Return the path of the points' intervals."""
+    ends = zip(series.x, series.low, series.high, strict=False)
+    return "".join(
+        f"M{short(x)} {short(_height(low, y))}V{short(_height(high, y))}"
+        for x, low, high in ends
+        if math.isfinite(low) and math.isfinite(high)
+    )
 
 
 def _line(series: Series, y: Span) -> str:
@@ -215,42 +195,25 @@ def _line(series: Series, y: Span) -> str:
     path, pen = [], "M"
     for x, value in zip(series.x, series.y, strict=True):
         if math.isfinite(value):
-            path.append(f"{pen}{_short(x)} {_short(HEIGHT * (1 - (value - y.low) / y.size))}")
+            path.append(f"{pen}{short(x)} {short(_height(value, y))}")
             pen = "L"
         else:
             pen = "M"
     return "".join(path)
 
 
-def _in_rows(chart: Chart) -> Drawing:
-    values = _values_span(chart)
-    rows = [
-        MarkRow(
-            name,
-            [mark for each in chart.series if (mark := _mark(chart, each, place, values))],
-            values.percent(chart.share[place]) if chart.share else "",
-        )
-        for place, name in enumerate(chart.names)
-    ]
-    return Drawing(chart, values, values, _ticks(values, _Y_TICKS), (), rows=rows)
+def _values(series: Series) -> dict[str, Any]:
+    told = {"name": series.name, "colour": series.colour, "x": [*series.x]}
+    ends = {"low": series.low, "high": series.high} if series.low else {}
+    numbers = {"y": series.y, **ends}
+    return told | {name: [_number(n) for n in each] for name, each in numbers.items()}
 
 
-def _mark(chart: Chart, series: Series, place: int, values: Span) -> Mark | None:
-    if place not in series.x:
-        return None
-    at = [*series.x].index(place)
-    value = series.y[at]
-    if not math.isfinite(value):
-        return None
-    text = f"{series.name}: {value:.2f} {chart.unit}"
-    low, high = (ends[at] if ends else math.nan for ends in (series.low, series.high))
-    if not (math.isfinite(low) and math.isfinite(high)):
-        return Mark(series, values.percent(value), text)
-    width = _short(100 * (high - low) / values.size)
-    text += f" ({low:.2f} to {high:.2f})"
-    return Mark(series, values.percent(value), text, values.percent(low), width)
+def _told(level: Level) -> dict[str, Any]:
+    """Return a level as a script shows it."""
+    numbers = {"value": level.value, "low": level.low, "high": level.high}
+    return {"name": level.name} | {name: _number(each) for name, each in numbers.items()}
 
 
-def _short(value: float) -> str:
-    """Return a number with few digits."""
-    return f"{round(value, 2):g}" if abs(value) < 1e4 else f"{value:.1f}".removesuffix(".0")
+def _number(value: float) -> float | None:
+    return round(value, 3) if math.isfinite(value) else None

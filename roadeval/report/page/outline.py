@@ -15,7 +15,7 @@ from roadeval.report.blocks import (
     TableOfContents,
     TwoColumns,
 )
-from roadeval.report.chart import Chart
+from roadeval.report.chart import Chart, HeatMap
 
 _PAPER = (PageBreak, TableOfContents)
 """What only paper has: a page's navigation is always there."""
@@ -62,7 +62,7 @@ def sections(blocks: Iterable[Block]) -> list[Section]:
     return [section for section in found if section.title or section.blocks]
 
 
-def charts(blocks: Iterable[Block]) -> Iterator[Chart]:
+def charts(blocks: Iterable[Block]) -> Iterator[Chart | HeatMap]:
     """Yield every chart of a document."""
     for block in _flat(blocks):
         if isinstance(block, Figure):

@@ -19,13 +19,14 @@ from typing import Any, Final, NoReturn
 from roadeval.report.blocks import Block, Cell, Document, ImageFile, Table
 from roadeval.report.browse import FrameBrowser
 from roadeval.report.page.drawing import Drawing, drawn, span_of_frames
+from roadeval.report.page.heat import HeatDrawing
 from roadeval.report.page.outline import charts, sections
 from roadeval.runtime.text import visible
 
 STYLE: Final = "page.css"
 SCRIPT: Final = "page.js"
 """Names of the files with a page's style and script, where they are not inside it."""
-_SCRIPTS: Final = ("tables.js", "charts.js", "pictures.js", "frames.js", "start.js")
+_SCRIPTS: Final = ("tables.js", "charts.js", "places.js", "pictures.js", "frames.js", "start.js")
 _MEDIA: Final = {"svg": "image/svg+xml", "png": "image/png", "jpg": "image/jpeg"}
 
 
@@ -124,7 +125,7 @@ def _hash(code: str) -> str:
 def _rendered(template: str, place: Place, document: Document | None, **values: Any) -> bytes:
     span = span_of_frames(_all_charts(document)) if document else None
 
-    def drawing(chart: Any) -> Drawing:
+    def drawing(chart: Any) -> Drawing | HeatDrawing:
         return drawn(chart, span)
 
     environment = _environment()

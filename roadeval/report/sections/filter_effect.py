@@ -51,8 +51,7 @@ def _paired(findings: Findings, pair: PairedComparison) -> Iterator[Block]:
         svg(lambda: difference(pair.frames, pair.treated, pair.control, change)),
         f"ERR of {pair.treated} minus {pair.control}, frame by frame. Dashed: the mean; grey band: "
         "its interval, where one is given.",
-        charts=[values.difference(pair.frames, pair.treated, pair.control)],
-        of_charts=f"ERR of {pair.treated} minus {pair.control}, frame by frame.",
+        charts=[values.difference(pair.frames, pair.treated, pair.control, change)],
     )
 
 

@@ -38,11 +38,13 @@ def section(findings: Findings) -> Iterator[Block]:
         yield regions_table(findings, names, {column: SHARES[column] for column in columns})
     yield Text(_note(findings), "note")
     for place in range(0, len(findings.heatmaps), MAPS):
+        maps = findings.heatmaps[place : place + MAPS]
         yield Figure(
-            svg(partial(heatmap, findings.heatmaps[place : place + MAPS])),
+            svg(partial(heatmap, maps, findings.heatmaps)),
             f"Where the final masks go wrong, over {sampled_frames(findings)}. "
             "Percent of the frames that label the pixel; grey: none does.",
             width=MAPS_SHARE,
+            charts=[*values.heat(maps, findings.heatmaps)],
         )
 
 

@@ -11,7 +11,7 @@ from roadeval.data import colours
 from roadeval.evaluation.comparison_result import MaskComparison
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.uncertainty import Difference
-from roadeval.report.figures import charts
+from roadeval.report.figures import charts, values
 from roadeval.report.findings import ErrorHeatmap
 
 FILTERED, UNFILTERED = (colours.hex_of(c).lower() for c in (colours.FILTERED, colours.UNFILTERED))
@@ -85,6 +85,18 @@ def test_false_positives_are_left_and_false_negatives_right_in_their_colours():
         np.testing.assert_allclose(np.ma.filled(image.get_array(), np.nan), 100 * share)
         assert image.get_cmap()(0.5)[:3] == pytest.approx(np.array(colour) / 255, abs=0.01)
     assert left.get_title(loc="left").startswith("FP")
+
+
+def test_equal_shades_are_equal_shares_in_every_map_of_a_report_and_of_a_page():
+    low, high = (
+        ErrorHeatmap(n, np.array([[e]]), np.array([[e]])) for n, e in (("a", 0.1), ("b", 0.4))
+    )
+    left, *_ = charts.heatmap([low], [low, high]).axes
+    assert left.images[0].get_clim() == pytest.approx((0, 40))
+    maps = [*values.heat([low], [low, high])]
+    assert [each.title for each in maps] == ["FP of a", "FN of a"]
+    assert [each.top for each in maps] == pytest.approx([40, 40])
+    assert maps[0].most == 10
 
 
 def test_the_covered_share_is_in_percent():

@@ -4,8 +4,9 @@ import math
 
 import pytest
 
-from roadeval.report.chart import Chart, ChartKind, Series, thinned
-from roadeval.report.page.drawing import Span, drawn, span_of_frames, ticks
+from roadeval.report.chart import Chart, ChartKind, Level, Series, thinned
+from roadeval.report.page.drawing import drawn, span_of_frames
+from roadeval.report.page.scales import Span, ticks
 
 
 def series(x, y, **more):
@@ -67,6 +68,37 @@ def test_marks_tell_their_value_and_interval_and_leave_out_what_is_undefined():
     first, second = made.rows
     assert [mark.text for mark in first.marks] == ["a: 2.00 % (1.00 to 4.00)"]
     assert second.marks == []
+
+
+def test_a_level_lies_across_with_its_interval_and_belongs_to_the_values():
+    chart = Chart("change", ChartKind.BARS, [series([0], [2.0])], level=Level("mean", 1, 0.5, 3))
+    made = drawn(chart)
+    assert made.y.high > 3
+    top, height = map(float, made.band)
+    assert float(made.level) == pytest.approx(1000 * (1 - 1 / made.y.high), abs=0.01)
+    assert height == pytest.approx(1000 * 2.5 / made.y.high, abs=0.02)
+    assert top + height > float(made.level) > top
+    assert made.values()["level"] == {"name": "mean", "value": 1, "low": 0.5, "high": 3}
+    plain = drawn(Chart("change", ChartKind.BARS, [series([0], [2.0])], level=Level("mean", 1)))
+    assert plain.band is None
+    assert plain.values()["level"]["low"] is None
+
+
+def test_points_have_intervals_and_names_without_room_for_them():
+    own = series([0, 1], [2.0, 1.0], low=[1.0, math.nan], high=[3.0, math.nan])
+    made = drawn(Chart("change", ChartKind.POINTS, [own], names=["a", "b"], y_range=(0, 4)))
+    (shape,) = made.shapes
+    assert shape.intervals == "M0 750V250"
+    assert shape.marks == "M0 500h0M1 750h0"
+    assert made.x_ticks == []
+    assert made.values()["series"][0]["high"] == [3.0, None]
+
+
+def test_positions_of_their_own_have_a_range_of_their_own():
+    made = drawn(lines(series([40.0, 90.0], [1, 1]), across="recall", x_range=(40, 101)))
+    assert made.x == Span(40, 101)
+    assert [tick.text for tick in made.x_ticks] == ["40", "60", "80", "100"]
+    assert span_of_frames([made.chart]) == Span(0, 1)
 
 
 def test_of_a_long_drive_neighbours_are_averaged():

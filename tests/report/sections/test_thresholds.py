@@ -1,6 +1,7 @@
 """Over thresholds: curves, and what is quoted of them beside the mask as it is."""
 
 import pandas as pd
+import pytest
 
 from roadeval.data.words import DASH
 from roadeval.report.blocks import Figure, Table
@@ -53,6 +54,20 @@ def test_the_curves_are_drawn():
     (figure,) = (block for block in section(findings()) if isinstance(block, Figure))
     picture = figure.picture.content.decode()
     assert all(word in picture for word in ("recall, %", "TPR, %", "probability, %", "filtered"))
+
+
+def test_the_curves_are_charts_with_the_masks_at_their_own_thresholds():
+    (figure,) = (block for block in section(findings()) if isinstance(block, Figure))
+    recall, roc, reliability = figure.charts
+    curve, mask, *_ = recall.series
+    # Of 6 road and 9 other pixels, 4 and 1 are of the higher level.
+    assert curve.x == pytest.approx([100 * 4 / 6, 100])
+    assert curve.y == pytest.approx([80, 100 * 6 / 15])
+    assert (mask.name, mask.x, mask.y) == ("filtered: the mask", [83.0], [75.0])
+    assert roc.series[0].x == pytest.approx([0, 100 / 9, 100])
+    assert (roc.series[1].x, roc.series[1].y) == ([25.0], [83.0])
+    assert recall.x_range == roc.y_range
+    assert [*reliability.series[1].points()] == [(10, 20), (90, 70)]
 
 
 def test_what_is_undefined_is_a_dash():

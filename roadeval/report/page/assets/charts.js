@@ -31,6 +31,36 @@ function roundNumbers(low, high, count) {
   return found;
 }
 
+/** The first line of what is told at the pointer. */
+function tipHead(text) {
+  const head = document.createElement("p");
+  head.className = "head";
+  head.textContent = text;
+  return head;
+}
+
+/** A name with its value. */
+function tipLine(name, value, colour = null) {
+  const line = document.createElement("p");
+  const bold = document.createElement("b");
+  bold.textContent = value;
+  if (colour) {
+    const dot = svg("svg", { class: "dot", viewBox: "0 0 10 10" });
+    dot.append(svg("circle", { cx: 5, cy: 5, r: 4.4, fill: colour }));
+    line.append(dot);
+  }
+  line.append(name, bold);
+  return line;
+}
+
+/** A value with its interval, where it has one. */
+function withEnds(value, low, high, unit) {
+  if (value === null || value === undefined) return "\u2013";
+  const told = (each) => `${unit === "pp" && each > 0 ? "+" : ""}${each.toFixed(2)}`.replace("-", "\u2212");
+  const known = typeof low === "number" && typeof high === "number";
+  return `${told(value)} ${unit}` + (known ? ` (${told(low)} to ${told(high)})` : "");
+}
+
 class ChartView {
   constructor(element, onFrame) {
     this.element = element;
@@ -65,6 +95,7 @@ class ChartView {
     });
     area.addEventListener("pointerleave", () => pointAt(this, null));
     area.addEventListener("blur", () => pointAt(this, null));
+    area.addEventListener("keydown", (event) => this.key(event, onFrame));
     if (!this.values.frames) return;
     area.addEventListener("pointerdown", (event) => {
       if (event.button === 0) begin = this.at(event);
@@ -81,7 +112,6 @@ class ChartView {
       begin = null;
       this.select(null);
     });
-    area.addEventListener("keydown", (event) => this.key(event, onFrame));
   }
 
   key(event, onFrame) {
@@ -91,8 +121,8 @@ class ChartView {
     if (step) {
       const next = Math.min(Math.max(place + step, 0), numbers.length - 1);
       pointAt(this, numbers[next]);
-    } else if (event.key === "Enter") onFrame(Math.round(numbers[place]));
-    else if (event.key === "Escape") zoom(...range.whole);
+    } else if (event.key === "Enter" && this.values.frames) onFrame(Math.round(numbers[place]));
+    else if (event.key === "Escape" && this.values.frames) zoom(...range.whole);
     else return;
     event.preventDefault();
     event.stopPropagation();
@@ -122,22 +152,32 @@ class ChartView {
     this.cursor.setAttribute("d", `M${this.pointed} 0V1000`);
   }
 
+  /** What stands at the position that is pointed at. */
+  where() {
+    const { across, frames, names, unit } = this.values;
+    if (frames) return `frame ${Math.round(this.pointed)}`;
+    return across ? `${across} ${this.pointed.toFixed(2)} ${unit}` : names[Math.round(this.pointed)];
+  }
+
+  /** The place of a series' value at the position; none where it has no value near it. */
+  placeIn(each) {
+    if (!each.x.length) return -1;
+    const place = nearest(each.x, this.pointed);
+    const near = this.values.across ? (this.high - this.low) / 50 : 0.5;
+    const far = Math.abs(each.x[place] - this.pointed) > near;
+    return far && !this.values.frames ? -1 : place;
+  }
+
   tell() {
-    const { series, unit, names, frames } = this.values;
-    const head = document.createElement("p");
-    head.className = "head";
-    head.textContent = frames ? `frame ${Math.round(this.pointed)}` : names[Math.round(this.pointed)];
+    const { series, unit, level } = this.values;
     const lines = series.map((each) => {
-      const value = each.x.length ? each.y[nearest(each.x, this.pointed)] : null;
-      const line = document.createElement("p");
-      const dot = svg("svg", { class: "dot", viewBox: "0 0 10 10" });
-      dot.append(svg("circle", { cx: 5, cy: 5, r: 4.4, fill: each.colour }));
-      const bold = document.createElement("b");
-      bold.textContent = value === null ? "\u2013" : `${value.toFixed(2)} ${unit}`;
-      line.append(dot, each.name, bold);
-      return value === null && series.length > 1 && unit === "pp" ? null : line;
+      const place = this.placeIn(each);
+      const value = place < 0 ? null : each.y[place];
+      const left = value === null && series.length > 1 && (unit === "pp" || !this.values.frames);
+      return left ? null : tipLine(each.name, withEnds(value, each.low?.[place], each.high?.[place], unit), each.colour);
     });
-    this.tip.replaceChildren(head, ...lines.filter(Boolean));
+    if (level) lines.push(tipLine(level.name, withEnds(level.value, level.low, level.high, unit)));
+    this.tip.replaceChildren(tipHead(this.where()), ...lines.filter(Boolean));
     this.tip.hidden = false;
     const share = (this.pointed - this.low) / (this.high - this.low);
     const [left, width] = [this.area.getBoundingClientRect().left - this.element.getBoundingClientRect().left, this.area.clientWidth];

@@ -39,6 +39,7 @@ makeCommands(document);
 const element = document.querySelector(".browser");
 let browser = null;
 startCharts((frame) => browser?.show(browser.byFrame.has(frame) ? frame : nearestFrame(frame), true));
+startPlaces();
 if (element) browser = new Browser(element);
 followOutline();
 
