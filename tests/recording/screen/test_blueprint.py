@@ -86,3 +86,9 @@ def test_every_shape_of_image_leaves_room_for_the_curves(width, height):
     shares = root.contents[0].row_shares
     assert min(shares) > 0
     assert shares[-1] >= sum(shares) * 0.15
+
+
+@pytest.mark.parametrize(("width", "height"), [(480, 360), (1920, 400)])
+def test_the_rows_of_the_overview_fill_a_screen_and_no_more(width, height):
+    root = blueprint.arrange(layout(width=width, height=height)).root_container
+    assert sum(root.contents[0].row_shares) == pytest.approx(990)
