@@ -170,6 +170,12 @@ def test_rows_are_named_by_their_frames() -> None:
     assert ax.get_xlabel() == "Evaluated frames, 10 a row; the last row, drawn pale, holds 1"
 
 
+@pytest.mark.parametrize(("rows", "beside"), [(3, 0.5), (400, 2)])
+def test_the_rows_fill_the_width(rows: int, beside: float) -> None:
+    (ax,) = error_rate(FigureData("drive", a_table(rows))).axes
+    assert ax.get_xlim() == pytest.approx((-beside, rows - 1 + beside))
+
+
 def test_a_short_last_row_is_drawn_pale() -> None:
     table = a_table(3, ("filtered",), last=1)
     (ax,) = error_rate(FigureData("drive", table)).axes

@@ -1,8 +1,11 @@
 """The frames to look at: what is said about each, and how to open it."""
 
+import numpy as np
+
 from roadeval.data.words import MINUS
-from roadeval.report.blocks import Command, KeepTogether, Text, TwoColumns
+from roadeval.report.blocks import Command, ImageGrid, KeepTogether, Text, TwoColumns
 from roadeval.report.findings import NotableFrame
+from roadeval.report.images import LayerImage
 from roadeval.report.sections.frames import section
 from tests.report.making import column, plain_rows, rates, some_findings, the
 
@@ -57,6 +60,16 @@ def test_helped_and_harmed_frames_are_told_apart():
     assert said(helped)[-1] == f"The filter changes ERR by {MINUS}10.00 pp."
     assert harmed[0].text == "Frames that the filter harmed most"
     assert said(harmed)[-1] == "The filter changes ERR by +10.00 pp."
+
+
+def test_equal_phases_of_the_variants_stand_below_each_other():
+    image = LayerImage("it", np.zeros((4, 4, 3), np.uint8), None, None)
+    (blocks,) = shown(some_findings(worst=[a_frame(7, layers=[[image] * 5, [image] * 3])]))
+    grids = [block for block in blocks if isinstance(block, ImageGrid)]
+    assert [(grid.columns, grid.skip, len(grid.pictures)) for grid in grids] == [
+        (5, 0, 5),
+        (5, 2, 3),
+    ]
 
 
 def test_without_pictures_there_is_nothing_to_open():
