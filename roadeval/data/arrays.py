@@ -24,6 +24,10 @@ Costs = npt.NDArray[np.uint16]
 """``(H, W)``: what a step of length 1 costs at each pixel."""
 Distances = npt.NDArray[np.int32]
 """``(H, W)``: what the cheapest path to each pixel costs."""
+Indices = npt.NDArray[np.int32]
+"""``(n, m)``: the place of each in a list."""
+Masks = npt.NDArray[np.uint32]
+"""``(n, m)``: a bit for each of something, 32 of each."""
 Flags = npt.NDArray[np.bool_]
 """``(n,)``: whether something holds of each of something."""
 Sums = npt.NDArray[np.int64]

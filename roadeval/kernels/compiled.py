@@ -19,7 +19,9 @@ from roadeval.data.arrays import (
     Costs,
     Distances,
     Image,
+    Indices,
     Labels,
+    Masks,
     Matrix,
     Plane,
     Planes,
@@ -30,7 +32,7 @@ from roadeval.data.arrays import (
     Vector,
     Words,
 )
-from roadeval.kernels import _loops
+from roadeval.kernels import _loops, plain
 
 __all__ = [
     "add_outcomes",
@@ -50,6 +52,7 @@ __all__ = [
     "ring_sums",
     "run_sums",
     "transfer",
+    "tree_sum",
 ]
 
 if lacking := [name for name in __all__ if not hasattr(_loops, name)]:
@@ -64,6 +67,9 @@ COLOUR_WORDS: Final = 1 << 18
 
 BLOCK: Final = 512
 """As in ``c/rectified.c``: pixels at a time."""
+
+TREE_BLOCK: Final = 256
+"""As in ``c/trees.c``."""
 
 
 def _shape(*arrays: npt.NDArray[Any]) -> tuple[int, ...]:
@@ -280,3 +286,16 @@ def rectified_sum(features: Values, planes: Values, bias: Values, weights: Value
 def _in_pairs(values: Values) -> Values:
     """Return an even number of planes: what a plane of zeros adds to the sum is 0."""
     return values if len(values) % 2 == 0 else np.concatenate([values, np.zeros_like(values[:1])])
+
+
+def tree_sum(
+    features: Values, feature: Indices, threshold: Values, kept: Masks, values: Values
+) -> Values:
+    """See `plain.tree_sum`."""
+    count, pixels = features.shape
+    trees, nodes = _shape(feature, threshold, kept)
+    _require(values, trees, plain.LEAVES)
+    result, block = np.empty(pixels, np.float32), np.zeros(count * TREE_BLOCK, np.float32)
+    sized = features, count, pixels
+    _loops.tree_sum(*sized, feature, threshold, kept, values, trees, nodes, block, result)
+    return result

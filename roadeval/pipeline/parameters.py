@@ -13,7 +13,7 @@ float32 too."""
 
 
 def check_arrays(
-    parameters: Any, dtype: type[np.floating[Any]], **shapes: tuple[int | str, ...]
+    parameters: Any, dtype: type[np.number[Any]], **shapes: tuple[int | str, ...]
 ) -> None:
     """Check what the functions of a stage assume about its parameters.
 

@@ -24,6 +24,9 @@ class TrainingSet:
         ``(n,)`` bool: its label.
     seed
         For whatever a fit draws at random.
+    share
+        Of road among the labelled pixels of the frames, from which as many pixels of road as of
+        the rest are sampled; None where the labels are a guess that leaves most of them open.
     """
 
     images: tuple[Rgb, ...]
@@ -32,6 +35,7 @@ class TrainingSet:
     column: npt.NDArray[np.intp]
     road: npt.NDArray[np.bool_]
     seed: int = 0
+    share: float | None = None
 
     def colours(self) -> npt.NDArray[np.uint8]:
         """Return the colours of the sampled pixels, ``(n, 3)`` uint8 RGB."""

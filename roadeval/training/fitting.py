@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import Frame, Rgb, Truth
+from roadeval.data import IGNORE, ROAD, Frame, Rgb, Truth
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import StageError, TrainingSet, View
@@ -61,6 +61,8 @@ def fit(
     learning = {name: pipeline for name, pipeline in pipelines.items() if pipeline.learning()}
     source, truths = _truths(frames, settings)
     samples = _sampled(frames, truths, settings) if learning else None
+    if samples is not None and source == "truth":
+        samples = dataclasses.replace(samples, share=_share_of_road(truths))
     parameters: dict[str, dict[str, Any]] = {name: {} for name in pipelines}
     warnings: list[str] = []
     if samples is not None:
@@ -108,6 +110,12 @@ def _sampled(
         )
     images = tuple(frame.image for frame in frames)
     return TrainingSet(images, pixels.frame, pixels.row, pixels.column, pixels.road, settings.seed)
+
+
+def _share_of_road(truths: Sequence[Truth]) -> float:
+    """Return the share of road among the labelled pixels of all frames."""
+    road = sum(np.count_nonzero(truth == ROAD) for truth in truths)
+    return road / sum(np.count_nonzero(truth != IGNORE) for truth in truths)
 
 
 def _fit_variant(

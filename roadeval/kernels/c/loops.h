@@ -82,6 +82,10 @@ void rectified_sum(
 void geodesics(
     const uint16_t *cost, const uint8_t *seeds, int64_t height, int64_t width, int64_t rounds,
     int32_t *distance);
+void tree_sum(
+    const float *features, int64_t count, int64_t pixels, const int32_t *feature,
+    const float *threshold, const uint32_t *kept, const float *values, int64_t trees,
+    int64_t nodes, float *block, float *result);
 
 PART int64_t least(int64_t a, int64_t b) { return a < b ? a : b; }
 PART int64_t most(int64_t a, int64_t b) { return a > b ? a : b; }

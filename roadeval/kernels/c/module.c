@@ -40,6 +40,8 @@ static bool is_of(const Py_buffer *view, char type)
         return view->itemsize == 8 && (format[0] == 'Q' || format[0] == 'L');
     if (type == 'i')
         return view->itemsize == 4 && (format[0] == 'i' || format[0] == 'l');
+    if (type == 'I')
+        return view->itemsize == 4 && (format[0] == 'I' || format[0] == 'L');
     return format[0] == type;
 }
 
@@ -175,6 +177,10 @@ FUNCTION(rectified_sum, "f2 n n f2 f1 f1 n >f1 >f1",
 FUNCTION(geodesics, "H2 B2 n n n >i2",
     geodesics(ARRAY(0), ARRAY(1), SIZE(2), SIZE(3), SIZE(4), ARRAY(5)))
 
+FUNCTION(tree_sum, "f2 n n i2 f2 I2 f2 n n >f1 >f1",
+    tree_sum(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3), ARRAY(4), ARRAY(5), ARRAY(6), SIZE(7), SIZE(8),
+        ARRAY(9), ARRAY(10)))
+
 #define METHOD(name) {#name, (PyCFunction)(void (*)(void))call_##name, METH_FASTCALL, NULL}
 
 static PyMethodDef methods[] = {
@@ -182,7 +188,7 @@ static PyMethodDef methods[] = {
     METHOD(ring_sums), METHOD(transfer), METHOD(paint), METHOD(label_runs), METHOD(components),
     METHOD(keep_region), METHOD(fill_holes), METHOD(count_bits), METHOD(grow),
     METHOD(outcomes), METHOD(add_outcomes), METHOD(rectified_sum),
-    METHOD(geodesics), {NULL, NULL, 0, NULL},
+    METHOD(geodesics), METHOD(tree_sum), {NULL, NULL, 0, NULL},
 };
 
 static struct PyModuleDef module = {

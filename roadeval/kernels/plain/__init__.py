@@ -10,10 +10,12 @@ from roadeval.kernels.plain.geodesics import ASLANT, FAR, STRAIGHT, geodesics
 from roadeval.kernels.plain.outcomes import add_outcomes, outcomes
 from roadeval.kernels.plain.rectified import rectified_sum
 from roadeval.kernels.plain.runs import components, fill_holes, keep_region, label_runs, paint
+from roadeval.kernels.plain.trees import LEAVES, tree_sum
 
 __all__ = [
     "ASLANT",
     "FAR",
+    "LEAVES",
     "STRAIGHT",
     "add_outcomes",
     "components",
@@ -32,4 +34,5 @@ __all__ = [
     "ring_sums",
     "run_sums",
     "transfer",
+    "tree_sum",
 ]

@@ -1,0 +1,139 @@
+"""Decision trees as plain arrays, and how they are grown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data.arrays import Flags, Floats, Indices, Masks, Values
+from roadeval.kernels.plain.trees import LEAVES
+from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
+from roadeval.runtime.extensions import whole
+
+NODES: Final = LEAVES
+"""Of a tree: one less than its leaves, and the rest never above their threshold."""
+ALL: Final = (1 << LEAVES) - 1
+"""The bits of all leaves."""
+
+
+class Growth(Protocol):
+    """What the growing depends on, see `roadeval.pipeline.beyond.trees.TreesSettings`."""
+
+    @property
+    def trees(self) -> int:
+        """How many."""
+
+    @property
+    def leaves(self) -> int:
+        """Of each, at most."""
+
+    @property
+    def rate(self) -> float:
+        """Of learning."""
+
+    @property
+    def least(self) -> int:
+        """Pixels of a leaf."""
+
+    @property
+    def share(self) -> float:
+        """Of the features, for each node."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Forest:
+    """The sum of T trees, see `roadeval.kernels.plain.tree_sum`.
+
+    Parameters
+    ----------
+    feature, threshold, kept
+        ``(T, NODES)`` int32, float32, uint32: which feature a node looks at, what it compares it
+        with, and a bit for each leaf that is left where it is above that.
+    values
+        ``(T, LEAVES)`` float32: what each leaf adds.
+    offset
+        Where the sum begins.
+    """
+
+    feature: Indices
+    threshold: Values
+    kept: Masks
+    values: Values
+    offset: float
+
+    def __post_init__(self) -> None:
+        check_arrays(self, np.int32, feature=("T", NODES))
+        check_arrays(self, np.uint32, kept=(len(self.feature), NODES))
+        check_arrays(self, np.float32, threshold=(len(self.feature), NODES))
+        check_arrays(self, np.float32, values=(len(self.feature), LEAVES), offset=())
+        check_range("feature", self.feature, 0, GREATEST)
+        check_range("offset", self.offset, -GREATEST, GREATEST)
+        if not (self.kept >> np.uint32(LEAVES - 1)).all():
+            raise ValueError("kept rules out a tree's last leaf, and so may leave none")
+
+
+def grow(
+    values: Values, road: Flags, weights: Floats | None, settings: Growth, seed: int
+) -> Forest:
+    """Grow trees with scikit-learn's gradient boosting on histograms.
+
+    By one thread: sums of many threads end with other last digits from one run to the next.
+
+    Parameters
+    ----------
+    values
+        ``(n, F)`` features.
+    road
+        ``(n,)`` labels; both occur.
+    weights
+        ``(n,)`` of the pixels; None: all weigh the same.
+    settings
+        Of the growing.
+    seed
+        Of the draw of features.
+    """
+    from threadpoolctl import threadpool_limits
+
+    # Only here: the import takes a second, and a model from a file does not need it.
+    boosting = whole("sklearn.ensemble").HistGradientBoostingClassifier(
+        learning_rate=settings.rate,
+        max_iter=settings.trees,
+        max_leaf_nodes=settings.leaves,
+        min_samples_leaf=settings.least,
+        max_features=settings.share,
+        early_stopping=False,
+        random_state=seed,
+    )
+    with threadpool_limits(1, "openmp"):
+        boosting.fit(values, road, sample_weight=weights)
+    grown = [_arrays(tree.nodes) for (tree,) in boosting._predictors]
+    feature, threshold, kept, leaves = (np.stack(each) for each in zip(*grown, strict=True))
+    return Forest(feature, threshold, kept, leaves, float(boosting._baseline_prediction.item()))
+
+
+def _arrays(nodes: npt.NDArray[Any]) -> tuple[Indices, Values, Masks, Values]:
+    """Return a tree as a row of each of a forest's arrays; its root comes first."""
+    feature, threshold = np.zeros(NODES, np.int32), np.full(NODES, GREATEST, np.float32)
+    kept, values = np.full(NODES, ALL, np.uint32), np.zeros(LEAVES, np.float32)
+    leaves = {int(place): leaf for leaf, place in enumerate(_leaves(nodes, 0))}
+    values[: len(leaves)] = nodes["value"][list(leaves)]
+    inner = np.flatnonzero(nodes["is_leaf"] == 0)
+    feature[: len(inner)] = nodes["feature_idx"][inner]
+    threshold[: len(inner)] = nodes["num_threshold"][inner]
+    for place, node in enumerate(inner):
+        ruled_out = sum(1 << leaves[leaf] for leaf in _leaves(nodes, int(nodes["left"][node])))
+        kept[place] = ALL & ~ruled_out
+    return feature, threshold, kept, values
+
+
+def _leaves(nodes: npt.NDArray[Any], root: int) -> Iterator[int]:
+    """Yield the places of a subtree's leaves, from the left."""
+    if nodes["is_leaf"][root]:
+        yield root
+        return
+    for side in ("left", "right"):
+        yield from _leaves(nodes, int(nodes[side][root]))

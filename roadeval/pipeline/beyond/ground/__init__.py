@@ -1,0 +1,1 @@
+"""Features of a pixel of the ground, one idea a file: those that define ``GROUP`` are found."""

@@ -1,0 +1,190 @@
+"""Boosted trees on what is known of a pixel of the ground: how probable road is.
+
+The sum of many small decision trees, each of which was grown to mend what those before it leave
+[1]_, is the log-odds of road: ``p = 1 / (1 + exp(-sum))``. It is computed on a working image.
+
+References
+----------
+.. [1] J. H. Friedman, Greedy Function Approximation: A Gradient Boosting Machine, The Annals of
+   Statistics 29 (2001).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Annotated, Final
+
+import numpy as np
+from pydantic import ConfigDict, Field, field_validator
+from pydantic.dataclasses import dataclass as validated
+
+from roadeval.data import Layer, LayerKind, LayerSpec, Rgb, mask_spec
+from roadeval.data.arrays import Flags, Floats, Values
+from roadeval.data.packed import Packed
+from roadeval.kernels import KERNELS
+from roadeval.kernels.plain.trees import LEAVES
+from roadeval.pipeline.beyond.forest import Forest, grow
+from roadeval.pipeline.beyond.ground.scene import scene_of
+from roadeval.pipeline.beyond.ground_features import GROUPS, at_samples, features, names_of
+from roadeval.pipeline.beyond.working_image import stretched
+from roadeval.pipeline.reference_patch import ReferencePatch
+from roadeval.pipeline.stage import (
+    MisfitError,
+    Output,
+    Stage,
+    TrainingSet,
+    View,
+    perfect_mask,
+)
+
+FULL: Final = 65535
+"""The code of probability 1."""
+FARTHEST: Final = 3.0
+"""Of geodesic distances as they are shown."""
+SHOWN_PATH: Final = "paths.over_edges_and_hues"
+"""Of the geodesic distances the one with most to see: kerbs and verges."""
+
+TREES: Final = mask_spec("trees", "Road by boosted trees")
+PROBABILITY: Final = LayerSpec(
+    "probability", LayerKind.SCALAR, "How probable road is, by boosted trees", exact=False
+)
+GEODESIC: Final = LayerSpec(
+    "geodesic",
+    LayerKind.SCALAR,
+    "Geodesic distance from the reference patch, over edges and hues",
+    value_range=(0.0, FARTHEST),
+    exact=False,
+)
+
+
+@validated(frozen=True, config=ConfigDict(extra="forbid"))
+class TreesSettings:
+    """Settings of the boosted trees.
+
+    Parameters
+    ----------
+    width
+        Columns of the working image.
+    features
+        Groups of features, each a file of `roadeval.pipeline.beyond.ground`.
+    patch
+        The reference patch, from which distances of colour and paths are measured.
+    trees
+        How many. What a decision costs grows with them.
+    leaves
+        Of a tree, at most.
+    rate
+        Share of what is left to mend that a tree mends.
+    least
+        Training pixels of a leaf, mirrored ones included, at least.
+    share
+        Of the features, drawn anew for each node, among which it chooses.
+    threshold
+        A pixel is road where it is more probable than this.
+    """
+
+    width: Annotated[int, Field(ge=32, le=1024)] = 160
+    features: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(GROUPS)
+    patch: ReferencePatch = ReferencePatch()
+    trees: Annotated[int, Field(ge=1, le=1000)] = 150
+    leaves: Annotated[int, Field(ge=2, le=LEAVES)] = 31
+    rate: Annotated[float, Field(gt=0, le=1)] = 0.1
+    least: Annotated[int, Field(ge=1, le=10_000)] = 50
+    share: Annotated[float, Field(gt=0, le=1)] = 0.33
+    threshold: Annotated[float, Field(ge=0, le=1)] = 0.5
+
+    @field_validator("features")
+    @classmethod
+    def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        if unknown := [name for name in names if name not in GROUPS]:
+            raise ValueError(f"there is no group {unknown[0]}; choose from {', '.join(GROUPS)}")
+        if len(set(names)) < len(names):
+            raise ValueError("a group is named twice")
+        return names
+
+
+def see(settings: TreesSettings, image: Rgb) -> Values:
+    """Compute the features of ``(H, W, 3)`` uint8 RGB, ``(F, h, w)`` float32."""
+    return features(scene_of(image, settings.width, settings.patch), settings.features)
+
+
+def fit(sample: TrainingSet, settings: TreesSettings) -> Forest:
+    """Grow the trees on the sampled pixels and their mirror images.
+
+    The sample has as many pixels of road as of the rest. Where the frames' share of road is known,
+    the classes weigh as much as they have there.
+    """
+    values = at_samples(sample, partial(see, settings))
+    road = np.concatenate([sample.road, sample.road])
+    weights = None if sample.share is None else balanced_back(road, sample.share)
+    return grow(np.concatenate(values), road, weights, settings, sample.seed)
+
+
+def balanced_back(road: Flags, share: float) -> Floats:
+    """Return weights ``(n,)`` with mean 1, by which a share of the ``(n,)`` pixels is road."""
+    own = road.mean()
+    weights: Floats = np.where(road, share / own, (1 - share) / (1 - own))
+    return weights
+
+
+def check_fit(forest: Forest, settings: TreesSettings) -> None:
+    """Raise a `MisfitError` if the trees ask for features that the settings do not have."""
+    known, asked = len(names_of(settings.features)), int(forest.feature.max()) + 1
+    if asked > known:
+        raise MisfitError(
+            f"the model is damaged: its trees ask for {asked} features, and there are {known}; "
+            "train it again"
+        )
+
+
+def log_odds(planes: Values, forest: Forest) -> Values:
+    """Compute the log-odds of road from `features`, ``(F, h, w)``; ``(h, w)`` float32."""
+    arrays = forest.feature, forest.threshold, forest.kept, forest.values
+    total = KERNELS.tree_sum(planes.reshape(len(planes), -1), *arrays)
+    odds: Values = total.reshape(planes.shape[1:]) + np.float32(forest.offset)
+    return odds
+
+
+def probability(odds: Values) -> Values:
+    """Compute ``1 / (1 + exp(-x))``, in a form that cannot overflow."""
+    result: Values = np.float32(0.5) + np.float32(0.5) * np.tanh(np.float32(0.5) * odds)
+    return result
+
+
+def bind(settings: TreesSettings, forest: Forest) -> Callable[[View], Output]:
+    """Return the trees as a pure function of what they see; a `MisfitError`, see `check_fit`."""
+    check_fit(forest, settings)
+    names = names_of(settings.features)
+    path = names.index(SHOWN_PATH) if SHOWN_PATH in names else None
+
+    def run(view: View) -> Output:
+        seen, shape = see(settings, view.image), view.image.shape
+        share = stretched(probability(log_odds(seen, forest)), shape)
+        codes = np.rint(share * np.float32(FULL)).astype(np.uint16)
+        road = Packed.of(codes > round(settings.threshold * FULL))
+        shown = [Layer(PROBABILITY, (codes >> 8).astype(np.uint8)), Layer(TREES, road)]
+        if path is not None:
+            shown.insert(0, Layer(GEODESIC, stretched(seen[path], shape)))
+        return Output(tuple(shown), mask=road, probability=codes)
+
+    return run
+
+
+def layers(settings: TreesSettings) -> tuple[LayerSpec, ...]:
+    """Return the layers of the trees."""
+    shown = (PROBABILITY, TREES)
+    return (GEODESIC, *shown) if SHOWN_PATH in names_of(settings.features) else shown
+
+
+STAGE: Final = Stage(
+    name="trees",
+    title="Boosted trees on colour, place, texture, surroundings and paths from the patch",
+    settings=TreesSettings,
+    bind=bind,
+    layers=layers,
+    fit=fit,
+    parameters=Forest,
+    oracle=perfect_mask,
+    inference_only=("threshold",),
+)

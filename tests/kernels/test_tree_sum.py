@@ -1,0 +1,73 @@
+"""The sum of decision trees, as a walk from node to node finds it."""
+
+import numpy as np
+import pytest
+
+from roadeval.kernels import KERNELS, plain
+
+compiled = pytest.importorskip(
+    "roadeval.kernels.compiled", reason="the loops were not compiled", exc_type=ImportError
+)
+ALL = 0xFFFFFFFF
+GREATEST = 1e15
+"""What no feature is above: a node that is not there."""
+
+
+def forest(*trees):
+    """Arrays of trees, each of ``(feature, threshold, kept)`` of its nodes and its leaves' values.
+
+    Nodes and leaves are filled up to 32.
+    """
+    shape = len(trees), plain.LEAVES
+    feature, threshold = np.zeros(shape, np.int32), np.full(shape, GREATEST, np.float32)
+    kept, values = np.full(shape, ALL, np.uint32), np.zeros(shape, np.float32)
+    for tree, (nodes, leaves) in enumerate(trees):
+        for place, (which, least, left) in enumerate(nodes):
+            feature[tree, place], threshold[tree, place], kept[tree, place] = which, least, left
+        values[tree, : len(leaves)] = leaves
+    return feature, threshold, kept, values
+
+
+# Above 0.5 in feature 0: the third leaf. Else above 2 in feature 1: the second. Else the first.
+TREE = [(0, 0.5, ALL & ~0b011), (1, 2.0, ALL & ~0b001)], [10.0, 20.0, 30.0]
+STUMP = [(1, 3.0, ALL & ~1)], [1.0, 2.0]
+
+
+def test_a_pixel_gets_the_value_of_the_leaf_that_a_walk_ends_at():
+    features = np.array([[0.0, 0.0, 1.0, 1.0], [2.0, 2.5, 0.0, 9.0]], np.float32)
+    assert KERNELS.tree_sum(features, *forest(TREE)).tolist() == [10, 20, 30, 30]
+
+
+def test_trees_add_up():
+    features = np.array([[0.0, 1.0], [4.0, 0.0]], np.float32)
+    assert KERNELS.tree_sum(features, *forest(TREE, STUMP)).tolist() == [20 + 2, 30 + 1]
+
+
+def test_a_value_at_the_threshold_is_not_above_it():
+    assert KERNELS.tree_sum(np.array([[0.5], [0.0]], np.float32), *forest(TREE)).tolist() == [10]
+
+
+def test_the_last_of_32_leaves_can_be_reached():
+    nodes = [(0, float(at), ALL & ~((1 << (at + 1)) - 1)) for at in range(31)]
+    features = np.arange(33, dtype=np.float32)[None] - np.float32(0.5)
+    found = KERNELS.tree_sum(features, *forest((nodes, list(range(32)))))
+    assert found.tolist() == [*range(32), 31]
+
+
+@pytest.mark.parametrize("pixels", [1, 255, 256, 257, 1000])
+def test_the_twins_agree_on_any_number_of_pixels(pixels):
+    rng = np.random.default_rng(pixels)
+    features = rng.normal(size=(7, pixels)).astype(np.float32)
+    feature = rng.integers(0, 7, (9, 32)).astype(np.int32)
+    threshold, values = rng.normal(size=(2, 9, 32)).astype(np.float32)
+    kept = (rng.integers(0, 1 << 31, (9, 32)) | 1 << 31).astype(np.uint32)
+    given = features, feature, threshold, kept, values
+    np.testing.assert_array_equal(compiled.tree_sum(*given), plain.tree_sum(*given))
+
+
+def test_arrays_that_do_not_fit_together_are_refused():
+    features = np.zeros((2, 4), np.float32)
+    feature, threshold, kept, values = forest(TREE)
+    for wrong in [(feature[:, :4], threshold), (feature, threshold[:0])]:
+        with pytest.raises(ValueError, match="shape"):
+            compiled.tree_sum(features, *map(np.ascontiguousarray, wrong), kept, values)

@@ -1,0 +1,253 @@
+"""Each group of features, held against SciPy, scikit-image or a plain loop."""
+
+import cv2
+import numpy as np
+import pytest
+from scipy import ndimage
+from skimage.graph import MCP_Geometric
+from skimage.measure import block_reduce
+from skimage.transform import downscale_local_mean
+
+from roadeval.pipeline.beyond.ground import (
+    barriers,
+    colour,
+    light,
+    paths,
+    place,
+    scans,
+    surroundings,
+    texture,
+)
+from roadeval.pipeline.beyond.ground.scene import from_patch, scene_of, steepness, tones_of
+from roadeval.pipeline.beyond.ground_features import GROUPS, features, names_of
+from roadeval.pipeline.reference_patch import ReferencePatch
+
+PATCH = ReferencePatch()
+WIDTH, HEIGHT = 64, 48
+INNER = np.s_[24:-24, 30:-30]
+"""Clear of the borders, where libraries differ."""
+
+
+def picture(width=2 * WIDTH, height=2 * HEIGHT, seed=0):
+    """Smooth colours at random."""
+    noise = np.random.default_rng(seed).integers(0, 256, (height, width, 3)).astype(np.uint8)
+    return cv2.GaussianBlur(noise, (0, 0), 2)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return scene_of(picture(), WIDTH, PATCH)
+
+
+def close(found, expected, tolerance=1e-4):
+    np.testing.assert_allclose(found, expected, rtol=tolerance, atol=tolerance)
+
+
+def slopes(plane):
+    """Sobel's slopes, as SciPy computes them."""
+    wide = plane.astype(float)
+    return [ndimage.sobel(wide, axis=axis, mode="mirror") / 8 for axis in (1, 0)]
+
+
+def averaged(plane, rows, columns=None):
+    size = rows, columns or rows
+    return ndimage.uniform_filter(plane.astype(float), size, mode="mirror")
+
+
+# --- Scene ----------------------------------------------------------------------------------------
+
+
+def test_the_working_image_is_the_mean_of_four_pixels_of_the_fine_one(scene):
+    np.testing.assert_array_equal(scene.fine, picture())
+    means = downscale_local_mean(picture().astype(float), (2, 2, 1))
+    assert np.abs(scene.image - means).max() <= 0.5
+
+
+def test_tones_are_logarithms_and_their_differences(scene):
+    red, green, blue = np.moveaxis(np.log(scene.image + 8.0), 2, 0)
+    for found, expected in zip(
+        scene.tones, ((red + green + blue) / 3, red - green, blue - green), strict=True
+    ):
+        close(found, expected)
+
+
+def test_distance_to_the_patch_is_in_its_own_deviations_from_its_medians():
+    patch = np.array([[1, 1, 1, 1, 1, 0]], np.uint8)
+    tone = np.array([[1.0, 2.0, 3.0, 4.0, 50.0, 9.0]], np.float32)
+    flat = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.04]], np.float32)
+    middle, hue, distance = from_patch((tone, flat, flat), patch)
+    assert middle == (3.0, 0.0, 0.0)
+    close(hue[0, 5], np.hypot(2, 2))
+    close(distance[0, 5], np.sqrt(((9 - 3) / (1.48 * 1 + 0.06)) ** 2 + 8))
+
+
+def test_a_narrow_image_is_enlarged():
+    small = scene_of(picture(40, 30), WIDTH, PATCH)
+    assert small.image.shape == (48, 64, 3)
+    assert small.fine.shape == (96, 128, 3)
+
+
+# --- Groups ---------------------------------------------------------------------------------------
+
+
+def test_every_group_gives_the_features_that_it_names(scene):
+    for name, group in GROUPS.items():
+        assert len(group.compute(scene)) == len(group.names), name
+    found = features(scene, tuple(GROUPS))
+    assert found.shape == (len(names_of(GROUPS)), HEIGHT, WIDTH)
+    assert np.isfinite(found).all()
+    assert len(set(names_of(GROUPS))) == len(found)
+
+
+def test_features_come_in_the_order_that_is_asked_for(scene):
+    two = features(scene, ("place", "light"))
+    np.testing.assert_array_equal(two[:3], features(scene, ("place",)))
+    np.testing.assert_array_equal(two[3:], features(scene, ("light",)))
+
+
+def test_an_image_of_one_colour_has_no_feature_that_is_not_finite():
+    for grey in (0, 255):
+        flat = np.full((24, 32, 3), grey, np.uint8)
+        assert np.isfinite(features(scene_of(flat, 32, PATCH), tuple(GROUPS))).all()
+
+
+def test_colour_is_projected_relative_to_the_patch(scene):
+    *channels, _, red, blue = colour.compute(scene)[:6]
+    np.testing.assert_array_equal(np.stack(channels, axis=2), scene.image)
+    inside = scene.patch > 0
+    for angle, found in zip((30, 45, 60), colour.compute(scene)[6:9], strict=True):
+        way = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        own = way[0] * np.median(red[inside]) + way[1] * np.median(blue[inside])
+        close(found, way[0] * red + way[1] * blue - own)
+
+
+def test_light_is_held_against_the_lower_half_and_the_row(scene):
+    own = scene.tones[0].astype(float)
+    half, bright, row, far = light.compute(scene)
+    lower = np.sort(own[HEIGHT // 2 :].ravel())
+    close(own - half, lower[[len(lower) // 2 - 1, len(lower) // 2]].mean())
+    assert np.mean(own[HEIGHT // 2 :] < (own - bright)[0, 0]) == pytest.approx(0.8, abs=0.01)
+    close(row[5], own[5] - np.mean(own[5]))
+    close(far[5], np.median(scene.colour[5]))
+
+
+def test_place_is_the_pixels_centre(scene):
+    across, outer, down = place.compute(scene)
+    close(across[0, [0, 31, 32, 63]], [-63 / 64, -1 / 64, 1 / 64, 63 / 64])
+    np.testing.assert_array_equal(outer, np.abs(across))
+    close(down[[0, 47], 0], [0.5 / 48, 47.5 / 48])
+
+
+def test_texture_is_the_root_of_the_mean_slope(scene):
+    found = texture.compute(scene)
+    for place_, (side, way) in enumerate((side, way) for side in (3, 9, 21) for way in (0, 1)):
+        mean = averaged(np.abs(slopes(scene.tones[0])[way]), side)
+        close(found[place_][INNER], np.sqrt(mean)[INNER], 1e-3)
+    deviation = ndimage.generic_filter(scene.tones[0].astype(float), np.std, 9)
+    close(found[6][INNER], deviation[INNER], 1e-3)
+
+
+def test_surroundings_are_means_and_their_changes(scene):
+    found = surroundings.compute(scene)
+    for place_, (side, tone) in enumerate((s, t) for s in (7, 19, 41) for t in scene.tones):
+        close(found[place_][INNER], averaged(tone, side)[INNER], 1e-3)
+    mean = found[0]
+    close(found[9][:, 14:], mean[:, 14:] - mean[:, :-14])  # 14 columns to the left
+    close(found[13][:-20], mean[:-20] - mean[20:])  # 20 rows down
+    close(found[9][:, :14], mean[:, :14] - mean[:, :1])  # beyond the border lies the border
+
+
+def test_a_column_is_walked_from_below_and_from_above(scene):
+    found = scans.compute(scene)
+    steep = np.sqrt(averaged(np.abs(slopes(scene.tones[0])[1]), 3, 5))
+    bright, colours = averaged(scene.tones[0], 5), averaged(scene.colour, 3)
+    hue, edge = averaged(scene.hue, 3), averaged(np.hypot(*slopes(scene.tones[0])), 3, 5)
+    x = WIDTH // 2
+    for y in (3, 20, 40):
+        for first, rows in ((0, np.s_[y:]), (6, np.s_[: y + 1])):
+            expected = [
+                steep[rows, x].max(),
+                bright[rows, x].min(),
+                bright[rows, x].max(),
+                colours[rows, x].mean(),
+                hue[rows, x].max(),
+                edge[rows, x].sum(),
+            ]
+            close([plane[y, x] for plane in found[first : first + 6]], expected, 1e-3)
+
+
+@pytest.mark.parametrize("width", [1, 2, 7, 8])
+def test_a_row_is_walked_from_the_middle_outwards(width):
+    plane = np.random.default_rng(width).random((3, width)).astype(np.float32)
+    found, half = scans.outwards(plane), width // 2
+    for y, x in np.ndindex(plane.shape):
+        met = plane[y, half : x + 1] if x >= half else plane[y, x:half]
+        assert found[y, x] == met.max()
+
+
+def test_paths_are_the_integrals_of_their_costs_along_the_cheapest_path(scene):
+    edge = np.hypot(*slopes(scene.tones[0]))
+    hue, distance = np.minimum(scene.hue, 10), np.minimum(scene.colour, 15)
+    costs = edge, edge / 2 + hue / 20, 0.03 * distance
+    for cost, found in zip(costs, paths.compute(scene), strict=True):
+        expected, _ = MCP_Geometric(0.005 + cost).find_costs(np.argwhere(scene.patch))
+        # A step aslant is 1 % shorter than the root of 2, and a cost is rounded to 1e-4.
+        close(found, expected, 0.02)
+
+
+def street(kerb=74, height=48, width=96):
+    """A grey street, a bright kerb beside it from top to bottom, and a pavement of its grey."""
+    image = np.random.default_rng(0).integers(96, 100, (height, width, 1))
+    image[:, kerb : kerb + 2] = 220
+    return np.broadcast_to(image, (height, width, 3)).astype(np.uint8)
+
+
+@pytest.mark.parametrize("kind", range(3))
+def test_a_kerb_is_a_step_for_whatever_lies_beyond_it(kind):
+    found = paths.compute(scene_of(street(), 96, PATCH))[kind]
+    assert found[:, 78:].min() > 1.5 * found[:, :72].max()
+
+
+def test_a_kerb_that_ends_is_walked_around():
+    ends = street()
+    ends[:28, 74:76] = 98
+    around, behind = (paths.compute(scene_of(s, 96, PATCH))[0][30, 84] for s in (ends, street()))
+    assert around < 0.75 * behind
+
+
+def test_barriers_are_the_greatest_of_four_pixels(scene):
+    tones = tones_of(scene.fine)
+    edge = np.hypot(*slopes(tones[0]))
+    hues = sum(np.hypot(*slopes(tone)) for tone in tones[1:])
+    yellow = tones[1] / 2 - tones[2]
+    expected = [
+        edge,
+        edge / (averaged(edge, 31) + 0.02),
+        hues,
+        np.maximum(averaged(yellow, 3) - averaged(yellow, 15), 0),
+        np.maximum(averaged(tones[0], 15) - averaged(tones[0], 3), 0),
+    ]
+    found = barriers.compute(scene)
+    for mine, plane in zip(found, expected, strict=False):
+        close(mine[INNER], block_reduce(plane, (2, 2), np.max)[INNER], 1e-3)
+    for mine, plane in zip(found[10:], found[:5], strict=True):
+        np.testing.assert_array_equal(mine, scans.outwards(plane))
+
+
+def test_a_line_of_one_fine_pixel_is_a_barrier_on_the_way():
+    image = np.full((96, 128, 3), 100, np.uint8)
+    image[:, 100] = 40
+    dark = barriers.compute(scene_of(image, 64, PATCH))[9]
+    assert dark[40, 60] > 2 * dark[40, 40]
+
+
+def test_steepness_does_not_depend_on_where_arrays_lie_in_memory():
+    """Vector instructions may round otherwise at the ends of an array, and these move."""
+    across, down = np.random.default_rng(0).normal(size=(2, 1000)).astype(np.float32)
+    first = steepness((across, down))
+    for offset in range(16):
+        room = np.empty((2, 1016), np.float32)
+        moved = room[0, offset : offset + 1000], room[1, offset : offset + 1000]
+        for place_, values in zip(moved, (across, down), strict=True):
+            place_[:] = values
+        np.testing.assert_array_equal(steepness(moved), first)

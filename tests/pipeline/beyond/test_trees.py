@@ -1,0 +1,174 @@
+"""Boosted trees: what they learn, and that their arrays say what scikit-learn's say."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from sklearn.ensemble import HistGradientBoostingClassifier
+
+from roadeval.pipeline.beyond import trees
+from roadeval.pipeline.beyond.forest import ALL, NODES, Forest, grow
+from roadeval.pipeline.beyond.ground_features import at_samples
+from roadeval.pipeline.beyond.trees import TreesSettings
+from roadeval.pipeline.stage import MisfitError, TrainingSet, View
+
+SMALL = TreesSettings(width=32, trees=20, leaves=8, least=5)
+
+
+def picture(kerb, seed=0, height=24, width=32):
+    """A road below a kerb, and a pavement of its grey above it; with the truth."""
+    grey = np.random.default_rng(seed).integers(95, 100, (height, width, 1))
+    grey[kerb] = 220
+    truth = np.zeros((height, width), np.uint8)
+    truth[kerb + 1 :] = 1
+    return np.broadcast_to(grey, (height, width, 3)).astype(np.uint8), truth
+
+
+def every_pixel(kerbs, seed=0):
+    images, truths = zip(*(picture(kerb, kerb) for kerb in kerbs), strict=True)
+    frame, row, column = np.indices((len(images), *truths[0].shape)).reshape(3, -1)
+    return TrainingSet(tuple(images), frame, row, column, np.stack(truths).ravel() == 1, seed)
+
+
+@pytest.fixture(scope="module")
+def sample():
+    return every_pixel((5, 9, 13))
+
+
+@pytest.fixture(scope="module")
+def forest(sample):
+    return trees.fit(sample, SMALL)
+
+
+def features_and_road(seed=0, count=600):
+    values = np.random.default_rng(seed).normal(size=(count, 4)).astype(np.float32)
+    return values, values[:, 0] + values[:, 1] ** 2 > 0.5
+
+
+@pytest.mark.parametrize("leaves", [2, 5, 32])
+def test_the_arrays_say_what_scikit_learns_trees_say(leaves):
+    values, road = features_and_road()
+    settings = replace(SMALL, leaves=leaves, share=1.0)
+    planes = np.ascontiguousarray(values.T).reshape(4, 20, 30)
+    found = trees.log_odds(planes, grow(values, road, None, settings, 0))
+    boosting = HistGradientBoostingClassifier(
+        learning_rate=SMALL.rate,
+        max_iter=SMALL.trees,
+        max_leaf_nodes=leaves,
+        min_samples_leaf=SMALL.least,
+        early_stopping=False,
+        random_state=0,
+    ).fit(values, road)
+    np.testing.assert_allclose(found.ravel(), boosting.decision_function(values), atol=1e-5)
+
+
+def test_the_same_seed_grows_the_same_trees(sample, forest):
+    again = trees.fit(sample, SMALL)
+    for field in fields(Forest):
+        np.testing.assert_array_equal(getattr(again, field.name), getattr(forest, field.name))
+    other = trees.fit(replace(sample, seed=1), SMALL)
+    assert (other.feature != forest.feature).any()
+
+
+def test_a_pavement_of_the_roads_grey_is_told_from_it_by_the_kerb(forest):
+    for kerb in (7, 11):
+        image, truth = picture(kerb, seed=99)
+        mask = trees.bind(SMALL, forest)(View.of(image)).mask.pixels()
+        assert (mask == truth).mean() > 0.95
+
+
+def test_the_mask_is_where_road_is_more_probable_than_the_threshold(forest):
+    view = View.of(picture(9, seed=99)[0])
+    for threshold in (0.2, 0.5, 0.9):
+        output = trees.bind(replace(SMALL, threshold=threshold), forest)(view)
+        expected = output.probability > round(threshold * 65535)
+        np.testing.assert_array_equal(output.mask.pixels(), expected)
+
+
+def test_probability_is_the_logistic_function_and_does_not_overflow():
+    odds = np.array([-1000, -2, 0, 2, 1000], np.float32)
+    expected = [0, 1 / (1 + np.exp(2)), 0.5, 1 / (1 + np.exp(-2)), 1]
+    np.testing.assert_allclose(trees.probability(odds), expected, atol=1e-6)
+
+
+def test_classes_weigh_what_the_frames_have_of_them():
+    road = np.array([True, True, False, False])
+    weights = trees.balanced_back(road, 0.25)
+    np.testing.assert_allclose(weights, [0.5, 0.5, 1.5, 1.5])
+
+
+def test_less_road_in_the_frames_makes_road_less_probable(sample):
+    view = View.of(picture(9, seed=99)[0])
+    few, many = (
+        trees.bind(SMALL, trees.fit(replace(sample, share=share), SMALL))(view).probability
+        for share in (0.05, 0.95)
+    )
+    assert few.mean() < many.mean()
+
+
+def test_samples_are_seen_as_they_are_and_mirrored():
+    image = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
+    where = np.array([0, 0]), np.array([23, 3]), np.array([31, 5])
+    sample = TrainingSet((image,), *where, np.array([True, False]))
+
+    def see(seen):
+        return np.moveaxis(seen, 2, 0).astype(np.float32)
+
+    straight, mirrored = at_samples(sample, see)
+    np.testing.assert_array_equal(straight, image[[23, 3], [31, 5]])
+    np.testing.assert_array_equal(mirrored, straight)
+
+
+def test_the_mirrored_image_has_other_features_at_the_same_pixel():
+    image = picture(9)[0].copy()
+    image[:, :10] = 20
+    sample = TrainingSet((image,), *np.array([[0], [20], [3]]), np.array([True]))
+    place = replace(SMALL, features=("place",))
+    straight, mirrored = at_samples(sample, lambda seen: trees.see(place, seen))
+    np.testing.assert_allclose(straight[0, 0], -mirrored[0, 0])
+    np.testing.assert_allclose(straight[0, 1:], mirrored[0, 1:])
+
+
+def test_samples_keep_their_order():
+    images = tuple(np.full((24, 32, 3), grey, np.uint8) for grey in (10, 200))
+    sample = TrainingSet(images, *np.array([[1, 0, 1], [0, 1, 2], [0, 1, 2]]), np.ones(3, bool))
+    straight, _ = at_samples(sample, lambda seen: np.moveaxis(seen, 2, 0).astype(np.float32))
+    assert straight[:, 0].tolist() == [200, 10, 200]
+
+
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({"feature": np.full((20, NODES), -1, np.int32)}, "feature holds a number outside"),
+        ({"kept": np.zeros((20, NODES), np.uint32)}, "rules out a tree's last leaf"),
+        ({"kept": np.full((19, NODES), ALL, np.uint32)}, "kept has the shape"),
+        ({"threshold": np.full((20, NODES), np.nan, np.float32)}, "not finite"),
+        ({"values": np.zeros((20, 31), np.float32)}, "values has the shape"),
+        ({"feature": np.zeros((20, NODES), np.int64)}, "instead of int32"),
+    ],
+)
+def test_trees_that_no_training_gives_are_refused(forest, changed, why):
+    with pytest.raises(ValueError, match=why):
+        replace(forest, **changed)
+
+
+def test_trees_for_other_features_are_a_misfit(forest):
+    with pytest.raises(MisfitError, match="the model is damaged: its trees ask for"):
+        trees.bind(replace(SMALL, features=("place",)), forest)
+
+
+@pytest.mark.parametrize("names", [("nose",), ("place", "place"), ()])
+def test_groups_must_be_known_and_named_once(names):
+    with pytest.raises(ValueError, match=r"features"):
+        TreesSettings(features=names)
+
+
+def test_the_path_is_shown_where_it_is_computed(forest):
+    assert [layer.spec.name for layer in trees.bind(SMALL, forest)(VIEW).layers] == [
+        each.name for each in trees.layers(SMALL)
+    ]
+    bare = replace(SMALL, features=("place", "colour"))
+    assert [each.name for each in trees.layers(bare)] == ["probability", "trees"]
+
+
+VIEW = View.of(picture(9)[0])
