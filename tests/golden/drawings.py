@@ -43,6 +43,9 @@ def _axes(axes: Axes) -> Iterator[str]:
         ticks = getattr(axes, f"get_{side}ticklabels")()
         names = " | ".join(tick.get_text() for tick in ticks)
         yield f"{side} from {low:.4g} to {high:.4g}: {names}".rstrip(": |")
+        grid = [line for line in getattr(axes, f"get_{side}gridlines")() if line.get_visible()]
+        if grid and axes.axison:
+            yield f"{side} grid: {_look(grid[0])}"
     for line in axes.lines:
         yield f"line {_points(line.get_xdata(), line.get_ydata())}: {_look(line)}"
     for patch in axes.patches:
