@@ -38,14 +38,7 @@ def _axes(axes: Axes) -> Iterator[str]:
         get = getattr(axes, f"get_{what}")
         if text := get(loc="left") or get() if what == "title" else get():
             yield f"{what} {text!r}"
-    for side in "xy":
-        low, high = getattr(axes, f"get_{side}lim")()
-        ticks = getattr(axes, f"get_{side}ticklabels")()
-        names = " | ".join(tick.get_text() for tick in ticks)
-        yield f"{side} from {low:.4g} to {high:.4g}: {names}".rstrip(": |")
-        grid = [line for line in getattr(axes, f"get_{side}gridlines")() if line.get_visible()]
-        if grid and axes.axison:
-            yield f"{side} grid: {_look(grid[0])}"
+    yield from _sides(axes)
     for line in axes.lines:
         yield f"line {_points(line.get_xdata(), line.get_ydata())}: {_look(line)}"
     for patch in axes.patches:
@@ -62,6 +55,18 @@ def _axes(axes: Axes) -> Iterator[str]:
         edge = "" if box is None else f" in a box, {_look(box)}, edge {box.get_edgecolor()[3]:.2g}"
         place = " ".join(f"{each:.4g}" for each in text.get_position())
         yield f"text {text.get_text()!r} at {place}, size {text.get_size():.3g}{edge}"
+
+
+def _sides(axes: Axes) -> Iterator[str]:
+    """The range, the words and the grid of each side."""
+    for side in "xy":
+        low, high = getattr(axes, f"get_{side}lim")()
+        ticks = getattr(axes, f"get_{side}ticklabels")()
+        names = " | ".join(tick.get_text() for tick in ticks)
+        yield f"{side} from {low:.4g} to {high:.4g}: {names}".rstrip(": |")
+        grid = [line for line in getattr(axes, f"get_{side}gridlines")() if line.get_visible()]
+        if grid and axes.axison:
+            yield f"{side} grid: {_look(grid[0])}"
 
 
 def _images(axes: Axes) -> Iterator[str]:

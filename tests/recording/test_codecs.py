@@ -88,6 +88,16 @@ def test_what_need_not_be_exact_takes_less_than_half():
     assert sizes[1] < sizes[0] / 2
 
 
+@pytest.mark.parametrize("kind", [LayerKind.SCALAR, LayerKind.RGB])
+def test_what_need_not_be_exact_has_half_the_resolution_rounded_up(kind):
+    spec = LayerSpec("it", kind, "", value_range=(0.0, 1.0), exact=False)
+    for width, half in ((640, 320), (641, 321)):
+        shape = (480, width, 3) if kind is LayerKind.RGB else (480, width)
+        payload = codec(spec, width, 480).encode(np.zeros(shape, np.uint8))
+        with Image.open(BytesIO(payload)) as picture:
+            assert picture.size == (half, 240)
+
+
 @pytest.mark.parametrize("spec", [POST, NDI, LayerSpec("aligned", LayerKind.RGB, "")])
 def test_a_damaged_picture_is_refused(spec):
     chosen = codec(spec, WIDTH, HEIGHT)

@@ -46,6 +46,12 @@ def test_a_drive_has_its_interval_and_one_without_has_none():
     assert not [line for line in ax.lines if len(line.get_xdata()) == 3]
 
 
+def test_a_drives_mark_stands_at_its_mean_in_percent():
+    ax, _ = drawn(forest([ForestRow("a", None, 0.01, -0.01, 0.03)], MEAN, "pp"))
+    marks = [line.get_xdata() for line in ax.lines if line.get_marker() == "o"]
+    assert np.concatenate(marks) == pytest.approx([1.0])
+
+
 def test_groups_stand_at_the_edge():
     ax, _ = drawn(forest(rows(2, "monday"), MEAN, "pp"))
     assert [text.get_text() for text in ax.texts[:2]] == ["monday", "monday"]
