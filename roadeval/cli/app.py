@@ -99,8 +99,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments
         Words after the program's name; those of the process if None.
     """
-    if arguments is None:
-        streams.take_over(debug=messages.debug())
+    if arguments is not None:
+        return _run(arguments)
+    streams.take_over(debug=messages.debug())
+    memory.collect_rarely()
+    code = _run(None)
+    memory.collect_no_more()
+    return code
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
         with signals.raised():
             code = app(args=arguments, prog_name=messages.PROGRAM, standalone_mode=False)

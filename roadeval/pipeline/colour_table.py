@@ -84,18 +84,19 @@ def _table(margins: Slabs) -> tuple[Words, Words]:
         reshaped                  (G7..G2, G1 G0, B7..B2, B1 B0) = (64, 4, 64, 4)
         transposed                (G7..G2, B7..B2, G1 G0, B1 B0) = (64, 64, 4, 4)
         four of them, the block   (G7..G2, B7..B2, R1 R0, G1 G0, B1 B0): word, then bit
+
+    B1 B0 stay together, so that four colours are moved at once, as one number.
     """
     words = np.empty((2, 64, 64 * 64), np.uint64)
-    block = np.empty((2, 64, 64, 4, 4, 4), np.bool_)
+    block = np.empty((2, 64, 64, 4, 4), np.uint32)
     road, left = block
     for red, margin in enumerate(margins):
-        for kind, slab in (
-            (road, margin > margins.error),
-            (left, np.abs(margin) <= margins.error),
-        ):
-            kind[:, :, red & 3] = slab.reshape(64, 4, 64, 4).transpose(0, 2, 1, 3)
+        above = margin > margins.error
+        for kind, slab in ((road, above), (left, above ^ (margin >= -margins.error))):
+            kind[:, :, red & 3] = slab.view(np.uint32).reshape(64, 4, 64).transpose(0, 2, 1)
         if red & 3 == 3:
-            bits = np.packbits(block.reshape(2, -1), axis=1, bitorder="little")
+            colours = block.view(np.bool_).reshape(2, -1)
+            bits = np.packbits(colours, axis=1, bitorder="little")
             words[:, red >> 2] = bits.view(np.uint64)
     return words[0].reshape(-1), words[1].reshape(-1)
 

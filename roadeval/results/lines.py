@@ -10,6 +10,9 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
+import numpy as np
+import numpy.typing as npt
+
 from roadeval.data import Change, Counts, FrameResult, Tally, Transition
 from roadeval.evaluation.maps import HeatMap, Name
 from roadeval.evaluation.scoreboard import DriveSums
@@ -18,8 +21,8 @@ from roadeval.evaluation.windows import Window
 
 Row = tuple[str | int | float, ...]
 """A row's cells in the order of the table's columns."""
-_HEAT: Final = "%s,%d,%d,%d,%d,%d,%d\n"
-"""A line of ``heat.csv``."""
+_CELL: Final = "%d,%d,%d,%d,%d,%d\n"
+"""A line of ``heat.csv``, after the variant."""
 
 
 def lines(result: FrameResult) -> dict[str, str]:
@@ -69,8 +72,7 @@ def sum_lines(sums: DriveSums) -> dict[str, str]:
     texts = {
         "windows": "".join(map(_line, window_rows(sums.windows))),
         "changes": "".join(map(_line, change_rows(sums.changes))),
-        # There are tens of thousands of rows, without a rate that may be undefined.
-        "heat": "".join(_HEAT % row for row in heat_rows(sums.heat)),
+        "heat": "".join(_heat_lines(sums.heat)),
         "probabilities": "".join(map(_line, probability_rows(sums.probabilities))),
     }
     return {name: text for name, text in texts.items() if text}
@@ -95,12 +97,23 @@ def change_rows(changes: Mapping[Transition, Change]) -> Iterator[Row]:
 def heat_rows(heat: Mapping[str, HeatMap]) -> Iterator[Row]:
     """Yield the rows of ``heat.csv``, without cells that are never labelled."""
     for variant, each in heat.items():
-        side, sums = each.cells()
-        rows, columns = sums[0].nonzero()
-        places = zip((rows * side).tolist(), (columns * side).tolist(), strict=True)
-        counted = sums[:, rows, columns].T.tolist()
-        for place, counts in zip(places, counted, strict=True):
-            yield (variant, *place, side, *counts)
+        for cell in _cells(each).tolist():
+            yield (variant, *cell)
+
+
+def _heat_lines(heat: Mapping[str, HeatMap]) -> Iterator[str]:
+    """Yield the lines of `heat_rows`, all of a variant at once: there are tens of thousands."""
+    for variant, each in heat.items():
+        cells = _cells(each)
+        yield f"{variant},{_CELL}" * len(cells) % tuple(cells.ravel().tolist())
+
+
+def _cells(heat: HeatMap) -> npt.NDArray[np.int64]:
+    """Return top, left, side, labelled, FP and FN of the cells that are ever labelled, (n, 6)."""
+    side, sums = heat.cells()
+    rows, columns = sums[0].nonzero()
+    sides = np.full_like(rows, side)
+    return np.column_stack((rows * side, columns * side, sides, *sums[:, rows, columns]))
 
 
 def probability_rows(found: Mapping[Name, Sums]) -> Iterator[Row]:

@@ -97,6 +97,8 @@ def read_rows(name: str, source: Path | str, summary: Mapping[str, Any] | None =
 
 def _read(name: str, source: Path | str, summary: Mapping[str, Any] | None) -> pa.Table:
     """Read a table whose names are dictionaries; a `ResultsError` if it is not whole."""
+    import pyarrow as pa
+
     table = TABLES[name]
     where = source if isinstance(source, Path) else f"the recording's table {name}"
     try:
@@ -108,7 +110,8 @@ def _read(name: str, source: Path | str, summary: Mapping[str, Any] | None) -> p
     if summary and "tables" in summary:
         _check(where, content, summary["tables"].get(name))
     if not content:
-        return _coded(table).empty_table()
+        # Arrow's own `empty_table` imports pandas.
+        return pa.Table.from_batches([], _coded(table))
     try:
         return _parsed(content, table)
     except ValueError as error:  # Arrow's too

@@ -158,3 +158,14 @@ def test_a_limit_of_addresses_that_stops_a_command_is_a_known_problem(words, cap
 def test_such_a_limit_stops_no_command_that_needs_little(words, capsys, few_addresses):
     main(words.split())
     assert "address space" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("call", "ours"), [("main()", True), ("main(['--version'])", False)])
+def test_cycles_are_searched_rarely_in_a_process_of_its_own_alone(call, ours):
+    code = (
+        "import gc, sys; sys.argv = ['roadeval', '--version']; from roadeval.cli.app import main; "
+        f"before = gc.get_threshold(); {call}; "
+        "print(gc.get_threshold() != before, gc.get_freeze_count() > 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == f"{ours} {ours}"
