@@ -20,7 +20,6 @@ from roadeval.evaluation.conditions import Condition, Judgement, judge
 from roadeval.evaluation.settings import settings_of
 from roadeval.evaluation.windows import Window
 from roadeval.jobs.result import Result
-from roadeval.report.blocks import Document
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.comparison import as_dict, judged
 from roadeval.results.lines import window_rows
@@ -30,6 +29,8 @@ from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from roadeval.report.blocks import Document
 
 ASKED: Final = {
     "topics": ("image", "truth", "shadow", "masks", "sync_tolerance_ms", "resize_truth"),

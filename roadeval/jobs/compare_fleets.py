@@ -38,7 +38,7 @@ from roadeval.report.fleet.comparison import document, markdown
 from roadeval.report.page.render import page
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.fleet.comparison import FleetComparison, FleetSide, as_dict, judged
-from roadeval.results.fleet.folder import Fleet, is_fleet
+from roadeval.results.fleet.folder import Fleet
 from roadeval.results.fleet.masks import read_masks
 from roadeval.results.fleet.record import DAMAGED, SCORED
 from roadeval.results.fleet.schema import ALL
@@ -64,30 +64,6 @@ class ComparedFleets:
     def held(self) -> list[str]:
         """The sentences of the conditions that hold."""
         return [judged(each, self.comparison) for each in self.judgements if each.holds]
-
-
-def are_fleets(results: Sequence[str | Path]) -> bool:
-    """Return whether what is to be compared are two fleets, and no single results.
-
-    Raises
-    ------
-    RoadevalError
-        If a fleet is to be compared with something else.
-    """
-    fleets = [path for path in results if is_fleet(path)]
-    if not fleets:
-        return False
-    if others := [path for path in results if path not in fleets]:
-        raise RoadevalError(
-            f"{fleets[0]} is a fleet and {others[0]} is not; compare two fleets, or the result "
-            f"of one drive with that in {Path(fleets[0]) / 'results'}"
-        )
-    if len(fleets) != 2:
-        raise RoadevalError(
-            f"{fleets[0]}: two fleets can be compared, not {len(fleets)}; the variants of one "
-            "stand side by side in its report"
-        )
-    return True
 
 
 def compare_fleets(

@@ -8,14 +8,17 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from roadeval.config import OutputSettings
 from roadeval.errors import RoadevalError
 from roadeval.recording import RecordRule
 from roadeval.results.folder import CONTENT
 from roadeval.runtime.claims import claimed
 from roadeval.runtime.files import check_file, check_folder, made, own_names, target_of
 from roadeval.runtime.folders import home_of, recover
+
+if TYPE_CHECKING:
+    from roadeval.config import OutputSettings
 
 AnyPath = str | Path
 

@@ -19,7 +19,8 @@ from roadeval.report.fleet.document import page_document as fleet_page_document
 from roadeval.report.page.files import Beside, write_page
 from roadeval.report.page.render import page
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
-from roadeval.results.fleet.folder import Fleet, is_fleet
+from roadeval.results.fleet.folder import Fleet
+from roadeval.results.fleet.kind import is_fleet
 
 PAGES: Final = (".html", ".htm")
 """Endings of files that are written as a page."""

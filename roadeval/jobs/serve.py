@@ -18,7 +18,7 @@ from roadeval.report.blocks import Document, Heading
 from roadeval.report.browse import LinkList
 from roadeval.report.findings import Commands
 from roadeval.report.page.render import SCRIPT, STYLE, Place, code, page
-from roadeval.results.fleet.folder import is_fleet
+from roadeval.results.fleet.kind import is_fleet
 from roadeval.runtime.local_server import NOT_FOUND, PAGE, LocalServer, Request, Response, told
 
 MakeCommands = Callable[[Result | Path], Commands]

@@ -12,8 +12,9 @@ from roadeval.evaluation import comparison
 from roadeval.evaluation.comparison import Side
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.jobs import compare_fleets as job
-from roadeval.jobs.compare_fleets import are_fleets, as_json, compare_fleets
+from roadeval.jobs.compare_fleets import as_json, compare_fleets
 from roadeval.results.fleet.folder import Fleet
+from roadeval.results.fleet.kind import are_fleets
 from roadeval.results.fleet.record import frames_path
 from tests.results.fleet.making import RUN, fleet_of
 

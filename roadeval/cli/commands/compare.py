@@ -73,8 +73,8 @@ def compare(
     judged, as where two results have fewer than ten frames in common, or fewer than half of those
     of the shorter one. Fleets are paired by drive, and judged over drives.
     """
-    from roadeval.jobs.compare_fleets import are_fleets
     from roadeval.jobs.outputs import holding
+    from roadeval.results.fleet.kind import are_fleets
 
     size = arguments.paper_of(paper)
     told = _fleets if are_fleets(results) else _results

@@ -68,9 +68,11 @@ def inspect(
         raise typer.BadParameter("give --frame or --worst, not both")
     if listed and (frame is not None or screenshot is not None):
         raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
-    from roadeval.results.fleet.folder import Fleet, is_fleet
+    from roadeval.results.fleet.kind import is_fleet
 
     if is_fleet(recording):
+        from roadeval.results.fleet.folder import Fleet
+
         if variant is not None:
             raise typer.BadParameter(
                 "--variant does not go with a fleet: its worst are the first's"

@@ -63,7 +63,7 @@ def report(
     """
     from roadeval.jobs.report import PageSettings, is_page, write_report
     from roadeval.jobs.result import Result
-    from roadeval.results.fleet.folder import is_fleet
+    from roadeval.results.fleet.kind import is_fleet
 
     size = arguments.paper_of(paper)
     if (pictures is not None or assets) and not (output and is_page(output)):

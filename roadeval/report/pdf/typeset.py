@@ -16,13 +16,15 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data import colours
 from roadeval.errors import RoadevalError
-from roadeval.report.blocks import Document
 from roadeval.runtime.files import put
 from roadeval.runtime.text import visible
+
+if TYPE_CHECKING:
+    from roadeval.report.blocks import Document
 
 _TEMPLATE: Final = "document.typ"
 _FIGURE: Final = b"""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from roadeval.evaluation.conditions import Condition
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.fleet.conditions import DriveJudgement, judge_drives
+from roadeval.results.fleet.kind import FLEET, is_fleet
 from roadeval.results.fleet.metrics import flat_metrics, junit_xml
 from roadeval.results.fleet.record import RECORDS, Record, frames_path, read_record
 from roadeval.results.fleet.schema import FORMAT, TABLES
@@ -27,17 +28,10 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-FLEET: Final = "fleet.json"
-"""The file that makes a folder a fleet's; written last."""
 RUN: Final = "run.toml"
 METRICS: Final = "metrics.json"
 JUNIT: Final = "junit.xml"
 PATIENCE_S: Final = 0.2
-
-
-def is_fleet(path: str | Path) -> bool:
-    """Return whether a path leads to a fleet's folder."""
-    return (Path(path) / FLEET).is_file()
 
 
 class FleetWriter:
