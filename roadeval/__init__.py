@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from roadeval.jobs.progress import Progress
     from roadeval.jobs.replay import Outcome, replay
     from roadeval.jobs.report import write_report
+    from roadeval.jobs.serve import serve
     from roadeval.jobs.train import train
     from roadeval.recording import Recording
     from roadeval.results.fleet.folder import Fleet
@@ -64,12 +65,14 @@ __all__ = [
     "replay_fleet",
     "run_frame",
     "save_model",
+    "serve",
     "train",
     "write_report",
 ]
 
+_NAMED: Final = ("compare", "demo", "info", "pack", "replay", "serve", "train")
 _HOMES: Final = {
-    **{name: f"jobs.{name}" for name in ("compare", "demo", "info", "pack", "replay", "train")},
+    **{name: f"jobs.{name}" for name in _NAMED},
     **dict.fromkeys(("RunConfig", "configure", "load_config"), "config"),
     **dict.fromkeys(("Model", "load_model", "save_model"), "training"),
     "Fleet": "results.fleet.folder",

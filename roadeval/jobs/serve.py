@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from http import HTTPStatus
 from pathlib import Path
 from typing import Final
 
 from roadeval.errors import RoadevalError
+from roadeval.jobs.replayed import Replayer
 from roadeval.jobs.result import Result
-from roadeval.jobs.served import Served, ServedDrive, ServedFleet
-from roadeval.recording import Recording
+from roadeval.jobs.served import VIEWER, Served, ServedDrive, moved, policy
+from roadeval.jobs.served_fleet import ServedFleet
 from roadeval.recording.screen import steered
 from roadeval.report.blocks import Document, Heading
 from roadeval.report.browse import LinkList
@@ -27,6 +28,37 @@ _CODE: Final = {STYLE: "text/css; charset=utf-8", SCRIPT: "text/javascript; char
 _PLACE: Final = Place("", "", "{}")
 
 
+def serve(
+    results: Sequence[str | Path],
+    on_address: Callable[[str], None],
+    *,
+    web: bool = False,
+    commands: MakeCommands | None = None,
+) -> None:
+    """Serve results as pages on 127.0.0.1 until the process is told to end, as by Ctrl-C.
+
+    Parameters
+    ----------
+    results
+        Recordings, results folders and fleets.
+    on_address
+        Called with the address to open, before anything is answered. It holds a token without which
+        nothing is answered.
+    web
+        Whether frames open in the viewer's web build, in the browser, and not in a window.
+    commands
+        Makes the commands that pages name; none by default.
+
+    Raises
+    ------
+    RoadevalError
+        If a result cannot be read, or the web viewer cannot be had.
+    """
+    with serving(results, web=web, commands=commands) as server:
+        on_address(server.address)
+        server.serve()
+
+
 @contextmanager
 def serving(
     results: Sequence[str | Path],
@@ -34,55 +66,31 @@ def serving(
     web: bool = False,
     commands: MakeCommands | None = None,
 ) -> Iterator[LocalServer]:
-    """Serve results on 127.0.0.1; when the block ends, all that was started ends with it.
-
-    Parameters
-    ----------
-    results
-        Recordings, results folders and fleets.
-    web
-        Whether frames open in the viewer's web build, in the browser, and not in a window.
-    commands
-        Makes the commands that pages name; none by default.
+    """Have a server of results, as `serve`; when the block ends, all that it started ends with it.
 
     Yields
     ------
     LocalServer
-        Its address holds a token without which nothing is answered; its ``serve`` answers.
-
-    Raises
-    ------
-    RoadevalError
-        If a result cannot be read, or the web viewer cannot be had.
+        Its ``serve`` answers.
     """
-    opened = [_opened(Path(path), commands) for path in results]
-    viewer = _viewer(opened) if web else steered.WindowViewer()
-    try:
+    with ExitStack() as stack:
+        replayer = Replayer()
+        opened = [_opened(Path(path), commands, replayer) for path in results]
+        viewer = steered.BrowserViewer() if web else steered.WindowViewer()
+        stack.callback(viewer.close)
+        for each in opened:
+            each.begin(viewer)
+        stack.callback(replayer.cancel)
         server = LocalServer(_Site(opened, viewer).answer)
-        try:
-            yield server
-        finally:
-            server.close()
-    finally:
-        viewer.close()
+        stack.callback(server.close)
+        yield server
 
 
-def _opened(path: Path, commands: MakeCommands | None) -> Served:
+def _opened(path: Path, commands: MakeCommands | None, replayer: Replayer) -> Served:
     if is_fleet(path):
-        return ServedFleet(path, commands(path).inspect if commands else None)
+        inspect = commands(path).inspect if commands else None
+        return ServedFleet(path, inspect, commands, replayer)
     return ServedDrive(path, commands)
-
-
-def _viewer(opened: Sequence[Served]) -> steered.BrowserViewer:
-    """Return the web viewer for every recording; those of one result share a layout."""
-    groups = [
-        (Recording(next(iter(each.recordings))).layout, each.recordings)
-        for each in opened
-        if each.recordings
-    ]
-    if not groups:
-        raise RoadevalError("there is no recording among the results that the viewer could open")
-    return steered.BrowserViewer(groups)
 
 
 class _Site:
@@ -105,33 +113,28 @@ class _Site:
                 return self._home()
             case (name,) if name in _CODE and not request.acts:
                 return Response(code()[name], _CODE[name])
-            case ("viewer", *rest) if not request.acts and len(rest) < 2:
+            case (first, *rest) if first == VIEWER and not request.acts and len(rest) < 2:
                 return self._viewer_file("".join(rest))
             case (place, *rest) if place.isdecimal() and int(place) < len(self._served):
                 if not rest and not request.folder:
-                    return _moved(f"{place}/")
+                    return moved(f"{place}/")
                 below = replace(request, parts=tuple(rest))
                 return self._served[int(place)].answer(below, self._viewer)
         return NOT_FOUND
 
     def _home(self) -> Response:
         if len(self._served) == 1:
-            return _moved("0/")
+            return moved("0/")
         links = [
             (f"{each.title} ({each.path})", f"{place}/") for place, each in enumerate(self._served)
         ]
         blocks = [Heading("Results"), LinkList(links)]
         made = Document("roadeval", "Results", f"{len(links)} results", "", blocks)
-        policy = {"Content-Security-Policy": f"{_PLACE.policy}; frame-ancestors 'none'"}
-        return Response(page(made, _PLACE), PAGE, headers=policy)
+        return Response(page(made, _PLACE), PAGE, headers=policy(_PLACE))
 
     def _viewer_file(self, name: str) -> Response:
         content = self._viewer.file(name)
         if content is None:
             return NOT_FOUND
-        policy = {"Content-Security-Policy": steered.POLICY}
-        return Response(content, steered.FILES[name], headers=policy, kept=bool(name))
-
-
-def _moved(to: str) -> Response:
-    return Response(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": to})
+        allowed = {"Content-Security-Policy": steered.POLICY}
+        return Response(content, steered.FILES[name], headers=allowed, kept=bool(name))

@@ -1,4 +1,4 @@
-"""What a server gives of one result: its page, its pictures, and a frame opened in the viewer."""
+"""What a server gives of one drive: its page, its pictures, and a frame opened in the viewer."""
 
 from __future__ import annotations
 
@@ -11,29 +11,23 @@ from threading import Lock
 from typing import Final, Protocol
 
 from roadeval.errors import RoadevalError
-from roadeval.jobs.fleet_inspect import worst_frames
 from roadeval.jobs.page_frames import StripMaker, browsed
-from roadeval.jobs.report import PICTURED
 from roadeval.jobs.report_findings import collect
-from roadeval.jobs.report_fleet import collect_fleet
 from roadeval.jobs.result import Result
 from roadeval.recording.screen.steered import SteeredViewer
 from roadeval.report.blocks import Document, Heading
 from roadeval.report.browse import Strip
 from roadeval.report.drive import page_document
 from roadeval.report.findings import Commands
-from roadeval.report.fleet.document import page_document as fleet_page_document
 from roadeval.report.page.render import Place, page, part
 from roadeval.report.sections.browse import LARGE
-from roadeval.results.fleet.folder import Fleet
 from roadeval.runtime.local_server import NOT_FOUND, PAGE, Request, Response, told
 
 STRIPS: Final = 40
 """Frames whose pictures are kept in memory."""
+VIEWER: Final = "viewer"
+"""Address of the web viewer, below that of the site."""
 _MEDIA: Final = {"jpg": "image/jpeg", "png": "image/png", "svg": "image/svg+xml"}
-_AT_HOME: Final = Place("pictures/", "../", "frame/{}", "../")
-_AT_FRAME: Final = Place("../pictures/", "../../", "../frame/{}", "../")
-"""Places of a result's page, and of one frame's."""
 
 
 class Served(Protocol):
@@ -45,9 +39,8 @@ class Served(Protocol):
     def title(self) -> str:
         """Its name."""
 
-    @property
-    def recordings(self) -> Mapping[Path, str]:
-        """The recordings that the viewer may show, with their names."""
+    def begin(self, viewer: SteeredViewer) -> None:
+        """Tell the viewer what it may be asked to show from the beginning."""
 
     def answer(self, request: Request, viewer: SteeredViewer) -> Response:
         """Return what is asked for below its address."""
@@ -62,6 +55,10 @@ class ServedDrive:
         A recording or results folder.
     commands
         Makes the commands that its page names.
+    site
+        The address of the whole site, as its page names it.
+    above
+        The address and the title of the page above.
 
     Raises
     ------
@@ -69,29 +66,40 @@ class ServedDrive:
         If it cannot be read.
     """
 
-    def __init__(self, path: Path, commands: Callable[[Result], Commands] | None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        commands: Callable[[Result], Commands] | None,
+        site: str = "../",
+        above: tuple[str, str] = ("../", "All results"),
+    ) -> None:
         self.path: Path = path
         self._result: Final = Result(path)
         self._commands: Final = commands(self._result) if commands else None
         self._lock: Final = Lock()
         self._strips: Final[OrderedDict[int, Strip]] = OrderedDict()
         self._frames: Final = frozenset(self._result.pictured)
+        self._site: Final = site
+        self._place: Final = Place("pictures/", site, "frame/{}", *above)
+        self._frame_place: Final = Place(
+            *("../pictures/", f"../{site}", "../frame/{}", "../", self.title), forms=True
+        )
 
     @property
     def title(self) -> str:
         """The drive's name."""
         return self._result.name
 
-    @property
-    def recordings(self) -> Mapping[Path, str]:
-        """Its recording; none of a folder."""
-        return {self._result.path: self.title} if self._result.recording else {}
+    def begin(self, viewer: SteeredViewer) -> None:
+        """Make its recording known; of a folder nothing."""
+        if self._result.recording:
+            viewer.add(self.path, self.title, self._result.recording.layout)
 
     def answer(self, request: Request, viewer: SteeredViewer) -> Response:
         """Return what is asked for below its address."""
         match request.parts:
             case () if not request.acts:
-                return Response(self._page, PAGE, headers=_policy(_AT_HOME))
+                return Response(self._page, PAGE, headers=policy(self._place))
             case ("pictures", name) if not request.acts:
                 return self._picture(name)
             case ("frame", number, *rest) if number.isdecimal() and int(number) in self._frames:
@@ -108,7 +116,7 @@ class ServedDrive:
 
     @cached_property
     def _page(self) -> bytes:
-        return page(self._document, _AT_HOME)
+        return page(self._document, self._place)
 
     @cached_property
     def _pictures(self) -> Mapping[str, bytes]:
@@ -123,7 +131,7 @@ class ServedDrive:
         with self._lock:
             strips = [*self._strips.values()]
         found = next((i for each in strips for i in each.images() if i.name == name), None)
-        return _image(name, found.content if found else self._pictures.get(name))
+        return image(name, found.content if found else self._pictures.get(name))
 
     def _strip(self, frame: int) -> Strip:
         with self._lock:
@@ -139,107 +147,46 @@ class ServedDrive:
     ) -> Response:
         match rest, acts:
             case ("part",), False:
-                return Response(part(self._strip(frame), _AT_HOME), PAGE)
+                return Response(part(self._strip(frame), self._place), PAGE)
             case (), False:
-                made = Document(
-                    "frame",
-                    self.title,
-                    f"frame {frame}",
-                    "",
-                    [Heading(f"Frame {frame}"), self._strip(frame)],
-                )
-                return Response(page(made, _AT_FRAME), PAGE, headers=_policy(_AT_FRAME))
+                return self._frame_page(frame)
             case ("view",), True:
-                return _viewed(viewer, self._result.path, frame)
+                self.begin(viewer)
+                return viewed(viewer, self.path, frame, self._site)
+            case ("show",), True:
+                self.begin(viewer)
+                shown = viewed(viewer, self.path, frame, f"../../{self._site}")
+                return moved(shown.content.decode() or "../..") if shown.succeeded else shown
         return NOT_FOUND
 
-
-class ServedFleet:
-    """A fleet's folder.
-
-    Parameters
-    ----------
-    path
-        Of the folder.
-    inspect
-        Returns the command that opens one of its worst frames, by its rank.
-
-    Raises
-    ------
-    RoadevalError
-        If it cannot be read.
-    """
-
-    def __init__(self, path: Path, inspect: Callable[[int], str] | None) -> None:
-        self.path: Path = path
-        self._fleet: Final = Fleet(path)
-        self._inspect: Final = inspect
-        self._lock: Final = Lock()
-
-    @property
-    def title(self) -> str:
-        """The fleet's name."""
-        return self._fleet.name
-
-    @cached_property
-    def recordings(self) -> Mapping[Path, str]:
-        """The recordings that were kept of the drives with the worst frames."""
-        return {place: drive for drive, place, _ in self._kept.values() if place}
-
-    def answer(self, request: Request, viewer: SteeredViewer) -> Response:
-        """Return what is asked for below its address."""
-        match request.parts:
-            case () if not request.acts:
-                return Response(self._page, PAGE, headers=_policy(_AT_HOME))
-            case ("pictures", name) if not request.acts:
-                return _image(name, self._pictures.get(name))
-            case ("worst", rank, "view") if request.acts and rank.isdecimal():
-                return self._view(int(rank), viewer)
-        return NOT_FOUND
-
-    @cached_property
-    def _kept(self) -> Mapping[int, tuple[str, Path | None, int]]:
-        """The worst frames by rank: drive, recording where it was kept, and number."""
-        if not self._fleet.table("worst").num_rows:
-            return {}
-        found = enumerate(worst_frames(self._fleet, PICTURED), 1)
-        return {rank: (each.drive, each.recording, each.frame) for rank, each in found}
-
-    @cached_property
-    def _document(self) -> Document:
-        with self._lock:
-            return fleet_page_document(collect_fleet(self._fleet, self._inspect, PICTURED))
-
-    @cached_property
-    def _page(self) -> bytes:
-        return page(self._document, _AT_HOME)
-
-    @cached_property
-    def _pictures(self) -> Mapping[str, bytes]:
-        return self._document.files()
-
-    def _view(self, rank: int, viewer: SteeredViewer) -> Response:
-        drive, recording, frame = self._kept.get(rank, ("", None, 0))
-        if recording is None:
-            sentence = f"No recording of {drive or 'this drive'} was kept: type the command."
-            return told(HTTPStatus.CONFLICT, sentence)
-        return _viewed(viewer, recording, frame)
+    def _frame_page(self, frame: int) -> Response:
+        blocks = [Heading(f"Frame {frame}"), self._strip(frame)]
+        made = Document("frame", self.title, f"frame {frame}", "", blocks)
+        place = self._frame_place
+        return Response(page(made, place), PAGE, headers=policy(place))
 
 
-def _viewed(viewer: SteeredViewer, recording: Path, frame: int) -> Response:
+def viewed(viewer: SteeredViewer, recording: Path, frame: int, site: str) -> Response:
     """Show a frame in the viewer; answer where it is to be seen, if that is in the browser."""
     try:
         added = viewer.show(recording, frame)
     except RoadevalError as error:
         return told(HTTPStatus.CONFLICT, str(error))
-    return Response(f"../viewer/{added}".encode() if added else b"")
+    return Response(f"{site}{VIEWER}/{added}".encode() if added else b"")
 
 
-def _image(name: str, content: bytes | None) -> Response:
+def image(name: str, content: bytes | None) -> Response:
+    """Return a picture that the page names; None is one that it does not."""
     if content is None:
         return NOT_FOUND
     return Response(content, _MEDIA[name.rpartition(".")[2]], kept=True)
 
 
-def _policy(place: Place) -> dict[str, str]:
+def moved(to: str) -> Response:
+    """Return where the browser is to look instead."""
+    return Response(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": to})
+
+
+def policy(place: Place) -> dict[str, str]:
+    """Return the header that says what a page may ask for."""
     return {"Content-Security-Policy": f"{place.policy}; frame-ancestors 'none'"}

@@ -95,12 +95,15 @@ class Cell(Block):
         Colour of a dot before it.
     opens
         Address below that of a served page at which its frame is opened in the viewer; or empty.
+    leads
+        Address below that of a served page to which it leads; or empty.
     """
 
     text: str
     bold: bool = False
     dot: str | None = None
     opens: str = ""
+    leads: str = ""
 
 
 @dataclass(frozen=True, slots=True)

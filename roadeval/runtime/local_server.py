@@ -79,6 +79,11 @@ class Response:
     headers: Mapping[str, str] = field(default_factory=dict)
     kept: bool = False
 
+    @property
+    def succeeded(self) -> bool:
+        """Whether it is what was asked for."""
+        return self.status is HTTPStatus.OK
+
 
 def told(status: HTTPStatus, sentence: str) -> Response:
     """Return a sentence as an answer."""

@@ -1,5 +1,6 @@
 """``roadeval serve``: pages on this machine alone, with pictures on demand and the viewer."""
 
+import os
 import re
 import signal
 import subprocess
@@ -7,10 +8,14 @@ import urllib.error
 import urllib.request
 from contextlib import contextmanager
 from importlib.util import find_spec
+from pathlib import Path
+from threading import Thread
 
 import pytest
 
+import roadeval
 from tests.e2e.commands import ROADEVAL, here
+from tests.e2e.test_fleet import Here, write
 from tests.fixtures.browser import violations
 from tests.results.fleet.making import fleet_of
 
@@ -87,10 +92,87 @@ def test_where_there_is_no_screen_the_page_says_what_to_do_instead(demo, watched
         assert "No screen" in seen.tab.locator(".absent").inner_text()
 
 
-def test_a_fleets_frame_whose_recording_was_not_kept_says_so(address, watched):
+def test_a_fleets_frame_whose_recording_was_not_kept_says_why_it_cannot_be_had(address, watched):
     tab = watched(f"{address}2/").tab
     tab.locator(".opens").first.click()
-    tab.get_by_text("was kept").wait_for()
+    tab.get_by_text("has gone, and no recording of it was kept").wait_for()
+
+
+@pytest.fixture
+def fleet(tmp_path):
+    """A fleet of two drives whose logs are there and whose recordings are not."""
+    for place, name in enumerate("ab"):
+        write(tmp_path / "logs" / f"{name}.mcap", 100 * place)
+    config = roadeval.configure({"training": {"frames": 4}})
+    roadeval.replay_fleet([tmp_path / "logs"], tmp_path / "week", config, executor=Here())
+    return tmp_path / "week"
+
+
+def test_a_frame_of_a_fleet_is_replayed_before_it_opens(fleet, watched, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    recordings = fleet / "recordings"
+    assert not recordings.exists()
+    with serving(fleet) as (address, _):
+        tab = watched(f"{address}0/").tab
+        answers = []
+        tab.on("response", lambda answer: answers.append((answer.status, answer.url)))
+        tab.locator(".opens").first.click()
+        # The drive is replayed by now; the rest is the viewer's part.
+        tab.locator(".problem").get_by_text("No screen").wait_for()
+        statuses = [status for status, url in answers if url.endswith("/worst/1/view")]
+        assert statuses[0] == 202
+        assert statuses[-1] == 409
+        (recording,) = recordings.glob("*.rrd")
+        worst = roadeval.Fleet(fleet).worst.iloc[0]
+        assert recording.stem == worst.drive
+        assert worst.frame in roadeval.Recording(recording).frame_numbers
+        assert tab.locator(".cancel").count() == 0
+
+
+def test_a_fleet_leads_to_its_drives_and_they_lead_back(fleet, watched):
+    with serving(fleet) as (address, _):
+        seen = watched(f"{address}0/")
+        tab = seen.tab
+        for place, name in enumerate("ab"):
+            tab.goto(f"{address}0/")
+            tab.locator("#all-drives tbody a").get_by_text(name, exact=True).click()
+            tab.wait_for_url(f"{address}0/drive/{place}/")
+            assert tab.locator("h1").inner_text() == name
+            assert "Made without pictures" in tab.content()
+            tab.get_by_role("link", name="week").click()
+            tab.wait_for_url(f"{address}0/")
+        worst = roadeval.Fleet(fleet).worst.iloc[0]
+        tab.locator("#the-worst-frames-over-all-drives tbody a").nth(1).click()
+        tab.wait_for_url(f"**/#frame-{worst.frame}")
+        assert tab.locator(".frames tr[aria-current]").get_attribute("data-frame") == str(
+            worst.frame
+        )
+        assert seen.complaints == []
+        assert status(f"{address}0/drive/2/") == 404
+        assert status(f"{address}0/drive/0/frame/10/view", method="POST") == 403
+
+
+def test_without_a_script_a_frames_page_opens_the_viewer(demo, watched, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with serving(demo.recording) as (address, _):
+        tab = watched(f"{address}0/frame/40", java_script_enabled=False).tab
+        tab.get_by_role("button", name="Open in viewer").click()
+        tab.get_by_text("No screen to open a window on").wait_for()
+        assert status(f"{address}0/frame/40/show", method="POST") == 403
+
+
+def test_a_notebook_serves_by_a_function(demo):
+    addresses = []
+
+    def ask(address):
+        addresses.append(status(address))
+        os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        roadeval.serve([demo.recording], lambda address: Thread(target=ask, args=[address]).start())
+    assert addresses == [200]
 
 
 def status(address, *, method="GET", **headers):
@@ -132,6 +214,30 @@ def test_what_is_no_result_is_one_line(tmp_path):
     run = here("serve", tmp_path / "missing.rrd")
     assert run.returncode == 1
     assert len(run.stderr.splitlines()) == 1
+
+
+def listening(process):
+    """Addresses, as Linux writes them, on which a process and those that it started listen."""
+    processes, sockets = [process], set()
+    for each in processes:
+        for task in Path(f"/proc/{each}/task").iterdir():
+            processes += map(int, (task / "children").read_text().split())
+        links = [str(each.readlink()) for each in Path(f"/proc/{each}/fd").iterdir()]
+        sockets |= {link[8:-1] for link in links if link.startswith("socket:[")}
+    rows = [
+        row.split()
+        for family in ("tcp", "tcp6")
+        for row in Path(f"/proc/net/{family}").read_text().splitlines()[1:]
+    ]
+    return [row[1].partition(":")[0] for row in rows if row[3] == "0A" and row[9] in sockets]
+
+
+@pytest.mark.skipif(find_spec("datafusion") is None, reason="needs roadeval[catalogue]")
+def test_whatever_listens_does_so_on_this_machine_alone(demo):
+    with serving("--web", demo.recording) as (address, run):
+        assert status(f"{address}0/frame/40/part") == 200
+        # The page's, the catalogue's and the web viewer's: 127.0.0.1 each.
+        assert listening(run.pid) == ["0100007F"] * 3
 
 
 @pytest.mark.skipif(find_spec("datafusion") is None, reason="needs roadeval[catalogue]")

@@ -32,14 +32,16 @@ def serve(
     Every frame has its pictures, and a button that opens the viewer there. The address that is
     printed holds a token; without it nothing is answered. Ctrl-C ends the server and the viewer.
     """
-    from roadeval.jobs.serve import serving
+    from roadeval.jobs import serve as job
 
-    with serving(results, web=web, commands=commands_of) as server:
-        console.emit(server.address)
-        console.flush()
-        messages.note("open that address in a browser; Ctrl-C ends")
-        server.serve()
+    job.serve(results, _tell, web=web, commands=commands_of)
     return ExitCode.DONE
+
+
+def _tell(address: str) -> None:
+    console.emit(address)
+    console.flush()
+    messages.note("open that address in a browser; Ctrl-C ends")
 
 
 COMMAND: Final = serve

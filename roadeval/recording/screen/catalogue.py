@@ -86,11 +86,7 @@ def served(
     RecordingError
         If Rerun's catalogue is not installed, or a recording cannot be read.
     """
-    if find_spec("datafusion") is None:
-        raise RecordingError(
-            "the catalogue of a fleet needs DataFusion, which is not installed: "
-            "pip install 'roadeval[catalogue]'"
-        )
+    require_catalogue()
     chosen, left_out = _told_apart(drives)
     with (
         tempfile.TemporaryDirectory(prefix="roadeval-") as folder,
@@ -109,6 +105,21 @@ def served(
         address = f"{server.url()}/entry/{dataset.id}"
         places = {each.name: dataset.segment_url(key) for key, each in chosen.items()}
         yield Catalogue(address, places, left_out)
+
+
+def require_catalogue() -> None:
+    """Make sure that Rerun's catalogue is there.
+
+    Raises
+    ------
+    RecordingError
+        If what it needs is not installed.
+    """
+    if find_spec("datafusion") is None:
+        raise RecordingError(
+            "the catalogue of a fleet needs DataFusion, which is not installed: "
+            "pip install 'roadeval[catalogue]'"
+        )
 
 
 def _told_apart(

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 import subprocess
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import ExitStack
 from pathlib import Path
 from threading import Lock
 from typing import Final, Protocol
@@ -16,7 +15,7 @@ from rerun.experimental import ViewerClient
 
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout, RecordingError
-from roadeval.recording.screen.catalogue import Catalogue, CataloguedDrive, served
+from roadeval.recording.screen.catalogue import CataloguedDrive, require_catalogue, served
 from roadeval.recording.screen.viewer import go, has_screen, hosted, opened
 
 FILES: Final = {
@@ -38,8 +37,19 @@ _ELSEWHERE: Final = re.compile(rb"<link\b[^>]*\bhttps://[^>]*>")
 class SteeredViewer(Protocol):
     """Shows frames of recordings."""
 
+    def add(self, recording: Path, name: str, layout: Layout) -> None:
+        """Make a recording known under a name; one that is known stays as it is.
+
+        Raises
+        ------
+        RecordingError
+            If it cannot be served.
+        """
+
     def show(self, recording: Path, frame: int) -> str:
-        """Show a frame; return what to add to the web build's address, empty for a window.
+        """Show a frame of a recording that is known.
+
+        Returns what to add to the web build's address; empty for a window.
 
         Raises
         ------
@@ -61,6 +71,9 @@ class WindowViewer:
         self._stack: Final = ExitStack()
         self._lock: Final = Lock()
         self._shown: tuple[Path, subprocess.Popen[bytes], ViewerClient] | None = None
+
+    def add(self, recording: Path, name: str, layout: Layout) -> None:
+        """Do nothing: a window opens any recording."""
 
     def show(self, recording: Path, frame: int) -> str:
         """Show a frame, as `SteeredViewer.show`."""
@@ -96,29 +109,32 @@ class WindowViewer:
 class BrowserViewer:
     """The viewer's web build beside the page; Rerun's catalogue leads it to a frame.
 
-    Parameters
-    ----------
-    groups
-        Recordings of one layout that it can show, each with its name; they are served on 127.0.0.1
-        until it is closed.
+    Every recording has a catalogue of its own, on 127.0.0.1 and a port that nobody else has, until
+    it is closed: one catalogue refuses two recordings of one identity.
 
     Raises
     ------
     RecordingError
-        If the catalogue is not installed, or a recording cannot be served.
+        If the catalogue is not installed.
     """
 
-    def __init__(self, groups: Sequence[tuple[Layout, Mapping[Path, str]]]) -> None:
+    def __init__(self) -> None:
+        require_catalogue()
         self._places: Final[dict[Path, str]] = {}
-        with ExitStack() as stack:
-            held = [stack.enter_context(_catalogue(*group)) for group in groups]
-            for (_, recordings), catalogue in zip(groups, held, strict=True):
-                self._places.update(
-                    (path, catalogue.drives[catalogue.left_out.get(name, name)])
-                    for path, name in recordings.items()
-                )
-            self._files: Final = stack.enter_context(hosted(held[0].address))
-            self._stack: Final = stack.pop_all()
+        self._files: str | None = None
+        self._stack: Final = ExitStack()
+        self._lock: Final = Lock()
+
+    def add(self, recording: Path, name: str, layout: Layout) -> None:
+        """Serve a recording, as `SteeredViewer.add`."""
+        with self._lock:
+            if recording in self._places:
+                return
+            drives = [CataloguedDrive(name, recording, {})]
+            catalogue = self._stack.enter_context(served(name, drives, layout, ""))
+            if self._files is None:
+                self._files = self._stack.enter_context(hosted(catalogue.address))
+            self._places[recording] = catalogue.drives[name]
 
     def show(self, recording: Path, frame: int) -> str:
         """Return what to add to the web build's address, as `SteeredViewer.show`."""
@@ -127,7 +143,7 @@ class BrowserViewer:
 
     def file(self, name: str) -> bytes | None:
         """Return a file of the web build, as `SteeredViewer.file`."""
-        if name not in FILES:
+        if name not in FILES or self._files is None:
             return None
         with urlopen(self._files + name) as answer:
             content: bytes = answer.read()
@@ -136,8 +152,3 @@ class BrowserViewer:
     def close(self) -> None:
         """End the servers."""
         self._stack.close()
-
-
-def _catalogue(layout: Layout, recordings: Mapping[Path, str]) -> AbstractContextManager[Catalogue]:
-    drives = [CataloguedDrive(name, path, {}) for path, name in recordings.items()]
-    return served(drives[0].name, drives, layout, "")

@@ -34,12 +34,13 @@ def drives_table(findings: FleetFindings) -> Table:
     changes = {kind: {r["drive"]: r["mean"] for r in by_kind(findings, kind)} for kind in _KINDS}
     shown = {kind: values for kind, values in changes.items() if values}
     tags = {each["drive"]: tags_in_words(each["tags"]) for each in findings.summary["drives"]}
+    pages = findings.pages()
     differences = [_KINDS[kind] for kind in shown]
     return Table(
         [*_WORDS, "frames", "ERR", "FPR", "FNR", *differences, *_LIGHT],
         [
             [
-                findings.names[drive],
+                Cell(findings.names[drive], leads=pages.get(drive, "")),
                 str(row["status"]),
                 tags.get(drive, ""),
                 str(row["group"] or ""),

@@ -7,8 +7,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from roadeval.report.blocks import ImageFile
+from roadeval.results.fleet.record import FAILED
 
 Row = Mapping[str, Any]
+
+
+def page_address(place: int) -> str:
+    """Return the address of the page of a drive, by its place in the table of drives."""
+    return f"drive/{place}/"
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,3 +62,14 @@ class FleetFindings:
     scores: Sequence[Row]
     worst: Sequence[WorstFrame] = field(default_factory=tuple)
     inspect: Callable[[int], str] | None = None
+
+    def pages(self) -> dict[str, str]:
+        """Return where each drive's own page lies below that of a served fleet.
+
+        By the drives' identity; a drive that failed has none.
+        """
+        return {
+            drive: page_address(place)
+            for place, (drive, row) in enumerate(self.drives.items())
+            if row["status"] != FAILED
+        }

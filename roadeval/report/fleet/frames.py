@@ -34,13 +34,17 @@ def section(findings: FleetFindings) -> Iterator[Block]:
 
 def commands_table(findings: FleetFindings, inspect: Callable[[int], str]) -> Table:
     """Tabulate the worst frames with the command that opens each in the viewer."""
+    pages = findings.pages()
     return Table(
         ["", "drive", "frame", "ERR, %", "in the viewer"],
         [
             [
                 str(frame.rank),
-                findings.names[frame.drive],
-                str(frame.frame),
+                Cell(findings.names[frame.drive], leads=pages[frame.drive]),
+                Cell(
+                    str(frame.frame),
+                    leads=f"{pages[frame.drive]}#frame-{frame.frame}",
+                ),
                 Cell(percent(frame.rates["ERR"]), bold=True),
                 Cell(inspect(frame.rank), opens=f"worst/{frame.rank}"),
             ]

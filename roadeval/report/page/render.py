@@ -41,14 +41,18 @@ class Place:
     frames
         Address of a frame, with ``{}`` for its number, where a server gives it; None: all that
         the page shows is on it.
-    home
-        Address of the page above, or empty.
+    home, home_title
+        Address of the page above, or empty, and what it is called.
+    forms
+        Whether a form of the page may ask its server to open the viewer, as without a script.
     """
 
     pictures: str | None = None
     code: str | None = None
     frames: str | None = None
     home: str = ""
+    home_title: str = "All results"
+    forms: bool = False
 
     @property
     def policy(self) -> str:
@@ -61,12 +65,13 @@ class Place:
                 f"script-src {_hash(script()) if self.code is None else _BESIDE}",
                 *(["connect-src 'self'"] if self.frames else []),
                 "base-uri 'none'",
-                "form-action 'none'",
+                f"form-action {_BESIDE if self.forms else _NOWHERE}",
             ]
         )
 
 
 _BESIDE: Final = "'self'"
+_NOWHERE: Final = "'none'"
 INSIDE: Final = Place()
 
 
@@ -90,6 +95,7 @@ def page(document: Document, place: Place = INSIDE) -> bytes:
         policy=place.policy,
         code_at=place.code,
         home=place.home,
+        home_title=place.home_title,
         style=style(),
         script=script(),
     )
@@ -136,6 +142,7 @@ def _rendered(template: str, place: Place, document: Document | None, **values: 
         filled=_filled,
         unknown=_unknown,
         is_live=place.frames is not None,
+        has_forms=place.forms,
         # A picture inside the page is there already, and paper shows it only if it is loaded.
         loading="eager" if place.pictures is None else "lazy",
         **values,

@@ -185,15 +185,39 @@ async function openInViewer(button, address) {
   [button.disabled, button.textContent] = [true, "Opening \u2026"];
   let told = "The server has ended.";
   try {
-    const answer = await fetch(address, { method: "POST" });
-    told = (await answer.text()).trim();
-    if (answer.ok && told) window.open(told, "rerun");
-    if (answer.ok) told = "";
+    const answer = await whenDone(button, address);
+    told = answer ? (await answer.text()).trim() : "Cancelled.";
+    // After a while a browser opens no window by itself.
+    if (answer?.ok && told) told = window.open(told, "rerun") ? "" : "It is there now: click again.";
+    else if (answer?.ok) told = "";
   } catch {
     // It is told below.
   }
   [button.disabled, button.textContent] = [false, words];
   return told;
+}
+
+/** Ask until the server is ready, as after a replay, which may be cancelled: then there is none. */
+async function whenDone(button, address) {
+  const stop = document.createElement("button");
+  [stop.type, stop.className, stop.textContent] = ["button", "cancel", "Cancel"];
+  let cancelled = false;
+  stop.addEventListener("click", async () => {
+    [cancelled, stop.disabled] = [true, true];
+    await fetch(address.replace(/view$/, "cancel"), { method: "POST" });
+  });
+  try {
+    for (;;) {
+      const answer = await fetch(address, { method: "POST" });
+      if (answer.status !== 202) return answer;
+      button.textContent = (await answer.text()).trim();
+      if (!stop.isConnected) button.after(stop);
+      await new Promise((done) => setTimeout(done, 500));
+      if (cancelled) return null;
+    }
+  } finally {
+    stop.remove();
+  }
 }
 
 function hasCondition(row, condition) {

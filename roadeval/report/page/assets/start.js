@@ -52,12 +52,16 @@ function nearestFrame(frame) {
 for (const button of document.querySelectorAll(".opens")) {
   button.hidden = false;
   button.addEventListener("click", async () => {
+    button.parentElement.querySelector(".problem")?.remove();
     const problem = await openInViewer(button, `${button.dataset.open}/view`);
-    button.title = problem;
-    if (problem) button.textContent = problem;
+    if (!problem) return;
+    const told = document.createElement("p");
+    [told.className, told.textContent] = ["problem", problem];
+    told.setAttribute("role", "status");
+    button.after(told);
   });
 }
-for (const image of document.querySelectorAll(".grid img, figure.picture img")) {
+for (const image of document.querySelectorAll(".grid img, figure.picture img, section > .strip img")) {
   image.addEventListener("click", () => enlargePicture(image));
 }
 addEventListener("hashchange", () => {
