@@ -13,6 +13,7 @@ from roadeval.report.figures.forest import (
     forest,
     limits,
 )
+from tests.golden.drawings import described
 
 MEAN = ForestMean(0.01, 0.005, 0.015, -0.02, 0.04)
 
@@ -55,6 +56,23 @@ def test_a_drives_mark_stands_at_its_mean_in_percent():
 def test_groups_stand_at_the_edge():
     ax, _ = drawn(forest(rows(2, "monday"), MEAN, "pp"))
     assert [text.get_text() for text in ax.texts[:2]] == ["monday", "monday"]
+
+
+DRAWN = """\
+x from -2.24 to 4.24: \N{MINUS SIGN}3 | \N{MINUS SIGN}2 | \N{MINUS SIGN}1 | 0 | 1 | 2 | 3 | 4 | 5
+x grid: color #b0b0b0, linestyle -, linewidth 0.8, markerfacecolor #b0b0b0
+y from 3.7 to -0.7: drive_0001 | drive_0000 | mean over drives | a new drive
+box 0 1.5 1 2.2: facecolor #e3e3e373, linestyle solid, linewidth 0.0
+text 'a group o\N{HORIZONTAL ELLIPSIS}y letters' at 4 0, size 7
+text 'a group o\N{HORIZONTAL ELLIPSIS}y letters' at 4 0, size 7
+text 'better' at 0 1, size 8
+text 'worse' at 1 1, size 8"""
+
+
+def test_all_but_the_lines_is_drawn_as_it_was():
+    lines = described(forest(rows(2, "a group of very many letters"), MEAN, "pp")).splitlines()
+    kept = [line.strip() for line in lines if line.startswith("    ")]
+    assert "\n".join(line for line in kept if not line.startswith(("line", "xlabel"))) == DRAWN
 
 
 def test_of_many_drives_only_the_extremes_are_named():
