@@ -22,3 +22,11 @@ def test_the_panels_stand_side_by_side_and_fill_the_width(axes):
     places = [ax.get_position() for ax in axes]
     assert sum(place.width for place in places) > 0.7
     assert places[0].x1 < places[1].x0 < places[1].x1 < places[2].x0
+
+
+def test_the_axes_begin_and_end_where_the_masks_lie(axes):
+    recall, roc, _ = axes
+    # Half of the room at least; the FPR of the mask is 25 %.
+    assert (recall.get_xlim(), recall.get_ylim()) == ((50, 101), (50, 101))
+    assert roc.get_xlim() == pytest.approx((-0.3, 30))
+    assert roc.get_ylim() == recall.get_xlim()

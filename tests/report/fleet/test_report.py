@@ -8,7 +8,7 @@ import pytest
 
 from roadeval.jobs.report import write_report
 from roadeval.jobs.report_fleet import collect_fleet
-from roadeval.report.blocks import BulletList, Figure, ImageGrid, Table, Text
+from roadeval.report.blocks import BulletList, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.fleet import drives, frames, losses, provenance, strata, summary
 from roadeval.results.fleet.folder import Fleet
 from tests.report.making import column, plain_rows, reader, text, the
@@ -97,6 +97,13 @@ def test_what_is_missing_has_its_reasons(findings):
     assert failed == [["1", "drive_0007", "no image topic; the log has: no topics at all"]]
     assert unscored == [["1", "drive_0009", "no truth"]]
     assert lost == [["drive_0008", "frame 8 cannot be decoded (and 1 more)"]]
+    headings = [b for b in blocks(losses, findings) if isinstance(b, Heading)]
+    assert [(heading.text, heading.level) for heading in headings] == [
+        ("What is missing", 1),
+        ("Drives that failed: 1", 2),
+        ("Drives without a score: 1", 2),
+        ("Logs of which a part was lost: 1", 2),
+    ]
 
 
 def test_reasons_of_many_drives_are_counted(tmp_path):

@@ -106,3 +106,13 @@ def test_of_a_long_drive_neighbours_are_averaged():
     assert long.x == [0, 2, 4, 6, 8]
     assert long.y == [0.5, 2.5, 4.5, 6.5, 8.5]
     assert thinned(long, most=5) is long
+
+
+def test_only_what_is_said_to_be_is_dashed_or_hollow():
+    plain, other = series([0, 1], [1, 2]), series([0, 1], [1, 2], dashed=True, hollow=True)
+    assert (plain.dashed, plain.hollow) == (False, False)
+    shapes = drawn(lines(plain, other)).shapes
+    assert [(shape.series.dashed, shape.series.hollow) for shape in shapes] == [
+        (False, False),
+        (True, True),
+    ]
