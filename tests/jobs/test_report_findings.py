@@ -29,3 +29,14 @@ def test_what_a_stage_changed_is_a_share_of_the_labelled_pixels():
     (found,) = report_findings._stage_changes(changes).to_dict("records")
     assert (found["variant"], found["before"], found["after"]) == ("filtered", "svm", "post")
     assert (found["repaired"], found["spoiled"]) == (1, 0)
+
+
+def test_pixels_that_changed_between_variants_are_known_where_some_are_labelled():
+    row = {"from_variant": "unfiltered", "to_variant": "filtered", "repaired": 3, "spoiled": 2}
+
+    def pixels(labelled):
+        changes = pd.DataFrame([row | {"N": labelled}])
+        return report_findings._changed_pixels(changes, "filtered", "unfiltered")
+
+    assert pixels(9) == (3, 2, 9)
+    assert pixels(0) is None

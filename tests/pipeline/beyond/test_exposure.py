@@ -65,6 +65,7 @@ def test_one_pixel_is_its_own_patch():
 def test_bounds_out_of_order_are_refused():
     with pytest.raises(ValueError, match="least must not be above greatest"):
         ExposureSettings(least=3.0, greatest=2.0)
+    assert ExposureSettings(least=2.0, greatest=2.0).least == 2.0
 
 
 def test_it_prepares_the_image_in_every_variant_and_makes_no_mask():
