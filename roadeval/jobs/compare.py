@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from roadeval.report.blocks import Document
+    from roadeval.report.sections.browse import BrowsedFrames
 
 ASKED: Final = {
     "topics": ("image", "truth", "shadow", "masks", "sync_tolerance_ms", "resize_truth"),
@@ -193,8 +194,12 @@ def _page(compared: Compared, _: Paper, inspect: Inspect | None) -> bytes:
     made = _document(compared, inspect)
     if not compared.comparison.same_drive:
         return page(made)
-    frames = browsed(compared.comparison, compared.sides, compared.recordings, inspect)
-    return page(replace(made, blocks=[*made.blocks, *browse.section(frames)]))
+
+    def rendered(frames: BrowsedFrames) -> bytes:
+        return page(replace(made, blocks=[*made.blocks, *browse.section(frames)]))
+
+    compared_at = compared.comparison, compared.sides, compared.recordings
+    return rendered(browsed(*compared_at, inspect, lambda frames: len(rendered(frames))))
 
 
 def _document(compared: Compared, inspect: Inspect | None) -> Document:

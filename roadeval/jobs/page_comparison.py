@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,7 +12,7 @@ from roadeval.evaluation.comparison import Side
 from roadeval.evaluation.comparison_result import Comparison
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.scored import final_stages
-from roadeval.jobs.page_frames import PICTURED
+from roadeval.jobs.page_frames import BYTES, PICTURED, fitting
 from roadeval.jobs.report_frames import rates_by_frame
 from roadeval.jobs.result import Result
 from roadeval.recording import Recording
@@ -47,6 +47,7 @@ def browsed(
     sides: Sequence[Side],
     recordings: Mapping[str, Path],
     inspect: Inspect | None,
+    taken: Callable[[BrowsedFrames], int] = lambda _frames: 0,
 ) -> BrowsedFrames:
     """Collect the frames that all results have, the base's mask and the new ones' side by side.
 
@@ -60,6 +61,9 @@ def browsed(
         By the results' labels, where there are any.
     inspect
         Returns the command that opens a frame.
+    taken
+        Returns the bytes of a page with these frames and none of their pictures: of those as many
+        are there as keep it below `roadeval.jobs.page_frames.BYTES`.
     """
     masks = list(_masks(sides))
     table = _table(masks, {side.label: side for side in sides})
@@ -69,15 +73,17 @@ def browsed(
         [each.frame for each in comparison.moved]
         + [each.frame for each in comparison.disagreements]
     )
-    strips = [made for frame in [*wanted][:PICTURED] if (made := album.strip(frame))]
-    return BrowsedFrames(
+    without = BrowsedFrames(
         frames=facts,
         variants=[mask.name for mask in masks],
-        pictured=frozenset(each.frame for each in strips),
-        strips=sorted(strips, key=lambda each: each.frame),
+        pictured=frozenset(),
+        strips=[],
         charts=over_frames(table, [*SHORT]),
         inspect=album.command if inspect and album.newest else None,
     )
+    made = (strip for frame in [*wanted][:PICTURED] if (strip := album.strip(frame)))
+    strips = sorted(fitting(made, BYTES - taken(without)), key=lambda each: each.frame)
+    return replace(without, strips=strips, pictured=frozenset(each.frame for each in strips))
 
 
 def _masks(sides: Sequence[Side]) -> Iterator[_Mask]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -12,7 +12,7 @@ from roadeval.evaluation import analysis, scored
 from roadeval.evaluation.health import judge
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.settings import EvaluationSettings, settings_of
-from roadeval.jobs.report_frames import FramePicker, evenly, rates_by_frame
+from roadeval.jobs.report_frames import LAYERS, FramePicker, evenly, rates_by_frame
 from roadeval.jobs.result import Result
 from roadeval.report.browse import Strip
 from roadeval.report.figures.values import over_frames
@@ -23,6 +23,8 @@ PICTURED: Final = 24
 """Frames with pictures, where nobody says how many."""
 BYTES: Final = 9_900_000
 """Of a page, at most, where nobody says how many frames have pictures."""
+FEWEST: Final = 8
+"""Frames that have pictures even if not every variant's layers have room for it."""
 SHADOW: Final = 1 / 3
 """A frame with much shadow is among this share of the drive's."""
 
@@ -117,8 +119,10 @@ def strips_of(
     inspect: Callable[[int], str] | None,
     count: int | None = None,
     taken: int = 0,
-) -> list[Strip]:
-    """Return frames with their pictures, in the drive's order: the worst, the best, and others.
+) -> tuple[list[Strip], list[str]]:
+    """Return frames with their pictures, and the variants whose layers had no room.
+
+    In the drive's order: the worst, the best, and others.
 
     Parameters
     ----------
@@ -127,22 +131,36 @@ def strips_of(
     inspect
         Returns the command that opens a frame.
     count
-        How many. By default as many of `PICTURED` as keep the page below `BYTES`.
+        How many. By default as many of `PICTURED` as keep the page below `BYTES`; where that would
+        be fewer than `FEWEST`, only the first variants have their layers.
     taken
         Bytes of the page without them.
     """
     if result.recording is None:
-        return []
-    shown: list[Strip] = []
-    room, maker = BYTES - taken, StripMaker(result, inspect)
-    for frame in _chosen(result, PICTURED if count is None else count):
-        made = maker.strip(frame)
-        # As text, and with the words around each.
-        room -= sum(len(image.content) * 4 // 3 + 400 for image in made.images())
-        if count is None and room < 0:
-            break
-        shown.append(made)
-    return sorted(shown, key=lambda each: each.frame)
+        return [], []
+    left_out: list[str] = []
+    chosen, room = _chosen(result, PICTURED if count is None else count), BYTES - taken
+    maker = StripMaker(result, inspect)
+    if count is None and chosen and FEWEST * bytes_of(maker.strip(chosen[0])) > room:
+        maker = StripMaker(result, inspect, layered=LAYERS)
+        left_out = [variant.name for variant in result.recording.variants[LAYERS:]]
+    made = (maker.strip(frame) for frame in chosen)
+    shown = made if count is not None else fitting(made, room)
+    return sorted(shown, key=lambda each: each.frame), left_out
+
+
+def fitting(strips: Iterable[Strip], room: int) -> Iterator[Strip]:
+    """Yield the first strips that have room together."""
+    for made in strips:
+        room -= bytes_of(made)
+        if room < 0:
+            return
+        yield made
+
+
+def bytes_of(made: Strip) -> int:
+    """Return how many bytes of a page a strip takes: pictures as text, with words around each."""
+    return sum(len(image.content) * 4 // 3 + 400 for image in made.images())
 
 
 class StripMaker:
@@ -156,13 +174,19 @@ class StripMaker:
         Returns the command that opens a frame.
     layers
         Pixels across the pictures of layers, at most.
+    layered
+        Variants whose layers are shown; None for all.
     """
 
     def __init__(
-        self, result: Result, inspect: Callable[[int], str] | None, layers: int = SMALL
+        self,
+        result: Result,
+        inspect: Callable[[int], str] | None,
+        layers: int = SMALL,
+        layered: int | None = None,
     ) -> None:
         self._layers: Final = layers
-        self._picker = FramePicker(result)
+        self._picker = FramePicker(result, None, layered)
         self._inspect = inspect
         frames = result.frames
         self._variants = list(dict.fromkeys(frames["variant"])) if len(frames) else []

@@ -115,8 +115,8 @@ def drive_page(
     findings, frames = collect(opened, commands), browsed(opened, inspect)
     without = page_document(findings, frames)
     taken = len(page(without)) if pictures is None else 0
-    strips = strips_of(opened, inspect, pictures, taken)
-    return with_frames(without, replace(frames, strips=strips))
+    strips, left_out = strips_of(opened, inspect, pictures, taken)
+    return with_frames(without, replace(frames, strips=strips, left_out=left_out))
 
 
 def _write_fleet(

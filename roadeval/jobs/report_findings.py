@@ -41,6 +41,7 @@ def collect(result: Result, commands: Commands | None = None) -> Findings:
         source=str(result.path),
         complete=result.complete,
         commands=commands,
+        viewable=commands is not None and result.viewable is not None,
         pictured=len(pictured),
         summary=summary,
         properties=result.properties,

@@ -22,7 +22,7 @@ MOVED: Final = 3
 """Frames that are shown: the worst, and those that the filter helped and harmed most."""
 OUTCOMES: Final = 6
 LAYERS: Final = 2
-"""Variants of which such a frame shows the errors, and all layers."""
+"""Variants of which such a frame shows the errors, and all layers, on paper."""
 
 
 def variants_but_baseline(frames: pd.DataFrame) -> list[str]:
@@ -65,10 +65,21 @@ def rates_by_frame(
 
 
 class FramePicker:
-    """Picks frames of a result and collects their pictures and facts."""
+    """Picks frames of a result and collects their pictures and facts.
 
-    def __init__(self, result: Result) -> None:
+    Parameters
+    ----------
+    result
+        The result.
+    outcomes, layered
+        Variants whose errors, and whose layers are shown, at most; None for all.
+    """
+
+    def __init__(
+        self, result: Result, outcomes: int | None = OUTCOMES, layered: int | None = LAYERS
+    ) -> None:
         self._result = result
+        self._outcomes, self._layered = slice(outcomes), slice(layered)
         self._recording = result.recording
         self._frames = result.frames
         self._variants = variants_but_baseline(result.frames)
@@ -133,18 +144,18 @@ class FramePicker:
             parts=self._causes[first].of(frame),
             change=change,
             notes=self._result.notes(frame, first),
-            images=list(self._outcomes(recording, frame)) if recording and seen else [],
+            images=list(self._with_outcomes(recording, frame)) if recording and seen else [],
             layers=list(self._layers(recording, frame))
             if recording and seen and change is None
             else [],
         )
 
-    def _outcomes(self, recording: Recording, frame: int) -> Iterator[LayerImage]:
+    def _with_outcomes(self, recording: Recording, frame: int) -> Iterator[LayerImage]:
         """Yield the camera, the truth and each variant's errors."""
         image = recording.image(frame)
         yield LayerImage("camera", image)
         yield LayerImage("truth", image, TRUTH, recording.truth(frame))
-        for variant in recording.variants[:OUTCOMES]:
+        for variant in recording.variants[self._outcomes]:
             errors = self._result.layer(variant.name, ERRORS.name, frame)
             if errors is None:
                 yield LayerImage(f"{variant.name}: no mask", faded(image))
@@ -157,7 +168,7 @@ class FramePicker:
         The first of a row bears the variant's name, too.
         """
         image = recording.image(frame)
-        for variant in recording.variants[:LAYERS]:
+        for variant in recording.variants[self._layered]:
             specs = [
                 spec
                 for spec in variant.layers

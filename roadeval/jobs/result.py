@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from roadeval.data import Rows
+from roadeval.errors import RoadevalError
 from roadeval.evaluation import scored
 from roadeval.evaluation.differences import drive_differences
 from roadeval.evaluation.settings import EvaluationSettings, settings_of
@@ -65,6 +66,24 @@ class Result:
             return self.path if self.recording.result("run") else None
         path = self.path / RUN
         return path if path.exists() else None
+
+    @cached_property
+    def viewable(self) -> Path | None:
+        """The recording that the viewer can open: its own, or of a folder that of the same run.
+
+        None where that is not where the run wrote it, or is another drive's by now.
+        """
+        if self.recording is not None:
+            return self.path if self.pictured else None
+        written = self.summary.get("run", {}).get("output", {}).get("save")
+        path = Path(written or Path("recordings", f"{self.name}.rrd"))
+        if not path.is_file():
+            return None
+        try:
+            other = Result(path).summary.get("log", {}).get("sha256")
+        except RoadevalError:
+            return None
+        return path if other == self.summary["log"]["sha256"] else None
 
     @cached_property
     def summary(self) -> dict[str, Any]:

@@ -188,7 +188,9 @@ class TwoColumns(Block):
 
 @dataclass(frozen=True, slots=True)
 class TableOfContents(Block):
-    """The document's headings with their pages."""
+    """The document's headings with their pages: of the first level, or down to a depth."""
+
+    depth: int = 1
 
 
 @dataclass(frozen=True, slots=True)

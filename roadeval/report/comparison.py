@@ -10,7 +10,17 @@ from roadeval.data.words import listing, number, percent, points, timestamp
 from roadeval.evaluation.comparison_result import Comparison, MaskComparison
 from roadeval.evaluation.conditions import Judgement
 from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
-from roadeval.report.blocks import Block, BulletList, Cell, Document, Figure, Heading, Table, Text
+from roadeval.report.blocks import (
+    Block,
+    BulletList,
+    Cell,
+    Document,
+    Figure,
+    Heading,
+    Table,
+    TableOfContents,
+    Text,
+)
 from roadeval.report.comparison_rows import breaks, interval_of, named, naming_columns
 from roadeval.report.comparison_where import disagreement_table, where
 from roadeval.report.figures import row_values
@@ -100,6 +110,7 @@ def _blocks(
     yield from _why_nointerval_of(comparison.changes)
     if comparison.notes:
         yield BulletList("Beware", warnings(comparison), "warning")
+    yield TableOfContents(depth=2)
     finals = [row for row in comparison.changes if row.final]
     if comparison.same_drive:
         yield Figure(

@@ -110,6 +110,8 @@ class Findings:
         Whether the run reached its end.
     commands
         What to type for more; None where the report is not made at a terminal.
+    viewable
+        Whether ``commands`` open frames in the viewer: the recording is there.
     pictured
         Number of frames with pictures, of those evaluated, or without truth of all.
     summary
@@ -156,6 +158,7 @@ class Findings:
     source: str
     complete: bool
     commands: Commands | None
+    viewable: bool
     pictured: int
     summary: Mapping[str, Any]
     properties: Mapping[str, Any]

@@ -53,6 +53,24 @@ def test_a_results_folder_gives_the_same_numbers_without_pictures(demo, words, t
     assert table[1] in words
 
 
+def test_a_results_folder_names_the_command_where_its_recording_is_there(demo, tmp_path):
+    folder = tmp_path / "results"
+    shutil.copytree(demo.reports, folder)
+    assert here("report", folder).returncode == 0
+    told = text((folder / "report.pdf").read_bytes())
+    worst = json.loads(here("inspect", demo.recording, "--list", "--json").stdout)
+    assert re.sub(r"\s", "", f"{demo.recording} --frame {worst[0]['frame']}") in told.replace(
+        " ", ""
+    )
+    moved = json.loads((folder / "summary.json").read_text())
+    moved["run"]["output"]["save"] = str(tmp_path / "gone.rrd")
+    (folder / "summary.json").write_text(json.dumps(moved))
+    assert here("report", folder).returncode == 0
+    told = text((folder / "report.pdf").read_bytes())
+    assert "the recording of this run is not where it was written" in told
+    assert "--frame" not in told
+
+
 KILLED = """
 import os, signal, sys
 from roadeval import configure, replay

@@ -65,6 +65,7 @@ def some_findings(**changes):
         "source": "drive.rrd",
         "complete": True,
         "commands": Commands("repeat {}".format, "open frame {}".format),
+        "viewable": True,
         "pictured": 1200,
         "summary": {
             "drive": {"name": "street", "width": 40, "height": 20},
@@ -117,3 +118,14 @@ def column(table, title):
     """The cells below a title."""
     place = list(table.columns).index(title)
     return [row[place] for row in table.rows]
+
+
+def links_within(content):
+    """How many links of a PDF lead to a place in it; it has an outline and tagged structure."""
+    made = reader(content)
+    root = made.trailer["/Root"]
+    assert root["/MarkInfo"]["/Marked"]
+    assert "/StructTreeRoot" in root
+    assert made.outline
+    notes = [each.get_object() for page in made.pages for each in page.get("/Annots", [])]
+    return sum("/Dest" in note or note.get("/A", {}).get("/S") == "/GoTo" for note in notes)

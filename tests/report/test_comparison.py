@@ -19,7 +19,7 @@ from roadeval.report.blocks import BulletList, Table, Text
 from roadeval.report.comparison import document, markdown
 from roadeval.report.pdf.typeset import pdf
 from roadeval.results.comparison import judged
-from tests.report.making import text
+from tests.report.making import links_within, text
 
 
 def change_of(mean, low=None, high=None):
@@ -131,3 +131,8 @@ def test_different_drives_are_laid_side_by_side():
     words = text(pdf(document(comparison, (), pd.DataFrame())))
     assert "Different drives, side by side: no difference is given." in words
     assert "11.20" in words
+
+
+def test_its_contents_lead_to_its_parts():
+    made = document(a_comparison(), LIMITS, pd.DataFrame())
+    assert links_within(pdf(made)) == 3

@@ -102,7 +102,7 @@ def _of_drive(result: Result) -> Commands:
         again=None
         if config is None
         else lambda log: shlex.join(["roadeval", "replay", log, "--config", str(config)]),
-        inspect=lambda frame: inspect_command(result.path, frame),
+        inspect=lambda frame: inspect_command(result.viewable or result.path, frame),
     )
 
 

@@ -9,7 +9,17 @@ from roadeval.data.words import DASH, interval, number, percent, points
 from roadeval.evaluation.drives_comparison_result import TESTED, DriveChange, FleetChange
 from roadeval.evaluation.drives_conditions import FleetJudgement
 from roadeval.evaluation.metrics import SHORT
-from roadeval.report.blocks import Block, BulletList, Cell, Document, Figure, Heading, Table, Text
+from roadeval.report.blocks import (
+    Block,
+    BulletList,
+    Cell,
+    Document,
+    Figure,
+    Heading,
+    Table,
+    TableOfContents,
+    Text,
+)
 from roadeval.report.figures import row_values
 from roadeval.report.figures.files import svg
 from roadeval.report.figures.forest import ForestMean, ForestRow, forest
@@ -93,6 +103,7 @@ def _blocks(comparison: FleetComparison, judgements: Sequence[FleetJudgement]) -
         yield from (Text(legend, "note") for legend in _legend(comparison))
     if comparison.left_out or warnings(comparison):
         yield BulletList("Beware", warnings(comparison), "warning")
+    yield TableOfContents()
     yield from _drives(comparison)
     yield from _strata(comparison)
 

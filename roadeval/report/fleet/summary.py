@@ -8,7 +8,16 @@ from typing import Any, Final
 from roadeval.data import BASELINE
 from roadeval.data.words import DASH, defined, interval, listing, number, percent, points
 from roadeval.evaluation.metrics import FULL, SHORT
-from roadeval.report.blocks import Block, BulletList, Cell, Heading, Table, Text, TwoColumns
+from roadeval.report.blocks import (
+    Block,
+    BulletList,
+    Cell,
+    Heading,
+    Table,
+    TableOfContents,
+    Text,
+    TwoColumns,
+)
 from roadeval.report.fleet.findings import FleetFindings
 from roadeval.report.sections.common import variant_cell
 
@@ -38,6 +47,7 @@ def section(findings: FleetFindings) -> Iterator[Block]:
         [_counts(told)],
         [BulletList("Beware", warnings(findings) or ["Nothing known."], _tone(findings))],
     )
+    yield TableOfContents()
 
 
 def _tone(findings: FleetFindings) -> str:

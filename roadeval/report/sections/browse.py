@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from roadeval.data import BASELINE
-from roadeval.data.words import defined, number, percent, points, timestamp
+from roadeval.data.words import defined, listing, number, percent, points, timestamp
 from roadeval.evaluation.metrics import SHORT
 from roadeval.report.blocks import Block, Heading, Table
 from roadeval.report.browse import FrameBrowser, FrameRow, Picture, PictureRow, Strip
@@ -67,6 +67,8 @@ class BrowsedFrames:
         Returns the command that opens a frame; None where there is none.
     masks
         Names of the pictures of final masks, which are compared where there is no truth.
+    left_out
+        Variants whose layers had no room.
     """
 
     frames: Sequence[FrameFacts]
@@ -76,6 +78,7 @@ class BrowsedFrames:
     charts: Sequence[Chart]
     inspect: Callable[[int], str] | None
     masks: Sequence[str] = ()
+    left_out: Sequence[str] = ()
 
 
 def section(browsed: BrowsedFrames) -> Iterator[Block]:
@@ -156,7 +159,12 @@ def _note(browsed: BrowsedFrames, shown: int) -> str:
     if browsed.variants:
         told.append("Percent.")
     if len(browsed.strips) < len(browsed.frames) and browsed.strips:
-        told.append(f"{len(browsed.strips)} frames have their pictures on this page.")
+        told.append(
+            f"{len(browsed.strips)} of {number(len(browsed.frames))} frames have their pictures on "
+            "this page."
+        )
+    if browsed.left_out:
+        told.append(f"To keep it small, the layers of {listing(browsed.left_out)} are left out.")
     return " ".join(told)
 
 

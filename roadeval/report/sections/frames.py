@@ -26,6 +26,11 @@ LARGE: Final = 420
 SMALL: Final = 200
 """Pixels across the pictures of outcomes and of layers."""
 
+NO_COMMAND: Final = (
+    "No command opens them in the viewer, for the recording of this run is not where it was "
+    "written; a report of the recording names one for each."
+)
+
 
 def section(findings: Findings) -> Iterator[Block]:
     """Yield the worst frames with all their layers, then those that the filter changed most."""
@@ -38,7 +43,10 @@ def section(findings: Findings) -> Iterator[Block]:
         "Below the errors stand each variant's steps, from left to right.",
         "note",
     )
-    yield from _frames(findings, [Heading("The worst frames"), rule], findings.worst)
+    head = [Heading("The worst frames"), rule]
+    if findings.commands and not findings.viewable:
+        head.append(Text(NO_COMMAND, "note"))
+    yield from _frames(findings, head, findings.worst)
     helped, harmed = (
         Heading(f"Frames that the filter {what} most", 2) for what in ("helped", "harmed")
     )
@@ -74,7 +82,7 @@ def _frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
     for row in frame.layers:
         pictures = [(image.title, jpeg(image, SMALL)) for image in row]
         yield ImageGrid(pictures, columns, skip=columns - len(row))
-    if findings.pictured and findings.commands:
+    if findings.viewable and findings.commands:
         yield Command(findings.commands.inspect(frame.frame))
 
 

@@ -10,8 +10,10 @@ from roadeval.jobs.report import write_report
 from roadeval.jobs.report_fleet import collect_fleet
 from roadeval.report.blocks import BulletList, Figure, Heading, ImageGrid, Table, Text
 from roadeval.report.fleet import drives, frames, losses, provenance, strata, summary
+from roadeval.report.fleet.document import document
+from roadeval.report.pdf.typeset import pdf
 from roadeval.results.fleet.folder import Fleet
-from tests.report.making import column, plain_rows, reader, text, the
+from tests.report.making import column, links_within, plain_rows, reader, text, the
 from tests.results.fleet import making
 from tests.results.fleet.making import RUN, fleet_of
 
@@ -183,6 +185,13 @@ def test_a_plain_list_says_that_nothing_is_known(tmp_path):
     fleet = fleet_of(tmp_path / "f", 2, frames=0, broken=False)
     found = collect_fleet(Fleet(fleet))
     drives_ = {d: dict(row) | {"trained_on": 0} for d, row in found.drives.items()}
-    two = blocks(summary, replace(found, drives=drives_))[-1]
+    two = blocks(summary, replace(found, drives=drives_))[-2]
     (listed,) = (block for block in two.right if isinstance(block, BulletList))
     assert (list(listed.items), listed.tone) == (["Nothing known."], "plain")
+
+
+def test_its_contents_lead_to_its_sections(tmp_path):
+    found = collect_fleet(Fleet(fleet_of(tmp_path / "f", 12, pictures=2)))
+    made = document(found)
+    parts = [each for each in made.blocks if isinstance(each, Heading) and each.level == 1]
+    assert links_within(pdf(made)) == len(parts) > 4

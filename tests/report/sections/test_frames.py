@@ -6,7 +6,7 @@ from roadeval.data.words import MINUS
 from roadeval.report.blocks import Command, ImageGrid, KeepTogether, Text, TwoColumns
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import LayerImage
-from roadeval.report.sections.frames import section
+from roadeval.report.sections.frames import NO_COMMAND, section
 from tests.report.making import column, plain_rows, rates, some_findings, the
 
 
@@ -72,9 +72,10 @@ def test_equal_phases_of_the_variants_stand_below_each_other():
     ]
 
 
-def test_without_pictures_there_is_nothing_to_open():
-    (blocks,) = shown(some_findings(worst=[a_frame(7)], pictured=0))
+def test_where_the_recording_is_not_at_hand_no_command_opens_a_frame_and_that_is_told():
+    (blocks,) = shown(some_findings(worst=[a_frame(7)], viewable=False))
     assert not [block for block in blocks if isinstance(block, Command)]
+    assert NO_COMMAND in [block.text for block in blocks if isinstance(block, Text)]
 
 
 def test_where_no_frame_is_the_worst_that_is_told():

@@ -1,0 +1,81 @@
+"""The frames that pages picture: with every variant's layers, as far as there is room."""
+
+import re
+
+import pytest
+
+import roadeval
+from roadeval.jobs import compare, page_comparison, page_frames
+from roadeval.jobs.page_frames import FEWEST, bytes_of, strips_of
+from roadeval.jobs.report import drive_page
+from roadeval.jobs.result import Result
+from roadeval.report.browse import FrameBrowser
+from tests.jobs.making import settings, write_log
+
+OTHERS = {name: {"chain": ["similarity", "post"]} for name in ("third", "fourth")}
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    """A short drive replayed with four variants."""
+    folder = tmp_path_factory.mktemp("four")
+    log = write_log(folder / "drive.mcap")
+    path = folder / "out.rrd"
+    config = settings(train_frames=4, variants=OTHERS)
+    roadeval.replay(log, config, save=path, reports=folder / "reports")
+    return path
+
+
+def browser(document):
+    (found,) = (block for block in document.blocks if isinstance(block, FrameBrowser))
+    return found
+
+
+def layered(strip):
+    """The variants whose layers a strip shows."""
+    return [row.title for row in strip.rows if row.title]
+
+
+def test_every_variants_errors_and_layers_are_shown(recording):
+    shown = browser(drive_page(Result(recording)))
+    for strip in shown.strips:
+        assert layered(strip) == ["filtered", "unfiltered", "third", "fourth"]
+        names = [picture.name for picture in strip.rows[0].pictures]
+        assert names[2:] == [f"{each}: errors" for each in layered(strip)]
+    assert "left out" not in shown.note
+
+
+def test_where_layers_have_no_room_some_variants_have_none_and_the_page_says_so(
+    recording, monkeypatch
+):
+    result = Result(recording)
+    (strip,), _ = strips_of(result, None, 1)
+    monkeypatch.setattr(page_frames, "BYTES", FEWEST * bytes_of(strip) - 1)
+    strips, left_out = strips_of(result, None)
+    assert left_out == ["third", "fourth"]
+    assert layered(strips[0]) == ["filtered", "unfiltered"]
+    assert sum(map(bytes_of, strips)) <= page_frames.BYTES
+    monkeypatch.setattr(page_frames, "BYTES", page_frames.BYTES + 10**9)
+    monkeypatch.setattr(page_frames, "FEWEST", 10**6)
+    note = browser(drive_page(result)).note
+    assert "the layers of third and fourth are left out" in note
+
+
+def test_who_asks_for_a_number_gets_it_with_all_layers(recording, monkeypatch):
+    monkeypatch.setattr(page_frames, "BYTES", 0)
+    strips, left_out = strips_of(Result(recording), None, 5)
+    assert len(strips) == 5
+    assert left_out == []
+    assert len(layered(strips[0])) == 4
+
+
+def test_a_comparisons_page_has_as_many_pictures_as_keep_it_small(recording, monkeypatch, tmp_path):
+    compared = compare.compare([recording])
+    path = tmp_path / "page.html"
+    whole = compare.write(compared, path).stat().st_size
+    count = path.read_text().count('class="strip"')
+    assert count > 0
+    assert re.search(rf"{count} of \d+ frames have their pictures", path.read_text())
+    monkeypatch.setattr(page_comparison, "BYTES", whole - 3000)
+    assert compare.write(compared, path).stat().st_size < whole
+    assert path.read_text().count('class="strip"') == count - 1
