@@ -42,7 +42,8 @@ def text(layout: Layout, verdict: str = "") -> str:
 
 def variant(layout: VariantLayout) -> str:
     """Return the introduction of a variant."""
-    return f"### {as_markdown(layout.name)}\n\n{as_markdown(layout.title)}\n"
+    # A heading would break the name in a column as narrow as this one.
+    return f"**{as_markdown(layout.name)}**\n\n{as_markdown(layout.title)}\n"
 
 
 def overview(layout: Layout, summary: Mapping[str, Any]) -> str:
