@@ -56,6 +56,16 @@ def test_another_truth_is_noticed_whatever_the_masks_made_of_it():
         "a", "a", frames([1, 2]), frames([1, 2], road=40), tested=(), settings=SETTINGS
     )
     assert (same.truth_differs, other.truth_differs) == (0, 2)
+    # As many road pixels found as before, and fewer of the others: the same truth, or another.
+    mine, missed, relabelled = (
+        {MASK: MaskFrames(np.array([0]), np.array([counts]))}
+        for counts in ([50, 40, 10, 0], [45, 40, 10, 5], [50, 35, 10, 5])
+    )
+    found = [
+        pair_drive("a", "a", mine, new, tested=(), settings=SETTINGS).truth_differs
+        for new in (missed, relabelled)
+    ]
+    assert found == [0, 1]
 
 
 def test_a_drives_interval_is_that_of_a_comparison_of_two_results():
