@@ -5,7 +5,7 @@ python -m benchmarks.tables --write     writes the tables of both anew
 python -m benchmarks.tables --measure   replays the drives and writes the numbers
 
 A drive comes from the folder named for it; see PRESETS.md for where to get them. ``--measure NAME``
-measures one drive, ``idd`` or ``idd_geodesics``, and leaves the other numbers as they are.
+measures one drive, ``idd`` or ``idd_features``, and leaves the other numbers as they are.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from benchmarks.tables.measure import (
 from benchmarks.tables.text import DOCUMENTS, NUMBERS, faults, load, written
 from roadeval.version import VERSION
 
-IDD, ELSEWHERE, IDD_GEODESICS = "idd", "elsewhere", "idd_geodesics"
-ON_IDD = {IDD: idd.measured, IDD_GEODESICS: idd.with_geodesics}
+IDD, ELSEWHERE, IDD_FEATURES = "idd", "elsewhere", "idd_features"
+ON_IDD = {IDD: idd.measured, IDD_FEATURES: idd.without_each_group}
 
 
 def main() -> int:

@@ -10,13 +10,15 @@ from typing import Any, Final
 
 from benchmarks.tables import idd
 from benchmarks.tables.drives import DRIVES, Drive
-from benchmarks.tables.measure import GATES, REPLAYS, STRANGERS, TEACHER, command
+from benchmarks.tables.measure import GATES, STRANGERS, TEACHER, command
 from roadeval.results.claims import WORDS
 
 Numbers = Mapping[str, Any]
 SURE: Final = 0.05
 """The p-value below which a difference stands, as in roadeval's own verdicts."""
 MARK: Final = "\\*"
+NONE: Final = "-"
+"""Where nothing was measured."""
 GATE_WORDS: Final = {
     "texture": "texture (`max_texture`)",
     "horizon": "horizon",
@@ -40,6 +42,12 @@ def _err(numbers: Numbers, drive: str, replay: str, variant: str) -> list[float]
     """Return ERR with each seed."""
     found: list[float] = numbers["drives"][drive][replay]["variants"][variant]["ERR"]
     return found
+
+
+def _spread_or_none(numbers: Numbers, drive: str, replay: str, variant: str) -> str:
+    """Return the spread of ERR; a dash where the replay was not made."""
+    made = replay in numbers["drives"][drive]
+    return _spread(_err(numbers, drive, replay, variant)) if made else NONE
 
 
 def _blind(numbers: Numbers, drive: str) -> float:
@@ -72,7 +80,7 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def _bold(texts: Sequence[str]) -> list[str]:
     """Return texts of numbers with the least in bold."""
-    least = min(texts, key=float)
+    least = min((text for text in texts if text != NONE), key=float)
     return [f"**{text}**" if text == least else text for text in texts]
 
 
@@ -111,7 +119,11 @@ def _five(numbers: Numbers, drive: str) -> list[str]:
         ("gated", "filtered"),
         ("robust", "unfiltered"),
     )
-    errs = [_percent(median(_err(numbers, drive, *column))) for column in columns]
+    found = numbers["drives"][drive]
+    errs = [
+        _percent(median(_err(numbers, drive, *column))) if column[0] in found else NONE
+        for column in columns
+    ]
     return [_percent(_blind(numbers, drive)), *errs]
 
 
@@ -131,9 +143,9 @@ def _on_filters(numbers: Numbers) -> Iterator[str]:
 
 
 def _on_robust(numbers: Numbers) -> Iterator[str]:
-    margins = {name: _margins(numbers, name) for name in DRIVES}
+    margins = {name: _margins(numbers, name) for name in DRIVES if _has_robust(numbers, name)}
     below = sum(median(each) < 0 for each in margins.values())
-    yield f"`robust` is below `blind` on {below} of the {len(DRIVES)} drives"
+    yield f"`robust` is below `blind` on {below} of the {len(margins)} drives it was replayed on"
     close = [DRIVES[name].title for name, each in margins.items() if max(each) >= 0]
     yield f"(not with every seed on {_and(close)});" if close else "with every seed;"
     lite = numbers["idd"]
@@ -157,6 +169,10 @@ def _item(words: str) -> str:
 
 def _sure(changes: Sequence[Mapping[str, float]]) -> str:
     return str(sum(each["p_holm"] < SURE for each in changes) or "none")
+
+
+def _has_robust(numbers: Numbers, drive: str) -> bool:
+    return "robust" in numbers["drives"][drive]
 
 
 def _margins(numbers: Numbers, drive: str) -> list[float]:
@@ -216,7 +232,7 @@ def spreads(numbers: Numbers) -> str:
                 drive.title,
                 str(numbers["drives"][drive.name]["paper"]["frames"]),
                 _percent(_blind(numbers, drive.name)),
-                *(_spread(_err(numbers, drive.name, *column)) for column in columns.values()),
+                *(_spread_or_none(numbers, drive.name, *column) for column in columns.values()),
             ]
             for drive in DRIVES.values()
         ),
@@ -247,12 +263,12 @@ def against_blind(numbers: Numbers) -> str:
     }
     rows = []
     for drive in DRIVES.values():
-        row = [drive.title]
+        row, found = [drive.title], numbers["drives"][drive.name]
         for replay, variant in columns.values():
-            change = numbers["drives"][drive.name][replay]["against_blind"][variant]
-            row.append(_interval(change))
-        margins = _margins(numbers, drive.name)
-        rows.append([*row, _spread(margins, _points)])
+            made = replay in found
+            row.append(_interval(found[replay]["against_blind"][variant]) if made else NONE)
+        own = _has_robust(numbers, drive.name)
+        rows.append([*row, _spread(_margins(numbers, drive.name), _points) if own else NONE])
     return _table(["ERR minus `blind`, points", *columns, "`robust`: seeds"], rows)
 
 
@@ -314,26 +330,14 @@ def gates(numbers: Numbers) -> str:
     )
 
 
-def geodesics(numbers: Numbers) -> str:
-    """Return ERR of `robust` with and without geodesic distances."""
-    rows = []
-    for name in REPLAYS["geodesics"].drives:
-        variants = numbers["drives"][name]["geodesics"]["variants"]
-        errs = [variants[variant]["ERR"] for variant in ("unfiltered", "geodesics")]
-        rows.append([DRIVES[name].title, _percent(_blind(numbers, name)), *map(_spread, errs)])
-    lite = numbers["idd_geodesics"]
-    errs = [lite[variant]["ERR"] for variant in ("robust", "geodesics")]
-    rows.append(["IDD Lite", _percent(numbers["idd"]["blind"]["ERR"]), *map(_spread, errs)])
-    head = ["ERR, %", "`blind`", "`robust`", "`robust` with `geodesics`"]
-    both = [lite[variant] for variant in ("robust", "geodesics")]
-    dark = " and ".join(_spread(each["dark_missed"]) for each in both)
-    lost = " and ".join(_spread(each["not_below_blind"], str) for each in both)
-    words = (
-        f"On IDD the first seed's difference is {_interval(lite['change'])} points; without and "
-        f"with it, {dark} % of the dark road is missed, and {lost} drives of "
-        f"{numbers['idd']['labelled']} are not below `blind`."
-    )
-    return f"{_table(head, rows)}\n\n{textwrap.fill(words, 100)}"
+def features(numbers: Numbers) -> str:
+    """Return what ERR of `robust` becomes without each group of its features."""
+    found = numbers["idd_features"]
+    rows = [["none", _percent(found["ERR"]), _percent(found["dark_missed"]), ""]]
+    for name, each in found["without"].items():
+        own = _percent(found["ERR"] + each["mean"])
+        rows.append([f"`{name}`", own, _percent(each["dark_missed"]), _interval(each)])
+    return _table(["taken away", "ERR, %", "dark road missed, %", "points"], rows)
 
 
 def elsewhere(numbers: Numbers) -> str:
@@ -379,7 +383,7 @@ BLOCKS: Final = {
     "claims_by_drive": Block(claims_by_drive, (PAPER,)),
     "idd": Block(idd_lite, (f"{MEASURE} idd",)),
     "gates": Block(gates, (f"{MEASURE} --replays gates",)),
-    "geodesics": Block(geodesics, (f"{MEASURE} --replays geodesics", f"{MEASURE} idd_geodesics")),
+    "features": Block(features, (f"{MEASURE} idd_features",)),
     "elsewhere": Block(elsewhere, (f"{MEASURE} elsewhere",)),
     "flicker": Block(flicker, (PAPER, ROBUST)),
 }

@@ -101,7 +101,7 @@ def configuration(given: Given) -> RunConfig:
         whole = config.override(_tables(given) | masks).with_variants(variants)
     whole = whole.with_drives(_drive(*each) for each in given.get("drives", ()))
     chosen = {"training.frames", "training.placement", "training.gap"}
-    if whole.training.model and chosen & given.keys():
+    if whole.training.model and not whole.training.adapt and chosen & given.keys():
         raise typer.BadParameter(
             "--train-frames, --train-on and --train-gap do not go with a model "
             f"({whole.training.model})"

@@ -82,6 +82,11 @@ OPTIONS: Final = (
         "FILE",
         "Made by 'roadeval train'. Default: the drive's first frames train one.",
     ),
+    switch(
+        "training.adapt",
+        "--adapt",
+        "Let the model learn further from the drive's first frames, which are not evaluated then.",
+    ),
     Option(
         "training.frames",
         ("--train-frames",),

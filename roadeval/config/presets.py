@@ -24,8 +24,8 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
     "hsi": {"chain": PAPER_CHAIN, "shadow": {"colour_space": "hsi"}},
     "gated": {"chain": ("gated", "similarity", "svm", "post")},
     "robust": {
-        "chain": ("exposure", "similarity", "context", "post"),
-        "training": {"pixels_per_class": 800, "max_pixels": 20_000},
+        "chain": ("exposure", "trees", "post"),
+        "training": {"pixels_per_class": 1000, "max_pixels": 50_000},
     },
 }
 """By name, each in the shape of a TOML file (see `roadeval.config.toml`).

@@ -46,7 +46,8 @@ def asked(
     code of the file that defines them.
     """
     plain = {name: replace(each, path="", images=None) for name, each in config.masks.items()}
-    training = replace(config.training, model=None)
+    nowhere = "" if config.training.adapt else None  # wherever the file lies
+    training = replace(config.training, model=nowhere)
     settings = replace(deciding(config).without_places(), training=training, masks=plain)
     parts = [VERSION, of, json.dumps(settings.as_dict(), sort_keys=True), model]
     if masks:

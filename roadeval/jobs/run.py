@@ -159,9 +159,11 @@ def _learn(
     labelled: bool,
 ) -> tuple[tuple[Model, ...], Schedule]:
     pipelines = {variant.name: variant.pipeline for variant in variants}
+    base = None
     if settings.model is not None:
-        model, schedule = learning.from_file(Path(settings.model), pipelines)
-        return (model,), schedule
+        base, schedule = learning.from_file(Path(settings.model), pipelines)
+        if not settings.adapt:
+            return (base,), schedule
     total = min(settings.frames, len(frames()))
     return learning.from_log(
         frames,
@@ -169,6 +171,7 @@ def _learn(
         settings,
         lambda done: on_progress(Progress(done, total, "training")),
         labelled=labelled and settings.source != "patch",
+        base=base,
     )
 
 

@@ -131,7 +131,8 @@ def _near_training(run: Run) -> Iterator[str]:
     """Warn where frames that trained a model file, or their neighbours, lie in this drive."""
     roles, trained = Counter(run.board.roles()), len(run.model.digests)
     own, copies = roles[Role.TRAINING], roles[Role.COPY]
-    if run.config.training.model is None or not roles[Role.EVALUATED]:
+    settings = run.config.training
+    if settings.model is None or settings.adapt or not roles[Role.EVALUATED]:
         return
     if run.model.fingerprints is None:
         yield (
@@ -205,10 +206,12 @@ def _gap(config: RunConfig) -> str:
 
 
 def _training(run: Run) -> dict[str, Any]:
+    given = run.config.training.model is not None and not run.config.training.adapt
     return {
         "source": run.model.source,
         "frames": len(run.model.digests),
         "pixels": run.model.pixels,
         "model": run.config.training.model,
-        "placement": None if run.config.training.model else run.config.training.placement,
+        "placement": None if given else run.config.training.placement,
+        **({"adapted": True} if run.config.training.adapt else {}),
     }

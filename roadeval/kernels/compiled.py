@@ -48,7 +48,6 @@ __all__ = [
     "mahalanobis",
     "outcomes",
     "paint",
-    "rectified_sum",
     "ring_sums",
     "run_sums",
     "transfer",
@@ -65,11 +64,8 @@ TABLED: Final = 256
 COLOUR_WORDS: Final = 1 << 18
 """Of 64 colours each."""
 
-BLOCK: Final = 512
-"""As in ``c/rectified.c``: pixels at a time."""
-
-TREE_BLOCK: Final = 256
-"""As in ``c/trees.c``."""
+BLOCK: Final = 256
+"""As in ``c/trees.c``: pixels at a time."""
 
 
 def _shape(*arrays: npt.NDArray[Any]) -> tuple[int, ...]:
@@ -273,21 +269,6 @@ def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
 # --- Decision -------------------------------------------------------------------------------------
 
 
-def rectified_sum(features: Values, planes: Values, bias: Values, weights: Values) -> Values:
-    """See `plain.rectified_sum`."""
-    count, pixels = features.shape
-    _require(planes, *_shape(bias, weights), count)
-    planes, bias, weights = _in_pairs(planes), _in_pairs(bias), _in_pairs(weights)
-    result, block = np.empty(pixels, np.float32), np.empty(count * BLOCK, np.float32)
-    _loops.rectified_sum(features, count, pixels, planes, bias, weights, len(bias), block, result)
-    return result
-
-
-def _in_pairs(values: Values) -> Values:
-    """Return an even number of planes: what a plane of zeros adds to the sum is 0."""
-    return values if len(values) % 2 == 0 else np.concatenate([values, np.zeros_like(values[:1])])
-
-
 def tree_sum(
     features: Values, feature: Indices, threshold: Values, kept: Masks, values: Values
 ) -> Values:
@@ -295,7 +276,7 @@ def tree_sum(
     count, pixels = features.shape
     trees, nodes = _shape(feature, threshold, kept)
     _require(values, trees, plain.LEAVES)
-    result, block = np.empty(pixels, np.float32), np.zeros(count * TREE_BLOCK, np.float32)
+    result, block = np.empty(pixels, np.float32), np.zeros(count * BLOCK, np.float32)
     sized = features, count, pixels
     _loops.tree_sum(*sized, feature, threshold, kept, values, trees, nodes, block, result)
     return result

@@ -110,6 +110,9 @@ class Stage(Generic[S, P]):
         ``layers(settings)`` returns the layers that it will hand out, in order.
     fit
         ``fit(training_set, settings)`` learns the parameters; None if there is nothing to learn.
+    adapt
+        ``adapt(parameters, training_set, settings)`` learns further from a drive's own frames, on
+        top of what other drives have taught; None if that stays as it is.
     parameters
         The type of the parameters, for reading model files; None if there are none.
     is_filter
@@ -149,6 +152,7 @@ class Stage(Generic[S, P]):
     bind: Callable[[S, Any], Callable[[View], Output]]
     layers: Callable[[S], tuple[LayerSpec, ...]]
     fit: Callable[[TrainingSet, S], P] | None = None
+    adapt: Callable[[P, TrainingSet, S], P] | None = None
     parameters: type[P] | None = None
     is_filter: bool = False
     preprocesses: bool = False

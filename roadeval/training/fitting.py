@@ -38,6 +38,7 @@ def fit(
     pipelines: Mapping[str, Pipeline],
     settings: TrainingSettings,
     prior: npt.NDArray[np.float32] | None = None,
+    base: Model | None = None,
 ) -> Model:
     """Train every variant that learns anything.
 
@@ -51,6 +52,9 @@ def fit(
         Sampling, and where the labels come from.
     prior
         Kept in the model for the baseline, see `Model`.
+    base
+        What the variants have learnt from other drives. Stages that can learn further do so, the
+        others stay as they are.
 
     Raises
     ------
@@ -66,7 +70,7 @@ def fit(
     parameters: dict[str, dict[str, Any]] = {name: {} for name in pipelines}
     warnings: list[str] = []
     if samples is not None:
-        each = partial(_fit_variant, samples)
+        each = partial(_fit_variant, samples, {} if base is None else base.parameters)
         for name, learnt, told in ordered(each, learning.items(), _AT_ONCE):
             parameters[name] = learnt
             warnings += told
@@ -74,7 +78,7 @@ def fit(
         parameters,
         {name: pipeline.relevant() for name, pipeline in pipelines.items()},
         source,
-        frozenset(frame.digest() for frame in frames),
+        frozenset(frame.digest() for frame in frames) | (base.digests if base else frozenset()),
         0 if samples is None else len(samples.road),
         prior,
         tuple(warnings),
@@ -119,20 +123,27 @@ def _share_of_road(truths: Sequence[Truth]) -> float:
 
 
 def _fit_variant(
-    samples: TrainingSet, variant: tuple[str, Pipeline]
+    samples: TrainingSet,
+    base: Mapping[str, Mapping[str, Any]],
+    variant: tuple[str, Pipeline],
 ) -> tuple[str, dict[str, Any], list[str]]:
     """Return the variant's name, what its stages learn, and the warnings."""
     name, pipeline = variant
-    learnt = _fit_stages(samples, pipeline)
+    learnt = _fit_stages(samples, pipeline, base.get(name, {}))
     return name, learnt, _collapsed(name, samples.images, pipeline, learnt)
 
 
-def _fit_stages(training_set: TrainingSet, pipeline: Pipeline) -> dict[str, Any]:
+def _fit_stages(
+    training_set: TrainingSet, pipeline: Pipeline, base: Mapping[str, Any]
+) -> dict[str, Any]:
     """Fit the stages in order; what follows a filter learns from the filtered images."""
-    parameters: dict[str, Any] = {}
+    parameters: dict[str, Any] = dict(base)
     for stage in pipeline.stages():
-        if stage.fit is not None:
-            parameters[stage.name] = stage.fit(training_set, pipeline.settings[stage.name])
+        settings = pipeline.settings[stage.name]
+        if stage.fit is not None and stage.name not in base:
+            parameters[stage.name] = stage.fit(training_set, settings)
+        elif stage.adapt is not None:
+            parameters[stage.name] = stage.adapt(base[stage.name], training_set, settings)
         if not stage.yields_mask:
             only = pipeline.alone(stage.name).bind(parameters)
             filtered = tuple(only.filtered(image) for image in training_set.images)

@@ -49,6 +49,7 @@ def from_log(
     on_frame: Callable[[int], None],
     *,
     labelled: bool,
+    base: Model | None = None,
 ) -> tuple[tuple[Model, ...], Schedule]:
     """Train on some frames of a log, with each seed of the settings.
 
@@ -66,6 +67,8 @@ def from_log(
     labelled
         Whether the log's truth may be used; then only frames that have one train, and some must
         be left to evaluate. Where no frame of the range has one, the first ones train.
+    base
+        What was learnt from other drives, on top of which to learn.
 
     Returns
     -------
@@ -77,6 +80,8 @@ def from_log(
     TrainingError
         If there is nothing to learn from, or nothing left to evaluate.
     """
+    if base is not None:
+        _require_adaptable(pipelines)
     candidates, by_truth = candidates_of(frames, labelled=labelled)
     if not by_truth and not any(pipeline.learning() for pipeline in pipelines.values()):
         return (untrained(pipelines),), Schedule(frozenset())
@@ -89,9 +94,36 @@ def from_log(
     warnings += _repeated(held.frames)
     if labelled and not by_truth:
         warnings.append(f"no frame of the range has road truth: {BY_PATCH}")
-    models = _with_each_seed(held.frames, pipelines, settings, warnings)
+    if base is not None:
+        warnings.append(adapted(settings, len(held.frames), by_truth=by_truth))
+    models = _with_each_seed(held.frames, pipelines, settings, warnings, base)
     sizes = frozenset(len(frame.payload) for frame in held.frames)
-    return models, Schedule(models[0].digests, gap=chosen.gap, first=chosen.first, sizes=sizes)
+    schedule = Schedule(models[0].digests, gap=chosen.gap, first=chosen.first, sizes=sizes)
+    if base is not None:  # frames that it has learnt from may be of any size, and encoded anew
+        known = None if base.fingerprints is None else Likeness(base.fingerprints)
+        schedule = replace(schedule, sizes=None, likeness=known)
+    return models, schedule
+
+
+def _require_adaptable(pipelines: Mapping[str, Pipeline]) -> None:
+    """Raise a `TrainingError` for a variant that learns, and cannot learn further."""
+    for name, pipeline in pipelines.items():
+        learning = [stage for stage in pipeline.stages() if stage.fit is not None]
+        if learning and not any(stage.adapt for stage in learning):
+            stages = ", ".join(stage.name for stage in learning)
+            raise TrainingError(
+                f"variant {name}: no stage of it can learn further ({stages}); use preset robust, "
+                "or leave `training.adapt` out"
+            )
+
+
+def adapted(settings: TrainingSettings, frames: int, *, by_truth: bool) -> str:
+    """Return the sentence that sets an adapted model apart from one of other drives alone."""
+    how = "labelled frames" if by_truth else "frames, by the reference patch in them,"
+    return (
+        f"the model of other drives ({settings.model}) was adapted to this drive with {frames} of "
+        f"its own {how}: the rates are not those on a drive that it has not seen"
+    )
 
 
 def untrained(pipelines: Mapping[str, Pipeline]) -> Model:
@@ -105,9 +137,10 @@ def _with_each_seed(
     pipelines: Mapping[str, Pipeline],
     settings: TrainingSettings,
     warnings: Sequence[str],
+    base: Model | None,
 ) -> tuple[Model, ...]:
     """Train once a seed; the first model tells what any of the trainings warns of."""
-    first, *others = (train_on(frames, pipelines, each) for each in settings.by_seed())
+    first, *others = (train_on(frames, pipelines, each, base=base) for each in settings.by_seed())
     told = [
         f"seed {seed}: {warning}"
         for seed, model in enumerate(others, settings.seed + 1)
@@ -151,14 +184,15 @@ def train_on(
     pipelines: Mapping[str, Pipeline],
     settings: TrainingSettings,
     warnings: Sequence[str] = (),
+    base: Model | None = None,
 ) -> Model:
     """Train on decoded frames; their truths, where they have any, make the baseline.
 
-    ``warnings`` are put before those of the training itself.
+    ``warnings`` are put before those of the training itself, which builds on ``base``.
     """
     truths = [frame.truth for frame in frames if frame.truth is not None]
     prior = BlindPrior.of_truths(truths).road if truths else None
-    model = fit(frames, pipelines, settings, prior)
+    model = fit(frames, pipelines, settings, prior, base)
     return replace(model, warnings=(*warnings, *model.warnings))
 
 

@@ -23,6 +23,9 @@ class TrainingSettings:
     model
         A model file, made from other drives: then nothing is trained here. None: the log itself
         trains one.
+    adapt
+        Learn further from the log's own frames, on top of what ``model`` has learnt from other
+        drives. The result is then not one on a drive that the model has not seen.
     source
         ``auto``: the log's truth where it has one, else the reference patch; ``truth`` or
         ``patch`` insists.
@@ -60,6 +63,7 @@ class TrainingSettings:
     """
 
     model: str | None = None
+    adapt: bool = False
     source: Literal["auto", "truth", "patch"] = "auto"
     frames: Annotated[int, Field(ge=1, le=1000)] = 10
     placement: Literal["first", "spread"] = "first"
@@ -74,6 +78,8 @@ class TrainingSettings:
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        if self.adapt and self.model is None:
+            raise ValueError("`training.adapt` needs `training.model`, which it builds on")
         if self.model is not None and self.seeds > 1:
             raise ValueError(
                 "`training.seeds` trains several times, and `training.model` is trained already"

@@ -131,7 +131,6 @@ def test_overriding_twice_keeps_what_the_first_said():
         ("chain = ['svm', 'blur', 'post']", r"no stage 'blur'; choose .*shadow"),
         ("chain = ['svm']", "chain must end with post"),
         ("chain = ['svm', 'svm', 'post']", "a stage can occur only once"),
-        ("chain = ['svm', 'context', 'post']", "svm and context both make the mask svm"),
         ("chain = 'svm'", "chain must be a list"),
         ("preset = 'best'", r"preset: there is no 'best'; choose .*paper"),
         ("preset = 3", "preset: there is no 3"),

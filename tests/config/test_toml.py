@@ -25,6 +25,7 @@ OTHER = {
         {"path": "*/b*.mcap", "topics": {"masks": {"net": "/net"}}},
     ],
     "training.model": "city.model",
+    "training.adapt": True,
     "training.frames": 4,
     "training.placement": "spread",
     "training.gap": 2,
@@ -59,6 +60,7 @@ OTHER = {
 """A value other than the default for every option of the command line."""
 
 NEEDS = {
+    "training.adapt": {"training": {"model": "city.model"}},
     "labels.ignore": {"labels": {"road": [3]}},
     "labels.ignore_colors": {"labels": {"road_colors": [[1, 1, 1]]}},
 }

@@ -104,7 +104,6 @@ def test_arrays_that_do_not_fit_together_are_refused():
     plane, more = np.zeros((4, 70), np.uint8), np.zeros((5, 70), np.uint8)
     runs, bits = np.zeros((0, 4), np.int32), np.zeros((4, 1), np.uint64)
     whole = np.zeros((4, 2), np.uint64)
-    value = np.zeros(3, np.float32)
     image, road = np.zeros((4, 70, 3), np.uint8), np.zeros(1 << 18, np.uint64)
     wide, identity = np.zeros((2, 4)), np.eye(3)
     refused = [
@@ -131,9 +130,6 @@ def test_arrays_that_do_not_fit_together_are_refused():
             np.ones((2, 3)),
         ),
         lambda: fast.geodesics(np.zeros((4, 71), np.uint16), plane, 1),
-        lambda: fast.rectified_sum(
-            whole.view(np.float32), np.zeros((1, 3), np.float32), value[:1], value
-        ),
     ]
     for call in refused:
         with pytest.raises(ValueError, match="shape"):
@@ -346,16 +342,3 @@ def test_bits_of_full_words_are_counted():
 def test_any_value_but_0_is_inside(value):
     mask = (noise(30, 70)[..., 0] > 128).astype(np.uint8)
     np.testing.assert_array_equal(pack(mask * np.uint8(value)), pack(mask))
-
-
-@pytest.mark.parametrize("count", [1, 11, 40])
-@pytest.mark.parametrize("pixels", [1, 511, 512, 1200])
-def test_the_sum_over_rectified_planes_equals_its_twin(pixels, count):
-    rng = np.random.default_rng(0)
-    features, planes, bias, weights = (
-        rng.normal(size=shape).astype(np.float32) for shape in ((count, pixels), (9, count), 9, 9)
-    )
-    np.testing.assert_array_equal(
-        fast.rectified_sum(features, planes, bias, weights),
-        plain.rectified_sum(features, planes, bias, weights),
-    )

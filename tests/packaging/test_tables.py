@@ -113,7 +113,7 @@ def test_a_folder_that_was_not_named_is_asked_for(arguments):
     with pytest.raises(SystemExit, match=r"idd: name .* \(--idd\)"):
         arguments("--measure", "idd")
     with pytest.raises(SystemExit, match=r"0001TP: name .* \(--camvid\)"):
-        arguments("--measure", "camvid_0001TP", "--replays", "robust")
+        arguments("--measure", "camvid_0001TP", "--replays", "gated")
 
 
 def test_every_drive_has_every_replay_with_every_seed():
@@ -122,8 +122,8 @@ def test_every_drive_has_every_replay_with_every_seed():
     for key, replay in REPLAYS.items():
         for name in replay.drives:
             found = numbers["drives"][name][key]
-            assert found["seeds"] == [*range(SEEDS)], (name, key)
-            assert all(len(each["ERR"]) == SEEDS for each in found["variants"].values())
+            assert found["seeds"] == [*range(replay.seeds)], (name, key)
+            assert all(len(each["ERR"]) == replay.seeds for each in found["variants"].values())
     assert {*numbers["drives"]} == {*DRIVES}
 
 

@@ -107,7 +107,7 @@ def test_running_oracles_changes_no_output(chain):
 
 def test_every_machine_and_every_filter_has_an_oracle():
     named = {name for name, stage in STAGES.items() if stage.oracle}
-    assert named == {"shadow", "gated", "svm", "context", "trees"}
+    assert named == {"shadow", "gated", "svm", "trees"}
 
 
 def test_variants_share_what_follows_a_perfect_mask_and_nothing_else(chain):

@@ -28,7 +28,8 @@ def filled(value):
     """Damage one number of an array."""
 
     def damage(array):
-        spoilt = array.copy()
+        whole = array.dtype.kind in "iu"  # no whole number is any of these
+        spoilt = array.astype(np.float64) if whole else array.copy()
         with np.errstate(over="ignore"):  # half precision makes infinity of a huge number
             spoilt[(0,) * array.ndim] = value
         return spoilt
@@ -98,7 +99,9 @@ def test_no_damaged_array_is_accepted(arrays, tmp_path, damage):
         ("filtered/svm/scale", np.zeros_like, "scale holds a number outside"),
         ("filtered/svm/mean", np.negative, "mean holds a number outside 0 to 255"),
         ("filtered/svm/vectors", lambda a: a[1:], r"weights has the shape .* instead of \(m,\)"),
-        ("robust/context/planes", lambda a: a.astype(np.float64), "instead of float32"),
+        ("robust/trees/values", lambda a: a.astype(np.float64), "instead of float32"),
+        ("robust/trees/feature", np.negative, "feature holds a number outside 0 to"),
+        ("robust/trees/kept", np.zeros_like, "rules out a tree's last leaf"),
         ("prior", lambda a: a + 0.5, "prior holds a number outside 0 to 1"),
         ("prior", lambda a: a * 255 > 0, "prior is of type bool"),
     ],
@@ -114,7 +117,7 @@ def test_a_machine_without_support_vectors_is_refused(arrays, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "stage", ["filtered/similarity", "filtered/svm", "gated/gated", "robust/context"]
+    "stage", ["filtered/similarity", "filtered/svm", "gated/gated", "robust/trees"]
 )
 def test_a_stage_that_learnt_nothing_is_refused(arrays, tmp_path, stage):
     rest = {name: array for name, array in arrays.items() if not name.startswith(stage)}
@@ -179,21 +182,20 @@ def test_no_flipped_byte_is_a_defect_of_the_program(arrays, tmp_path):
             from_file(path, TWO)
 
 
-def test_a_machine_without_the_features_of_a_window_ends_with_one_line_and_code_1(
+def test_trees_that_ask_for_features_that_are_not_there_end_with_one_line_and_code_1(
     tmp_path, capsys, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
     pipelines = configure({"preset": "robust"}).pipelines()
     sound = fit([frame(n) for n in range(3)], pipelines, TrainingSettings())
-    machine = sound.parameters["unfiltered"]["context"]
-    narrow = replace(machine, planes=machine.planes[:, :-2])
-    parameters = {"unfiltered": {**sound.parameters["unfiltered"], "context": narrow}}
-    save_model(replace(sound, parameters=parameters), Path("x.model"))
+    forest = sound.parameters["unfiltered"]["trees"]
+    beyond = replace(forest, feature=forest.feature + np.int32(85))
+    save_model(replace(sound, parameters={"unfiltered": {"trees": beyond}}), Path("x.model"))
     words = ["replay", str(DEMO), "--preset", "robust", "--model", "x.model", "--quiet"]
     assert main([*words, "--save", "x.rrd", "--reports", "x"]) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("roadeval: error: x.model: the model is damaged: ")
-    assert "is for 9 features, and windows = [5] and geodesics = false make 11" in line
+    assert line.startswith("roadeval: error: x.model: the model is damaged: its trees ask for ")
+    assert "features, and there are 85; train it again" in line
     assert [path.name for path in tmp_path.iterdir()] == ["x.model"]
 
 

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from roadeval.config import configure
 from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
 from roadeval.training import TrainingError, TrainingSettings, held, learning, save_model
-from roadeval.training.learning import from_drives, from_file, from_log, spread
+from roadeval.training.learning import from_drives, from_file, from_log, spread, train_on
 from roadeval.training.schedule import Schedule, Use
 from tests.training.making import frame, pipelines
 
@@ -106,7 +107,7 @@ def test_every_further_seed_trains_as_it_would_by_itself():
 
 
 def test_what_a_further_seed_warns_of_is_told_with_it(monkeypatch):
-    def collapsing(frames, pipelines, settings, prior):
+    def collapsing(frames, pipelines, settings, prior, *base):
         told = ("filtered: svm has collapsed",) if settings.seed != 4 else ()
         return replace(made(frames, pipelines, settings, prior), warnings=told)
 
@@ -286,3 +287,66 @@ def test_images_that_a_drive_repeats_are_told_with_its_name():
         "a.mcap: 1 of the 2 training frames repeat another one: the model learnt from fewer than "
         "was asked for"
     ]
+
+
+# --- On top of a model of other drives ------------------------------------------------------------
+
+
+def adapt(logged, path, pipelines, **settings):
+    base, _ = from_file(path, pipelines)
+    wanted = TrainingSettings(model=str(path), adapt=True, **settings)
+    (model,), schedule = from_log(
+        lambda: logged, pipelines, wanted, lambda done: None, labelled=True, base=base
+    )
+    return base, model, schedule
+
+
+@pytest.fixture
+def robust(tmp_path):
+    """The preset's pipeline, and a model of it."""
+    small = {"trees": 3, "width": 32, "least": 5, "features": ("place", "colour")}
+    made = {"unfiltered": configure({"preset": "robust", "trees": small}).pipeline}
+    path = tmp_path / "city.model"
+    save_model(train_on([frame(n) for n in (50, 51)], made, TrainingSettings()), path)
+    return made, path
+
+
+def test_an_adapted_model_has_learnt_from_both_and_says_so(robust):
+    pipelines, path = robust
+    base, model, schedule = adapt(log(8), path, pipelines, frames=2, gap=1)
+    own, taught = model.parameters["unfiltered"]["trees"], base.parameters["unfiltered"]["trees"]
+    assert own.base == len(taught.feature)
+    assert base.digests < model.digests
+    assert len(model.digests) == 4
+    assert roles(log(8), schedule) == "ttgeeeee"
+    (told,) = [each for each in model.warnings if "adapted to this drive" in each]
+    assert "2 of its own labelled frames" in told
+    assert str(path) in told
+
+
+def test_frames_that_the_model_learnt_from_are_not_evaluated_after_adapting_either(robust):
+    pipelines, path = robust
+    _, _, schedule = adapt(log(8), path, pipelines, frames=2)
+    assert schedule.use(frame(50)).role is Role.TRAINING
+
+
+def test_without_truth_the_patch_adapts(robust):
+    pipelines, path = robust
+    logged = log(4, unlabelled=tuple(range(4)))
+    _, model, _ = adapt(logged, path, pipelines, frames=2)
+    assert model.source == "patch"
+    assert any("by the reference patch" in each for each in model.warnings)
+
+
+def test_a_variant_that_cannot_learn_further_is_refused(tmp_path):
+    path = tmp_path / "city.model"
+    save_model(train_on([frame(0)], PIPELINES, TrainingSettings()), path)
+    with pytest.raises(
+        TrainingError, match=r"no stage of it can learn further \(similarity, svm\)"
+    ):
+        adapt(log(4), path, PIPELINES, frames=2)
+
+
+def test_adapting_needs_a_model():
+    with pytest.raises(ValueError, match=r"training.adapt. needs .training.model."):
+        TrainingSettings(adapt=True)

@@ -11,7 +11,7 @@ import pytest
 
 from roadeval.config import configure
 from roadeval.errors import RoadevalError
-from roadeval.pipeline.beyond.context import ContextSettings
+from roadeval.pipeline.beyond.trees import TreesSettings
 from roadeval.training import Model, TrainingSettings, fit, load_model, save_model
 from tests.training.making import frame, pipelines
 
@@ -74,7 +74,7 @@ def test_settings_of_stages_that_learn_nothing_do_not_matter(path):
     [
         ("paper", "svm", {"threshold": 0.3}),
         ("paper", "similarity", {"quantile": 0.5, "ridge": 4.0}),
-        ("robust", "context", {"smoothing": 1}),
+        ("robust", "trees", {"threshold": 0.3}),
     ],
 )
 def test_settings_that_decide_and_teach_nothing_may_differ(tmp_path, name, stage, setting):
@@ -88,31 +88,16 @@ def test_settings_that_decide_and_teach_nothing_may_differ(tmp_path, name, stage
     load_model(tmp_path / "x.model").require("x", other, tmp_path / "x.model")
 
 
-@pytest.mark.parametrize("thresholds", [(None, 0.3), (0.3, None), (0.3, 0.2)])
-def test_a_threshold_that_is_learnt_or_given_in_its_place_must_agree(tmp_path, thresholds):
-    pipeline = configure({"preset": "robust"}).pipeline
-    made, wanted = (
-        dataclasses.replace(
-            pipeline,
-            settings={**pipeline.settings, "context": ContextSettings(threshold=threshold)},
-        )
-        for threshold in thresholds
-    )
-    model = fit([frame(0)], {"x": made}, TrainingSettings())
-    with pytest.raises(RoadevalError, match=r"settings of context .*threshold"):
-        model.require("x", wanted, tmp_path / "x.model")
-
-
-@pytest.mark.parametrize(("wanted", "fits"), [(False, True), (True, False)])
+@pytest.mark.parametrize(("wanted", "fits"), [(150, True), (20, False)])
 def test_a_setting_that_an_older_model_does_not_know_was_at_its_default(tmp_path, wanted, fits):
     pipeline = configure({"preset": "robust"}).pipeline
     model = fit([frame(0)], {"x": pipeline}, TrainingSettings())
     older = json.loads(json.dumps(model.settings["x"]))
-    del older["context"]["geodesics"], older["context"]["patch"]
+    del older["trees"]["trees"], older["trees"]["patch"]
     model = dataclasses.replace(model, settings={"x": older})
-    settings = {**pipeline.settings, "context": ContextSettings(geodesics=wanted)}
+    settings = {**pipeline.settings, "trees": TreesSettings(trees=wanted)}
     other = dataclasses.replace(pipeline, settings=settings)
-    told = nullcontext() if fits else pytest.raises(RoadevalError, match="geodesics False there")
+    told = nullcontext() if fits else pytest.raises(RoadevalError, match="trees 150 there")
     with told:
         model.require("x", other, tmp_path / "x.model")
 
@@ -159,8 +144,8 @@ def test_an_array_that_hides_code_is_not_run(tmp_path):
     ("version", "why"),
     [
         (1, "made by an earlier version of roadeval; train it again"),
-        (99, "model format 99, this version reads 3; train it again"),
-        (None, "model format None, this version reads 3; train it again"),
+        (99, "model format 99, this version reads 4; train it again"),
+        (None, "model format None, this version reads 4; train it again"),
     ],
 )
 def test_another_version_is_refused_in_one_line(path, version, why):

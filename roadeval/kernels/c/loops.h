@@ -76,9 +76,6 @@ void grow(
     int outside, uint64_t *wide, uint64_t *spare, uint64_t *grown, uint64_t *result);
 void outcomes(const uint8_t *mask, const uint8_t *truth, int64_t size, uint8_t *errors);
 void add_outcomes(const uint8_t *errors, int64_t size, uint8_t *totals);
-void rectified_sum(
-    const float *features, int64_t count, int64_t pixels, const float *planes, const float *bias,
-    const float *weights, int64_t plane_count, float *block, float *result);
 void geodesics(
     const uint16_t *cost, const uint8_t *seeds, int64_t height, int64_t width, int64_t rounds,
     int32_t *distance);

@@ -170,10 +170,6 @@ FUNCTION(outcomes, "B2 B2 n >B2", outcomes(ARRAY(0), ARRAY(1), SIZE(2), ARRAY(3)
 
 FUNCTION(add_outcomes, "B2 n >B3", add_outcomes(ARRAY(0), SIZE(1), ARRAY(2)))
 
-FUNCTION(rectified_sum, "f2 n n f2 f1 f1 n >f1 >f1",
-    rectified_sum(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3), ARRAY(4), ARRAY(5), SIZE(6), ARRAY(7),
-        ARRAY(8)))
-
 FUNCTION(geodesics, "H2 B2 n n n >i2",
     geodesics(ARRAY(0), ARRAY(1), SIZE(2), SIZE(3), SIZE(4), ARRAY(5)))
 
@@ -187,8 +183,7 @@ static PyMethodDef methods[] = {
     METHOD(look_up_sum_min), METHOD(mahalanobis), METHOD(look_up_colours), METHOD(run_sums),
     METHOD(ring_sums), METHOD(transfer), METHOD(paint), METHOD(label_runs), METHOD(components),
     METHOD(keep_region), METHOD(fill_holes), METHOD(count_bits), METHOD(grow),
-    METHOD(outcomes), METHOD(add_outcomes), METHOD(rectified_sum),
-    METHOD(geodesics), METHOD(tree_sum), {NULL, NULL, 0, NULL},
+    METHOD(outcomes), METHOD(add_outcomes), METHOD(geodesics), METHOD(tree_sum), {NULL, NULL, 0, NULL},
 };
 
 static struct PyModuleDef module = {

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data.arrays import Flags, Floats, Indices, Masks, Values
+from roadeval.kernels import KERNELS
 from roadeval.kernels.plain.trees import LEAVES
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.runtime.extensions import whole
@@ -57,6 +58,11 @@ class Forest:
         ``(T, LEAVES)`` float32: what each leaf adds.
     offset
         Where the sum begins.
+    base
+        So many trees at the beginning are those of other drives: what they give, from
+        ``base_offset`` on, is one more feature of the trees after them, and is not in the sum.
+    base_offset
+        0 where there are none.
     """
 
     feature: Indices
@@ -64,16 +70,52 @@ class Forest:
     kept: Masks
     values: Values
     offset: float
+    base: int = 0
+    base_offset: float = 0.0
 
     def __post_init__(self) -> None:
         check_arrays(self, np.int32, feature=("T", NODES))
         check_arrays(self, np.uint32, kept=(len(self.feature), NODES))
         check_arrays(self, np.float32, threshold=(len(self.feature), NODES))
         check_arrays(self, np.float32, values=(len(self.feature), LEAVES), offset=())
+        check_arrays(self, np.float32, base=(), base_offset=())
         check_range("feature", self.feature, 0, GREATEST)
         check_range("offset", self.offset, -GREATEST, GREATEST)
+        check_range("base", self.base, 0, len(self.feature) - 1)
+        if not isinstance(self.base, int):
+            raise ValueError("base is no whole number")
+        check_range("base_offset", self.base_offset, -GREATEST, GREATEST)
         if not (self.kept >> np.uint32(LEAVES - 1)).all():
             raise ValueError("kept rules out a tree's last leaf, and so may leave none")
+
+    @property
+    def features(self) -> int:
+        """How many features the trees ask for, at least, that of `base` not counted."""
+        first = self.feature[: self.base].max(initial=-1) + 1
+        return max(int(first), int(self.feature[self.base :].max()) + 1 - (self.base > 0))
+
+    def sums(self, values: Values) -> Values:
+        """Return the sum for each pixel of ``(F, n)`` features, ``(n,)`` float32."""
+        if self.base:
+            first = self._sum(values, slice(self.base), self.base_offset)
+            values = np.concatenate([values, first[None]])
+        return self._sum(values, slice(self.base, None), self.offset)
+
+    def _sum(self, values: Values, trees: slice, offset: float) -> Values:
+        total: Values = KERNELS.tree_sum(
+            values, self.feature[trees], self.threshold[trees], self.kept[trees], self.values[trees]
+        )
+        return total + np.float32(offset)
+
+    def on_top(self, base: Forest) -> Forest:
+        """Return both in one: the last feature of these trees is the sum of those."""
+        both = (
+            np.concatenate([getattr(forest, name) for forest in (base, self)])
+            for name in ("feature", "threshold", "kept", "values")
+        )
+        feature, threshold, kept, values = both
+        offsets = self.offset, len(base.feature), base.offset
+        return Forest(feature, threshold, kept, values, *offsets)
 
 
 def grow(

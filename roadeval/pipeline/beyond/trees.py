@@ -22,7 +22,6 @@ from pydantic.dataclasses import dataclass as validated
 from roadeval.data import Layer, LayerKind, LayerSpec, Rgb, mask_spec
 from roadeval.data.arrays import Flags, Floats, Values
 from roadeval.data.packed import Packed
-from roadeval.kernels import KERNELS
 from roadeval.kernels.plain.trees import LEAVES
 from roadeval.pipeline.beyond.forest import Forest, grow
 from roadeval.pipeline.beyond.ground.scene import scene_of
@@ -116,9 +115,23 @@ def fit(sample: TrainingSet, settings: TreesSettings) -> Forest:
     the classes weigh as much as they have there.
     """
     values = at_samples(sample, partial(see, settings))
+    return _grown(np.concatenate(values), sample, settings)
+
+
+def adapt(base: Forest, sample: TrainingSet, settings: TreesSettings) -> Forest:
+    """Grow trees on a drive's own pixels, for which what ``base`` says is one more feature."""
+    if base.base:
+        raise MisfitError("the model was adapted to a drive already; train it again")
+    check_fit(base, settings)
+    values = np.concatenate(at_samples(sample, partial(see, settings)))
+    known = base.sums(np.ascontiguousarray(values.T))
+    return _grown(np.column_stack([values, known]), sample, settings).on_top(base)
+
+
+def _grown(values: Values, sample: TrainingSet, settings: TreesSettings) -> Forest:
     road = np.concatenate([sample.road, sample.road])
     weights = None if sample.share is None else balanced_back(road, sample.share)
-    return grow(np.concatenate(values), road, weights, settings, sample.seed)
+    return grow(values, road, weights, settings, sample.seed)
 
 
 def balanced_back(road: Flags, share: float) -> Floats:
@@ -130,7 +143,7 @@ def balanced_back(road: Flags, share: float) -> Floats:
 
 def check_fit(forest: Forest, settings: TreesSettings) -> None:
     """Raise a `MisfitError` if the trees ask for features that the settings do not have."""
-    known, asked = len(names_of(settings.features)), int(forest.feature.max()) + 1
+    known, asked = len(names_of(settings.features)), forest.features
     if asked > known:
         raise MisfitError(
             f"the model is damaged: its trees ask for {asked} features, and there are {known}; "
@@ -140,10 +153,7 @@ def check_fit(forest: Forest, settings: TreesSettings) -> None:
 
 def log_odds(planes: Values, forest: Forest) -> Values:
     """Compute the log-odds of road from `features`, ``(F, h, w)``; ``(h, w)`` float32."""
-    arrays = forest.feature, forest.threshold, forest.kept, forest.values
-    total = KERNELS.tree_sum(planes.reshape(len(planes), -1), *arrays)
-    odds: Values = total.reshape(planes.shape[1:]) + np.float32(forest.offset)
-    return odds
+    return forest.sums(planes.reshape(len(planes), -1)).reshape(planes.shape[1:])
 
 
 def probability(odds: Values) -> Values:
@@ -184,6 +194,7 @@ STAGE: Final = Stage(
     bind=bind,
     layers=layers,
     fit=fit,
+    adapt=adapt,
     parameters=Forest,
     oracle=perfect_mask,
     inference_only=("threshold",),

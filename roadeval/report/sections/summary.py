@@ -135,7 +135,8 @@ def warnings(findings: Findings) -> Iterator[str]:
     """Yield what a reader must know before believing the numbers."""
     yield from map(str, findings.summary.get("warnings", ()))
     training = findings.summary.get("training", {})
-    if training.get("source") == "truth" and training.get("model") is None and findings.totals:
+    own = training.get("model") is None or training.get("adapted", False)
+    if training.get("source") == "truth" and own and findings.totals:
         yield _trained_here(training.get("placement", "first"))
     yield from _worse_than_baseline(findings)
     yield from _undefined(findings)

@@ -172,3 +172,47 @@ def test_the_path_is_shown_where_it_is_computed(forest):
 
 
 VIEW = View.of(picture(9)[0])
+
+
+# --- On top of what other drives have taught ------------------------------------------------------
+
+
+def test_trees_on_top_see_the_sum_of_those_below_and_nothing_else_of_it():
+    values, road = features_and_road()
+    base = grow(values, road, None, replace(SMALL, share=1.0), 0)
+    below = base.sums(np.ascontiguousarray(values.T))
+    above = grow(below[:, None], road, None, replace(SMALL, share=1.0), 0)
+    # The only feature of the trees above is the place after the features of those below.
+    moved = replace(above, feature=above.feature + np.int32(values.shape[1]))
+    both = moved.on_top(base)
+    np.testing.assert_array_equal(
+        both.sums(np.ascontiguousarray(values.T)), above.sums(below[None])
+    )
+    assert both.features == 4
+
+
+def test_adapted_trees_know_what_other_drives_taught(forest):
+    nothing_to_see = replace(SMALL, features=("place",), least=20)
+    base = trees.fit(every_pixel((5, 9, 13)), nothing_to_see)
+    own = every_pixel((3,))
+    adapted = trees.adapt(base, own, nothing_to_see)
+    assert adapted.base == len(base.feature)
+    assert len(adapted.feature) == 2 * len(base.feature)
+    image, truth = picture(3, seed=99)
+    right = [
+        (trees.bind(nothing_to_see, each)(View.of(image)).mask.pixels() == truth).mean()
+        for each in (base, adapted)
+    ]
+    assert right[1] > right[0]
+
+
+def test_what_was_adapted_is_not_adapted_again(sample, forest):
+    adapted = trees.adapt(forest, sample, SMALL)
+    with pytest.raises(MisfitError, match="adapted to a drive already"):
+        trees.adapt(adapted, sample, SMALL)
+
+
+@pytest.mark.parametrize("base", [-1, 20, 1.5, 2.0])
+def test_a_base_that_cannot_be_is_refused(forest, base):
+    with pytest.raises(ValueError, match="base"):
+        replace(forest, base=base)
