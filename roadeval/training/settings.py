@@ -25,7 +25,9 @@ class TrainingSettings:
         trains one.
     adapt
         Learn further from the log's own frames, on top of what ``model`` has learnt from other
-        drives. The result is then not one on a drive that the model has not seen.
+        drives. The result is then not one on a drive that the model has not seen. By the
+        reference patch alone only where ``source`` insists on it: on drives whose truth was put
+        aside it made the model worse.
     source
         ``auto``: the log's truth where it has one, else the reference patch; ``truth`` or
         ``patch`` insists.

@@ -330,10 +330,12 @@ def test_frames_that_the_model_learnt_from_are_not_evaluated_after_adapting_eith
     assert schedule.use(frame(50)).role is Role.TRAINING
 
 
-def test_without_truth_the_patch_adapts(robust):
+def test_without_truth_the_patch_adapts_only_where_that_is_insisted_on(robust):
     pipelines, path = robust
     logged = log(4, unlabelled=tuple(range(4)))
-    _, model, _ = adapt(logged, path, pipelines, frames=2)
+    with pytest.raises(TrainingError, match="no frame of the range has road truth to adapt"):
+        adapt(logged, path, pipelines, frames=2)
+    _, model, _ = adapt(logged, path, pipelines, frames=2, source="patch")
     assert model.source == "patch"
     assert any("by the reference patch" in each for each in model.warnings)
 
