@@ -95,7 +95,7 @@ def test_no_damaged_array_is_accepted(arrays, tmp_path, damage):
     [
         ("filtered/similarity/covariance", np.negative, "no covariance"),
         ("filtered/similarity/covariance", np.tril, "not symmetric"),
-        ("gated/gated/covariance", np.zeros_like, "no covariance"),
+        ("gated/gated/place", lambda a: a + 1, "place holds a number outside 0 to 1"),
         ("filtered/svm/scale", np.zeros_like, "scale holds a number outside"),
         ("filtered/svm/mean", np.negative, "mean holds a number outside 0 to 255"),
         ("filtered/svm/vectors", lambda a: a[1:], r"weights has the shape .* instead of \(m,\)"),
