@@ -80,7 +80,7 @@ def _files(logged: logs.LoggedFrame) -> tuple[bytes, ...]:
 
 
 def _layer_bytes(payloads: dict[str, bytes]) -> int:
-    # Label images, as `gated` has them, lie raw in a payload; the recording packs chunks with LZ4.
+    # Label images, if there are any, lie raw in a payload; the recording packs chunks with LZ4.
     given = ("/camera", "/truth", "/true_shadow")
     mine = (payload for path, payload in payloads.items() if path not in given)
     return sum(min(len(p), len(lz4.block.compress(p))) for p in mine)

@@ -5,7 +5,8 @@ python -m benchmarks.tables --write     writes the tables of both anew
 python -m benchmarks.tables --measure   replays the drives and writes the numbers
 
 A drive comes from the folder named for it; see PRESETS.md for where to get them. ``--measure NAME``
-measures one drive, ``idd`` or ``idd_features``, and leaves the other numbers as they are.
+measures one drive, ``idd``, ``idd_features``, ``idd_filters`` or ``synthetic_shadow``, and leaves
+the other numbers as they are.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.tables import idd
+from benchmarks.tables import idd, idd_filters, synthetic_shadow
 from benchmarks.tables.drives import DRIVES, SEGNET, MissingSourceError, Sources
 from benchmarks.tables.measure import (
     REPLAYS,
@@ -32,7 +33,13 @@ from benchmarks.tables.text import DOCUMENTS, NUMBERS, faults, load, written
 from roadeval.version import VERSION
 
 IDD, ELSEWHERE, IDD_FEATURES = "idd", "elsewhere", "idd_features"
-ON_IDD = {IDD: idd.measured, IDD_FEATURES: idd.without_each_group}
+SYNTHETIC = "synthetic_shadow"
+ON_IDD = {
+    IDD: idd.measured,
+    IDD_FEATURES: idd.without_each_group,
+    "idd_filters": idd_filters.measured,
+    SYNTHETIC: synthetic_shadow.measured,
+}
 
 
 def main() -> int:
@@ -62,7 +69,7 @@ def _measure(options: argparse.Namespace, work: Path) -> None:
     names = options.measure or [*DRIVES, *([] if options.replays else [*ON_IDD, ELSEWHERE])]
     for name in names:
         if name in ON_IDD:
-            if options.idd is None:
+            if options.idd is None and name != SYNTHETIC:
                 sys.exit(f"idd: name the folder idd20k_lite of {idd.SOURCE} (--idd)")
             _keep(rounded(ON_IDD[name](options.idd, SEEDS)), name)
             continue

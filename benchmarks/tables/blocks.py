@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any, Final
 
-from benchmarks.tables import idd
+from benchmarks.tables import idd, idd_filters
 from benchmarks.tables.drives import DRIVES, Drive
-from benchmarks.tables.measure import GATES, STRANGERS, TEACHER, command
+from benchmarks.tables.measure import REPLAYS, STRANGERS, TEACHER, command
 from roadeval.results.claims import WORDS
 
 Numbers = Mapping[str, Any]
@@ -19,15 +19,7 @@ SURE: Final = 0.05
 MARK: Final = "\\*"
 NONE: Final = "-"
 """Where nothing was measured."""
-GATE_WORDS: Final = {
-    "texture": "texture (`max_texture`)",
-    "horizon": "horizon",
-    "reach": "reach",
-    "green": "excess green (`max_green`)",
-    "colour": "colour under skylight (`colour_distance`)",
-    "share": "share of the frame (`min_share`)",
-    "penumbra": "penumbra (`gap`)",
-}
+"""What the gated filter is measured before, see `benchmarks.tables.idd_filters`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,15 +122,18 @@ def _five(numbers: Numbers, drive: str) -> list[str]:
 def _on_filters(numbers: Numbers) -> Iterator[str]:
     """Yield what became of each filter, and of `robust`, on all drives together."""
     for replay in ("paper", "gated"):
-        changes = {name: numbers["drives"][name][replay]["filter"]["ERR"] for name in DRIVES}
+        on = REPLAYS[replay].drives
+        changes = {name: numbers["drives"][name][replay]["filter"]["ERR"] for name in on}
         middles = {name: round(100 * median(each["seeds"]), 1) for name, each in changes.items()}
-        up = [changes[name] for name, middle in middles.items() if middle > 0]
-        down = [changes[name] for name, middle in middles.items() if middle < 0]
-        yield _item(
-            f"The filter of `{replay}` raises ERR on {len(up)} of the {len(DRIVES)} drives, by up "
-            f"to {max(middles.values()):.1f} points, surely on {_sure(up)}; it lowers ERR on "
-            f"{len(down)}, by up to {-min(middles.values()):.1f}, surely on {_sure(down)}."
-        )
+        up = {name: middle for name, middle in middles.items() if middle > 0}
+        down = {name: middle for name, middle in middles.items() if middle < 0}
+        words = [
+            f"{does} ERR on {len(those)}, by up to {max(map(abs, those.values())):.1f} points, "
+            f"surely on {_sure([changes[name] for name in those])}"
+            for does, those in (("raises", up), ("lowers", down))
+            if those
+        ]
+        yield _item(f"Of {len(on)} drives the filter of `{replay}` {'; it '.join(words)}.")
     yield _item(" ".join(_on_robust(numbers)))
 
 
@@ -245,6 +240,9 @@ def filters(numbers: Numbers) -> str:
     for drive in DRIVES.values():
         row = [drive.title]
         for replay in ("paper", "gated"):
+            if replay not in numbers["drives"][drive.name]:
+                row += [NONE, NONE]
+                continue
             change = numbers["drives"][drive.name][replay]["filter"]["ERR"]
             row += [_spread(change["seeds"], _points), _interval(change)]
         rows.append(row)
@@ -316,17 +314,42 @@ def idd_lite(numbers: Numbers) -> str:
     )
 
 
-def gates(numbers: Numbers) -> str:
-    """Return ERR with each gate taken away."""
-    names = [name for name in DRIVES if "gates" in numbers["drives"].get(name, {})]
-    variants = {"none": "filtered"} | {GATE_WORDS[gate]: f"no_{gate}" for gate in GATES}
-    variants["all: no filter"] = "unfiltered"
+def filter_effects(numbers: Numbers) -> str:
+    """Return what the gated filter does on IDD Lite."""
+    found = numbers["idd_filters"]
+    rows = []
+    for chain in idd_filters.CHAINS:
+        none = found[chain]["none"]
+        rates = [_spread(none[rate]) for rate in ("ERR", "dark_missed")]
+        rows.append([chain, "no filter", rates[0], "", rates[1], "", ""])
+        for odds in map("{:g}".format, idd_filters.ODDS):
+            seeds = sorted(found[chain][odds], key=lambda each: each["change"]["mean"])
+            rates = [_spread([each[rate] for each in seeds]) for rate in ("ERR", "dark_missed")]
+            middle = seeds[len(seeds) // 2]
+            change, dark, flat = (
+                _interval(middle[key]) for key in ("change", "dark_change", "flat_change")
+            )
+            rows.append(["", odds, rates[0], change, rates[1], dark, flat])
     return _table(
-        ["gate taken away: ERR, %", *(DRIVES[name].title for name in names)],
-        (
-            [words, *(_spread(_err(numbers, name, "gates", variant)) for name in names)]
-            for words, variant in variants.items()
-        ),
+        [
+            *("before", "`odds`", "ERR, %", "filter's effect, points", "dark road missed, %"),
+            *("filter's effect, points", f"on {found['flat_frames']} flat frames, ERR, points"),
+        ],
+        rows,
+    )
+
+
+def shadow_found(numbers: Numbers) -> str:
+    """Return precision and recall of the filters' shadow on synthetic roads."""
+    rows = []
+    for preset, drives in numbers["synthetic_shadow"].items():
+        for name, found in drives.items():
+            kinds = ("precision", "recall", "recall_on_road")
+            rows.append(
+                [f"`{preset}`", DRIVES[name].title, *(f"{found[kind]:.2f}" for kind in kinds)]
+            )
+    return _table(
+        ["filter", "drive", "precision", "recall, all shadow", "recall, shadow on road"], rows
     )
 
 
@@ -382,7 +405,8 @@ BLOCKS: Final = {
     "against_blind": Block(against_blind, (PAPER, GATED, ROBUST)),
     "claims_by_drive": Block(claims_by_drive, (PAPER,)),
     "idd": Block(idd_lite, (f"{MEASURE} idd",)),
-    "gates": Block(gates, (f"{MEASURE} --replays gates",)),
+    "filter_effects": Block(filter_effects, (f"{MEASURE} idd_filters",)),
+    "shadow_found": Block(shadow_found, (f"{MEASURE} synthetic_shadow",)),
     "features": Block(features, (f"{MEASURE} idd_features",)),
     "elsewhere": Block(elsewhere, (f"{MEASURE} elsewhere",)),
     "flicker": Block(flicker, (PAPER, ROBUST)),

@@ -38,17 +38,6 @@ class Replay:
     drives: tuple[str, ...] = tuple(DRIVES)
 
 
-GATES: Final = {
-    "texture": {"max_texture": 99.0},
-    "horizon": {"horizon": 0.0},
-    "reach": {"reach": 0.0},
-    "green": {"max_green": 99.0},
-    "colour": {"colour_distance": 1e9},
-    "share": {"min_share": 0.0},
-    "penumbra": {"gap": 0},
-}
-"""What takes each gate of `gated` away."""
-
 TEACHER: Final = "camvid_0006R0_1hz"
 """The drive that a model for others is trained on."""
 STRANGERS: Final = {
@@ -57,6 +46,10 @@ STRANGERS: Final = {
 }
 """Those others: other cameras, and other journeys of the same one."""
 
+DEVELOPED: Final = tuple(
+    name for name, drive in DRIVES.items() if drive.tuned or name.startswith("synthetic")
+)
+"""Those that `gated` was replayed on since it learns its gate."""
 AVAILABLE: Final = tuple(
     name for name, drive in DRIVES.items() if drive.tuned or name == "synthetic_0"
 )
@@ -68,18 +61,9 @@ REPLAYS: Final[Mapping[str, Replay]] = {
         {"variants": {name: {"preset": name} for name in ("printed_order", "hsi")}},
         "--variant printed_order --variant hsi",
     ),
-    "gated": Replay({"preset": "gated"}, "--preset gated"),
+    "gated": Replay({"preset": "gated"}, "--preset gated", drives=DEVELOPED),
     "robust": Replay(
         {"preset": "robust"}, "--preset robust", seeds=SEEDS_OF_ROBUST, drives=AVAILABLE
-    ),
-    "gates": Replay(
-        {
-            "preset": "gated",
-            "variants": {
-                f"no_{gate}": {"preset": "gated", "gated": off} for gate, off in GATES.items()
-            },
-        },
-        drives=tuple(name for name in DRIVES if name.startswith("camvid")),
     ),
 }
 

@@ -113,7 +113,7 @@ def test_a_folder_that_was_not_named_is_asked_for(arguments):
     with pytest.raises(SystemExit, match=r"idd: name .* \(--idd\)"):
         arguments("--measure", "idd")
     with pytest.raises(SystemExit, match=r"0001TP: name .* \(--camvid\)"):
-        arguments("--measure", "camvid_0001TP", "--replays", "gated")
+        arguments("--measure", "camvid_0001TP", "--replays", "paper")
 
 
 def test_every_drive_has_every_replay_with_every_seed():
