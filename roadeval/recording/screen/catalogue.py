@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from threading import Thread
 from typing import Any, Final
 
 import rerun as rr
@@ -22,6 +23,8 @@ from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.screen import blueprint
 
 HOST: Final = "127.0.0.1"
+_ENDING_S: Final = 2.0
+"""How long the server may take to end."""
 INDEX: Final = "fleet"
 """The layer, and the group of properties, that hold what the fleet says of a drive."""
 
@@ -90,7 +93,7 @@ def served(
     chosen, left_out = _told_apart(drives)
     with (
         tempfile.TemporaryDirectory(prefix="roadeval-") as folder,
-        rr.server.Server(host=HOST) as server,
+        _server() as server,
     ):
         dataset = server.client().create_dataset(name)
         try:
@@ -105,6 +108,22 @@ def served(
         address = f"{server.url()}/entry/{dataset.id}"
         places = {each.name: dataset.segment_url(key) for key, each in chosen.items()}
         yield Catalogue(address, places, left_out)
+
+
+@contextmanager
+def _server() -> Iterator[rr.server.Server]:
+    """Run the catalogue's server until the block ends.
+
+    To end it waits for all that are connected, and a tab of a browser may be so for days: after a
+    moment it is left to end with the process.
+    """
+    server = rr.server.Server(host=HOST)
+    try:
+        yield server
+    finally:
+        ending = Thread(target=server.shutdown, daemon=True)
+        ending.start()
+        ending.join(_ENDING_S)
 
 
 def require_catalogue() -> None:

@@ -8,7 +8,16 @@ from typing import Final
 from roadeval.data.words import DASH, percent
 from roadeval.evaluation.metrics import FULL
 from roadeval.evaluation.settings import settings_of
-from roadeval.report.blocks import Block, Cell, Figure, Heading, ImageGrid, Table, Text
+from roadeval.report.blocks import (
+    Block,
+    Cell,
+    Figure,
+    Heading,
+    ImageGrid,
+    KeepTogether,
+    Table,
+    Text,
+)
 from roadeval.report.figures.figure import figures, variants_of
 from roadeval.report.figures.files import svg_of
 from roadeval.report.findings import Findings
@@ -45,14 +54,13 @@ def _claims(findings: Findings) -> Iterator[Block]:
         return
     size = settings_of(findings.summary).window
     short = any(each["short"] for each in found.values())
-    yield Heading("What the paper claims", 2)
-    yield Text(NO_NUMBERS)
-    yield Table(
+    table = Table(
         ["claim", "borne out by", *(["shorter, at the end"] if short else [])],
         [row[: 3 if short else 2] for row in map(list, rows)],
         caption=f"Windows of {size} frames that bear it out, of those in which both rates are "
         "defined. Equal rates do not.",
     )
+    yield KeepTogether([Heading("What the paper claims", 2), Text(NO_NUMBERS), table])
 
 
 def _tables(findings: Findings) -> Iterator[Block]:

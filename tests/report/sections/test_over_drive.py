@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from roadeval.report.blocks import Figure, ImageGrid, Table, Text
+from roadeval.report.blocks import Figure, ImageGrid, KeepTogether, Table, Text
 from roadeval.report.figures.figure import ExampleFrame
 from roadeval.report.sections.over_drive import section
 from tests.report.making import plain_rows, rates, some_findings, the
@@ -85,10 +85,11 @@ def test_the_paper_s_claims_stand_with_the_windows_that_bear_them_out():
         "filter_ERR": {"held": 2, "windows": 9, "short_held": 1, "short": 1},
         "post_ERR": {"held": 9, "windows": 9, "short_held": 0, "short": 1},
     }
-    table = the(Table, section(findings))
+    blocks = the(KeepTogether, section(findings)).blocks
+    table = the(Table, blocks)
     assert table.columns == ["claim", "borne out by", "shorter, at the end"]
     assert [row[1:] for row in plain_rows(table)] == [["2 of 9", "1 of 1"], ["9 of 9", "0 of 1"]]
-    words = " ".join(b.text for b in section(findings) if isinstance(b, Text))
+    words = " ".join(b.text for b in blocks if isinstance(b, Text))
     assert "gives no number for its figures 3a and 3b" in words
 
 
@@ -97,7 +98,8 @@ def test_no_column_for_shorter_windows_where_there_are_none():
     findings.summary["claims"] = {
         "filter_ERR": {"held": 2, "windows": 9, "short_held": 0, "short": 0}
     }
-    assert the(Table, section(findings)).columns == ["claim", "borne out by"]
+    table = the(Table, the(KeepTogether, section(findings)).blocks)
+    assert table.columns == ["claim", "borne out by"]
 
 
 def test_the_figures_of_rates_follow_and_none_without_rates():
