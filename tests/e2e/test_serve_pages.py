@@ -1,0 +1,190 @@
+"""``roadeval serve`` in a real browser: pictures on demand, and the viewer."""
+
+import re
+import time
+from importlib.util import find_spec
+
+import cv2
+import numpy as np
+import pytest
+
+import roadeval
+from tests.e2e.serving import serving, status
+from tests.e2e.test_fleet import Here, write
+from tests.fixtures.browser import missing, violations
+
+if reason := missing():
+    pytest.skip(reason, allow_module_level=True)
+
+
+def frame(tab):
+    return int(re.match(r"Frame (\d+)", tab.locator(".where").inner_text())[1])
+
+
+def test_every_result_is_listed_and_a_click_away(address, watched):
+    seen = watched(address)
+    links = seen.tab.locator(".links a")
+    assert links.count() == 3
+    for place, title in enumerate(["demo", "demo", "week"]):
+        seen.tab.goto(address)
+        links.nth(place).click()
+        assert seen.tab.locator("h1").inner_text() == title
+    assert seen.complaints == []
+    assert all(url.startswith(address) for url in seen.elsewhere)
+
+
+def test_every_frame_has_its_pictures_when_it_is_asked_for(address, demo, watched):
+    seen = watched(f"{address}0/")
+    rows = seen.tab.locator(".frames tr.pictured")
+    assert rows.count() == demo.summary["frames"]["evaluated"]
+    seen.tab.locator(".stage").wait_for()
+    for place in (3, 40):
+        rows.nth(place).locator("td").first.click()
+        number = int(rows.nth(place).get_attribute("data-frame"))
+        seen.tab.locator(f"#frame-{number} .tile img").first.wait_for()
+        assert frame(seen.tab) == number
+        loaded = "each => each.complete && each.naturalWidth > 0"
+        seen.tab.wait_for_function(f"({loaded})(document.querySelector('.views .above'))")
+    seen.tab.keyboard.press("ArrowRight")
+    seen.tab.locator(f"#frame-{number + 1} .tile").first.wait_for()
+    assert seen.complaints == []
+    assert violations(seen.tab) == []
+
+
+def test_without_a_script_a_frame_is_a_page_of_its_own(address, watched):
+    tab = watched(f"{address}0/", java_script_enabled=False).tab
+    tab.locator(".frames tr.pictured a").first.click()
+    tab.wait_for_load_state()  # with its pictures
+    assert tab.locator(".strip .tile img").first.evaluate("each => each.naturalWidth") > 0
+
+
+def test_where_there_is_no_screen_the_page_says_what_to_do_instead(demo, watched, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with serving(demo.recording) as (address, _):
+        seen = watched(address)
+        seen.tab.locator(".stage").wait_for()
+        seen.tab.locator(".open").click()
+        seen.tab.locator(".absent").wait_for()
+        assert "No screen" in seen.tab.locator(".absent").inner_text()
+
+
+def test_a_fleets_frame_whose_recording_was_not_kept_says_why_it_cannot_be_had(address, watched):
+    tab = watched(f"{address}2/").tab
+    tab.locator(".opens").first.click()
+    tab.get_by_text("has gone, and no recording of it was kept").wait_for()
+
+
+@pytest.fixture
+def fleet(tmp_path):
+    """A fleet of two drives whose logs are there and whose recordings are not."""
+    for place, name in enumerate("ab"):
+        write(tmp_path / "logs" / f"{name}.mcap", 100 * place)
+    config = roadeval.configure({"training": {"frames": 4}})
+    roadeval.replay_fleet([tmp_path / "logs"], tmp_path / "week", config, executor=Here())
+    return tmp_path / "week"
+
+
+def test_a_frame_of_a_fleet_is_replayed_before_it_opens(fleet, watched, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    recordings = fleet / "recordings"
+    assert not recordings.exists()
+    with serving(fleet) as (address, _):
+        tab = watched(f"{address}0/").tab
+        answers = []
+        tab.on("response", lambda answer: answers.append((answer.status, answer.url)))
+        tab.locator(".opens").first.click()
+        # The drive is replayed by now; the rest is the viewer's part.
+        tab.locator(".problem").get_by_text("No screen").wait_for()
+        statuses = [status for status, url in answers if url.endswith("/worst/1/view")]
+        assert statuses[0] == 202
+        assert statuses[-1] == 409
+        (recording,) = recordings.glob("*.rrd")
+        worst = roadeval.Fleet(fleet).worst.iloc[0]
+        assert recording.stem == worst.drive
+        assert worst.frame in roadeval.Recording(recording).frame_numbers
+        assert tab.locator(".cancel").count() == 0
+
+
+def test_a_fleet_leads_to_its_drives_and_they_lead_back(fleet, watched):
+    with serving(fleet) as (address, _):
+        seen = watched(f"{address}0/")
+        tab = seen.tab
+        for place, name in enumerate("ab"):
+            tab.goto(f"{address}0/")
+            tab.locator("#all-drives tbody a").get_by_text(name, exact=True).click()
+            tab.wait_for_url(f"{address}0/drive/{place}/")
+            assert tab.locator("h1").inner_text() == name
+            assert "Made without pictures" in tab.content()
+            tab.get_by_role("link", name="week").click()
+            tab.wait_for_url(f"{address}0/")
+        worst = roadeval.Fleet(fleet).worst.iloc[0]
+        tab.locator("#the-worst-frames-over-all-drives tbody a").nth(1).click()
+        tab.wait_for_url(f"**/#frame-{worst.frame}")
+        assert tab.locator(".frames tr[aria-current]").get_attribute("data-frame") == str(
+            worst.frame
+        )
+        assert seen.complaints == []
+        assert status(f"{address}0/drive/2/") == 404
+        assert status(f"{address}0/drive/0/frame/10/view", method="POST") == 403
+
+
+def test_without_a_script_a_frames_page_opens_the_viewer(demo, watched, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with serving(demo.recording) as (address, _):
+        tab = watched(f"{address}0/frame/40", java_script_enabled=False).tab
+        tab.get_by_role("button", name="Open in viewer").click()
+        tab.get_by_text("No screen to open a window on").wait_for()
+        assert status(f"{address}0/frame/40/show", method="POST") == 403
+
+
+def shown_in(viewer, recording, numbers, seconds=100):
+    """Which frame's camera image the viewer's upper left corner shows, once it shows one."""
+    pictures = {number: recording.image(number) for number in numbers}
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        seen = cv2.imdecode(np.frombuffer(viewer.screenshot(), np.uint8), cv2.IMREAD_GRAYSCALE)
+        corner = cv2.pyrDown(seen[: seen.shape[0] // 2, : seen.shape[1] // 3])
+        scores = {number: likeness(corner, image) for number, image in pictures.items()}
+        best = max(scores, key=scores.get)
+        if scores[best] > 0.8:
+            return best
+        time.sleep(2)
+    return None
+
+
+def likeness(seen, image):
+    """The best correlation of an image, in any size that it may have there, with what is seen."""
+    grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
+    height, width = grey.shape
+    small = [
+        cv2.resize(grey, (each, each * height // width), interpolation=cv2.INTER_AREA)
+        for each in range(110, 180, 2)
+    ]
+    return max(cv2.matchTemplate(seen, each, cv2.TM_CCOEFF_NORMED).max() for each in small)
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.skipif(find_spec("datafusion") is None, reason="needs roadeval[catalogue]")
+def test_the_web_viewer_opens_beside_the_page_at_that_frame_and_asks_nobody_else(demo, watched):
+    with serving("--web", demo.recording) as (address, run):
+        seen = watched(address)
+        seen.tab.locator(".stage").wait_for()
+        seen.tab.locator(".frames tbody tr").nth(60).locator("td").first.click()
+        seen.tab.locator("#frame-70 .tile").first.wait_for()
+        asked = []
+        seen.tab.context.on("request", lambda request: asked.append(request.url))
+        with seen.tab.expect_popup() as opened:
+            seen.tab.locator(".open").click()
+        viewer = opened.value
+        viewer.wait_for_url("**/viewer/?url=*")
+        assert f"when%3Dframe%40{frame(seen.tab)}" in viewer.url
+        viewer.wait_for_function("document.querySelector('canvas.visible')", timeout=60_000)
+        recording = roadeval.Recording(demo.recording)
+        assert shown_in(viewer, recording, (10, 45, 70, 95)) == frame(seen.tab) == 70
+        assert all(url.startswith(("http://127.0.0.1:", "data:", "blob:")) for url in asked)
+        assert any(url.endswith("re_viewer_bg.wasm") for url in asked)
+    # It has ended here, although the viewer's tab is still open.
+    assert run.returncode == 130
