@@ -1,4 +1,4 @@
-"""What a server gives of one drive: its page, its pictures, and a frame opened in the viewer."""
+"""A drive on a server: its page, its pictures, and its frames in the viewer."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Served(Protocol):
         """Its name."""
 
     def begin(self, viewer: SteeredViewer) -> None:
-        """Tell the viewer what it may be asked to show from the beginning."""
+        """Add to the viewer the recording that it will be asked to show, if it is known already."""
 
     def answer(self, request: Request, viewer: SteeredViewer) -> Response:
         """Return what is asked for below its address."""

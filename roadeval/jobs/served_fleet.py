@@ -1,4 +1,4 @@
-"""What a server gives of a fleet: its page, its drives' own, and any of its worst frames."""
+"""A fleet on a server: its page, its drives' pages, and its worst frames in the viewer."""
 
 from __future__ import annotations
 

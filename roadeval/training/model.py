@@ -31,8 +31,6 @@ VERSION: Final = 4
 the trees of ``robust`` in its place."""
 OLDEST: Final = 2
 """The earliest version that is read."""
-GONE: Final = frozenset({"context"})
-"""Stages that learnt in versions before this one, and are no more."""
 OWN: Final = ("prior", "fingerprints")
 """The arrays that belong to no variant."""
 
@@ -195,17 +193,13 @@ def load_model(path: Path, stages: Iterable[Stage[Any, Any]] = ()) -> Model:
         raise ModelError(
             f"{path}: model format {version}, this version reads {VERSION}; train it again"
         )
-    known = {**STAGES, **{stage.name: stage for stage in stages}}
-    kept = {name.split("/")[1] for name in arrays if name.count("/") == 2}
-    if version != VERSION and (gone := (GONE & kept) - known.keys()):
-        raise ModelError(
-            f"{path}: made by an earlier version of roadeval, with the stage {', '.join(gone)}, "
-            "which is no more; train it again"
-        )
     try:
-        return _model(header, arrays, known)
+        return _model(header, arrays, {**STAGES, **{stage.name: stage for stage in stages}})
     except ValueError as error:
-        raise ModelError(f"{path}: a damaged model file: {_line(error)}; train it again") from error
+        why = "a damaged model file"
+        if version != VERSION:  # a stage may be gone since, or learn something else
+            why = "made by an earlier version of roadeval, or damaged"
+        raise ModelError(f"{path}: {why}: {_line(error)}; train it again") from error
 
 
 def kept_model(path: Path, stages: tuple[Stage[Any, Any], ...] = ()) -> Model:

@@ -1,4 +1,4 @@
-"""What the values, or the colours, of label images mean."""
+"""The meaning of the values, or of the colours, of label images."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FRINGE: Final = 253
 
 @dataclass(frozen=True, eq=False)
 class LabelMap:
-    """What the values, or the colours, of a topic's label images mean.
+    """The meaning of the values, or of the colours, of a topic's label images.
 
     Parameters
     ----------

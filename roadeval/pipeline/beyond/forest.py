@@ -22,7 +22,7 @@ ALL: Final = (1 << LEAVES) - 1
 
 
 class Growth(Protocol):
-    """What the growing depends on, see `roadeval.pipeline.beyond.trees.TreesSettings`."""
+    """Settings of the growing, see `roadeval.pipeline.beyond.trees.TreesSettings`."""
 
     @property
     def trees(self) -> int:
@@ -121,7 +121,7 @@ class Forest:
 def grow(
     values: Values, road: Flags, weights: Floats | None, settings: Growth, seed: int
 ) -> Forest:
-    """Grow trees with scikit-learn's gradient boosting on histograms.
+    """Grow trees with scikit-learn's gradient boosting on histograms [1]_.
 
     By one thread: sums of many threads end with other last digits from one run to the next.
 
@@ -137,6 +137,11 @@ def grow(
         Of the growing.
     seed
         Of the draw of features.
+
+    References
+    ----------
+    .. [1] J. H. Friedman, Greedy Function Approximation: A Gradient Boosting Machine, The Annals of
+       Statistics 29 (2001).
     """
     from threadpoolctl import threadpool_limits
 

@@ -28,7 +28,7 @@ _Y_TICKS: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """What is drawn of a series: paths of its line or bars, of its marks, and of intervals."""
+    """The drawing of a series: SVG paths of its line or bars, its marks and its intervals."""
 
     series: Series
     path: str
