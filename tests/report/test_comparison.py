@@ -8,6 +8,7 @@ from roadeval.data.words import MINUS
 from roadeval.evaluation.comparison_result import (
     ComparedResult,
     Comparison,
+    Disagreement,
     LogUnknown,
     MaskComparison,
     MovedFrame,
@@ -15,7 +16,7 @@ from roadeval.evaluation.comparison_result import (
 from roadeval.evaluation.conditions import Condition
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference
-from roadeval.report.blocks import BulletList, Table, Text
+from roadeval.report.blocks import BulletList, Cell, Table, Text
 from roadeval.report.comparison import document, markdown
 from roadeval.report.pdf.typeset import pdf
 from roadeval.results.comparison import judged
@@ -131,6 +132,22 @@ def test_different_drives_are_laid_side_by_side():
     words = text(pdf(document(comparison, (), pd.DataFrame())))
     assert "Different drives, side by side: no difference is given." in words
     assert "11.20" in words
+
+
+def test_of_a_frame_of_disagreement_the_sum_of_both_shares_is_bold():
+    rows = (
+        Disagreement("new|er", "filtered", 7, 0, base_right=0.1, new_right=0.25),
+        Disagreement("newest", "filtered", 8, 100_000_000, base_right=0.2, new_right=0.0),
+    )
+    tables = blocks(Table, a_comparison(disagreements=rows))
+    (table,) = (table for table in tables if "disagree" in table.columns)
+    assert table.columns[4:] == ["disagree", "base right", "new right"]
+    assert table.rows == [
+        ["new|er", "filtered", "7", "0.000 s", Cell("35.00", bold=True), "10.00", "25.00"],
+        ["newest", "filtered", "8", "0.100 s", Cell("20.00", bold=True), "20.00", "0.00"],
+    ]
+    assert table.text_columns == [0, 1, 3]
+    assert table.breaks == [1]
 
 
 def test_its_contents_lead_to_its_parts():

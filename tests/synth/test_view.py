@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from roadeval.synth.camera import Camera
+from roadeval.synth.camera import Camera, Pose
 from roadeval.synth.journey import SPEED, Journey, Stretch
 from roadeval.synth.light import Light, daylight, is_shadow
 from roadeval.synth.noise import Field
@@ -67,6 +67,26 @@ def test_road_truth_is_where_the_asphalt_is(scene: Scene, journey: Journey) -> N
         inside = (column >= 0) & (column < 320) & (row < 240)
         assert inside.any()
         assert (film.road[row[inside], column[inside]] == expected).all()
+
+
+def edges_seen(scene: Scene, z: float) -> list[float]:
+    """Metres across the road from the centre line to its left and right edge, as they are seen."""
+    at = np.array([z])
+    centre = float(scene.road.centre(at)[0])
+    camera = Camera(640, 480, Pose(centre + 1.2, 3.0, z - 10.0, pitch=-0.25))
+    film = see(bare(scene), Moment(0.0, camera, daylight(0.0), cars=()))
+    offset = np.arange(-4.5, 6.9, 0.005)
+    points = np.stack([centre + offset, 0 * offset, np.full_like(offset, z)], axis=1)
+    column, row = np.rint(camera.project(points)).astype(int).T
+    across = offset[film.road[row, column] == 1] * np.cos(np.arctan(scene.road.slope(at)[0]))
+    return [float(across.min()), float(across.max())]
+
+
+def test_the_road_is_as_wide_as_two_lanes_and_wider_at_the_lay_by(scene: Scene) -> None:
+    begin, end = scene.road.bay
+    widths = {begin - 5.0: 3.4, begin + 4.5: 3.4 + 1.15, begin + 9.5: 5.7, end - 4.5: 3.4 + 1.15}
+    for z, right in widths.items():
+        assert edges_seen(scene, z) == pytest.approx([-3.4, right], abs=0.05), z
 
 
 def test_nothing_above_the_horizon_is_road_or_shadow(scene: Scene, journey: Journey) -> None:

@@ -36,6 +36,10 @@ def test_rows_wait_for_a_part_of_the_frames_so_far(frames, waits):
     assert WAIT.after(frames) == waits
 
 
+def test_of_the_first_frames_images_and_text_wait_for_eight_and_numbers_for_64():
+    assert (IMAGES_AND_TEXT.after(1), NUMBERS.after(1)) == (8, 64)
+
+
 def test_every_row_comes_once_and_in_order_and_waits_no_longer_than_it_may():
     ended = list(run(1000, lambda frame: [("/a", scalars, frame)]))
     assert [row for *_, rows in ended for row in rows] == list(range(1000))

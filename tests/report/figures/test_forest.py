@@ -53,6 +53,13 @@ def test_a_drives_mark_stands_at_its_mean_in_percent():
     assert np.concatenate(marks) == pytest.approx([1.0])
 
 
+@pytest.mark.parametrize("count", [3, NAMED + 1])
+def test_a_drives_mark_has_no_edge_that_would_make_it_larger(count):
+    ax, _ = drawn(forest(rows(count), MEAN, "pp"))
+    marks = [line for line in ax.lines if line.get_marker() == "o"]
+    assert {line.get_markeredgewidth() for line in marks} == {0}
+
+
 def test_groups_stand_at_the_edge():
     ax, _ = drawn(forest(rows(2, "monday"), MEAN, "pp"))
     assert [text.get_text() for text in ax.texts[:2]] == ["monday", "monday"]

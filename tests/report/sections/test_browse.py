@@ -1,5 +1,6 @@
 """A frame on a page: what is said about it, and its pictures by variant."""
 
+import cv2
 import numpy as np
 
 from roadeval.data import ERRORS
@@ -32,3 +33,19 @@ def test_a_strip_has_the_outcomes_first_and_then_a_row_of_layers_a_variant():
         ("filtered", ["filtered: ndi", "filtered: svm"]),
         ("", []),
     ]
+
+
+def test_outcomes_are_at_most_640_pixels_across_and_layers_300():
+    image, mask = np.zeros((4, 700, 3), np.uint8), np.zeros((4, 700), np.uint8)
+    outcome, layer = (LayerImage(title, image, ERRORS, mask) for title in ("errors", "svm"))
+    frame = NotableFrame(
+        7, 0, "filtered", {"filtered": rates(0.4)}, images=[outcome], layers=[[layer]]
+    )
+    found = strip(frame, ["filtered"])
+    assert [[across(each) for each in row.pictures] for row in found.rows] == [[640], [300]]
+
+
+def across(picture):
+    """Pixels across a picture's file."""
+    content = np.frombuffer(picture.image.content, np.uint8)
+    return cv2.imdecode(content, cv2.IMREAD_COLOR).shape[1]
