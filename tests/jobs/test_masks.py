@@ -12,6 +12,7 @@ from roadeval import RoadevalError
 from roadeval.jobs.identity import identity
 from roadeval.logs import LogWriter, TopicSettings, open_log
 from tests.e2e.commands import here
+from tests.e2e.test_fleet import Here
 from tests.jobs.making import FRAMES, settings, write_log
 
 IN_LOG = "/net/road_mask_prediction"
@@ -59,7 +60,7 @@ def masks(base, **tables):
 
 
 @pytest.fixture(scope="module")
-def outcome(places, tmp_path_factory):
+def outcome(places, figures, tmp_path_factory):
     """A replay with the masks of all places side by side; with those in the log, rolled alike."""
     inside = tmp_path_factory.mktemp("inside")
     drive = inside / "drive.mcap"
@@ -84,7 +85,8 @@ def outcome(places, tmp_path_factory):
         half={"path": "half"},
     )
     config = settings(masks={"inside": IN_LOG}).override({"masks": beside})
-    return roadeval.replay(drive, config, save=inside / "out.rrd", reports=inside / "reports")
+    with figures():
+        return roadeval.replay(drive, config, save=inside / "out.rrd", reports=inside / "reports")
 
 
 WHOLE = ("number", "stamp", "npy", "classes", "confidence", "named", "other", "order")
@@ -179,9 +181,10 @@ def test_workers_make_no_difference_to_curves(places, tmp_path):
     assert found[0] == found[1]
 
 
-def test_without_a_probability_there_are_no_curves(places, tmp_path):
+def test_without_a_probability_there_are_no_curves(places, figures, tmp_path):
     config = settings(record="none").override({"masks": masks(places, net={"path": "number"})})
-    done = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "reports")
+    with figures():
+        done = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "reports")
     assert "curves" not in done.summary
     assert not (tmp_path / "reports" / "probabilities.csv").exists()
     assert not (tmp_path / "reports" / "thresholds.png").exists()
@@ -343,12 +346,11 @@ def test_a_drive_of_a_fleet_is_replayed_again_when_its_masks_change(places, tmp_
     own.mkdir(parents=True)
     for file in (places / "number").iterdir():
         (own / file.name).write_bytes(file.read_bytes())
-    config = settings().override(
-        {"masks": {"net": {"path": f"{tmp_path}/masks/{{drive}}"}}, "fleet": {"workers": 1}}
-    )
+    config = settings().override({"masks": {"net": {"path": f"{tmp_path}/masks/{{drive}}"}}})
+    drives = [places / "drive.mcap"]
 
     def replayed():
-        return roadeval.replay_fleet([places / "drive.mcap"], tmp_path / "fleet", config).replayed
+        return roadeval.replay_fleet(drives, tmp_path / "fleet", config, executor=Here()).replayed
 
     assert (replayed(), replayed()) == (1, 0)
     np.save(own / "25.npy", np.zeros((1, 1)))

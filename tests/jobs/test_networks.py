@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from importlib import import_module
 
 import numpy as np
 import pandas as pd
@@ -15,11 +14,6 @@ from roadeval.jobs import identity
 from roadeval.logs import open_log
 from tests.jobs.making import settings, write_log
 from tests.networks.making import network, red_network
-
-
-@pytest.fixture(autouse=True)
-def _no_figures(monkeypatch):
-    monkeypatch.setattr(import_module("roadeval.jobs.replay"), "write_figures", lambda *given: [])
 
 
 @pytest.fixture(scope="module")
@@ -48,11 +42,7 @@ def run(drive, to, config):
 @pytest.fixture(scope="module")
 def once(folder, tmp_path_factory):
     to = tmp_path_factory.mktemp("once")
-    patched = pytest.MonkeyPatch()
-    patched.setattr(import_module("roadeval.jobs.replay"), "write_figures", lambda *given: [])
-    outcome = run(folder / "drive.mcap", to, with_network(folder / "red.onnx"))
-    patched.undo()
-    return to, outcome
+    return to, run(folder / "drive.mcap", to, with_network(folder / "red.onnx"))
 
 
 def test_the_network_and_its_answer_stand_in_the_tables(once):

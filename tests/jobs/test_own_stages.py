@@ -3,7 +3,6 @@
 import hashlib
 import importlib
 import sys
-from importlib import import_module
 from pathlib import Path
 
 import pandas as pd
@@ -19,11 +18,6 @@ from tests.pipeline import somebody
 
 def somebodys(name):
     return {"chain": [f"tests.pipeline.somebody:{name}", "post"]}
-
-
-@pytest.fixture(autouse=True)
-def _no_figures(monkeypatch):
-    monkeypatch.setattr(import_module("roadeval.jobs.replay"), "write_figures", lambda *given: [])
 
 
 @pytest.fixture(scope="module")

@@ -34,15 +34,6 @@ def drive(tmp_path_factory) -> Path:
     return write_log(tmp_path_factory.mktemp("log") / "small.mcap", net=True)
 
 
-@pytest.fixture(autouse=True)
-def _no_figures(request, monkeypatch):
-    """Draw figures only for the run that looks at them: they take most of a small run's time."""
-    if "once" not in request.fixturenames:
-        monkeypatch.setattr(
-            import_module("roadeval.jobs.replay"), "write_figures", lambda *given: []
-        )
-
-
 def run(drive: Path, folder: Path, **options):
     save = None if options.get("record") == "none" else folder / "out.rrd"
     return roadeval.replay(drive, settings(**options), save=save, reports=folder / "reports")
@@ -59,9 +50,11 @@ def frames_of(folder: Path) -> pd.DataFrame:
 
 
 @pytest.fixture(scope="module")
-def once(drive, tmp_path_factory):
+def once(drive, figures, tmp_path_factory):
+    """The run whose figures are looked at."""
     folder = tmp_path_factory.mktemp("once")
-    return folder, run(drive, folder, jobs=2)
+    with figures():
+        return folder, run(drive, folder, jobs=2)
 
 
 def test_every_frame_is_accounted_for(once):

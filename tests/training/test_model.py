@@ -16,6 +16,9 @@ from roadeval.training import Model, TrainingSettings, fit, load_model, save_mod
 from roadeval.training.model import VERSION
 from tests.training.making import frame, pipelines
 
+FEW = {"trees": {"trees": 10, "features": ["place"]}}
+"""Boosted trees that learn at once."""
+
 
 @pytest.fixture(scope="module")
 def model() -> Model:
@@ -79,7 +82,7 @@ def test_settings_of_stages_that_learn_nothing_do_not_matter(path):
     ],
 )
 def test_settings_that_decide_and_teach_nothing_may_differ(tmp_path, name, stage, setting):
-    pipeline = configure({"preset": name}).pipeline
+    pipeline = configure({"preset": name, **(FEW if stage == "trees" else {})}).pipeline
     save_model(fit([frame(0)], {"x": pipeline}, TrainingSettings()), tmp_path / "x.model")
     settings = {
         **pipeline.settings,
@@ -91,12 +94,12 @@ def test_settings_that_decide_and_teach_nothing_may_differ(tmp_path, name, stage
 
 @pytest.mark.parametrize(("wanted", "fits"), [(150, True), (20, False)])
 def test_a_setting_that_an_older_model_does_not_know_was_at_its_default(tmp_path, wanted, fits):
-    pipeline = configure({"preset": "robust"}).pipeline
+    pipeline = configure({"preset": "robust", **FEW}).pipeline
     model = fit([frame(0)], {"x": pipeline}, TrainingSettings())
     older = json.loads(json.dumps(model.settings["x"]))
     del older["trees"]["trees"], older["trees"]["patch"]
     model = dataclasses.replace(model, settings={"x": older})
-    settings = {**pipeline.settings, "trees": TreesSettings(trees=wanted)}
+    settings = {**pipeline.settings, "trees": TreesSettings(trees=wanted, features=("place",))}
     other = dataclasses.replace(pipeline, settings=settings)
     told = nullcontext() if fits else pytest.raises(RoadevalError, match="trees 150 there")
     with told:
