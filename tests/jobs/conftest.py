@@ -16,5 +16,5 @@ Figures = Callable[[], AbstractContextManager[object]]
 def figures() -> Iterator[Figures]:
     replay = import_module("roadeval.jobs.replay")
     drawing = partial(mock.patch.object, replay, "write_figures", replay.write_figures)
-    with mock.patch.object(replay, "write_figures", lambda *given: []):
+    with mock.patch.object(replay, "write_figures", return_value=[]):
         yield drawing

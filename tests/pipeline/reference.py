@@ -155,8 +155,9 @@ def distance(rgb, model, ridge=1.0):
 
 
 def decision(rgb, model):
-    """Eq. 16 before its sign."""
-    return model.machine.decision_function(rgb.reshape(-1, 3)).reshape(rgb.shape[:2])
+    """Eq. 16 before its sign, of each colour once: it takes seconds for every pixel of an image."""
+    _, first, place = np.unique(rgb @ (1 << 16, 1 << 8, 1), return_index=True, return_inverse=True)
+    return model.machine.decision_function(rgb.reshape(-1, 3)[first])[place].reshape(rgb.shape[:2])
 
 
 # --- Post-processing: Eq. 17-23 -------------------------------------------------------------------

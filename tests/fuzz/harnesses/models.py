@@ -29,7 +29,7 @@ def check(data: bytes) -> None:
 
 @cache
 def wanted():
-    """Return pipelines with every stage that learns; boosted trees of few features learn at once."""
+    """Return pipelines with every stage that learns, and boosted trees that learn at once."""
     trees = {"preset": "robust", "trees": {"trees": 10, "features": ["place"]}}
     return configure({"variants": {"mine": trees, "other": {"preset": "gated"}}}).pipelines()
 
