@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import resource
 import sys
 from collections.abc import Callable
 from typing import Any, Final
@@ -41,23 +42,37 @@ def run(work: Callable[[], object], hook: Callable[[str], None]) -> int:
         os._exit(code)
 
 
-def killed_at(number: int) -> Callable[[str], None]:
-    """End the process before its step of this number, from 1."""
-    steps = iter(range(1, number))
+class KilledAt:
+    """Ends the process before its step of this number, from 1."""
 
-    def hook(_event: str) -> None:
-        if next(steps, None) is None:
+    def __init__(self, number: int) -> None:
+        self._left = number
+
+    def __call__(self, _event: str) -> None:
+        self._left -= 1
+        if self._left == 0:
             os._exit(KILLED)
 
-    return hook
 
+class FullFrom:
+    """Lets every step that needs room fail, from the one of this number on."""
 
-def full_from(number: int) -> Callable[[str], None]:
-    """Let every step that needs room fail, from the one of this number on."""
-    steps = iter(range(1, number))
+    def __init__(self, number: int) -> None:
+        self._before = number - 1
 
-    def hook(event: str) -> None:
-        if event in (*ADDING, "open") and next(steps, None) is None:
+    def __call__(self, event: str) -> None:
+        if event not in (*ADDING, "open"):
+            return
+        if self._before == 0:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        self._before -= 1
 
-    return hook
+
+def undisturbed(_event: str) -> None:
+    """Do nothing at any step."""
+
+
+def in_small_files(size: int, work: Callable[[], object]) -> None:
+    """Do some work whose files have room for so many bytes each."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+    work()

@@ -1,7 +1,6 @@
 """A run that is killed, or whose disk is full, at any of its steps on the file system."""
 
 import os
-import resource
 import shutil
 import sys
 from functools import partial
@@ -11,11 +10,11 @@ import pytest
 
 from roadeval.runtime import folders
 from tests.faults import making, steps
+from tests.faults.forking import Forks
 
-pytestmark = [
-    pytest.mark.skipif(not hasattr(os, "fork"), reason="a run of its own is a forked process"),
-    pytest.mark.filterwarnings("ignore:.*use of fork:DeprecationWarning"),
-]
+pytestmark = pytest.mark.skipif(
+    not hasattr(os, "fork"), reason="a run of its own is a forked process"
+)
 
 
 def others_file(place):
@@ -31,6 +30,12 @@ IN_PLACE = "in place"
 SITUATIONS = {"exchange": others_file, IN_PLACE: others_folder, "first": None}
 if sys.platform != "linux":
     del SITUATIONS["exchange"]
+
+
+@pytest.fixture(scope="module")
+def forks():
+    with Forks() as forks:
+        yield forks
 
 
 @pytest.fixture(params=SITUATIONS)
@@ -83,14 +88,14 @@ def check_next_run(place, before, whole):
 
 
 def test_a_run_that_is_killed_at_any_step_leaves_old_or_new_and_nothing_else(
-    again, whole, situation, tmp_path
+    forks, again, whole, situation, tmp_path
 ):
     old, new, after = making.outputs(again()), whole("new"), whole("next")
     moving, code, number = 0, steps.KILLED, 0
     while code == steps.KILLED:
         number += 1
         place = again()
-        code = steps.run(partial(making.run, place, "new"), steps.killed_at(number))
+        code = forks.run(partial(making.run, place, "new"), steps.KilledAt(number))
         found = making.outputs(place)
         for name in ("out.rrd", "out.mcap"):
             assert found[name] in (old[name], new[name])
@@ -108,14 +113,14 @@ def test_a_run_that_is_killed_at_any_step_leaves_old_or_new_and_nothing_else(
 
 
 def test_a_disk_that_is_full_from_any_step_on_costs_no_earlier_result(
-    again, whole, situation, tmp_path
+    forks, again, whole, situation, tmp_path
 ):
     old, new, after = making.outputs(again()), whole("new"), whole("next")
     code, number = steps.FAILED, 0
     while code == steps.FAILED:
         number += 1
         place = again()
-        code = steps.run(partial(making.run, place, "new"), steps.full_from(number))
+        code = forks.run(partial(making.run, place, "new"), steps.FullFrom(number))
         found = making.outputs(place)
         if found["reports"] not in (old["reports"], new["reports"]):
             assert "summary.json" not in found["reports"]
@@ -132,15 +137,11 @@ def test_a_disk_that_is_full_from_any_step_on_costs_no_earlier_result(
 
 @pytest.mark.parametrize("situation", [IN_PLACE], indirect=True)
 @pytest.mark.parametrize("size", [0, 3, 40, 400])
-def test_no_room_for_a_file_s_content_costs_no_earlier_result(again, whole, size, tmp_path):
+def test_no_room_for_a_file_s_content_costs_no_earlier_result(forks, again, whole, size, tmp_path):
     old, after = making.outputs(again()), whole("next")
     place = again()
-
-    def limited():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
-        making.run(place, "new")
-
-    assert steps.run(limited, lambda _event: None) == steps.FAILED
+    limited = partial(steps.in_small_files, size, partial(making.run, place, "new"))
+    assert forks.run(limited, steps.undisturbed) == steps.FAILED
     assert making.outputs(place) == old
     assert notes(place) == notes(tmp_path / "model")
     check_next_run(place, tmp_path / "model", after)
