@@ -81,15 +81,28 @@ class Silhouettes:
             column, row = cells[on_map & (layer == k)].T
             leaves[row, column] = 255
 
-    def add_rod(self, foot: Matrix, tip: Matrix, radius: float) -> None:
-        """Add a straight trunk, branch or pole of ``radius`` metres."""
-        steps = max(1, int(np.ceil(float(np.linalg.norm(tip - foot)) / 0.5)))
-        ends = foot + np.linspace(0.0, 1.0, steps + 1)[:, None] * (tip - foot)
+    def add_rods(self, feet: Matrix, tips: Matrix, radii: Matrix) -> None:
+        """Add straight trunks, branches or poles: ``(n, 3)`` ends and ``(n,)`` radii, metres.
+
+        Each is cut into pieces of half a metre, which lie in their own layers.
+        """
+        ways = tips - feet
+        pieces = np.ceil(np.linalg.norm(ways, axis=1) / 0.5).astype(int).clip(1)
+        rod = np.repeat(np.arange(len(feet)), pieces + 1)
+        along = np.concatenate([np.linspace(0.0, 1.0, count + 1) for count in pieces.tolist()])
+        ends = feet[rod] + along[:, None] * ways[rod]
         corners = np.round(self._cells(ends) * 16 - 8).astype(int)
-        thickness = max(1, round(2 * radius / CELL))
-        for a, b, low, high in zip(corners, corners[1:], ends, ends[1:], strict=False):
-            layer = self._layer(float(low[1] + high[1]) / 2)
-            cv2.line(self._solid[layer], a.tolist(), b.tolist(), 255, thickness, cv2.LINE_8, 4)
+        begins = np.flatnonzero(rod[1:] == rod[:-1])
+        layers = self._layers((ends[begins, 1] + ends[begins + 1, 1]) / 2)
+        widths = np.round(2 * radii / CELL).astype(int).clip(1)[rod[begins]]
+        for a, b, layer, width in zip(
+            corners[begins].tolist(),
+            corners[begins + 1].tolist(),
+            layers.tolist(),
+            widths.tolist(),
+            strict=True,
+        ):
+            cv2.line(self._solid[layer], a, b, 255, width, cv2.LINE_8, 4)
 
     def add_box(self, low: Matrix, high: Matrix) -> None:
         """Add an upright box between two opposite corners, ``(3,)`` metres each."""
@@ -118,8 +131,9 @@ class Silhouettes:
         """``(n, 2)`` column and row, in cells from the map's outer corner, of points' shadows."""
         return to_cells(self.road, self.start, self.sun.shadow_of(points))
 
-    def _layer(self, height: float) -> int:
-        return int(np.clip(np.searchsorted(HEIGHTS, height, "right") - 1, 0, len(HEIGHTS) - 2))
+    def _layers(self, heights: Matrix) -> npt.NDArray[np.intp]:
+        """``(n,)`` numbers of the layers that ``(n,)`` heights lie in."""
+        return np.searchsorted(HEIGHTS, heights, "right").clip(1, len(HEIGHTS) - 1) - 1
 
 
 def to_cells(road: Road, start: float, ground: Matrix) -> Matrix:

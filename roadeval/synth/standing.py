@@ -49,5 +49,9 @@ class Standing:
     def occlude(self, silhouettes: Silhouettes, foot: Matrix, scale: float) -> None:
         """Stand in the sun's way."""
         silhouettes.add_leaves(foot + scale * self.leaves)
-        for rod in self.rods:
-            silhouettes.add_rod(foot + scale * rod.foot, foot + scale * rod.tip, scale * rod.radius)
+        if self.rods:
+            feet, tips = (
+                foot + scale * np.stack(ends)
+                for ends in zip(*((rod.foot, rod.tip) for rod in self.rods), strict=True)
+            )
+            silhouettes.add_rods(feet, tips, scale * np.array([rod.radius for rod in self.rods]))

@@ -1,9 +1,14 @@
 """One small drive and one scene, made once for all tests of the room."""
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from functools import partial
+from unittest import mock
+
 import numpy as np
 import pytest
 
-from roadeval.synth import RenderSettings, SynthFrame, render_drive
+from roadeval.synth import RenderSettings, SynthFrame, drive, render_drive
 from roadeval.synth.journey import Journey
 from roadeval.synth.scene import Scene, build
 
@@ -15,8 +20,24 @@ def settings() -> RenderSettings:
 
 
 @pytest.fixture(scope="session")
-def frames(settings: RenderSettings) -> list[SynthFrame]:
-    return list(render_drive(settings))
+def same_scene() -> Callable[[], AbstractContextManager[object]]:
+    """Within ``with same_scene():`` drives of one seed and length have one scene, built once."""
+    built: dict[Journey, Scene] = {}
+
+    def build_once(journey: Journey, rng: np.random.Generator) -> Scene:
+        if journey not in built:
+            built[journey] = build(journey, rng)
+        return built[journey]
+
+    return partial(mock.patch.object, drive, "build", build_once)
+
+
+@pytest.fixture(scope="session")
+def frames(
+    settings: RenderSettings, same_scene: Callable[[], AbstractContextManager[object]]
+) -> list[SynthFrame]:
+    with same_scene():
+        return list(render_drive(settings))
 
 
 @pytest.fixture(scope="session")

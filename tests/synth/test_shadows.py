@@ -47,7 +47,7 @@ def test_without_occluders_the_whole_sun_is_seen() -> None:
 
 def test_a_pole_casts_a_shadow_as_long_as_the_sun_is_low() -> None:
     silhouettes = empty()
-    silhouettes.add_rod(np.array([3.0, 0.0, 10.0]), np.array([3.0, 5.0, 10.0]), radius=0.1)
+    silhouettes.add_rods(*np.array([[[3.0, 0.0, 10.0]], [[3.0, 5.0, 10.0]]]), np.array([0.1]))
     visible = seen_on_ground(silhouettes.cast(), np.array([-2.3, -1.8, 0.0, 2.8, 3.3]))
     assert (visible > 0.5).tolist() == [True, False, False, False, True]
 
