@@ -123,7 +123,8 @@ def unscored(number, role=Role.TRAINING):
 
 def rows_of(recording, path, component):
     """How many values each frame's row of an entity has: none where nothing is to be shown."""
-    chunks = RrdFile(recording.path).stream()
+    # Of the file that is open: a partial one is tried out by another process whenever it is opened.
+    chunks = recording._file.stream()
     chunks = chunks.filter(content=[path], components=[component], is_static=False)
     batches = [chunk.to_record_batch() for chunk in chunks]
     return {
