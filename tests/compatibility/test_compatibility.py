@@ -1,6 +1,8 @@
 """What every earlier version left is read, with the numbers it had, or refused with the way out."""
 
 import json
+from functools import cache
+from unittest import mock
 
 import pytest
 
@@ -9,6 +11,7 @@ from roadeval.config import ConfigError
 from roadeval.jobs.inspect import worst_frames
 from roadeval.jobs.report_findings import collect
 from roadeval.jobs.result import Result
+from roadeval.recording import checks
 from roadeval.training.learning import from_file
 from tests.compatibility.make import MODEL, RECORDING, RESULTS, unpack, versions
 
@@ -20,6 +23,13 @@ PICTURES = {
     **dict.fromkeys(("shadow", "rings", "similarity", "svm", "post", "boundary"), "uint8"),
     "compensated": "uint8",
 }
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _tried_once():
+    """Try a recording without checksums in another process once, and not whenever it is opened."""
+    with mock.patch.object(checks, "can_be_read", cache(checks.can_be_read)):
+        yield
 
 
 @pytest.fixture(scope="module", params=versions())
