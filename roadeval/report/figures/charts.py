@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -10,6 +10,21 @@ import numpy as np
 from roadeval.data import BASELINE, colours
 from roadeval.data.words import in_percent
 from roadeval.evaluation.metrics import SHORT
+from roadeval.report.figures.layout import (
+    BELOW,
+    EDGE,
+    INCH,
+    LETTERS,
+    LINE,
+    NAMES,
+    TICKED,
+    fitting,
+    name_columns,
+    place,
+    place_maps,
+    place_rows,
+)
+from roadeval.report.figures.legend import LegendStyle, legend
 from roadeval.report.figures.style import FAINT, INK, PALE, Look, looks
 from roadeval.report.figures.values import tops_of
 
@@ -23,10 +38,12 @@ if TYPE_CHECKING:
 
 WIDTH: Final = 7.4
 """Inches across a chart; a page's text is 6.7 wide, so letters come out a little smaller."""
-MAPS_SHARE: Final = 0.68
+MAPS_SHARE: Final = 0.62
 """Share of the page's width that `heatmap` is drawn for, so that its letters keep their size."""
 PER_ROW: Final = 3
 """Rates that are drawn beside each other."""
+STAGES: Final = 140
+"""Points that are there at least for the names of the stages below one of them."""
 BARS: Final = 400
 """More frames than this are drawn as means of neighbours."""
 LEAST: Final = 0.1
@@ -47,7 +64,7 @@ def difference(frames: pd.DataFrame, treated: str, control: str, mean: Mapping[s
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, 2.6), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 2.6))
     ax = figure.subplots()
     group = max(-(-len(frames) // BARS), 1)
     places = np.arange(0, len(frames), group)
@@ -74,6 +91,7 @@ def difference(frames: pd.DataFrame, treated: str, control: str, mean: Mapping[s
             size=8,
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5},
         )
+    place(figure, [ax], top=EDGE, bottom=BELOW)
     return figure
 
 
@@ -91,7 +109,7 @@ def regions(table: pd.DataFrame, variants: Sequence[str], titles: Mapping[str, s
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, 0.75 + 0.24 * len(titles)), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 3))
     left, right = figure.subplots(1, 2, sharey=True)
     rows = np.arange(len(titles))
     pixels = table.drop_duplicates("region").set_index("region")["pixels"].reindex([*titles])
@@ -100,7 +118,7 @@ def regions(table: pd.DataFrame, variants: Sequence[str], titles: Mapping[str, s
         own = table[table["variant"] == name].set_index("region").reindex([*titles])
         for ax, column in ((left, "ERR"), (right, "errors")):
             _marks(ax, 100 * own[column].to_numpy(float), rows, look)
-    left.set_yticks(rows, list(titles.values()))
+    left.set_yticks(rows, _beside(titles.values()))
     left.invert_yaxis()
     left.set_xlabel("ERR within the region, %")
     right.set_xlabel("share of the wrong pixels, %")
@@ -109,28 +127,29 @@ def regions(table: pd.DataFrame, variants: Sequence[str], titles: Mapping[str, s
         ax.grid(axis="x")
     handles, labels = left.get_legend_handles_labels()
     more, also = right.get_legend_handles_labels()
-    figure.legend(
+    lines = legend(
+        figure,
         [*handles, more[also.index("share of the pixels")]],
         [*(label.partition(":")[0] for label in labels), "share of the pixels"],
-        loc="outside upper left",
-        ncols=len(labels) + 1,
-        handlelength=1.5,
+        LegendStyle(columns=len(labels) + 1, handlelength=1.5),
     )
+    place_rows(figure, [left, right], 16.5 * len(titles), top=lines + EDGE, bottom=BELOW)
     return figure
 
 
 def stages(totals: Totals) -> Figure:
     """Draw the rates of each stage's mask, a line a variant."""
-    figure, grid = _rate_axes(2.5)
+    figure, grid = _rate_axes()
     names = list(dict.fromkeys(s for v, own in totals.items() for s in own if v != BASELINE))
+    below = 0.0
     for rate, ax in grid.items():
         _stage_lines(ax, totals, names, rate)
-        ax.set_xticks(range(len(names)), names)
+        below = name_columns(ax, names, STAGES)
         ax.set_xlim(-0.3, len(names) - 0.7)
         if not SHORT[rate].higher_is_better:
             ax.set_ylim(bottom=0)
         ax.set_title(f"{rate}, %", loc="left")
-    _legend(figure, list(totals))
+    place_rows(figure, grid.values(), 123, top=_legend(figure, list(totals)) + LINE, bottom=below)
     return figure
 
 
@@ -155,16 +174,15 @@ def heatmap(maps: Sequence[ErrorHeatmap], among: Sequence[ErrorHeatmap] | None =
     from matplotlib.figure import Figure
 
     height, width = maps[0].fp.shape
-    across = MAPS_SHARE * WIDTH
-    row = (across - 0.9) / 2 * height / width
-    figure = Figure(figsize=(across, (row + 0.1) * len(maps) + 0.5), layout="constrained")
+    figure = Figure(figsize=(MAPS_SHARE * WIDTH, 3))
     grid = figure.subplots(len(maps), 2, squeeze=False)
+    bars = place_maps(figure, len(maps), height / width)
     columns = (
         ("FP: non-road called road", colours.FP, [each.fp for each in maps]),
         ("FN: road missed", colours.FN, [each.fn for each in maps]),
     )
     tops = tops_of(among or maps)
-    for axes, (title, colour, shares), top in zip(grid.T, columns, tops, strict=True):
+    for axes, cax, (title, colour, shares), top in zip(grid.T, bars, columns, tops, strict=True):
         shades = ["white", colours.hex_of(colour), colours.hex_of(colours.MOST_ERRORS)]
         bad = colours.hex_of(colours.NEVER_LABELLED)
         palette = LinearSegmentedColormap.from_list("", shades).with_extremes(bad=bad)
@@ -174,11 +192,12 @@ def heatmap(maps: Sequence[ErrorHeatmap], among: Sequence[ErrorHeatmap] | None =
             ax.set_yticks([])
             ax.spines[:].set_visible(True)
         axes[0].set_title(title, loc="left")
-        bar = figure.colorbar(drawn, ax=axes, location="bottom", aspect=30, pad=0.02)
+        bar = figure.colorbar(drawn, cax=cax, orientation="horizontal")
         bar.set_label("% of the frames")
         bar.outline.set_visible(False)
     for ax, each in zip(grid[:, 0], maps, strict=True):
-        ax.set_ylabel(each.variant)
+        room = INCH * figure.get_figheight() * ax.get_position().height - EDGE
+        ax.set_ylabel(fitting(each.variant, room, LETTERS))
     return figure
 
 
@@ -186,28 +205,27 @@ def coverage(table: pd.DataFrame) -> Figure:
     """Draw the share of the image that each variant calls road; ``table`` is indexed by frame."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, 2.6), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 2.6))
     ax = figure.subplots()
     for name, look in looks(list(table.columns)).items():
         ax.plot(table.index.to_numpy(), 100 * table[name], **look.line)
     ax.set_xlabel("frame")
     ax.set_ylabel("image called road, %")
     ax.set_ylim(bottom=0)
-    _legend(figure, list(table.columns))
+    place(figure, [ax], top=_legend(figure, list(table.columns)) + EDGE, bottom=BELOW)
     return figure
 
 
 def forest(changes: Sequence[MaskComparison]) -> Figure:
     """Draw each result's changes of rates against the base, with their intervals."""
-    figure, grid = _rate_axes(0.8 + 0.26 * len(changes), sharey=True)
-    places = np.arange(len(changes))
+    figure, grid = _rate_axes(sharey=True)
     for rate, ax in grid.items():
-        for place, each in zip(places, changes, strict=True):
+        for row, each in enumerate(changes):
             change = each.difference[rate]
-            ax.plot(in_percent(change.mean), place, "o", color=INK, markersize=5)
+            ax.plot(in_percent(change.mean), row, "o", color=INK, markersize=5)
             if change.low is not None and change.high is not None:
                 ends = [100 * change.low, 100 * change.high]
-                ax.plot(ends, [place, place], color=INK, linewidth=1.6)
+                ax.plot(ends, [row, row], color=INK, linewidth=1.6)
         ax.axvline(0, color=FAINT, linewidth=0.8)
         ax.margins(x=0.15)
         low, high = ax.get_xlim()
@@ -216,8 +234,9 @@ def forest(changes: Sequence[MaskComparison]) -> Figure:
         ax.grid(axis="x")
         ax.grid(visible=False, axis="y")
     first = next(iter(grid.values()))
-    first.set_yticks(places, [_name(each) for each in changes])
+    first.set_yticks(range(len(changes)), _beside(map(_name, changes)))
     first.set_ylim(len(changes) - 0.5, -0.5)
+    place_rows(figure, grid.values(), 18.7 * len(changes) + LETTERS, top=EDGE + LINE, bottom=TICKED)
     return figure
 
 
@@ -225,7 +244,7 @@ def levels(rows: Sequence[MaskComparison]) -> Figure:
     """Draw the rates of several results' final masks, a line of marks a result."""
     results = list(dict.fromkeys(row.result for row in rows))
     variants = list(dict.fromkeys(row.variant for row in rows))
-    figure, grid = _rate_axes(1.0 + 0.32 * len(results), sharey=True)
+    figure, grid = _rate_axes(sharey=True)
     for rate, ax in grid.items():
         for variant, look in looks(variants).items():
             own = [row for row in rows if row.variant == variant]
@@ -236,22 +255,28 @@ def levels(rows: Sequence[MaskComparison]) -> Figure:
             ax.set_xlim(left=0)
         ax.grid(axis="x")
     first = next(iter(grid.values()))
-    first.set_yticks(range(len(results)), results)
+    first.set_yticks(range(len(results)), _beside(results))
     first.set_ylim(len(results) - 0.5, -0.5)
-    _legend(figure, variants)
+    lines = _legend(figure, variants)
+    place_rows(figure, grid.values(), 23 * len(results) + LETTERS, top=lines + LINE, bottom=TICKED)
     return figure
 
 
-def _rate_axes(height: float, *, sharey: bool = False) -> tuple[Figure, dict[str, Axes]]:
-    """Return a figure with axes for each rate, in rows of ``height`` inches."""
+def _rate_axes(*, sharey: bool = False) -> tuple[Figure, dict[str, Axes]]:
+    """Return a figure with axes for each rate, `PER_ROW` beside each other."""
     from matplotlib.figure import Figure
 
     rows, columns = -(-len(SHORT) // PER_ROW), min(len(SHORT), PER_ROW)
-    figure = Figure(figsize=(WIDTH, height * rows), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 3))
     grid = figure.subplots(rows, columns, sharey=sharey, squeeze=False).ravel()
     for spare in grid[len(SHORT) :]:
         spare.remove()
     return figure, dict(zip(SHORT, grid, strict=False))
+
+
+def _beside(names: Iterable[str]) -> list[str]:
+    """Return names as they are written left of the axes."""
+    return [fitting(name, NAMES * WIDTH * INCH) for name in names]
 
 
 def _name(row: MaskComparison) -> str:
@@ -272,15 +297,15 @@ def _marks(ax: Axes, x: Any, y: Any, look: Look) -> None:
     )
 
 
-def _legend(figure: Figure, variants: Sequence[str]) -> None:
-    """Write above the axes which variant is drawn how."""
+def _legend(figure: Figure, variants: Sequence[str]) -> float:
+    """Write above the axes which variant is drawn how; return the points that this takes."""
     from matplotlib.lines import Line2D
 
     handles = []
     for name, look in looks(variants).items():
         mark = {} if name == BASELINE else look.mark
-        handles.append(Line2D([], [], **look.line, **mark, markersize=5, label=name))
-    figure.legend(handles=handles, loc="outside upper left", ncols=6, handlelength=3.2)
+        handles.append(Line2D([], [], **look.line, **mark, markersize=5))
+    return legend(figure, handles, variants, LegendStyle())
 
 
 def _frame_ticks(ax: Axes, frames: Any) -> None:

@@ -10,6 +10,8 @@ import numpy as np
 from roadeval.data.words import listing
 from roadeval.evaluation.analysis import finals
 from roadeval.evaluation.metrics import METRICS
+from roadeval.report.figures.layout import EDGE, INCH
+from roadeval.report.figures.legend import LegendStyle
 from roadeval.report.figures.style import Look, heading, looks
 
 if TYPE_CHECKING:
@@ -23,8 +25,11 @@ PALE: Final = 0.4
 """Opacity of a last row that holds fewer frames than the others, and of the line to it."""
 MARKED: Final = 25
 """Up to this many points each has its marker; beyond, about as many do."""
-PER_LINE: Final = 3
-"""Entries of the legend in a line."""
+WIDTH: Final = 8
+"""Inches across the figure."""
+ROOM: Final = WIDTH * INCH - 4 * EDGE
+"""Points across its legend."""
+LEGEND: Final = LegendStyle(columns=3, handlelength=3.4)
 
 
 def rates_over_drive(
@@ -57,14 +62,18 @@ def rates_over_drive(
         short = f"; a last row of {rest} is left out"
     elif rest < size:
         short = f"; the last row, drawn pale, holds {rest}"
-    figure = Figure(figsize=(8, height))
+    names = [look.label for look in looks(list(dict.fromkeys(final["variant"]))).values()]
+    lines = LEGEND.lines(LEGEND.short(names, ROOM), ROOM)
+    # Long names take more lines than there are planned for.
+    height += 0.2 * (lines - -(-len(names) // LEGEND.columns))
+    figure = Figure(figsize=(WIDTH, height))
     heading(figure, title, _subtitle(final, rows, group, rates))
     axes = figure.subplots(len(rates), 1, sharex=True, squeeze=False)[:, 0]
     for ax, (rate, name) in zip(axes, rates.items(), strict=True):
         _draw(ax, final, rate, group, pale=last if short else None)
         ax.set_ylabel(name)
     _label_rows(axes[-1], rows, short)
-    lines = _legend(figure, axes[0])
+    _legend(figure, axes[0])
     top = 1 - (0.66 + 0.2 * lines) / height
     figure.subplots_adjust(left=0.11, right=0.985, bottom=0.55 / height, top=top, hspace=0.13)
     figure.align_ylabels(axes)
@@ -148,16 +157,14 @@ def _step(labels: pd.Series[str]) -> int:
     return -(-len(labels) // room)
 
 
-def _legend(figure: Figure, ax: Axes) -> int:
-    """Write the legend above the axes; return its number of lines."""
+def _legend(figure: Figure, ax: Axes) -> None:
+    """Write the legend above the axes."""
     handles, labels = ax.get_legend_handles_labels()
+    labels = LEGEND.short(labels, ROOM)
     figure.legend(
         handles,
         labels,
         loc="upper left",
         bbox_to_anchor=(0.0, 1 - 0.5 / figure.get_figheight()),
-        ncols=PER_LINE,
-        handlelength=3.4,
-        columnspacing=2.0,
+        **LEGEND.arguments(labels, ROOM),
     )
-    return -(-len(labels) // PER_LINE)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from roadeval.report.figures.figure import FigureData, FigureSpec
+from roadeval.report.figures.layout import EDGE, INCH
+from roadeval.report.figures.legend import LINE, LegendStyle
 from roadeval.report.figures.style import FAINT, Look, heading
 from roadeval.report.figures.threshold_values import (
     MOST,
@@ -22,6 +24,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+WIDTH: Final = 8
+HEIGHT: Final = 3.7
+"""Inches across the figure and from its top to its bottom, with `LINES` of a legend at most."""
+ABOVE: Final = 0.16 * HEIGHT
+HIGH: Final = 0.54 * HEIGHT
+"""Inches above the axes, and from their top to their bottom."""
+LINES: Final = 3
+LEGEND: Final = LegendStyle(columns=4, handlelength=2.0)
+ROOM: Final = WIDTH * INCH - 4 * EDGE
+"""Points across the legend."""
+
 
 def curves(data: FigureData) -> Figure | None:
     """Draw the curves of every variant that says how probable road is, and the other masks."""
@@ -30,10 +43,12 @@ def curves(data: FigureData) -> Figure | None:
     found = data.thresholds
     if found is None or found.levels.empty:
         return None
-    figure = Figure(figsize=(8, 3.7))
+    drawn, masks = variants_in(found), masks_in(found)
+    labels = LEGEND.short([drawn[name].label for name in masks], ROOM)
+    height = HEIGHT + LINE / INCH * max(LEGEND.lines(labels, ROOM) - LINES, 0)
+    figure = Figure(figsize=(WIDTH, height))
     heading(figure, f"Over thresholds on {data.drive}", "Marks: the masks at their own thresholds")
     axes = figure.subplots(1, 3)
-    drawn, masks = variants_in(found), masks_in(found)
     for variant, thresholds in thresholds_in(found).items():
         look = drawn[variant]
         axes[0].plot(100 * thresholds.recall, 100 * thresholds.precision, **look.line)
@@ -46,8 +61,10 @@ def curves(data: FigureData) -> Figure | None:
         for own in stages.values():
             _reliability(axes[2], own["bins"], drawn[variant])
     _frame(axes, masks)
-    figure.legend(ncols=4, loc="lower center", frameon=False)
-    figure.subplots_adjust(left=0.07, right=0.985, top=0.84, bottom=0.3, wspace=0.32)
+    handles, _ = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="lower center", **LEGEND.arguments(labels, ROOM))
+    top, bottom = 1 - ABOVE / height, 1 - (ABOVE + HIGH) / height
+    figure.subplots_adjust(left=0.07, right=0.985, top=top, bottom=bottom, wspace=0.32)
     return figure
 
 
