@@ -148,7 +148,7 @@ def stages(totals: Totals) -> Figure:
         ax.set_xlim(-0.3, len(names) - 0.7)
         if not SHORT[rate].higher_is_better:
             ax.set_ylim(bottom=0)
-        ax.set_title(f"{rate}, %", loc="left")
+        ax.set_title(f"{rate}, %", loc="left", y=1)
     place_rows(figure, grid.values(), 123, top=_legend(figure, list(totals)) + LINE, bottom=below)
     return figure
 
@@ -191,7 +191,7 @@ def heatmap(maps: Sequence[ErrorHeatmap], among: Sequence[ErrorHeatmap] | None =
             ax.set_xticks([])
             ax.set_yticks([])
             ax.spines[:].set_visible(True)
-        axes[0].set_title(title, loc="left")
+        axes[0].set_title(title, loc="left", y=1)
         bar = figure.colorbar(drawn, cax=cax, orientation="horizontal")
         bar.set_label("% of the frames")
         bar.outline.set_visible(False)
@@ -230,7 +230,7 @@ def forest(changes: Sequence[MaskComparison]) -> Figure:
         ax.margins(x=0.15)
         low, high = ax.get_xlim()
         ax.set_xlim(min(low, -LEAST), max(high, LEAST))
-        ax.set_title(f"{rate}, pp", loc="left")
+        ax.set_title(f"{rate}, pp", loc="left", y=1)
         ax.grid(axis="x")
         ax.grid(visible=False, axis="y")
     first = next(iter(grid.values()))
@@ -250,7 +250,7 @@ def levels(rows: Sequence[MaskComparison]) -> Figure:
             own = [row for row in rows if row.variant == variant]
             values = [in_percent(row.new[rate]) for row in own]
             _marks(ax, values, [results.index(row.result) for row in own], look)
-        ax.set_title(f"{rate}, %", loc="left")
+        ax.set_title(f"{rate}, %", loc="left", y=1)
         if not SHORT[rate].higher_is_better:
             ax.set_xlim(left=0)
         ax.grid(axis="x")

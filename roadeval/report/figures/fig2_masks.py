@@ -51,7 +51,7 @@ def road_masks(data: FigureData) -> Figure | None:
             Picture(ax, picture)
         _name_row(axes[0], example.frame)
     for ax, title in zip(grid[0], rows[0], strict=True):
-        ax.set_title(title, color=INK, pad=4)
+        ax.set_title(title, color=INK, pad=4, y=1)
     figure.subplots_adjust(
         left=LEFT / WIDTH,
         right=0.995,
