@@ -82,6 +82,7 @@ class FramePicker:
         self._outcomes, self._layered = slice(outcomes), slice(layered)
         self._recording = result.recording
         self._frames = result.frames
+        self._finals = analysis.finals(result.frames)
         self._variants = variants_but_baseline(result.frames)
         self._scored = frozenset(result.rows["frame"].tolist())
         self._causes = {name: scored.causes(result.rows, name) for name in self._variants}
@@ -132,7 +133,7 @@ class FramePicker:
         )
 
     def _notable(self, frame: int, stamp_ns: int, change: float | None = None) -> NotableFrame:
-        own = analysis.finals(self._frames[self._frames["frame"] == frame]).set_index("variant")
+        own = self._finals[self._finals["frame"] == frame].set_index("variant")
         rates = str_keys(own[[*SHORT]].to_dict("index"))
         first, recording = self._variants[0], self._recording
         seen = recording is not None and frame in self._result.pictured
