@@ -185,7 +185,7 @@ def place_maps(figure: Figure, rows: int, ratio: float) -> list[Axes]:
     The figure becomes as high as that takes.
     """
     across = INCH * figure.get_figwidth()
-    left, between, scale = EDGE + LINE, 2.5 * EDGE, EDGE
+    left, between, scale = EDGE + LINE, 3 * EDGE, EDGE
     width = (across - left - between - 2 * EDGE) / 2
     height = ratio * width
     top, bottom = EDGE + LINE, BELOW + scale + EDGE
