@@ -10,6 +10,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
 
+from roadeval.report.figures.picture import Picture
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 def described(figure: Figure) -> str:
     """A figure's words and data, axes by axes."""
     width, height = figure.get_size_inches()
-    lines = [f"figure of {width:.3g} x {height:.3g} inches", *_words(figure)]
+    lines = [f"figure of {width:.3g} x {height:.3g} inches", *_words(figure), *_pictures(figure)]
     for number, axes in enumerate(figure.axes, 1):
         lines += [f"  axes {number}", *(f"    {line}" for line in _axes(axes))]
     return "\n".join(lines)
@@ -31,6 +33,16 @@ def _words(figure: Figure) -> Iterator[str]:
         # By its lines: Matplotlib draws copies of what it was given.
         for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True):
             yield f"  legend {text.get_text()!r}: {_look(handle)}"
+
+
+def _pictures(figure: Figure) -> Iterator[str]:
+    """The pictures that lie on the figure itself, with their places in shares of it."""
+    for picture in figure.artists:
+        if isinstance(picture, Picture):
+            box = picture.box.transformed(figure.transFigure.inverted())
+            place = " ".join(f"{each:.3g}" for each in box.extents)
+            pixels = np.asarray(picture.get_array())
+            yield f"  picture of {pixels.shape} at {place}, mean {pixels.mean():.5g}"
 
 
 def _axes(axes: Axes) -> Iterator[str]:

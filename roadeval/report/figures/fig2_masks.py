@@ -19,7 +19,6 @@ from roadeval.report.figures.style import FAINT, INK, heading
 from roadeval.report.images import faded, shrink
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 WIDTH: Final = 8
@@ -27,11 +26,14 @@ WIDTH: Final = 8
 LEFT: Final = 0.28
 TOP: Final = 0.78
 """Inches left of and above the pictures, for the frames' numbers and the titles."""
+GAP: Final = 0.05
+"""Inches between pictures, and to what names them."""
 
 
 def road_masks(data: FigureData) -> Figure | None:
     """Draw a row a frame: the image, each variant's mask over it, and the truth over it."""
     from matplotlib.figure import Figure
+    from matplotlib.transforms import Bbox
 
     from roadeval.report.figures.picture import Picture
 
@@ -41,25 +43,21 @@ def road_masks(data: FigureData) -> Figure | None:
     names = variants_of(data.examples)
     rows = [_pictures(example, names, truth=truth) for example in data.examples]
     height, width = rows[0]["camera image"].shape[:2]
-    row = (WIDTH - LEFT) / len(rows[0]) * height / width
-    total = TOP + row * len(rows) + 0.05
+    across = (WIDTH - LEFT) / len(rows[0])
+    down = across * height / width
+    total = TOP + down * len(rows) + GAP
     figure = Figure(figsize=(WIDTH, total))
     heading(figure, f"Road masks on {data.drive}", _legend(data.examples))
-    grid = figure.subplots(len(rows), len(rows[0]), squeeze=False)
-    for axes, example, pictures in zip(grid, data.examples, rows, strict=True):
-        for ax, picture in zip(axes, pictures.values(), strict=True):
-            Picture(ax, picture)
-        _name_row(axes[0], example.frame)
-    for ax, title in zip(grid[0], rows[0], strict=True):
-        ax.set_title(title, color=INK, pad=4, y=1)
-    figure.subplots_adjust(
-        left=LEFT / WIDTH,
-        right=0.995,
-        bottom=0.05 / total,
-        top=1 - TOP / total,
-        wspace=0.02,
-        hspace=0.03,
-    )
+    for number, (example, pictures) in enumerate(zip(data.examples, rows, strict=True)):
+        top, bottom = (1 - (TOP + at) / total for at in (number * down, (number + 1) * down - GAP))
+        _name_row(figure, example.frame, (top + bottom) / 2)
+        for column, (title, picture) in enumerate(pictures.items()):
+            left, right = (
+                (LEFT + at) / WIDTH for at in (column * across, (column + 1) * across - GAP)
+            )
+            Picture(figure, picture, Bbox.from_extents(left, bottom, right, top))
+            if number == 0:
+                _name_column(figure, title, (left + right) / 2, top)
     return figure
 
 
@@ -89,16 +87,22 @@ def _legend(examples: Sequence[ExampleFrame]) -> str:
     )
 
 
-def _name_row(ax: Axes, frame: int) -> None:
-    ax.text(
-        *(-0.03, 0.5, f"frame {frame}"),
-        transform=ax.transAxes,
+def _name_row(figure: Figure, frame: int, middle: float) -> None:
+    """Write a frame's number beside its row, whose middle is a share of the figure's height."""
+    figure.text(
+        *((LEFT - GAP) / WIDTH, middle, f"frame {frame}"),
         rotation=90,
         ha="right",
         va="center",
         size=8,
         color=FAINT,
     )
+
+
+def _name_column(figure: Figure, title: str, middle: float, top: float) -> None:
+    """Write a title above a column, whose middle and top are shares of the figure."""
+    above = GAP / figure.get_figheight()
+    figure.text(middle, top + above, title, size=9, color=INK, ha="center", va="bottom")
 
 
 def _overlay(image: Rgb, labels: Mask | Truth | None) -> Rgb:

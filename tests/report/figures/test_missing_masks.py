@@ -18,7 +18,7 @@ EXAMPLES = [
 
 def test_every_row_of_the_figure_has_every_variant():
     figure = road_masks(FigureData("street", pd.DataFrame(), EXAMPLES))
-    assert len(figure.axes) == 2 * len(["camera", "unfiltered", "net", "truth"])
+    assert len(figure.artists) == 2 * len(["camera", "unfiltered", "net", "truth"])
     assert any("faded: there is no mask" in text.get_text() for text in figure.texts)
 
 
