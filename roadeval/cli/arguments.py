@@ -134,9 +134,11 @@ def _from_file(given: Given) -> RunConfig:
 
 
 def _variant(name: str, path: str | None) -> Variant:
-    """Read a variant from its file; without one it is the preset of its name."""
-    from roadeval.config import Variant, read_tables
+    """Read a variant from its file, or from a preset; of neither it is the preset of its name."""
+    from roadeval.config import PRESETS, Variant, read_tables
 
+    if path is not None and path in PRESETS:
+        return Variant.of(name, {"preset": path}, path)
     if path is not None:
         return Variant.of(name, read_tables(path), path)
     with usage():

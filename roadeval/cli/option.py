@@ -27,7 +27,7 @@ def named(text: str) -> tuple[str, str]:
 
 
 def variant(text: str) -> tuple[str, str | None]:
-    """Read ``NAME=FILE.toml``, or the name of a preset alone."""
+    """Read ``NAME=FILE.toml`` or ``NAME=PRESET``, or the name of a preset alone."""
     return named(text) if "=" in text else (text, None)
 
 

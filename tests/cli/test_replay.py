@@ -114,6 +114,11 @@ def test_a_variant_without_a_file_is_the_preset_of_its_name(asked):
     assert asked["config"] == configure({"variants": presets})
 
 
+def test_a_variant_can_be_a_preset_by_another_name(asked):
+    assert main(["replay", "d.mcap", "--variant", "mine=hsi"]) == 0
+    assert asked["config"] == configure({"variants": {"mine": {"preset": "hsi"}}})
+
+
 def test_a_model_and_training_frames_do_not_go_together(capsys):
     assert main(["replay", "d.mcap", "--model", "m", "--train-gap", "3"]) == 2
     assert (
