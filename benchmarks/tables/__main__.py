@@ -5,8 +5,8 @@ python -m benchmarks.tables --write     writes the tables of both anew
 python -m benchmarks.tables --measure   replays the drives and writes the numbers
 
 A drive comes from the folder named for it; see PRESETS.md for where to get them. ``--measure NAME``
-measures one drive, ``idd``, ``idd_features``, ``idd_filters``, ``synthetic_shadow``, ``elsewhere``
-or ``taught``, and leaves the other numbers as they are.
+measures one drive, ``idd``, ``idd_features``, ``idd_filters``, ``synthetic_shadow``,
+``stage_times``, ``elsewhere`` or ``taught``, and leaves the other numbers as they are.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.tables import idd, idd_filters, synthetic_shadow, taught
+from benchmarks.tables import idd, idd_filters, stage_times, synthetic_shadow, taught
 from benchmarks.tables.drives import DRIVES, SEGNET, MissingSourceError, Sources
 from benchmarks.tables.measure import (
     REPLAYS,
@@ -34,13 +34,16 @@ from roadeval.version import VERSION
 
 IDD, ELSEWHERE, IDD_FEATURES = "idd", "elsewhere", "idd_features"
 TAUGHT = "taught"
-SYNTHETIC = "synthetic_shadow"
 ON_IDD = {
     IDD: idd.measured,
     IDD_FEATURES: idd.without_each_group,
     "idd_filters": idd_filters.measured,
-    SYNTHETIC: synthetic_shadow.measured,
 }
+WITHOUT_FILES = {
+    "synthetic_shadow": synthetic_shadow.measured,
+    "stage_times": stage_times.measured,
+}
+OTHERS = (*ON_IDD, *WITHOUT_FILES, ELSEWHERE, TAUGHT)
 
 
 def main() -> int:
@@ -67,10 +70,13 @@ def _measure(options: argparse.Namespace, work: Path) -> None:
     """Measure what was named, or everything; every result is kept at once."""
     work.mkdir(parents=True, exist_ok=True)
     sources = Sources(work, options.logs, options.camvid, options.comma10k)
-    names = options.measure or [*DRIVES, *([] if options.replays else [*ON_IDD, ELSEWHERE, TAUGHT])]
+    names = options.measure or [*DRIVES, *([] if options.replays else OTHERS)]
     for name in names:
+        if name in WITHOUT_FILES:
+            _keep(rounded(WITHOUT_FILES[name]()), name)
+            continue
         if name in (*ON_IDD, TAUGHT):
-            if options.idd is None and name != SYNTHETIC:
+            if options.idd is None:
                 sys.exit(f"{name}: name the folder idd20k_lite of {idd.SOURCE} (--idd)")
             on_idd = list(taught.measured(sources, options.idd)) if name == TAUGHT else None
             _keep(rounded(on_idd or ON_IDD[name](options.idd, SEEDS)), name)
@@ -111,7 +117,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--measure",
         nargs="*",
-        choices=(names := [*DRIVES, *ON_IDD, ELSEWHERE, TAUGHT]),
+        choices=(names := [*DRIVES, *OTHERS]),
         metavar="NAME",
         help=f"all by default, or some of {', '.join(names)}",
     )

@@ -149,7 +149,8 @@ def _on_robust(numbers: Numbers) -> Iterator[str]:
     yield f"(not with every seed on {_and(close)});" if close else "with every seed;"
     lite = numbers["idd"]
     lost = lite["variants"]["robust"]["not_below_blind"]
-    yield f"it is not on {min(lost)} to {max(lost)} of IDD's {lite['labelled']}."
+    seeds = " to ".join(map(str, sorted({min(lost), max(lost)})))
+    yield f"it is not on {seeds} of IDD's {lite['labelled']}."
     found = {name: numbers["elsewhere"][name] for name in STRANGERS}
     beaten = [
         f"{STRANGERS[name].title} ({_percent(median(each['ERR']))} against "
@@ -158,7 +159,8 @@ def _on_robust(numbers: Numbers) -> Iterator[str]:
         if median(each["ERR"]) >= each["blind"]
     ]
     teacher = DRIVES[TEACHER].title
-    where = f" loses on {_and(beaten)}" if beaten else " is below `blind` on every other drive"
+    all_of = f" is below `blind` on all {len(STRANGERS)} others that were scored with it"
+    where = f" loses on {_and(beaten)}" if beaten else all_of
     yield f"Trained on {teacher} alone it{where}."
 
 
@@ -274,6 +276,46 @@ def against_blind(numbers: Numbers) -> str:
     return _table(["ERR minus `blind`, points", *columns, "`robust`: seeds"], rows)
 
 
+def placement(numbers: Numbers) -> str:
+    """Return ERR of `robust` trained on a drive's first ten frames, and on ten spread along it."""
+    on = REPLAYS["spread"].drives
+    found = {name: numbers["drives"][name] for name in on}
+    return _table(
+        [
+            "`robust`: ERR, %",
+            "frames",
+            "first ten train",
+            "frames",
+            "ten along the drive train",
+        ],
+        (
+            [
+                DRIVES[name].title,
+                str(each["robust"]["frames"]),
+                _spread(_err(numbers, name, "robust", "unfiltered")),
+                str(each["spread"]["frames"]),
+                _spread(_err(numbers, name, "spread", "unfiltered")),
+            ]
+            for name, each in found.items()
+        ),
+    )
+
+
+def times(numbers: Numbers) -> str:
+    """Return what each stage of the presets costs."""
+    return _table(
+        ["640x480, one core", "ms by stage", "together"],
+        (
+            [
+                f"`{preset}`",
+                ", ".join(f"`{stage}` {each:.1f}" for stage, each in stages),
+                f"{sum(each for _, each in stages):.1f}",
+            ]
+            for preset, stages in numbers["stage_times"]
+        ),
+    )
+
+
 def claims_by_drive(numbers: Numbers) -> str:
     """Return the windows of each drive that bear out each claim."""
     head = ["claim", *(drive.title for drive in DRIVES.values())]
@@ -325,7 +367,8 @@ def filter_effects(numbers: Numbers) -> str:
     for chain in idd_filters.CHAINS:
         none = found[chain]["none"]
         rates = [_spread(none[rate]) for rate in ("ERR", "dark_missed")]
-        rows.append([chain, "no filter", rates[0], "", rates[1], "", ""])
+        title = chain if chain == "colours" else f"`{chain}`"
+        rows.append([title, "no filter", rates[0], "", rates[1], "", ""])
         for odds in map("{:g}".format, idd_filters.ODDS):
             seeds = sorted(found[chain][odds], key=lambda each: each["change"]["mean"])
             rates = [_spread([each[rate] for each in seeds]) for rate in ("ERR", "dark_missed")]
@@ -444,13 +487,15 @@ def flicker(numbers: Numbers) -> str:
 
 
 MEASURE: Final = "python -m benchmarks.tables --measure"
-PAPER, GATED, ROBUST = map(command, ("paper", "gated", "robust"))
+PAPER, GATED, ROBUST, SPREAD = map(command, ("paper", "gated", "robust", "spread"))
 BLOCKS: Final = {
     "drives": Block(drives, (MEASURE,)),
     "claims": Block(claims, (PAPER,)),
     "order": Block(order, (PAPER,)),
     "spreads": Block(spreads, (PAPER, GATED, ROBUST)),
     "filters": Block(filters, (PAPER, GATED)),
+    "placement": Block(placement, (ROBUST, SPREAD)),
+    "stage_times": Block(times, (f"{MEASURE} stage_times",)),
     "against_blind": Block(against_blind, (PAPER, GATED, ROBUST)),
     "claims_by_drive": Block(claims_by_drive, (PAPER,)),
     "idd": Block(idd_lite, (f"{MEASURE} idd",)),

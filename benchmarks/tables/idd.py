@@ -1,7 +1,6 @@
 """The presets on drives that they were not trained on: IDD Lite, split by drive.
 
-Half of the drives of its *train* part learn, the other half is scored, then the other way round;
-two frames of each drive.
+Half of the drives of its *train* part learn, the other half is scored, then the other way round.
 """
 
 from __future__ import annotations
@@ -25,8 +24,6 @@ from roadeval.pipeline.stage import View
 from roadeval.training import fit
 
 SOURCE: Final = "https://github.com/Siya26/Semantic-Segmentation-on-IDD_Lite"
-FRAMES: Final = 2
-"""Of each drive, evenly spread."""
 DRAWS: Final = 1000
 """Of the bootstrap over drives."""
 SEEDS_OF_ROBUST: Final = 3
@@ -130,14 +127,11 @@ def told(
 
 
 def read_drives(folder: Path) -> dict[str, list[Frame]]:
-    """Read some frames of each drive, evenly spread."""
-    found = {}
-    for drive in sorted((folder / "leftImg8bit" / "train").iterdir()):
-        paths = sorted(drive.glob("*_image.jpg"))
-        count = min(FRAMES, len(paths))
-        chosen = [paths[i * len(paths) // count] for i in range(count)]
-        found[drive.name] = [read(path, folder) for path in chosen]
-    return found
+    """Read the frames of each drive."""
+    return {
+        drive.name: [read(path, folder) for path in sorted(drive.glob("*_image.jpg"))]
+        for drive in sorted((folder / "leftImg8bit" / "train").iterdir())
+    }
 
 
 def read(path: Path, folder: Path) -> Frame:

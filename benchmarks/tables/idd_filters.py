@@ -26,10 +26,16 @@ ODDS: Final = (0.1, 1.0)
 """Factors of the odds, see `roadeval.pipeline.beyond.shade_candidates.GatedSettings`."""
 CHAINS: Final[Mapping[str, Mapping[str, Any]]] = {
     "colours": {"preset": "gated"},
+    "robust": {
+        "preset": "robust",
+        "chain": ("gated", "exposure", "trees", "post"),
+        "training": {"max_pixels": idd.FEWER_PIXELS},
+    },
 }
-"""The filter before a classifier on colours."""
+"""The filter before a classifier on colours, and before all that `robust` looks at."""
 Frames = NDArray[np.int64]
-"""Outcomes on each frame, ``(drives, FRAMES, 6)``; zeros for a frame that a drive does not have."""
+"""Outcomes on each frame, ``(drives, n, 6)``: n is the most frames that one of them has, and zeros
+stand for a frame that a drive does not have."""
 
 
 def measured(folder: Path, _seeds: int) -> dict[str, Any]:
@@ -59,14 +65,17 @@ def _unfiltered(tables: Mapping[str, Any]) -> RunConfig:
 
 
 def _outcomes(config: RunConfig, seed: int, folds: Sequence[idd.Fold]) -> Frames:
-    return np.concatenate([_by_frame(config, seed, *fold) for fold in folds])
+    most = max(len(frames) for _, test in folds for frames in test.values())
+    return np.concatenate([_by_frame(config, seed, most, *fold) for fold in folds])
 
 
-def _by_frame(config: RunConfig, seed: int, train: idd.Drives, test: idd.Drives) -> Frames:
+def _by_frame(
+    config: RunConfig, seed: int, most: int, train: idd.Drives, test: idd.Drives
+) -> Frames:
     frames = [frame for drive in train.values() for frame in drive]
     model = fit(frames, {"it": config.pipeline}, replace(config.training, seed=seed))
     chain: Chain = config.pipeline.bind(model.parameters["it"])
-    rows = np.zeros((len(test), idd.FRAMES, 6), np.int64)
+    rows = np.zeros((len(test), most, 6), np.int64)
     for drive, row in zip(test.values(), rows, strict=True):
         for index, frame in enumerate(drive):
             row[index] = idd.counts(idd.last(chain, frame), frame)

@@ -61,6 +61,12 @@ REPLAYS: Final[Mapping[str, Replay]] = {
     "robust": Replay(
         {"preset": "robust"}, "--preset robust", seeds=SEEDS_OF_ROBUST, drives=DEVELOPED
     ),
+    "spread": Replay(
+        {"preset": "robust", "training": {"placement": "spread"}},
+        "--preset robust --train-on spread",
+        seeds=SEEDS_OF_ROBUST,
+        drives=DEVELOPED,
+    ),
 }
 
 
@@ -71,12 +77,9 @@ def command(replay: str) -> str:
 
 def replayed(replay: str, drive: Drive, sources: Sources) -> dict[str, Any]:
     """Replay a drive; return what is kept of its summary."""
-    tables = {
-        **REPLAYS[replay].tables,
-        "labels": drive.labels,
-        "training": {"seeds": REPLAYS[replay].seeds},
-        "output": {"record": "none"},
-    }
+    tables = dict(REPLAYS[replay].tables)
+    training = {**tables.get("training", {}), "seeds": REPLAYS[replay].seeds}
+    tables |= {"labels": drive.labels, "training": training, "output": {"record": "none"}}
     outcome = roadeval.replay(
         drive.find(sources, drive.name),
         roadeval.configure(tables),

@@ -5,7 +5,6 @@ As in a replay the first frames train, and the others are scored.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -23,7 +22,7 @@ PRESETS: Final = {"paper": "shadow", "gated": "gated"}
 """Presets, and the stage that is their filter."""
 
 
-def measured(_folder: Path, _seeds: int) -> dict[str, Any]:
+def measured() -> dict[str, Any]:
     """Return precision and recall of each filter on each drive, pooled over its frames."""
     found: dict[str, Any] = {}
     for seed in SEEDS:
