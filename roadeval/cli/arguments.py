@@ -134,15 +134,14 @@ def _from_file(given: Given) -> RunConfig:
 
 
 def _variant(name: str, path: str | None) -> Variant:
-    """Read a variant from its file, or from a preset; of neither it is the preset of its name."""
+    """Return the variant of a file or of a preset; with neither, of the preset of its name."""
     from roadeval.config import PRESETS, Variant, read_tables
 
-    if path is not None and path in PRESETS:
-        return Variant.of(name, {"preset": path}, path)
-    if path is not None:
+    preset = name if path is None else path
+    if path is not None and preset not in PRESETS and (Path(path).suffix or Path(path).exists()):
         return Variant.of(name, read_tables(path), path)
     with usage():
-        return Variant.of(name, {"preset": name}, f"{FLAGS['variants']} {name} names no file")
+        return Variant.of(name, {"preset": preset}, f"{FLAGS['variants']} {name} names no file")
 
 
 def _network(name: str, path: str) -> Variant:

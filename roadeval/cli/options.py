@@ -43,7 +43,7 @@ OPTIONS: Final = (
     Option(
         "variants",
         ("--variant",),
-        "NAME=FILE.toml|PRESET",
+        "NAME=FILE.toml|NAME=PRESET|PRESET",
         "One more variant beside filtered and unfiltered: of a file, or a preset by its name. "
         "Repeatable.",
         list[str],

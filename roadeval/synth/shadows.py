@@ -82,9 +82,10 @@ class Silhouettes:
             leaves[row, column] = 255
 
     def add_rods(self, feet: Matrix, tips: Matrix, radii: Matrix) -> None:
-        """Add straight trunks, branches or poles: ``(n, 3)`` ends and ``(n,)`` radii, metres.
+        """Add straight trunks, branches or poles.
 
-        Each is cut into pieces of half a metre, which lie in their own layers.
+        ``feet`` and ``tips`` are ``(n, 3)``, ``radii`` ``(n,)``, all in metres. Each is cut into
+        pieces of half a metre at most, and a piece is drawn into the layer of its mean height.
         """
         ways = tips - feet
         pieces = np.ceil(np.linalg.norm(ways, axis=1) / 0.5).astype(int).clip(1)

@@ -50,8 +50,6 @@ class Standing:
         """Stand in the sun's way."""
         silhouettes.add_leaves(foot + scale * self.leaves)
         if self.rods:
-            feet, tips = (
-                foot + scale * np.stack(ends)
-                for ends in zip(*((rod.foot, rod.tip) for rod in self.rods), strict=True)
-            )
+            feet = foot + scale * np.stack([rod.foot for rod in self.rods])
+            tips = foot + scale * np.stack([rod.tip for rod in self.rods])
             silhouettes.add_rods(feet, tips, scale * np.array([rod.radius for rod in self.rods]))

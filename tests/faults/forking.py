@@ -6,6 +6,7 @@ take longer than the runs. Here is one thread only, too.
 
 from __future__ import annotations
 
+import os
 import pickle
 import subprocess
 import sys
@@ -46,16 +47,19 @@ class Forks:
 
 def serve() -> None:
     """Run what is asked for on the standard input, until that ends."""
+    # What a run prints is no answer.
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     with tempfile.TemporaryDirectory() as folder:
-        # What a run imports is imported once, and not by every fork: that would be steps of its.
+        # Import here what a run needs: in a fork the imports would count as its steps.
         making.run(Path(folder), "first")
     while True:
         try:
             work, hook = pickle.load(sys.stdin.buffer)
         except EOFError:
             return
-        pickle.dump(steps.run(work, hook), sys.stdout.buffer)
-        sys.stdout.buffer.flush()
+        pickle.dump(steps.run(work, hook), answers)
+        answers.flush()
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from roadeval.report.figures.layout import (
     LETTERS,
     LINE,
     NAMES,
+    SMALL,
     TICKED,
     fitting,
     name_columns,
@@ -43,7 +44,7 @@ MAPS_SHARE: Final = 0.62
 PER_ROW: Final = 3
 """Rates that are drawn beside each other."""
 STAGES: Final = 140
-"""Points that are there at least for the names of the stages below one of them."""
+"""Points across the names of the stages below one chart of rates, about."""
 BARS: Final = 400
 """More frames than this are drawn as means of neighbours."""
 LEAST: Final = 0.1
@@ -196,8 +197,8 @@ def heatmap(maps: Sequence[ErrorHeatmap], among: Sequence[ErrorHeatmap] | None =
         bar.set_label("% of the frames")
         bar.outline.set_visible(False)
     for ax, each in zip(grid[:, 0], maps, strict=True):
-        room = INCH * figure.get_figheight() * ax.get_position().height - EDGE
-        ax.set_ylabel(fitting(each.variant, room, LETTERS))
+        room = INCH * figure.get_figheight() * ax.get_position().height
+        ax.set_ylabel(fitting(each.variant, room), size=SMALL)
     return figure
 
 

@@ -15,6 +15,7 @@ from roadeval.report.figures.figure import (
     FigureSpec,
     variants_of,
 )
+from roadeval.report.figures.layout import INCH, LETTERS, SMALL, fitting, width_of
 from roadeval.report.figures.style import FAINT, INK, heading
 from roadeval.report.images import faded, shrink
 
@@ -44,20 +45,24 @@ def road_masks(data: FigureData) -> Figure | None:
     rows = [_pictures(example, names, truth=truth) for example in data.examples]
     height, width = rows[0]["camera image"].shape[:2]
     across = (WIDTH - LEFT) / len(rows[0])
-    down = across * height / width
+    down = (across - GAP) * height / width + GAP
     total = TOP + down * len(rows) + GAP
     figure = Figure(figsize=(WIDTH, total))
     heading(figure, f"Road masks on {data.drive}", _legend(data.examples))
     for number, (example, pictures) in enumerate(zip(data.examples, rows, strict=True)):
         top, bottom = (1 - (TOP + at) / total for at in (number * down, (number + 1) * down - GAP))
-        _name_row(figure, example.frame, (top + bottom) / 2)
+        name = f"frame {example.frame}"
+        if width_of(name) > INCH * (down - GAP):
+            name = str(example.frame)
+        _name_row(figure, name, (top + bottom) / 2)
         for column, (title, picture) in enumerate(pictures.items()):
             left, right = (
                 (LEFT + at) / WIDTH for at in (column * across, (column + 1) * across - GAP)
             )
             Picture(figure, picture, Bbox.from_extents(left, bottom, right, top))
             if number == 0:
-                _name_column(figure, title, (left + right) / 2, top)
+                name = fitting(title, INCH * (across - GAP), LETTERS)
+                _name_column(figure, name, (left + right) / 2, top)
     return figure
 
 
@@ -87,14 +92,14 @@ def _legend(examples: Sequence[ExampleFrame]) -> str:
     )
 
 
-def _name_row(figure: Figure, frame: int, middle: float) -> None:
-    """Write a frame's number beside its row, whose middle is a share of the figure's height."""
+def _name_row(figure: Figure, name: str, middle: float) -> None:
+    """Write a frame's name beside its row, whose middle is a share of the figure's height."""
     figure.text(
-        *((LEFT - GAP) / WIDTH, middle, f"frame {frame}"),
+        *((LEFT - GAP) / WIDTH, middle, name),
         rotation=90,
         ha="right",
         va="center",
-        size=8,
+        size=SMALL,
         color=FAINT,
     )
 
@@ -102,7 +107,7 @@ def _name_row(figure: Figure, frame: int, middle: float) -> None:
 def _name_column(figure: Figure, title: str, middle: float, top: float) -> None:
     """Write a title above a column, whose middle and top are shares of the figure."""
     above = GAP / figure.get_figheight()
-    figure.text(middle, top + above, title, size=9, color=INK, ha="center", va="bottom")
+    figure.text(middle, top + above, title, size=LETTERS, color=INK, ha="center", va="bottom")
 
 
 def _overlay(image: Rgb, labels: Mask | Truth | None) -> Rgb:

@@ -11,8 +11,8 @@ import numpy as np
 from roadeval.data import colours
 from roadeval.data.words import DASH, points
 from roadeval.report.figures.charts import LEAST, WIDTH
+from roadeval.report.figures.layout import short
 from roadeval.report.figures.style import FAINT, INK, PALE
-from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -144,7 +144,7 @@ def _drives(ax: Axes, rows: Sequence[ForestRow]) -> None:
         ax.plot(means[own], places[own], "o", color=colour, markersize=size, zorder=3, mew=0)
     if named:
         size = 7 if len(rows) <= 40 else 6
-        ax.set_yticks(places, [_short(row.name) for row in rows], size=size)
+        ax.set_yticks(places, [short(row.name, LONGEST) for row in rows], size=size)
         _groups(ax, rows, size)
         return
     ax.set_yticks([])
@@ -163,7 +163,7 @@ def _groups(ax: Axes, rows: Sequence[ForestRow], size: float) -> None:
     for place, row in enumerate(rows):
         if row.group:
             ax.annotate(
-                _short(row.group, 20),
+                short(row.group, 20),
                 (1, place),
                 xycoords=("axes fraction", "data"),
                 xytext=(4, 0),
@@ -197,7 +197,7 @@ def _extremes(ax: Axes, rows: Sequence[ForestRow]) -> None:
 
 
 def _told(row: ForestRow) -> str:
-    return f"{_short(row.name)} {points(row.mean)}"
+    return f"{short(row.name, LONGEST)} {points(row.mean)}"
 
 
 def _summary(ax: Axes, mean: ForestMean, top: float, scale: float) -> None:
@@ -224,12 +224,3 @@ def _summary(ax: Axes, mean: ForestMean, top: float, scale: float) -> None:
     ax.set_yticks([*ticks[0], *places], [*ticks[1], *words], size=size)
     for label in ax.get_yticklabels()[-2:]:
         label.set_fontweight("bold")
-
-
-def _short(name: str, longest: int = LONGEST) -> str:
-    """Return a name, its middle left out where it is long: both ends tell drives apart."""
-    name = visible(name)
-    if len(name) <= longest:
-        return name
-    half = (longest - 1) // 2
-    return f"{name[:half]}\N{HORIZONTAL ELLIPSIS}{name[-half:]}"

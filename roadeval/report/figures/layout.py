@@ -36,7 +36,7 @@ TICKED: Final = TICKS + SMALL + 5
 BELOW: Final = TICKED + LINE
 """Points below axes with labelled ticks and a label."""
 AXES: Final = 0.7
-"""Share of a column's width that its axes take at least, nearly always."""
+"""Share of a column's width that its axes have, about: with it labels beyond them are measured."""
 NAMES: Final = 0.4
 """Share of a figure's width that names at its left take, at most."""
 TILT: Final = 45
@@ -100,8 +100,9 @@ def place(
     ends = [_beyond(ax, AXES * width / grid.ncols) for ax in axes]
     before, after = (max(each) for each in zip(*ends, strict=True))
     across = max([before + after, *(room for first, room in beside if not first)])
+    left = max(left, EDGE + before)
     figure.subplots_adjust(
-        left=max(left, EDGE + before) / width,
+        left=left / width,
         right=1 - (EDGE + after) / width,
         wspace=_share(2 * EDGE + across, width - left - EDGE - after, grid.ncols),
     )
@@ -135,12 +136,7 @@ def _left_of(ax: Axes) -> float:
     label = LINE if ax.get_ylabel() else 0
     if not ax.yaxis.get_tick_params().get("labelleft", True):
         return label
-    return label + max((TICKS + width_of(text) for text in _tick_texts(ax.yaxis)), default=0)
-
-
-def _tick_texts(axis: Axis) -> list[str]:
-    """Return the labels of an axis's ticks."""
-    return [text for _, text in _ticks(axis)]
+    return label + max((TICKS + width_of(text) for _, text in _ticks(ax.yaxis)), default=0)
 
 
 def _ticks(axis: Axis) -> list[tuple[float, str]]:
@@ -153,8 +149,9 @@ def _ticks(axis: Axis) -> list[tuple[float, str]]:
 
 
 def _beyond(ax: Axes, width: float) -> tuple[float, float]:
-    """Return how far labels reach beyond either end of axes that are so wide, all in points."""
-    turned = np.deg2rad(ax.xaxis.get_major_ticks()[0].label1.get_rotation())
+    """Return how far labels reach beyond either end of axes of a width, all in points."""
+    marks = ax.xaxis.get_major_ticks()
+    turned = np.deg2rad(marks[0].label1.get_rotation()) if marks else 0.0
     before = after = 0.0
     for at, text in _ticks(ax.xaxis):
         # One that is turned ends at its tick.

@@ -13,13 +13,15 @@ from roadeval.report.figures.layout import EDGE, INCH, LETTERS, fitting, width_o
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LINE: Final = 15
+ROW: Final = 15
 """Points from one line of a legend to the next."""
+PAD: Final = 0.8
+"""Letters from a legend's line to its label."""
 
 
 @dataclass(frozen=True, slots=True)
 class LegendStyle:
-    """How a legend is set: the lengths of its lines and the distances of its columns, in letters.
+    """The length of a legend's lines, and the distance of its columns, in letters.
 
     ``columns`` is how many there are at most.
     """
@@ -33,6 +35,7 @@ class LegendStyle:
         return {
             "ncols": self._columns(labels, room),
             "handlelength": self.handlelength,
+            "handletextpad": PAD,
             "columnspacing": self.columnspacing,
         }
 
@@ -47,7 +50,7 @@ class LegendStyle:
     @property
     def _handle(self) -> float:
         """Points from the beginning of a line to its label."""
-        return LETTERS * (self.handlelength + 0.8)
+        return LETTERS * (self.handlelength + PAD)
 
     def _columns(self, labels: Sequence[str], room: float) -> int:
         """Return the greatest number of columns that have room beside each other."""
@@ -59,11 +62,16 @@ class LegendStyle:
         return 1
 
 
+def room_in(width: float) -> float:
+    """Return the points that a legend has in a figure of so many inches."""
+    return INCH * width - 4 * EDGE
+
+
 def legend(
     figure: Figure, handles: Sequence[Any], labels: Sequence[str], style: LegendStyle
 ) -> float:
     """Write a legend along the figure's top, in as many lines as it takes; return its points."""
-    room = INCH * figure.get_figwidth() - 3 * EDGE
+    room = room_in(figure.get_figwidth())
     labels = style.short(labels, room)
     figure.legend(
         handles,
@@ -74,4 +82,4 @@ def legend(
         borderpad=EDGE / LETTERS,
         **style.arguments(labels, room),
     )
-    return EDGE + LINE * style.lines(labels, room)
+    return EDGE + ROW * style.lines(labels, room)

@@ -10,8 +10,7 @@ import numpy as np
 from roadeval.data.words import listing
 from roadeval.evaluation.analysis import finals
 from roadeval.evaluation.metrics import METRICS
-from roadeval.report.figures.layout import EDGE, INCH
-from roadeval.report.figures.legend import LegendStyle
+from roadeval.report.figures.legend import LegendStyle, room_in
 from roadeval.report.figures.style import Look, heading, looks
 
 if TYPE_CHECKING:
@@ -27,8 +26,7 @@ MARKED: Final = 25
 """Up to this many points each has its marker; beyond, about as many do."""
 WIDTH: Final = 8
 """Inches across the figure."""
-ROOM: Final = WIDTH * INCH - 4 * EDGE
-"""Points across its legend."""
+ROOM: Final = room_in(WIDTH)
 LEGEND: Final = LegendStyle(columns=3, handlelength=3.4)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, colours
+from roadeval.report.figures.layout import LETTERS, SMALL
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
@@ -14,9 +15,9 @@ if TYPE_CHECKING:
 
 RC: Final[dict[str, Any]] = {
     "font.family": "DejaVu Sans",
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.labelsize": 9,
+    "font.size": LETTERS,
+    "axes.titlesize": LETTERS,
+    "axes.labelsize": LETTERS,
     "axes.edgecolor": "#666666",
     "axes.labelcolor": "#333333",
     "axes.spines.top": False,
@@ -28,10 +29,10 @@ RC: Final[dict[str, Any]] = {
     "axes.axisbelow": True,
     "xtick.color": "#333333",
     "ytick.color": "#333333",
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
     "legend.frameon": False,
-    "legend.fontsize": 9,
+    "legend.fontsize": LETTERS,
     "svg.fonttype": "none",
     "svg.hashsalt": "roadeval",
     "text.parse_math": False,  # a dollar in a name is no formula

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from roadeval.report.figures.figure import FigureData, FigureSpec
-from roadeval.report.figures.layout import EDGE, INCH
-from roadeval.report.figures.legend import LINE, LegendStyle
+from roadeval.report.figures.layout import INCH
+from roadeval.report.figures.legend import ROW, LegendStyle, room_in
 from roadeval.report.figures.style import FAINT, Look, heading
 from roadeval.report.figures.threshold_values import (
     MOST,
@@ -32,8 +32,7 @@ HIGH: Final = 0.54 * HEIGHT
 """Inches above the axes, and from their top to their bottom."""
 LINES: Final = 3
 LEGEND: Final = LegendStyle(columns=4, handlelength=2.0)
-ROOM: Final = WIDTH * INCH - 4 * EDGE
-"""Points across the legend."""
+ROOM: Final = room_in(WIDTH)
 
 
 def curves(data: FigureData) -> Figure | None:
@@ -45,7 +44,7 @@ def curves(data: FigureData) -> Figure | None:
         return None
     drawn, masks = variants_in(found), masks_in(found)
     labels = LEGEND.short([drawn[name].label for name in masks], ROOM)
-    height = HEIGHT + LINE / INCH * max(LEGEND.lines(labels, ROOM) - LINES, 0)
+    height = HEIGHT + ROW / INCH * max(LEGEND.lines(labels, ROOM) - LINES, 0)
     figure = Figure(figsize=(WIDTH, height))
     heading(figure, f"Over thresholds on {data.drive}", "Marks: the masks at their own thresholds")
     axes = figure.subplots(1, 3)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 from roadeval.data.words import percent
 from roadeval.report.blocks import Block, Cell, Heading, ImageGrid, Table, Text
+from roadeval.report.figures.layout import short
 from roadeval.report.fleet.findings import FleetFindings, WorstFrame
 
 ACROSS = 4
@@ -56,9 +57,7 @@ def commands_table(findings: FleetFindings, inspect: Callable[[int], str]) -> Ta
 
 
 def _caption(findings: FleetFindings, frame: WorstFrame) -> str:
-    name = findings.names[frame.drive]
-    if len(name) > LONGEST:
-        name = f"{name[: LONGEST // 2]}\N{HORIZONTAL ELLIPSIS}{name[1 - LONGEST // 2 :]}"
+    name = short(findings.names[frame.drive], LONGEST)
     return f"{frame.rank}. {name}, frame {frame.frame}: ERR {percent(frame.rates['ERR'], 1)} %"
 
 

@@ -70,8 +70,8 @@ x from -2.24 to 4.24: \N{MINUS SIGN}3 | \N{MINUS SIGN}2 | \N{MINUS SIGN}1 | 0 | 
 x grid: color #b0b0b0, linestyle -, linewidth 0.8, markerfacecolor #b0b0b0
 y from 3.7 to -0.7: drive_0001 | drive_0000 | mean over drives | a new drive
 box 0 1.5 1 2.2: facecolor #e3e3e373, linestyle solid, linewidth 0.0
-text 'a group o\N{HORIZONTAL ELLIPSIS}y letters' at 4 0, size 7
-text 'a group o\N{HORIZONTAL ELLIPSIS}y letters' at 4 0, size 7
+text 'a group of\N{HORIZONTAL ELLIPSIS}y letters' at 4 0, size 7
+text 'a group of\N{HORIZONTAL ELLIPSIS}y letters' at 4 0, size 7
 text 'better' at 0 1, size 8
 text 'worse' at 1 1, size 8"""
 

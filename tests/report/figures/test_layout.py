@@ -13,8 +13,9 @@ from roadeval.evaluation.comparison_result import MaskComparison
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.uncertainty import Difference
 from roadeval.report.figures import charts, layout
+from roadeval.report.figures.fig2_masks import road_masks
 from roadeval.report.figures.fig3b_fp_fn_rate import fp_fn_rate
-from roadeval.report.figures.figure import FigureData
+from roadeval.report.figures.figure import ExampleFrame, FigureData
 from roadeval.report.figures.legend import LegendStyle
 from roadeval.report.figures.style import RC
 from roadeval.report.figures.thresholds import curves
@@ -65,8 +66,12 @@ def assert_readable(figure):
         assert inside.containsy(box.y0), text
         assert inside.containsy(box.y1), text
     for (one, here), (other, there) in combinations(found, 2):
-        # The boxes of turned names overlap, the letters do not.
-        if one.get_rotation() != layout.TILT or other.get_rotation() != layout.TILT:
+        turned = one.get_rotation() == other.get_rotation() == layout.TILT
+        if turned and here.overlaps(there):
+            # Boxes of turned names do; their lines of text are this far from each other.
+            apart = abs(here.x1 - there.x1) * np.sin(np.deg2rad(layout.TILT))
+            assert apart >= layout.SMALL * figure.dpi / layout.INCH, (one, other)
+        else:
             assert not here.overlaps(there), (one, other)
     for legend, ax in ((each, ax) for each in figure.legends for ax in figure.axes):
         assert not legend.get_window_extent().overlaps(ax.get_window_extent())
@@ -177,6 +182,17 @@ def test_the_legend_of_the_curves_over_thresholds_is_readable(variants):
     (mask,) = found.totals["blind"].values()
     totals = {name: {"post": mask} for name in variants}
     assert_readable(curves(FigureData("drive", pd.DataFrame(), (), replace(found, totals=totals))))
+
+
+@pytest.mark.parametrize("variants", VARIANTS)
+@pytest.mark.parametrize("size", [(48, 64), (20, 64), (64, 36)])
+def test_the_pictures_of_figure_2_have_names_and_the_shape_of_the_image(variants, size):
+    image, mask = np.full((*size, 3), 90, np.uint8), np.ones(size, np.uint8)
+    example = ExampleFrame(999, image, mask, dict.fromkeys(variants, mask))
+    figure = road_masks(FigureData("drive", pd.DataFrame(), [example]))
+    assert_readable(figure)
+    for picture in figure.artists:
+        assert picture.box.height / picture.box.width == pytest.approx(size[0] / size[1])
 
 
 def test_a_width_is_that_of_the_letters():
