@@ -98,9 +98,9 @@ def test_classes_weigh_what_the_frames_have_of_them():
 
 
 def test_less_road_in_the_frames_makes_road_less_probable(sample):
-    view = View.of(picture(9, seed=99)[0])
+    view, place = View.of(picture(9, seed=99)[0]), replace(SMALL, features=("place",))
     few, many = (
-        trees.bind(SMALL, trees.fit(replace(sample, share=share), SMALL))(view).probability
+        trees.bind(place, trees.fit(replace(sample, share=share), place))(view).probability
         for share in (0.05, 0.95)
     )
     assert few.mean() < many.mean()
