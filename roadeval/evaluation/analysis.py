@@ -6,6 +6,7 @@ that was killed is understood as well as a complete one.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from roadeval.data import Counts
@@ -15,6 +16,23 @@ from roadeval.evaluation.regions import partitions
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+def merged(chains: Iterable[Iterable[str]]) -> list[str]:
+    """Return the names of several chains in one order, which is that of each chain where it can be.
+
+    >>> merged([("similarity", "svm", "post"), ("trees", "post")])
+    ['similarity', 'svm', 'trees', 'post']
+    """
+    names: list[str] = []
+    for chain in chains:
+        place = len(names)
+        for name in reversed(list(chain)):
+            if name in names:
+                place = names.index(name)
+            else:
+                names.insert(place, name)
+    return names
 
 
 def finals(frames: pd.DataFrame) -> pd.DataFrame:

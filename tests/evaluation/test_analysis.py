@@ -32,3 +32,17 @@ def test_a_region_tells_its_share_of_the_pixels_and_of_the_errors():
     assert found["pixels"].tolist() == pytest.approx([0.1, 0.9, 0.0])
     assert found["errors"].tolist() == pytest.approx([0.5, 0.5, 0.0])
     assert pd.isna(found.loc["shadow", "ERR"])
+
+
+@pytest.mark.parametrize(
+    ("chains", "order"),
+    [
+        ([("svm", "post"), ("trees", "post")], ["svm", "trees", "post"]),
+        ([("net", "post"), ("svm", "post", "smooth")], ["net", "svm", "post", "smooth"]),
+        ([("svm",), ("net",)], ["svm", "net"]),
+        ([("a", "b"), ("b", "a")], ["a", "b"]),
+        ([], []),
+    ],
+)
+def test_stages_of_several_chains_stand_in_the_order_of_each(chains, order):
+    assert analysis.merged(chains) == order

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, colours
+from roadeval.data import BASELINE
 from roadeval.data.words import in_percent
+from roadeval.evaluation.analysis import merged
 from roadeval.evaluation.metrics import SHORT
 from roadeval.report.figures.layout import (
     BELOW,
@@ -17,17 +18,14 @@ from roadeval.report.figures.layout import (
     LETTERS,
     LINE,
     NAMES,
-    SMALL,
     TICKED,
     fitting,
     name_columns,
     place,
-    place_maps,
     place_rows,
 )
 from roadeval.report.figures.legend import LegendStyle, legend
 from roadeval.report.figures.style import FAINT, INK, PALE, Look, looks
-from roadeval.report.figures.values import tops_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,12 +33,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from roadeval.evaluation.comparison_result import MaskComparison
-    from roadeval.report.findings import ErrorHeatmap, Totals
+    from roadeval.report.findings import Totals
 
 WIDTH: Final = 7.4
 """Inches across a chart; a page's text is 6.7 wide, so letters come out a little smaller."""
-MAPS_SHARE: Final = 0.62
-"""Share of the page's width that `heatmap` is drawn for, so that its letters keep their size."""
 PER_ROW: Final = 3
 """Rates that are drawn beside each other."""
 STAGES: Final = 140
@@ -83,6 +79,8 @@ def difference(frames: pd.DataFrame, treated: str, control: str, mean: Mapping[s
     _frame_ticks(ax, frames.index.to_numpy())
     ax.set_ylabel("difference of ERR, pp")
     ax.margins(y=0.12)
+    low, high = ax.get_ylim()
+    ax.set_ylim(min(low, -LEAST), max(high, LEAST))
     for height, align, word in ((0.98, "top", "worse"), (0.02, "bottom", "better")):
         ax.text(
             *(0.006, height, f"{treated} {word}"),
@@ -141,7 +139,7 @@ def regions(table: pd.DataFrame, variants: Sequence[str], titles: Mapping[str, s
 def stages(totals: Totals) -> Figure:
     """Draw the rates of each stage's mask, a line a variant."""
     figure, grid = _rate_axes()
-    names = list(dict.fromkeys(s for v, own in totals.items() for s in own if v != BASELINE))
+    names = merged(own for variant, own in totals.items() if variant != BASELINE)
     below = 0.0
     for rate, ax in grid.items():
         _stage_lines(ax, totals, names, rate)
@@ -164,42 +162,6 @@ def _stage_lines(ax: Axes, totals: Totals, names: Sequence[str], rate: str) -> N
             places = np.array([names.index(stage) for stage in totals[variant]])
             ax.plot(places, values, **look.line)
             _marks(ax, places, values, look)
-
-
-def heatmap(maps: Sequence[ErrorHeatmap], among: Sequence[ErrorHeatmap] | None = None) -> Figure:
-    """Draw where false positives and false negatives are, a row a variant.
-
-    Equal shades are equal shares in all maps ``among`` which these are; by default these alone.
-    """
-    from matplotlib.colors import LinearSegmentedColormap
-    from matplotlib.figure import Figure
-
-    height, width = maps[0].fp.shape
-    figure = Figure(figsize=(MAPS_SHARE * WIDTH, 3))
-    grid = figure.subplots(len(maps), 2, squeeze=False)
-    bars = place_maps(figure, len(maps), height / width)
-    columns = (
-        ("FP: non-road called road", colours.FP, [each.fp for each in maps]),
-        ("FN: road missed", colours.FN, [each.fn for each in maps]),
-    )
-    tops = tops_of(among or maps)
-    for axes, cax, (title, colour, shares), top in zip(grid.T, bars, columns, tops, strict=True):
-        shades = ["white", colours.hex_of(colour), colours.hex_of(colours.MOST_ERRORS)]
-        bad = colours.hex_of(colours.NEVER_LABELLED)
-        palette = LinearSegmentedColormap.from_list("", shades).with_extremes(bad=bad)
-        for ax, share in zip(axes, shares, strict=True):
-            drawn = ax.imshow(100 * share, cmap=palette, vmin=0, vmax=100 * top, aspect="auto")
-            ax.set_xticks([])
-            ax.set_yticks([])
-            ax.spines[:].set_visible(True)
-        axes[0].set_title(title, loc="left", y=1)
-        bar = figure.colorbar(drawn, cax=cax, orientation="horizontal")
-        bar.set_label("% of the frames")
-        bar.outline.set_visible(False)
-    for ax, each in zip(grid[:, 0], maps, strict=True):
-        room = INCH * figure.get_figheight() * ax.get_position().height
-        ax.set_ylabel(fitting(each.variant, room), size=SMALL)
-    return figure
 
 
 def coverage(table: pd.DataFrame) -> Figure:

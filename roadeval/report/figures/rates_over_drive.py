@@ -27,6 +27,8 @@ MARKED: Final = 25
 WIDTH: Final = 8
 """Inches across the figure."""
 ROOM: Final = room_in(WIDTH)
+LINE: Final = 0.2
+"""Inches from one line of the legend to the next."""
 LEGEND: Final = LegendStyle(columns=3, handlelength=3.4)
 
 
@@ -44,7 +46,7 @@ def rates_over_drive(
     rates
         Columns of ``windows``, each with the title of its axis.
     height
-        Of the figure, in inches.
+        Of the figure with one line of legend, in inches.
     """
     from matplotlib.figure import Figure
 
@@ -62,8 +64,7 @@ def rates_over_drive(
         short = f"; the last row, drawn pale, holds {rest}"
     names = [look.label for look in looks(list(dict.fromkeys(final["variant"]))).values()]
     lines = LEGEND.lines(LEGEND.short(names, ROOM), ROOM)
-    # Long names take more lines than there are planned for.
-    height += 0.2 * (lines - -(-len(names) // LEGEND.columns))
+    height += LINE * (lines - 1)
     figure = Figure(figsize=(WIDTH, height))
     heading(figure, title, _subtitle(final, rows, group, rates))
     axes = figure.subplots(len(rates), 1, sharex=True, squeeze=False)[:, 0]
@@ -72,7 +73,7 @@ def rates_over_drive(
         ax.set_ylabel(name)
     _label_rows(axes[-1], rows, short)
     _legend(figure, axes[0])
-    top = 1 - (0.66 + 0.2 * lines) / height
+    top = 1 - (0.66 + LINE * lines) / height
     figure.subplots_adjust(left=0.11, right=0.985, bottom=0.55 / height, top=top, hspace=0.13)
     figure.align_ylabels(axes)
     return figure

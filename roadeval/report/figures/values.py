@@ -9,7 +9,7 @@ import numpy as np
 
 from roadeval.data import BASELINE, colours
 from roadeval.data.words import in_percent
-from roadeval.evaluation.analysis import finals
+from roadeval.evaluation.analysis import finals, merged
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.report.chart import Chart, ChartKind, HeatMap, Level, Series, thinned
 from roadeval.report.figures.style import Look, looks
@@ -98,7 +98,7 @@ def coverage(table: pd.DataFrame) -> Chart:
 
 def stages(totals: Totals) -> list[Chart]:
     """Return a chart a rate: each stage's mask, a line a variant."""
-    names = list(dict.fromkeys(s for v, own in totals.items() for s in own if v != BASELINE))
+    names = merged(own for variant, own in totals.items() if variant != BASELINE)
     return [
         Chart(
             f"{rate}: {metric.in_words}",

@@ -25,6 +25,9 @@ from roadeval.report.sections.common import rate_cells, variant_cell
 LARGE: Final = 420
 SMALL: Final = 200
 """Pixels across the pictures of outcomes and of layers."""
+LEAST: Final = 4
+MOST: Final = 5
+"""Pictures of outcomes that have room beside each other, at least and at most."""
 
 NO_COMMAND: Final = (
     "No command opens them in the viewer, for the recording of this run is not where it was "
@@ -77,7 +80,9 @@ def _frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
     sentences = [Text(sentence, "note") for sentence in _sentences(frame)]
     yield TwoColumns([Text(f"Frame {frame.frame}", "title"), *sentences], [rates], 0.55)
     if frame.images:
-        yield ImageGrid([(image.title, jpeg(image, LARGE)) for image in frame.images], 4)
+        pictures = [(image.title, jpeg(image, LARGE)) for image in frame.images]
+        lines = -(-len(pictures) // MOST)
+        yield ImageGrid(pictures, max(LEAST, -(-len(pictures) // lines)))
     columns = max((len(row) for row in frame.layers), default=0)
     for row in frame.layers:
         pictures = [(image.title, jpeg(image, SMALL)) for image in row]

@@ -10,9 +10,9 @@ from roadeval.data.words import percent
 from roadeval.evaluation.regions import partitions, titles
 from roadeval.report.blocks import Block, Figure, Heading, Table, Text
 from roadeval.report.figures import values
-from roadeval.report.figures.charts import MAPS_SHARE, heatmap
 from roadeval.report.figures.charts import regions as chart
 from roadeval.report.figures.files import svg
+from roadeval.report.figures.heatmaps import MAPS_SHARE, heatmap
 from roadeval.report.findings import Findings
 from roadeval.report.sections.common import SIDE_BY_SIDE, sampled_frames
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import DASH, number, percent, points
+from roadeval.evaluation.analysis import merged
 from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
 from roadeval.evaluation.scored import FILTER
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
@@ -71,7 +72,7 @@ def stages_table(findings: Findings) -> Table:
 
 def _parts_table(findings: Findings) -> Table:
     """Tabulate the mean ERR of each final mask as a sum over its stages."""
-    columns = list(dict.fromkeys(part for parts in findings.error_parts.values() for part in parts))
+    columns = merged(findings.error_parts.values())
     return Table(
         ["final mask", *columns, "ERR"],
         [

@@ -12,6 +12,7 @@ from roadeval.evaluation.comparison_result import MaskComparison
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.uncertainty import Difference
 from roadeval.report.figures import charts, values
+from roadeval.report.figures.heatmaps import heatmap
 from roadeval.report.findings import ErrorHeatmap
 
 FILTERED, UNFILTERED = (colours.hex_of(c).lower() for c in (colours.FILTERED, colours.UNFILTERED))
@@ -79,7 +80,7 @@ def test_a_fourth_rate_stands_in_a_row_of_its_own_and_need_not_begin_at_zero(mon
 
 def test_false_positives_are_left_and_false_negatives_right_in_their_colours():
     heat = ErrorHeatmap("filtered", np.array([[0.1, np.nan]]), np.array([[0.2, 0.4]]))
-    left, right, *_ = charts.heatmap([heat]).axes
+    left, right, *_ = heatmap([heat]).axes
     for ax, share, colour in ((left, heat.fp, colours.FP), (right, heat.fn, colours.FN)):
         (image,) = ax.images
         np.testing.assert_allclose(np.ma.filled(image.get_array(), np.nan), 100 * share)
@@ -91,7 +92,7 @@ def test_equal_shades_are_equal_shares_in_every_map_of_a_report_and_of_a_page():
     low, high = (
         ErrorHeatmap(n, np.array([[e]]), np.array([[e]])) for n, e in (("a", 0.1), ("b", 0.4))
     )
-    left, *_ = charts.heatmap([low], [low, high]).axes
+    left, *_ = heatmap([low], [low, high]).axes
     assert left.images[0].get_clim() == pytest.approx((0, 40))
     maps = [*values.heat([low], [low, high])]
     assert [each.title for each in maps] == ["FP of a", "FN of a"]
@@ -129,3 +130,20 @@ def test_each_result_has_a_line_of_its_own_from_top_to_bottom():
     first = charts.levels(rows).axes[0]
     assert first.get_ylim() == (1.5, -0.5)
     assert [label.get_text() for label in first.get_yticklabels()] == ["old", "new"]
+
+
+def test_a_filter_without_effect_has_an_axis_with_numbers_that_differ():
+    table, none = pd.DataFrame({"ERR": np.zeros(12)}), dict.fromkeys(("mean", "low", "high"), 0.0)
+    (ax,) = charts.difference(table, "filtered", "unfiltered", none).axes
+    assert ax.get_ylim() == (-charts.LEAST, charts.LEAST)
+    names = [label.get_text() for label in ax.get_yticklabels()]
+    assert len(set(names)) == len(names)
+
+
+def test_stages_of_variants_stand_in_the_order_of_their_chains():
+    rates = dict.fromkeys(SHORT, 0.1)
+    chains = {"filtered": ("svm", "post"), "robust": ("trees", "post")}
+    totals = {variant: dict.fromkeys(chain, rates) for variant, chain in chains.items()}
+    names = [label.get_text() for label in charts.stages(totals).axes[0].get_xticklabels()]
+    assert names == ["svm", "trees", "post"]
+    assert values.stages(totals)[0].names == names

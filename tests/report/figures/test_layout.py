@@ -16,6 +16,7 @@ from roadeval.report.figures import charts, layout
 from roadeval.report.figures.fig2_masks import road_masks
 from roadeval.report.figures.fig3b_fp_fn_rate import fp_fn_rate
 from roadeval.report.figures.figure import ExampleFrame, FigureData
+from roadeval.report.figures.heatmaps import heatmap
 from roadeval.report.figures.legend import LegendStyle
 from roadeval.report.figures.style import RC
 from roadeval.report.figures.thresholds import curves
@@ -133,7 +134,7 @@ def test_regions_are_readable(variants):
 def test_a_difference_is_readable(scale, frames):
     changes = scale * np.sin(np.arange(1.0, frames + 1))
     table = pd.DataFrame({"ERR": changes}, index=range(frames))
-    mean = {"mean": changes.mean(), "low": None}
+    mean = dict.fromkeys(("mean", "low", "high"), changes.mean())
     assert_readable(charts.difference(table, "filtered", "unfiltered", mean))
 
 
@@ -146,7 +147,7 @@ def test_the_coverage_of_a_drive_without_truth_is_readable(variants):
 @pytest.mark.parametrize("variants", VARIANTS)
 @pytest.mark.parametrize("size", [(20, 64), (64, 36)])
 def test_heat_maps_are_readable_and_have_the_shape_of_the_image(variants, size):
-    figure = charts.heatmap([heat(name, *size) for name in variants])
+    figure = heatmap([heat(name, *size) for name in variants])
     assert_readable(figure)
     for ax in figure.axes[: 2 * len(variants)]:
         box = ax.get_window_extent()

@@ -1,6 +1,7 @@
 """The frames to look at: what is said about each, and how to open it."""
 
 import numpy as np
+import pytest
 
 from roadeval.data.words import MINUS
 from roadeval.report.blocks import Command, ImageGrid, KeepTogether, Text, TwoColumns
@@ -60,6 +61,13 @@ def test_helped_and_harmed_frames_are_told_apart():
     assert said(helped)[-1] == f"The filter changes ERR by {MINUS}10.00 pp."
     assert harmed[0].text == "Frames that the filter harmed most"
     assert said(harmed)[-1] == "The filter changes ERR by +10.00 pp."
+
+
+@pytest.mark.parametrize(("count", "columns"), [(3, 4), (4, 4), (5, 5), (6, 4), (9, 5)])
+def test_pictures_of_the_outcomes_fill_their_rows(count, columns):
+    image = LayerImage("it", np.zeros((4, 4, 3), np.uint8), None, None)
+    (blocks,) = shown(some_findings(worst=[a_frame(7, images=[image] * count)]))
+    assert the(ImageGrid, blocks).columns == columns
 
 
 def test_equal_phases_of_the_variants_stand_below_each_other():
