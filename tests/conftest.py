@@ -1,6 +1,8 @@
-"""What every room's tests share: examples without a deadline, and the loops that are there."""
+"""What every room's tests share: where they begin, examples without a deadline, and the loops."""
 
 import os
+from collections.abc import Iterator
+from contextlib import chdir
 from importlib.util import find_spec
 
 import pytest
@@ -23,3 +25,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="Write the golden files anew instead of comparing with them.",
     )
+
+
+@pytest.fixture(scope="session", autouse=True)
+def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Begin in a folder that no other process has: of two runs at one place the second is refused.
+
+    A run that is not told where to write writes below the folder it is started in.
+    """
+    with chdir(tmp_path_factory.mktemp("elsewhere")):
+        yield

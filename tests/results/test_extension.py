@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+ROOT = Path(__file__).resolve().parents[2]
 METRIC = '''
 """False discovery rate."""
 
@@ -88,7 +89,6 @@ def test_a_metric_and_a_region_arrive_in_tables_totals_and_documentation(tmp_pat
     for kind, text in (("metrics", METRIC), ("regions", REGION)):
         (tmp_path / kind).mkdir()
         (tmp_path / kind / "added.py").write_text(text)
-    run = subprocess.run(
-        [sys.executable, "-c", PROGRAM, tmp_path], capture_output=True, text=True, check=False
-    )
+    program = [sys.executable, "-c", PROGRAM, tmp_path]
+    run = subprocess.run(program, cwd=ROOT, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr

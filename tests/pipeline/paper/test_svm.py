@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from dataclasses import astuple, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from roadeval.pipeline.paper.svm import SvmSettings
 from roadeval.pipeline.stage import TrainingSet, View
 from tests.pipeline.images import IMAGES, noise
 
+ROOT = Path(__file__).resolve().parents[3]
 ROUNDING = 1e-9
 """A decision value this near the threshold may fall to either side."""
 
@@ -134,7 +136,9 @@ def test_by_default_scikit_learn_is_not_asked(monkeypatch):
 def test_nothing_is_printed():
     # A process of its own: a library in C keeps its lines back until the end.
     code = "from tests.pipeline.paper.test_svm import *; svm.fit(sample(), SvmSettings())"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
