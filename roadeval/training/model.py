@@ -25,10 +25,10 @@ from roadeval.runtime.files import check_input, put
 from roadeval.training.likeness import SIDE
 
 FORMAT: Final = "roadeval-model"
-VERSION: Final = 4
+VERSION: Final = 5
 """Of the file; raised when what a stage has learnt means something else, or something is added. In
 2 the machine of ``context`` knows the column below a pixel, in 3 there are fingerprints, in 4
-the trees of ``robust`` in its place."""
+the trees of ``robust`` in its place, in 5 these say how many features they know."""
 OLDEST: Final = 2
 """The earliest version that is read."""
 OWN: Final = ("prior", "fingerprints")

@@ -184,7 +184,7 @@ def test_no_flipped_byte_is_a_defect_of_the_program(arrays, tmp_path):
             from_file(path, TWO)
 
 
-def test_trees_that_ask_for_features_that_are_not_there_end_with_one_line_and_code_1(
+def test_trees_that_were_grown_on_other_features_end_with_one_line_and_code_1(
     tmp_path, tmp_path_factory, capsys, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
@@ -193,13 +193,14 @@ def test_trees_that_ask_for_features_that_are_not_there_end_with_one_line_and_co
     pipelines = configure(SMALL).pipelines()
     sound = fit([frame(n) for n in range(3)], pipelines, TrainingSettings())
     forest = sound.parameters["unfiltered"]["trees"]
-    beyond = replace(forest, feature=forest.feature + np.int32(3))
+    beyond = replace(forest, feature=forest.feature + np.int32(3), inputs=6)
     save_model(replace(sound, parameters={"unfiltered": {"trees": beyond}}), Path("x.model"))
     words = ["replay", str(DEMO), "--config", str(small), "--model", "x.model", "--quiet"]
     assert main([*words, "--save", "x.rrd", "--reports", "x"]) == 1
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("roadeval: error: x.model: the model is damaged: its trees ask for ")
-    assert "features, and there are 3; train it again" in line
+    assert capsys.readouterr().err.splitlines() == [
+        "roadeval: error: x.model: the model's trees were grown on 6 features of a pixel, and here "
+        "are 3; train it again"
+    ]
     assert [path.name for path in tmp_path.iterdir()] == ["x.model"]
 
 

@@ -148,8 +148,8 @@ def test_an_array_that_hides_code_is_not_run(tmp_path):
     ("version", "why"),
     [
         (1, "made by an earlier version of roadeval; train it again"),
-        (99, "model format 99, this version reads 4; train it again"),
-        (None, "model format None, this version reads 4; train it again"),
+        (99, "model format 99, this version reads 5; train it again"),
+        (None, "model format None, this version reads 5; train it again"),
     ],
 )
 def test_another_version_is_refused_in_one_line(path, version, why):

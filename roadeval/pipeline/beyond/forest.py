@@ -58,6 +58,8 @@ class Forest:
         ``(T, LEAVES)`` float32: what each leaf adds.
     offset
         Where the sum begins.
+    inputs
+        How many features of a pixel there were to choose from.
     base
         So many trees at the beginning are those of other drives: what they give, from
         ``base_offset`` on, is one more feature of the trees after them, and is not in the sum.
@@ -70,6 +72,7 @@ class Forest:
     kept: Masks
     values: Values
     offset: float
+    inputs: int
     base: int = 0
     base_offset: float = 0.0
 
@@ -78,21 +81,20 @@ class Forest:
         check_arrays(self, np.uint32, kept=(len(self.feature), NODES))
         check_arrays(self, np.float32, threshold=(len(self.feature), NODES))
         check_arrays(self, np.float32, values=(len(self.feature), LEAVES), offset=())
-        check_arrays(self, np.float32, base=(), base_offset=())
-        check_range("feature", self.feature, 0, GREATEST)
+        check_arrays(self, np.float32, inputs=(), base=(), base_offset=())
         check_range("offset", self.offset, -GREATEST, GREATEST)
         check_range("base", self.base, 0, len(self.feature) - 1)
-        if not isinstance(self.base, int):
-            raise ValueError("base is no whole number")
+        check_range("inputs", self.inputs, 1, GREATEST)
+        for name in ("inputs", "base"):
+            if not isinstance(getattr(self, name), int):
+                raise ValueError(f"{name} is no whole number")
+        check_range("feature", self.feature[: self.base], 0, self.inputs - 1)
+        # What `base` gives comes after the features of a pixel.
+        last = self.inputs - (self.base == 0)
+        check_range("feature", self.feature[self.base :], 0, last)
         check_range("base_offset", self.base_offset, -GREATEST, GREATEST)
         if not (self.kept >> np.uint32(LEAVES - 1)).all():
             raise ValueError("kept rules out a tree's last leaf, and so may leave none")
-
-    @property
-    def features(self) -> int:
-        """How many features the trees ask for, at least, that of `base` not counted."""
-        first = self.feature[: self.base].max(initial=-1) + 1
-        return max(int(first), int(self.feature[self.base :].max()) + 1 - (self.base > 0))
 
     def sums(self, values: Values) -> Values:
         """Return the sum for each pixel of ``(F, n)`` features, ``(n,)`` float32."""
@@ -114,8 +116,8 @@ class Forest:
             for name in ("feature", "threshold", "kept", "values")
         )
         feature, threshold, kept, values = both
-        offsets = self.offset, len(base.feature), base.offset
-        return Forest(feature, threshold, kept, values, *offsets)
+        known = base.inputs, len(base.feature), base.offset
+        return Forest(feature, threshold, kept, values, self.offset, *known)
 
 
 def grow(
@@ -159,7 +161,8 @@ def grow(
         boosting.fit(values, road, sample_weight=weights)
     grown = [_arrays(tree.nodes) for (tree,) in boosting._predictors]
     feature, threshold, kept, leaves = (np.stack(each) for each in zip(*grown, strict=True))
-    return Forest(feature, threshold, kept, leaves, float(boosting._baseline_prediction.item()))
+    offset = float(boosting._baseline_prediction.item())
+    return Forest(feature, threshold, kept, leaves, offset, values.shape[1])
 
 
 def _arrays(nodes: npt.NDArray[Any]) -> tuple[Indices, Values, Masks, Values]:

@@ -142,12 +142,12 @@ def balanced_back(road: Flags, share: float) -> Floats:
 
 
 def check_fit(forest: Forest, settings: TreesSettings) -> None:
-    """Raise a `MisfitError` if the trees ask for features that the settings do not have."""
-    known, asked = len(names_of(settings.features)), forest.features
-    if asked > known:
+    """Raise a `MisfitError` if the trees were grown on other features than are computed."""
+    known = len(names_of(settings.features))
+    if forest.inputs != known:
         raise MisfitError(
-            f"the model is damaged: its trees ask for {asked} features, and there are {known}; "
-            "train it again"
+            f"the model's trees were grown on {forest.inputs} features of a pixel, and here are "
+            f"{known}; train it again"
         )
 
 

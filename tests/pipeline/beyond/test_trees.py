@@ -8,7 +8,7 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 
 from roadeval.pipeline.beyond import trees
 from roadeval.pipeline.beyond.forest import ALL, NODES, Forest, grow
-from roadeval.pipeline.beyond.ground_features import at_samples
+from roadeval.pipeline.beyond.ground_features import at_samples, names_of
 from roadeval.pipeline.beyond.trees import TreesSettings
 from roadeval.pipeline.stage import MisfitError, TrainingSet, View
 
@@ -140,6 +140,9 @@ def test_samples_keep_their_order():
     ("changed", "why"),
     [
         ({"feature": np.full((20, NODES), -1, np.int32)}, "feature holds a number outside"),
+        ({"inputs": 5}, "feature holds a number outside 0 to 4"),
+        ({"inputs": 0}, "inputs holds a number outside"),
+        ({"inputs": 90.0}, "inputs is no whole number"),
         ({"kept": np.zeros((20, NODES), np.uint32)}, "rules out a tree's last leaf"),
         ({"kept": np.full((19, NODES), ALL, np.uint32)}, "kept has the shape"),
         ({"threshold": np.full((20, NODES), np.nan, np.float32)}, "not finite"),
@@ -153,7 +156,8 @@ def test_trees_that_no_training_gives_are_refused(forest, changed, why):
 
 
 def test_trees_for_other_features_are_a_misfit(forest):
-    with pytest.raises(MisfitError, match="the model is damaged: its trees ask for"):
+    known = len(names_of(SMALL.features))
+    with pytest.raises(MisfitError, match=f"grown on {known} features of a pixel, and here are 3;"):
         trees.bind(replace(SMALL, features=("place",)), forest)
 
 
@@ -183,12 +187,13 @@ def test_trees_on_top_see_the_sum_of_those_below_and_nothing_else_of_it():
     below = base.sums(np.ascontiguousarray(values.T))
     above = grow(below[:, None], road, None, replace(SMALL, share=1.0), 0)
     # The only feature of the trees above is the place after the features of those below.
-    moved = replace(above, feature=above.feature + np.int32(values.shape[1]))
+    known = values.shape[1]
+    moved = replace(above, feature=above.feature + np.int32(known), inputs=known + 1)
     both = moved.on_top(base)
     np.testing.assert_array_equal(
         both.sums(np.ascontiguousarray(values.T)), above.sums(below[None])
     )
-    assert both.features == 4
+    assert both.inputs == known
 
 
 def test_adapted_trees_know_what_other_drives_taught(forest):

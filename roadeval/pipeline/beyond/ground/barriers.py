@@ -24,14 +24,25 @@ FAINT: Final = 0.02
 """Added to that square's mean edge: noise is no edge."""
 WEIGHTS: Final = {"edge": 1.0, "relative_edge": 0.05, "hue_edge": 1.0, "yellow": 1.0, "dark": 1.0}
 """What each adds to the cost of a path."""
+SQUARED: Final = {"edge": 20.0, "relative_edge": 0.05}
+"""What the squares of some add to the cost of another path. It goes a long way through what is
+faint before it crosses anything steep: around the end of a kerb, not over it."""
 
 
 def compute(scene: Scene) -> Sequence[Values]:
-    """Return each barrier at a pixel, on its path from the patch, and from the middle outwards."""
+    """Return each barrier at a pixel, on its path from the patch, and from the middle outwards.
+
+    And the paths of `SQUARED`.
+    """
     found = [greatest_of_four(plane) for plane in barriers(tones_of(scene.fine))]
-    weights = [np.float32(weight) for weight in WEIGHTS.values()]
-    paths = [distance(p * w, scene.patch) for p, w in zip(found, weights, strict=True)]
-    return [*found, *paths, *(outwards(plane) for plane in found)]
+    named = dict(zip(WEIGHTS, found, strict=True))
+    costs = [
+        *(named[name] * np.float32(weight) for name, weight in WEIGHTS.items()),
+        *(np.square(named[name]) * np.float32(weight) for name, weight in SQUARED.items()),
+    ]
+    paths = [distance(cost, scene.patch) for cost in costs]
+    direct, around = paths[: len(found)], paths[len(found) :]
+    return [*found, *direct, *(outwards(plane) for plane in found), *around]
 
 
 def barriers(tones: tuple[Values, Values, Values]) -> list[Values]:
@@ -62,6 +73,11 @@ def greatest_of_four(plane: Values) -> Values:
 
 GROUP: Final = Group(
     "barriers",
-    (*WEIGHTS, *(f"over_{name}" for name in WEIGHTS), *(f"{name}_inside" for name in WEIGHTS)),
+    (
+        *WEIGHTS,
+        *(f"over_{name}" for name in WEIGHTS),
+        *(f"{name}_inside" for name in WEIGHTS),
+        *(f"around_{name}" for name in SQUARED),
+    ),
     compute,
 )

@@ -230,8 +230,30 @@ def test_barriers_are_the_greatest_of_four_pixels(scene):
     found = barriers.compute(scene)
     for mine, plane in zip(found, expected, strict=False):
         close(mine[INNER], block_reduce(plane, (2, 2), np.max)[INNER], 1e-3)
-    for mine, plane in zip(found[10:], found[:5], strict=True):
+    for mine, plane in zip(found[10:15], found[:5], strict=True):
         np.testing.assert_array_equal(mine, scans.outwards(plane))
+
+
+def test_squared_barriers_are_costs_of_a_path(scene):
+    edge, relative, *_, around, relative_around = barriers.compute(scene)
+    for cost, found in ((20 * edge**2, around), (0.05 * relative**2, relative_around)):
+        expected, _ = MCP_Geometric(0.005 + np.minimum(cost, 6.5)).find_costs(
+            np.argwhere(scene.patch)
+        )
+        close(found, expected, 0.02)
+
+
+def test_a_path_of_squares_would_rather_go_around_a_kerb():
+    ends = street()
+    ends[:20, 74:76] = 98
+    names, behind = barriers.GROUP.names, {}
+    for kind, image in (("ends", ends), ("whole", street())):
+        large = cv2.resize(image, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
+        found = barriers.compute(scene_of(large, 96, PATCH))
+        for way in ("over", "around"):
+            behind[way, kind] = found[names.index(f"{way}_edge")][30, 84]
+    share = {way: behind[way, "ends"] / behind[way, "whole"] for way in ("over", "around")}
+    assert share["around"] < 0.5 * share["over"] < 0.5
 
 
 def test_a_line_of_one_fine_pixel_is_a_barrier_on_the_way():
