@@ -86,7 +86,7 @@ def from_log(
     if base is not None and not by_truth and settings.source != "patch":
         raise TrainingError(
             "no frame of the range has road truth to adapt the model to, and what the reference "
-            "patch guesses made it worse where that could be measured: leave `training.adapt` out, "
+            "patch guesses made it worse on two of three drives: leave `training.adapt` out, "
             'or insist with training.source = "patch"'
         )
     if not by_truth and not any(pipeline.learning() for pipeline in pipelines.values()):

@@ -26,8 +26,8 @@ class TrainingSettings:
     adapt
         Learn further from the log's own frames, on top of what ``model`` has learnt from other
         drives. The result is then not one on a drive that the model has not seen. By the
-        reference patch alone only where ``source`` insists on it: on drives whose truth was put
-        aside it made the model worse.
+        reference patch alone only where ``source`` insists on it: of three drives whose truth was
+        put aside it made the model worse on two.
     source
         ``auto``: the log's truth where it has one, else the reference patch; ``truth`` or
         ``patch`` insists.
@@ -58,10 +58,10 @@ class TrainingSettings:
         Self-supervision: the trapezoid in front of the vehicle that is taken for road.
     horizon
         Self-supervision: pixels above this share of the height are not road.
-    far
-        Self-supervision: below the horizon, pixels whose colour is further from the patch's
-        than this quantile of its own colours (chi-squared, 3 degrees of freedom) are not road.
-        The rest stays undecided.
+    reach
+        Self-supervision: pixels below the horizon that can be reached from the patch without
+        crossing more edges than this are road, the others are not; see
+        `roadeval.training.selfsupervision.reach`. At 1 a kerb is not crossed.
     """
 
     model: str | None = None
@@ -76,7 +76,7 @@ class TrainingSettings:
     seeds: Annotated[int, Field(ge=1, le=100)] = 1
     patch: ReferencePatch = ReferencePatch()
     horizon: Annotated[float, Field(ge=0, le=1)] = 0.4
-    far: Annotated[float, Field(gt=0, lt=1)] = 0.9999
+    reach: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
 
     @model_validator(mode="after")
     def _check(self) -> Self:

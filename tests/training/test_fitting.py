@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from roadeval.data import IGNORE
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import View
 from roadeval.training import TrainingError, TrainingSettings, fit
-from roadeval.training.selfsupervision import patch_truth
 from tests.training.making import frame, pipelines
 
 FRAMES = [frame(n) for n in range(3)]
@@ -89,17 +87,3 @@ def test_a_collapsed_classifier_is_reported():
 def test_a_sound_classifier_is_not_reported():
     only = {"unfiltered": pipelines()["unfiltered"]}
     assert fit(FRAMES, only, TrainingSettings()).warnings == ()
-
-
-def test_the_patch_is_road_and_what_is_unlike_it_is_not():
-    shown = frame()
-    truth = patch_truth(shown.image, TrainingSettings())
-    assert (truth[18:22, 13:19] == 1).all()
-    assert (truth[:12] == 0).all()
-
-
-def test_the_patch_leaves_open_what_looks_like_it():
-    grey = np.full((40, 60, 3), 120, np.uint8)
-    truth = patch_truth(grey, TrainingSettings(horizon=0.4))
-    assert (truth[:16] == 0).all()
-    assert (truth[16:28] == IGNORE).all()

@@ -1,0 +1,79 @@
+"""What the reference patch teaches where there is no truth."""
+
+import cv2
+import numpy as np
+import pytest
+from scipy import ndimage
+from skimage.graph import MCP_Geometric
+from skimage.measure import block_reduce
+
+from roadeval.data import NON_ROAD, ROAD
+from roadeval.pipeline.beyond.ground.scene import scene_of, tones_of
+from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
+from roadeval.training import TrainingSettings
+from roadeval.training.selfsupervision import WIDTH, patch_truth, reach
+
+HEIGHT = 120
+SETTINGS = TrainingSettings()
+
+
+def street(grey=100, kerb=112, pavement=100, shade=0.8):
+    """A street with noise, a kerb and a pavement on its right, and a shadow across its middle."""
+    image = np.full((2 * HEIGHT, 2 * WIDTH, 3), float(grey))
+    image[:, 2 * kerb :] = pavement
+    image[:, 2 * kerb : 2 * kerb + 4] = 0.5 * grey
+    image[120:150] *= shade
+    noise = np.random.default_rng(0).normal(0, 1, image.shape[:2])
+    return (image + noise[..., None]).clip(0, 255).astype(np.uint8)
+
+
+def test_what_is_reached_without_crossing_a_kerb_is_road():
+    truth = patch_truth(street(), SETTINGS)
+    low = truth[100:]
+    assert (low[:, :216] == ROAD).mean() > 0.99
+    assert (low[:, 232:] == NON_ROAD).mean() > 0.99
+
+
+def test_the_pavement_is_road_where_the_kerb_is_lowered():
+    lowered = street()
+    lowered[200:] = street(kerb=WIDTH)[200:]
+    assert (patch_truth(lowered, SETTINGS)[100:, 232:] == ROAD).mean() > 0.5
+
+
+def test_the_further_one_may_reach_the_more_is_road():
+    found = [
+        (patch_truth(street(), TrainingSettings(reach=far))[100:, 232:] == ROAD).mean()
+        for far in (1.0, 20.0)
+    ]
+    assert found[0] < 0.01
+    assert found[1] > 0.99
+
+
+def test_nothing_above_the_horizon_is_road():
+    grey = np.full((40, 60, 3), 120, np.uint8)
+    truth = patch_truth(grey, TrainingSettings(horizon=0.4))
+    assert (truth[:16] == NON_ROAD).all()
+    assert (truth[16:] == ROAD).all()
+
+
+@pytest.mark.parametrize("shape", [(24, 32), (240, 320), (33, 47)])
+def test_the_patch_is_road_whatever_it_shows(shape):
+    image = np.random.default_rng(0).integers(0, 256, (*shape, 3), dtype=np.uint8)
+    truth = patch_truth(image, TrainingSettings(horizon=1.0, reach=0.01))
+    assert truth.dtype == np.uint8
+    np.testing.assert_array_equal(truth == ROAD, patch_mask(*shape, ReferencePatch()) > 0)
+
+
+def test_reach_is_the_mean_of_two_distances_as_others_compute_them():
+    noise = np.random.default_rng(0).integers(0, 256, (96, 128, 3)).astype(np.uint8)
+    scene = scene_of(cv2.GaussianBlur(noise, (0, 0), 2), 64, ReferencePatch())
+    coarse, fine = (
+        np.hypot(*(ndimage.sobel(light.astype(float), axis, mode="mirror") / 8 for axis in (0, 1)))
+        for light in (scene.tones[0], tones_of(scene.fine)[0])
+    )
+    costs = coarse, 20 * block_reduce(fine, (2, 2), np.max) ** 2
+    seeds = np.argwhere(scene.patch)
+    over, around = (
+        MCP_Geometric(0.005 + np.minimum(cost, 6.495)).find_costs(seeds)[0] for cost in costs
+    )
+    np.testing.assert_allclose(reach(scene), (over / 1.2 + around / 2) / 2, rtol=0.02, atol=0.02)
