@@ -61,7 +61,7 @@ class TrainingSettings:
     reach
         Self-supervision: pixels below the horizon that can be reached from the patch without
         crossing more edges than this are road, the others are not; see
-        `roadeval.training.selfsupervision.reach`. At 1 a kerb is not crossed.
+        `roadeval.pipeline.beyond.ground.reach`. At 1 a kerb is not crossed.
     """
 
     model: str | None = None

@@ -1,17 +1,12 @@
 """What the reference patch teaches where there is no truth."""
 
-import cv2
 import numpy as np
 import pytest
-from scipy import ndimage
-from skimage.graph import MCP_Geometric
-from skimage.measure import block_reduce
 
 from roadeval.data import NON_ROAD, ROAD
-from roadeval.pipeline.beyond.ground.scene import scene_of, tones_of
 from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.training import TrainingSettings
-from roadeval.training.selfsupervision import WIDTH, patch_truth, reach
+from roadeval.training.selfsupervision import WIDTH, patch_truth
 
 HEIGHT = 120
 SETTINGS = TrainingSettings()
@@ -62,18 +57,3 @@ def test_the_patch_is_road_whatever_it_shows(shape):
     truth = patch_truth(image, TrainingSettings(horizon=1.0, reach=0.01))
     assert truth.dtype == np.uint8
     np.testing.assert_array_equal(truth == ROAD, patch_mask(*shape, ReferencePatch()) > 0)
-
-
-def test_reach_is_the_mean_of_two_distances_as_others_compute_them():
-    noise = np.random.default_rng(0).integers(0, 256, (96, 128, 3)).astype(np.uint8)
-    scene = scene_of(cv2.GaussianBlur(noise, (0, 0), 2), 64, ReferencePatch())
-    coarse, fine = (
-        np.hypot(*(ndimage.sobel(light.astype(float), axis, mode="mirror") / 8 for axis in (0, 1)))
-        for light in (scene.tones[0], tones_of(scene.fine)[0])
-    )
-    costs = coarse, 20 * block_reduce(fine, (2, 2), np.max) ** 2
-    seeds = np.argwhere(scene.patch)
-    over, around = (
-        MCP_Geometric(0.005 + np.minimum(cost, 6.495)).find_costs(seeds)[0] for cost in costs
-    )
-    np.testing.assert_allclose(reach(scene), (over / 1.2 + around / 2) / 2, rtol=0.02, atol=0.02)

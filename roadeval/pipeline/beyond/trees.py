@@ -1,7 +1,8 @@
 """Boosted trees on what is known of a pixel of the ground: how probable road is.
 
 The sum of many small decision trees, each of which was grown to mend what those before it leave
-[1]_, is the log-odds of road: ``p = 1 / (1 + exp(-sum))``. It is computed on a working image.
+[1]_, is the log-odds of road: ``p = 1 / (1 + exp(-sum))``. What has learnt nothing has a say in it:
+how far a pixel lies from the reference patch. It is computed on a working image.
 
 References
 ----------
@@ -24,6 +25,7 @@ from roadeval.data.arrays import Flags, Floats, Values
 from roadeval.data.packed import Packed
 from roadeval.kernels.plain.trees import LEAVES
 from roadeval.pipeline.beyond.forest import Forest, grow
+from roadeval.pipeline.beyond.ground.reach import combined, reach
 from roadeval.pipeline.beyond.ground.scene import scene_of
 from roadeval.pipeline.beyond.ground_features import GROUPS, at_samples, features, names_of
 from roadeval.pipeline.beyond.working_image import stretched
@@ -43,6 +45,8 @@ FARTHEST: Final = 3.0
 """Of geodesic distances as they are shown."""
 SHOWN_PATH: Final = "paths.over_edges_and_hues"
 """Of the geodesic distances the one with most to see: kerbs and verges."""
+REACH: Final = ("paths.over_edges", "barriers.around_edge")
+"""The features that `combined` takes, in its order."""
 
 TREES: Final = mask_spec("trees", "Road by boosted trees")
 PROBABILITY: Final = LayerSpec(
@@ -79,6 +83,10 @@ class TreesSettings:
         Training pixels of a leaf, mirrored ones included, at least.
     share
         Of the features, drawn anew for each node, among which it chooses.
+    reach
+        Log-odds that a pixel on the patch gets besides, and one at twice the distance where roads
+        end loses (`roadeval.pipeline.beyond.ground.reach`). At 1 it changes little on cameras that
+        taught the trees, and mends much on others; 2 and more trust those others still less.
     threshold
         A pixel is road where it is more probable than this.
     """
@@ -91,6 +99,7 @@ class TreesSettings:
     rate: Annotated[float, Field(gt=0, le=1)] = 0.1
     least: Annotated[int, Field(ge=1, le=10_000)] = 50
     share: Annotated[float, Field(gt=0, le=1)] = 0.33
+    reach: Annotated[float, Field(ge=0, le=100)] = 1.0
     threshold: Annotated[float, Field(ge=0, le=1)] = 0.5
 
     @field_validator("features")
@@ -167,10 +176,14 @@ def bind(settings: TreesSettings, forest: Forest) -> Callable[[View], Output]:
     check_fit(forest, settings)
     names = names_of(settings.features)
     path = names.index(SHOWN_PATH) if SHOWN_PATH in names else None
+    distances = [names.index(name) for name in REACH if name in names]
 
     def run(view: View) -> Output:
-        seen, shape = see(settings, view.image), view.image.shape
-        share = stretched(probability(log_odds(seen, forest)), shape)
+        scene, shape = scene_of(view.image, settings.width, settings.patch), view.image.shape
+        seen = features(scene, settings.features)
+        far = combined(*seen[distances]) if len(distances) == len(REACH) else reach(scene)
+        odds = log_odds(seen, forest) + np.float32(settings.reach) * (1 - far)
+        share = stretched(probability(odds), shape)
         codes = np.rint(share * np.float32(FULL)).astype(np.uint16)
         road = Packed.of(codes > round(settings.threshold * FULL))
         shown = [Layer(PROBABILITY, (codes >> 8).astype(np.uint8)), Layer(TREES, road)]
@@ -197,5 +210,5 @@ STAGE: Final = Stage(
     adapt=adapt,
     parameters=Forest,
     oracle=perfect_mask,
-    inference_only=("threshold",),
+    inference_only=("reach", "threshold"),
 )

@@ -8,8 +8,11 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 
 from roadeval.pipeline.beyond import trees
 from roadeval.pipeline.beyond.forest import ALL, NODES, Forest, grow
+from roadeval.pipeline.beyond.ground.reach import reach
+from roadeval.pipeline.beyond.ground.scene import scene_of
 from roadeval.pipeline.beyond.ground_features import at_samples, names_of
 from roadeval.pipeline.beyond.trees import TreesSettings
+from roadeval.pipeline.beyond.working_image import stretched
 from roadeval.pipeline.stage import MisfitError, TrainingSet, View
 
 SMALL = TreesSettings(width=32, trees=20, leaves=8, least=5)
@@ -176,6 +179,22 @@ def test_the_path_is_shown_where_it_is_computed(forest):
 
 
 VIEW = View.of(picture(9)[0])
+
+
+@pytest.mark.parametrize("groups", [("place",), ("place", "paths"), ("place", "barriers", "paths")])
+def test_reach_is_added_to_the_log_odds_whatever_the_trees_see(sample, groups):
+    without = replace(SMALL, features=groups, reach=0.0)
+    forest = trees.fit(sample, without)
+    plain, more = (
+        trees.bind(replace(without, reach=weight), forest)(VIEW).probability / trees.FULL
+        for weight in (0.0, 2.0)
+    )
+    far = stretched(reach(scene_of(VIEW.image, SMALL.width, SMALL.patch)), VIEW.image.shape)
+    changed = np.log(more / (1 - more)) - np.log(plain / (1 - plain))
+    # The picture is as large as the working image; a probability has a code of 16 bit.
+    inside = (np.minimum(plain, more) > 0.01) & (np.maximum(plain, more) < 0.99)
+    assert inside.mean() > 0.1
+    np.testing.assert_allclose(changed[inside], 2 * (1 - far[inside]), atol=0.01)
 
 
 # --- On top of what other drives have taught ------------------------------------------------------

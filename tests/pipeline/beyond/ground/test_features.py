@@ -18,6 +18,7 @@ from roadeval.pipeline.beyond.ground import (
     surroundings,
     texture,
 )
+from roadeval.pipeline.beyond.ground.reach import combined, reach
 from roadeval.pipeline.beyond.ground.scene import from_patch, scene_of, steepness, tones_of
 from roadeval.pipeline.beyond.ground_features import GROUPS, features, names_of
 from roadeval.pipeline.reference_patch import ReferencePatch
@@ -254,6 +255,14 @@ def test_a_path_of_squares_would_rather_go_around_a_kerb():
             behind[way, kind] = found[names.index(f"{way}_edge")][30, 84]
     share = {way: behind[way, "ends"] / behind[way, "whole"] for way in ("over", "around")}
     assert share["around"] < 0.5 * share["over"] < 0.5
+
+
+def test_reach_is_the_mean_of_two_distances_over_their_thresholds(scene):
+    found = features(scene, tuple(GROUPS))
+    names = names_of(GROUPS)
+    over, around = (found[names.index(n)] for n in ("paths.over_edges", "barriers.around_edge"))
+    np.testing.assert_array_equal(reach(scene), combined(over, around))
+    close(reach(scene), (over / 1.2 + around / 2) / 2)
 
 
 def test_a_line_of_one_fine_pixel_is_a_barrier_on_the_way():
