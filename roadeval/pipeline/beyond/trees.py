@@ -42,9 +42,7 @@ from roadeval.pipeline.stage import (
 FULL: Final = 65535
 """The code of probability 1."""
 FARTHEST: Final = 3.0
-"""Of geodesic distances as they are shown."""
-SHOWN_PATH: Final = "paths.over_edges_and_hues"
-"""Of the geodesic distances the one with most to see: kerbs and verges."""
+"""Of the distances from the patch as they are shown."""
 REACH: Final = ("paths.over_edges", "barriers.around_edge")
 """The features that `combined` takes, in its order."""
 
@@ -55,7 +53,7 @@ PROBABILITY: Final = LayerSpec(
 GEODESIC: Final = LayerSpec(
     "geodesic",
     LayerKind.SCALAR,
-    "Geodesic distance from the reference patch, over edges and hues",
+    "Geodesic distance from the reference patch, over edges; roads end at about 1",
     value_range=(0.0, FARTHEST),
     exact=False,
 )
@@ -175,7 +173,6 @@ def bind(settings: TreesSettings, forest: Forest) -> Callable[[View], Output]:
     """Return the trees as a pure function of what they see; a `MisfitError`, see `check_fit`."""
     check_fit(forest, settings)
     names = names_of(settings.features)
-    path = names.index(SHOWN_PATH) if SHOWN_PATH in names else None
     distances = [names.index(name) for name in REACH if name in names]
 
     def run(view: View) -> Output:
@@ -186,18 +183,19 @@ def bind(settings: TreesSettings, forest: Forest) -> Callable[[View], Output]:
         share = stretched(probability(odds), shape)
         codes = np.rint(share * np.float32(FULL)).astype(np.uint16)
         road = Packed.of(codes > round(settings.threshold * FULL))
-        shown = [Layer(PROBABILITY, (codes >> 8).astype(np.uint8)), Layer(TREES, road)]
-        if path is not None:
-            shown.insert(0, Layer(GEODESIC, stretched(seen[path], shape)))
-        return Output(tuple(shown), mask=road, probability=codes)
+        shown = (
+            Layer(GEODESIC, stretched(far, shape)),
+            Layer(PROBABILITY, (codes >> 8).astype(np.uint8)),
+            Layer(TREES, road),
+        )
+        return Output(shown, mask=road, probability=codes)
 
     return run
 
 
-def layers(settings: TreesSettings) -> tuple[LayerSpec, ...]:
+def layers(_settings: TreesSettings) -> tuple[LayerSpec, ...]:
     """Return the layers of the trees."""
-    shown = (PROBABILITY, TREES)
-    return (GEODESIC, *shown) if SHOWN_PATH in names_of(settings.features) else shown
+    return GEODESIC, PROBABILITY, TREES
 
 
 STAGE: Final = Stage(

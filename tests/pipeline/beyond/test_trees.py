@@ -170,12 +170,11 @@ def test_groups_must_be_known_and_named_once(names):
         TreesSettings(features=names)
 
 
-def test_the_path_is_shown_where_it_is_computed(forest):
-    assert [layer.spec.name for layer in trees.bind(SMALL, forest)(VIEW).layers] == [
-        each.name for each in trees.layers(SMALL)
-    ]
-    bare = replace(SMALL, features=("place", "colour"))
-    assert [each.name for each in trees.layers(bare)] == ["probability", "trees"]
+def test_the_layers_are_those_that_are_announced(forest):
+    found = trees.bind(SMALL, forest)(VIEW).layers
+    assert tuple(layer.spec for layer in found) == trees.layers(SMALL)
+    far = reach(scene_of(VIEW.image, SMALL.width, SMALL.patch))
+    np.testing.assert_allclose(found[0].array, stretched(far, VIEW.image.shape), rtol=1e-6)
 
 
 VIEW = View.of(picture(9)[0])
