@@ -83,8 +83,8 @@ class TreesSettings:
         Of the features, drawn anew for each node, among which it chooses.
     reach
         Log-odds that a pixel on the patch gets besides, and one at twice the distance where roads
-        end loses (`roadeval.pipeline.beyond.ground.reach`). At 1 it changes little on cameras that
-        taught the trees, and mends much on others; 2 and more trust those others still less.
+        end loses (`roadeval.pipeline.beyond.ground.reach`). 0.5 changes next to nothing on cameras
+        that taught the trees; on others more than that may mend much.
     threshold
         A pixel is road where it is more probable than this.
     """
@@ -97,7 +97,7 @@ class TreesSettings:
     rate: Annotated[float, Field(gt=0, le=1)] = 0.1
     least: Annotated[int, Field(ge=1, le=10_000)] = 50
     share: Annotated[float, Field(gt=0, le=1)] = 0.33
-    reach: Annotated[float, Field(ge=0, le=100)] = 1.0
+    reach: Annotated[float, Field(ge=0, le=100)] = 0.5
     threshold: Annotated[float, Field(ge=0, le=1)] = 0.5
 
     @field_validator("features")
