@@ -81,7 +81,7 @@ class TreesSettings:
         Training pixels of a leaf, mirrored ones included, at least.
     share
         Of the features, drawn anew for each node, among which it chooses.
-    reach
+    reach_weight
         Log-odds that a pixel on the patch gets besides, and one at twice the distance where roads
         end loses (`roadeval.pipeline.beyond.ground.reach`). 0.5 changes next to nothing on cameras
         that taught the trees; on others more than that may mend much.
@@ -97,7 +97,7 @@ class TreesSettings:
     rate: Annotated[float, Field(gt=0, le=1)] = 0.1
     least: Annotated[int, Field(ge=1, le=10_000)] = 50
     share: Annotated[float, Field(gt=0, le=1)] = 0.33
-    reach: Annotated[float, Field(ge=0, le=100)] = 0.5
+    reach_weight: Annotated[float, Field(ge=0, le=100)] = 0.5
     threshold: Annotated[float, Field(ge=0, le=1)] = 0.5
 
     @field_validator("features")
@@ -179,7 +179,7 @@ def bind(settings: TreesSettings, forest: Forest) -> Callable[[View], Output]:
         scene, shape = scene_of(view.image, settings.width, settings.patch), view.image.shape
         seen = features(scene, settings.features)
         far = combined(*seen[distances]) if len(distances) == len(REACH) else reach(scene)
-        odds = log_odds(seen, forest) + np.float32(settings.reach) * (1 - far)
+        odds = log_odds(seen, forest) + np.float32(settings.reach_weight) * (1 - far)
         share = stretched(probability(odds), shape)
         codes = np.rint(share * np.float32(FULL)).astype(np.uint16)
         road = Packed.of(codes > round(settings.threshold * FULL))
@@ -208,5 +208,5 @@ STAGE: Final = Stage(
     adapt=adapt,
     parameters=Forest,
     oracle=perfect_mask,
-    inference_only=("reach", "threshold"),
+    inference_only=("reach_weight", "threshold"),
 )

@@ -182,10 +182,10 @@ VIEW = View.of(picture(9)[0])
 
 @pytest.mark.parametrize("groups", [("place",), ("place", "paths"), ("place", "barriers", "paths")])
 def test_reach_is_added_to_the_log_odds_whatever_the_trees_see(sample, groups):
-    without = replace(SMALL, features=groups, reach=0.0)
+    without = replace(SMALL, features=groups, reach_weight=0.0)
     forest = trees.fit(sample, without)
     plain, more = (
-        trees.bind(replace(without, reach=weight), forest)(VIEW).probability / trees.FULL
+        trees.bind(replace(without, reach_weight=weight), forest)(VIEW).probability / trees.FULL
         for weight in (0.0, 2.0)
     )
     far = stretched(reach(scene_of(VIEW.image, SMALL.width, SMALL.patch)), VIEW.image.shape)
