@@ -26,7 +26,7 @@ class TrainingSet:
         For whatever a fit draws at random.
     share
         Of road among the labelled pixels of the frames, from which as many pixels of road as of
-        the rest are sampled; None where the labels are a guess that leaves most of them open.
+        the rest are sampled; None where the labels are a guess, whose share is not to be trusted.
     """
 
     images: tuple[Rgb, ...]

@@ -86,8 +86,8 @@ def from_log(
     if base is not None and not by_truth and settings.source != "patch":
         raise TrainingError(
             "no frame of the range has road truth to adapt the model to, and what the reference "
-            "patch guesses made it worse on two of three drives: leave `training.adapt` out, "
-            'or insist with training.source = "patch"'
+            "patch guesses may make it worse: leave `training.adapt` out, or insist with "
+            'training.source = "patch"'
         )
     if not by_truth and not any(pipeline.learning() for pipeline in pipelines.values()):
         return (untrained(pipelines),), Schedule(frozenset())

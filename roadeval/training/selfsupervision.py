@@ -1,7 +1,7 @@
 """A training truth for logs that have none: what the ground in front of the vehicle leads to.
 
 The ground right in front of a vehicle is road, and so is what can be reached from there without
-crossing an edge: a kerb, a verge or another vehicle.
+crossing much of an edge, as a kerb, a wall or another vehicle has.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ WIDTH: Final = 160
 def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     """Guess the truth of an ``(H, W, 3)`` uint8 RGB image from its reference patch.
 
-    Road (1) is the patch, and what lies below the horizon row and within ``settings.reach`` of it,
-    see `reach`; all else is not (0). Returns ``(H, W)`` uint8.
+    Road (1) is the patch, and what lies below the horizon row and nearer to it than
+    ``settings.reach``, see `reach`; all else is not (0). Returns ``(H, W)`` uint8.
     """
     height, width = image.shape[:2]
     near = stretched(reach(scene_of(image, WIDTH, settings.patch)), image.shape) < settings.reach
     near[: round(settings.horizon * height)] = False
     near |= patch_mask(height, width, settings.patch) > 0
-    return np.where(near, ROAD, NON_ROAD).astype(np.uint8)
+    return np.where(near, np.uint8(ROAD), np.uint8(NON_ROAD))

@@ -26,8 +26,7 @@ class TrainingSettings:
     adapt
         Learn further from the log's own frames, on top of what ``model`` has learnt from other
         drives. The result is then not one on a drive that the model has not seen. By the
-        reference patch alone only where ``source`` insists on it: of three drives whose truth was
-        put aside it made the model worse on two.
+        reference patch alone only where ``source`` insists on it: it may make the model worse.
     source
         ``auto``: the log's truth where it has one, else the reference patch; ``truth`` or
         ``patch`` insists.
@@ -59,9 +58,9 @@ class TrainingSettings:
     horizon
         Self-supervision: pixels above this share of the height are not road.
     reach
-        Self-supervision: pixels below the horizon that can be reached from the patch without
-        crossing more edges than this are road, the others are not; see
-        `roadeval.pipeline.beyond.ground.reach`. At 1 a kerb is not crossed.
+        Self-supervision: pixels below the horizon whose distance from the patch is less than this
+        are road, the others are not; see `roadeval.pipeline.beyond.ground.reach`. Most roads end
+        at 1.
     """
 
     model: str | None = None

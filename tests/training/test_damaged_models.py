@@ -198,8 +198,8 @@ def test_trees_that_were_grown_on_other_features_end_with_one_line_and_code_1(
     words = ["replay", str(DEMO), "--config", str(small), "--model", "x.model", "--quiet"]
     assert main([*words, "--save", "x.rrd", "--reports", "x"]) == 1
     assert capsys.readouterr().err.splitlines() == [
-        "roadeval: error: x.model: the model's trees were grown on 6 features of a pixel, and here "
-        "are 3; train it again"
+        "roadeval: error: x.model: the model's trees were grown on 6 features of a pixel, and this "
+        "version computes 3; train it again"
     ]
     assert [path.name for path in tmp_path.iterdir()] == ["x.model"]
 

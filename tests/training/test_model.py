@@ -198,6 +198,15 @@ def test_what_a_stage_learnt_in_an_earlier_version_is_told_to_be_of_one(
     assert told.endswith("; train it again")
 
 
+def test_trees_of_version_4_did_not_say_how_many_features_they_know(tmp_path):
+    robust = configure({"preset": "robust", "trees": {"trees": 2, "features": ["place"]}})
+    path = tmp_path / "old.model"
+    save_model(fit([frame(n) for n in range(2)], robust.pipelines(), TrainingSettings()), path)
+    of_version(path, 4, without="unfiltered/trees/inputs")
+    with pytest.raises(RoadevalError, match=r"by an earlier version .*: inputs; train it again$"):
+        load_model(path)
+
+
 def test_a_model_of_today_without_fingerprints_is_damaged(path):
     of_version(path, VERSION, without="fingerprints")
     with pytest.raises(RoadevalError, match="a damaged model file: fingerprints are missing"):

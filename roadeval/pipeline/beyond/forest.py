@@ -59,7 +59,7 @@ class Forest:
     offset
         Where the sum begins.
     inputs
-        How many features of a pixel there were to choose from.
+        How many features of a pixel there were to choose from, what `base` gives not counted.
     base
         So many trees at the beginning are those of other drives: what they give, from
         ``base_offset`` on, is one more feature of the trees after them, and is not in the sum.
@@ -97,7 +97,7 @@ class Forest:
             raise ValueError("kept rules out a tree's last leaf, and so may leave none")
 
     def sums(self, values: Values) -> Values:
-        """Return the sum for each pixel of ``(F, n)`` features, ``(n,)`` float32."""
+        """Return the sum for each pixel of ``(inputs, n)`` features, ``(n,)`` float32."""
         if self.base:
             first = self._sum(values, slice(self.base), self.base_offset)
             values = np.concatenate([values, first[None]])

@@ -1,8 +1,9 @@
 """Boosted trees on what is known of a pixel of the ground: how probable road is.
 
-The sum of many small decision trees, each of which was grown to mend what those before it leave
-[1]_, is the log-odds of road: ``p = 1 / (1 + exp(-sum))``. What has learnt nothing has a say in it:
-how far a pixel lies from the reference patch. It is computed on a working image.
+The log-odds of road are the sum of many small decision trees, each of which was grown to mend what
+those before it leave [1]_, and of a term that is not learnt: ``x = sum + w (1 - d)`` with the
+distance d from the reference patch (`roadeval.pipeline.beyond.ground.reach`), and
+``p = 1 / (1 + exp(-x))``. It is computed on a working image.
 
 References
 ----------
@@ -25,7 +26,7 @@ from roadeval.data.arrays import Flags, Floats, Values
 from roadeval.data.packed import Packed
 from roadeval.kernels.plain.trees import LEAVES
 from roadeval.pipeline.beyond.forest import Forest, grow
-from roadeval.pipeline.beyond.ground.reach import combined, reach
+from roadeval.pipeline.beyond.ground.reach import FEATURES, combined, reach
 from roadeval.pipeline.beyond.ground.scene import scene_of
 from roadeval.pipeline.beyond.ground_features import GROUPS, at_samples, features, names_of
 from roadeval.pipeline.beyond.working_image import stretched
@@ -43,8 +44,6 @@ FULL: Final = 65535
 """The code of probability 1."""
 FARTHEST: Final = 3.0
 """Of the distances from the patch as they are shown."""
-REACH: Final = ("paths.over_edges", "barriers.around_edge")
-"""The features that `combined` takes, in its order."""
 
 TREES: Final = mask_spec("trees", "Road by boosted trees")
 PROBABILITY: Final = LayerSpec(
@@ -53,7 +52,7 @@ PROBABILITY: Final = LayerSpec(
 GEODESIC: Final = LayerSpec(
     "geodesic",
     LayerKind.SCALAR,
-    "Geodesic distance from the reference patch, over edges; roads end at about 1",
+    "Distance from the reference patch over edges; roads end at about 1",
     value_range=(0.0, FARTHEST),
     exact=False,
 )
@@ -82,9 +81,9 @@ class TreesSettings:
     share
         Of the features, drawn anew for each node, among which it chooses.
     reach_weight
-        Log-odds that a pixel on the patch gets besides, and one at twice the distance where roads
-        end loses (`roadeval.pipeline.beyond.ground.reach`). 0.5 changes next to nothing on cameras
-        that taught the trees; on others more than that may mend much.
+        Of the distance d from the patch, 1 where roads end: ``reach_weight (1 - d)`` is added to
+        the log-odds. 0.5 changes next to nothing on cameras that taught the trees. For trees that
+        other cameras taught 1 to 4 may mend much.
     threshold
         A pixel is road where it is more probable than this.
     """
@@ -149,12 +148,12 @@ def balanced_back(road: Flags, share: float) -> Floats:
 
 
 def check_fit(forest: Forest, settings: TreesSettings) -> None:
-    """Raise a `MisfitError` if the trees were grown on other features than are computed."""
+    """Raise a `MisfitError` if the trees were grown on more or fewer features of a pixel."""
     known = len(names_of(settings.features))
     if forest.inputs != known:
         raise MisfitError(
-            f"the model's trees were grown on {forest.inputs} features of a pixel, and here are "
-            f"{known}; train it again"
+            f"the model's trees were grown on {forest.inputs} features of a pixel, and this "
+            f"version computes {known}; train it again"
         )
 
 
@@ -173,12 +172,12 @@ def bind(settings: TreesSettings, forest: Forest) -> Callable[[View], Output]:
     """Return the trees as a pure function of what they see; a `MisfitError`, see `check_fit`."""
     check_fit(forest, settings)
     names = names_of(settings.features)
-    distances = [names.index(name) for name in REACH if name in names]
+    distances = [names.index(name) for name in FEATURES if name in names]
 
     def run(view: View) -> Output:
         scene, shape = scene_of(view.image, settings.width, settings.patch), view.image.shape
         seen = features(scene, settings.features)
-        far = combined(*seen[distances]) if len(distances) == len(REACH) else reach(scene)
+        far = combined(*seen[distances]) if len(distances) == len(FEATURES) else reach(scene)
         odds = log_odds(seen, forest) + np.float32(settings.reach_weight) * (1 - far)
         share = stretched(probability(odds), shape)
         codes = np.rint(share * np.float32(FULL)).astype(np.uint16)

@@ -18,7 +18,7 @@ from roadeval.pipeline.beyond.ground.scene import Scene, mean, slopes_of, steepn
 
 THIN, WIDE = 3, 15
 """Sides of the squares whose means differ where there is a thin line."""
-AROUND: Final = 31
+SURROUNDINGS: Final = 31
 """Side of the square that an edge is held against: on a smooth pavement a low kerb is steep."""
 FAINT: Final = 0.02
 """Added to that square's mean edge: noise is no edge."""
@@ -32,7 +32,7 @@ faint before it crosses anything steep: around the end of a kerb, not over it.""
 def compute(scene: Scene) -> Sequence[Values]:
     """Return each barrier at a pixel, on its path from the patch, and from the middle outwards.
 
-    And the paths of `SQUARED`.
+    After them come the paths over the squares of some.
     """
     found = [greatest_of_four(plane) for plane in barriers(tones_of(scene.fine))]
     named = dict(zip(WEIGHTS, found, strict=True))
@@ -58,7 +58,7 @@ def barriers(tones: tuple[Values, Values, Values]) -> list[Values]:
     yellow: Values = np.float32(1 / 2) * red - blue
     return [
         edge,
-        edge / (mean(edge, AROUND) + np.float32(FAINT)),
+        edge / (mean(edge, SURROUNDINGS) + np.float32(FAINT)),
         hues,
         np.maximum(mean(yellow, THIN) - mean(yellow, WIDE), 0),
         np.maximum(mean(light, WIDE) - mean(light, THIN), 0),
