@@ -25,10 +25,10 @@ def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     """Guess the truth of an ``(H, W, 3)`` uint8 RGB image from its reference patch.
 
     Road (1) is the patch, and what lies below the horizon row and nearer to it than
-    ``settings.reach``, see `reach`; all else is not (0). Returns ``(H, W)`` uint8.
+    ``settings.far``, see `reach`; all else is not (0). Returns ``(H, W)`` uint8.
     """
     height, width = image.shape[:2]
-    near = stretched(reach(scene_of(image, WIDTH, settings.patch)), image.shape) < settings.reach
+    near = stretched(reach(scene_of(image, WIDTH, settings.patch)), image.shape) < settings.far
     near[: round(settings.horizon * height)] = False
     near |= patch_mask(height, width, settings.patch) > 0
     return np.where(near, np.uint8(ROAD), np.uint8(NON_ROAD))

@@ -57,7 +57,7 @@ class TrainingSettings:
         Self-supervision: the trapezoid in front of the vehicle that is taken for road.
     horizon
         Self-supervision: pixels above this share of the height are not road.
-    reach
+    far
         Self-supervision: pixels below the horizon whose distance from the patch is less than this
         are road, the others are not; see `roadeval.pipeline.beyond.ground.reach`. Most roads end
         at 1.
@@ -75,7 +75,7 @@ class TrainingSettings:
     seeds: Annotated[int, Field(ge=1, le=100)] = 1
     patch: ReferencePatch = ReferencePatch()
     horizon: Annotated[float, Field(ge=0, le=1)] = 0.4
-    reach: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
+    far: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -37,7 +37,7 @@ def test_the_pavement_is_road_where_the_kerb_is_lowered():
 
 def test_the_further_one_may_reach_the_more_is_road():
     found = [
-        (patch_truth(street(), TrainingSettings(reach=far))[100:, 232:] == ROAD).mean()
+        (patch_truth(street(), TrainingSettings(far=far))[100:, 232:] == ROAD).mean()
         for far in (1.0, 20.0)
     ]
     assert found[0] < 0.01
@@ -54,6 +54,6 @@ def test_nothing_above_the_horizon_is_road():
 @pytest.mark.parametrize("shape", [(24, 32), (240, 320), (33, 47)])
 def test_the_patch_is_road_whatever_it_shows(shape):
     image = np.random.default_rng(0).integers(0, 256, (*shape, 3), dtype=np.uint8)
-    truth = patch_truth(image, TrainingSettings(horizon=1.0, reach=0.01))
+    truth = patch_truth(image, TrainingSettings(horizon=1.0, far=0.01))
     assert truth.dtype == np.uint8
     np.testing.assert_array_equal(truth == ROAD, patch_mask(*shape, ReferencePatch()) > 0)
