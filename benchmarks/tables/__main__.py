@@ -6,7 +6,8 @@ python -m benchmarks.tables --measure   replays the drives and writes the number
 
 A drive comes from the folder named for it; see PRESETS.md for where to get them. ``--measure NAME``
 measures one drive, ``idd``, ``idd_features``, ``idd_filters``, ``synthetic_shadow``,
-``stage_times``, ``elsewhere`` or ``taught``, and leaves the other numbers as they are.
+``stage_times``, ``elsewhere``, ``taught`` or ``reach_weights``, and leaves the other numbers as
+they are.
 """
 
 from __future__ import annotations
@@ -16,10 +17,18 @@ import json
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.tables import idd, idd_filters, stage_times, synthetic_shadow, taught
+from benchmarks.tables import (
+    idd,
+    idd_filters,
+    reach_weights,
+    stage_times,
+    synthetic_shadow,
+    taught,
+)
 from benchmarks.tables.drives import DRIVES, SEGNET, MissingSourceError, Sources
 from benchmarks.tables.measure import (
     REPLAYS,
@@ -27,23 +36,23 @@ from benchmarks.tables.measure import (
     STRANGERS,
     replayed,
     rounded,
-    trained_elsewhere,
 )
 from benchmarks.tables.text import DOCUMENTS, NUMBERS, faults, load, written
 from roadeval.version import VERSION
 
-IDD, ELSEWHERE, IDD_FEATURES = "idd", "elsewhere", "idd_features"
-TAUGHT = "taught"
-ON_IDD = {
-    IDD: idd.measured,
-    IDD_FEATURES: idd.without_each_group,
-    "idd_filters": idd_filters.measured,
+ELSEWHERE = "elsewhere"
+ON_IDD: Mapping[str, Callable[[Sources, Path], Any]] = {
+    "idd": lambda _, folder: idd.measured(folder, SEEDS),
+    "idd_features": lambda _, folder: idd.without_each_group(folder),
+    "idd_filters": lambda _, folder: idd_filters.measured(folder),
+    "taught": lambda sources, folder: [*taught.measured(sources, folder)],
+    "reach_weights": reach_weights.measured,
 }
 WITHOUT_FILES = {
     "synthetic_shadow": synthetic_shadow.measured,
     "stage_times": stage_times.measured,
 }
-OTHERS = (*ON_IDD, *WITHOUT_FILES, ELSEWHERE, TAUGHT)
+OTHERS = (*ON_IDD, *WITHOUT_FILES, ELSEWHERE)
 
 
 def main() -> int:
@@ -75,15 +84,14 @@ def _measure(options: argparse.Namespace, work: Path) -> None:
         if name in WITHOUT_FILES:
             _keep(rounded(WITHOUT_FILES[name]()), name)
             continue
-        if name in (*ON_IDD, TAUGHT):
+        if name in ON_IDD:
             if options.idd is None:
                 sys.exit(f"{name}: name the folder idd20k_lite of {idd.SOURCE} (--idd)")
-            on_idd = list(taught.measured(sources, options.idd)) if name == TAUGHT else None
-            _keep(rounded(on_idd or ON_IDD[name](options.idd, SEEDS)), name)
+            _keep(rounded(ON_IDD[name](sources, options.idd)), name)
             continue
         if name == ELSEWHERE:
             for stranger in STRANGERS.values():
-                _keep(trained_elsewhere(stranger, sources), ELSEWHERE, stranger.name)
+                _keep(taught.trained_elsewhere(stranger, sources), ELSEWHERE, stranger.name)
             continue
         for key, replay in REPLAYS.items():
             if name in replay.drives and key in (options.replays or REPLAYS):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any, Final
 
-from benchmarks.tables import idd, idd_filters, taught
+from benchmarks.tables import idd, idd_filters, reach_weights, taught
 from benchmarks.tables.drives import DRIVES, Drive
 from benchmarks.tables.measure import REPLAYS, STRANGERS, TEACHER, command
 from roadeval.results.claims import WORDS
@@ -22,6 +22,11 @@ NONE: Final = "-"
 ERR_AT_MOST: Final = {"camvid_0016E5_15hz": 0.04, "camvid_0006R0_1hz": 0.025}
 """What `robust` was to reach on the drives that it was developed on."""
 IDD_ERR_AT_MOST: Final = 0.045
+ADAPTED: Final = {
+    None: "no",
+    "truth": "its first ten frames",
+    "patch": "the same, without labels",
+}
 NOT_BELOW: Final = 4
 """Of IDD's drives, on which `blind` may be as good."""
 
@@ -301,6 +306,23 @@ def placement(numbers: Numbers) -> str:
     )
 
 
+def unlabelled(numbers: Numbers) -> str:
+    """Return ERR of `robust` that has learnt from a drive's first ten frames without labels."""
+    rows = []
+    for name in REPLAYS["patch"].drives:
+        found = numbers["drives"][name]["patch"]
+        rows.append(
+            [
+                DRIVES[name].title,
+                str(found["frames"]),
+                _percent(found["blind"]["ERR"]),
+                _spread(found["variants"]["unfiltered"]["ERR"]),
+                _interval(found["against_blind"]["unfiltered"]),
+            ]
+        )
+    return _table(["ERR, %", "frames", "`blind`, with labels", "`robust`, without", "points"], rows)
+
+
 def times(numbers: Numbers) -> str:
     """Return what each stage of the presets costs."""
     return _table(
@@ -338,12 +360,13 @@ def idd_lite(numbers: Numbers) -> str:
     lite = numbers["idd"]
     blind = lite["blind"]
     rows = [["`blind`", _percent(blind["ERR"]), _percent(blind["dark_missed"]), "", "", ""]]
-    for name in idd.VARIANTS:
+    titles = {"unfiltered": "no filter", idd.UNLABELLED: "`robust`, no labels"}
+    for name in (*idd.VARIANTS, idd.UNLABELLED):
         found = lite["variants"][name]
         own, lost = found.get("against_unfiltered"), found["not_below_blind"]
         rows.append(
             [
-                "no filter" if name == "unfiltered" else f"`{name}`",
+                titles.get(name, f"`{name}`"),
                 _spread(found["ERR"]),
                 _spread(found["dark_missed"]),
                 f"{median(lost)} ({min(lost)} to {max(lost)}) of {lite['labelled']}",
@@ -461,12 +484,31 @@ def taught_by(numbers: Numbers) -> str:
             [
                 titles[found["teacher"]],
                 titles[found["pupil"]],
-                "its first ten frames" if found["adapt"] else "no",
+                ADAPTED[found["adapt"]],
                 _percent(found["blind"]),
                 _spread(found["ERR"]),
                 _interval(found["against_blind"]),
             ]
             for found in numbers["taught"]
+        ),
+    )
+
+
+def weights(numbers: Numbers) -> str:
+    """Return ERR of `robust` with each weight of the distance from the patch."""
+    drives = {name: drive.title for name, drive in DRIVES.items()}
+    teachers = {
+        taught.IDD_LITE: "IDD Lite",
+        reach_weights.OWN: "its own first ten frames",
+        reach_weights.HALF: "half of IDD Lite",
+        **drives,
+    }
+    pupils = {taught.IDD_LITE: "its other half", **drives}
+    return _table(
+        [*("trained on", "scored on"), *(f"weight {each:g}" for each in reach_weights.WEIGHTS)],
+        (
+            [teachers[row["teacher"]], pupils[row["pupil"]], *map(_percent, row["ERR"])]
+            for row in numbers["reach_weights"]
         ),
     )
 
@@ -487,7 +529,7 @@ def flicker(numbers: Numbers) -> str:
 
 
 MEASURE: Final = "python -m benchmarks.tables --measure"
-PAPER, GATED, ROBUST, SPREAD = map(command, ("paper", "gated", "robust", "spread"))
+PAPER, GATED, ROBUST, SPREAD, PATCH = map(command, ("paper", "gated", "robust", "spread", "patch"))
 BLOCKS: Final = {
     "drives": Block(drives, (MEASURE,)),
     "claims": Block(claims, (PAPER,)),
@@ -495,6 +537,7 @@ BLOCKS: Final = {
     "spreads": Block(spreads, (PAPER, GATED, ROBUST)),
     "filters": Block(filters, (PAPER, GATED)),
     "placement": Block(placement, (ROBUST, SPREAD)),
+    "unlabelled": Block(unlabelled, (PATCH,)),
     "stage_times": Block(times, (f"{MEASURE} stage_times",)),
     "against_blind": Block(against_blind, (PAPER, GATED, ROBUST)),
     "claims_by_drive": Block(claims_by_drive, (PAPER,)),
@@ -505,6 +548,7 @@ BLOCKS: Final = {
     "aims": Block(aims, (ROBUST, f"{MEASURE} idd")),
     "elsewhere": Block(elsewhere, (f"{MEASURE} elsewhere",)),
     "taught": Block(taught_by, (f"{MEASURE} taught",)),
+    "reach_weights": Block(weights, (f"{MEASURE} reach_weights",)),
     "flicker": Block(flicker, (PAPER, ROBUST)),
 }
 """By the names in the marks."""

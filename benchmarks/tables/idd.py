@@ -31,6 +31,8 @@ SEEDS_OF_ROBUST: Final = 3
 FEWER_PIXELS: Final = 20_000
 """That each of many trainings learns from; `robust` takes more."""
 VARIANTS: Final = ("unfiltered", "paper", "gated", "robust")
+UNLABELLED: Final = "unlabelled"
+"""`robust` taught by the reference patch, without any label."""
 TP, TN, FP, FN, DARK, DARK_MISSED = range(6)
 
 Counted = NDArray[np.int64]
@@ -52,7 +54,7 @@ def measured(folder: Path, seeds: int) -> dict[str, Any]:
     """
     folds = both_ways(folder)
     blind = np.concatenate([count_blind(*fold) for fold in folds])
-    fewer = {"robust": SEEDS_OF_ROBUST}
+    fewer = dict.fromkeys(("robust", UNLABELLED), SEEDS_OF_ROBUST)
     trained = {
         name: with_each_seed(config, fewer.get(name, seeds), folds) for name, config in variants()
     }
@@ -64,10 +66,11 @@ def measured(folder: Path, seeds: int) -> dict[str, Any]:
     }
 
 
-def without_each_group(folder: Path, _seeds: int) -> dict[str, Any]:
+def without_each_group(folder: Path) -> dict[str, Any]:
     """Return ERR of `robust`, and its change without each group of its features.
 
-    With one seed and `FEWER_PIXELS`; half of the drives learn, the others are scored.
+    Without what the distance from the patch adds to the trees; with one seed and `FEWER_PIXELS`.
+    Half of the drives learn, the others are scored.
     """
     folds = both_ways(folder)[:1]
     groups = {name: tuple(each for each in GROUPS if each != name) for name in GROUPS}
@@ -88,8 +91,9 @@ def without_each_group(folder: Path, _seeds: int) -> dict[str, Any]:
 
 
 def _robust_with(groups: tuple[str, ...]) -> RunConfig:
-    fewer = {"trees": {"features": groups}, "training": {"max_pixels": FEWER_PIXELS}}
-    return configure({"preset": "robust", **fewer})
+    fewer = {"max_pixels": FEWER_PIXELS}
+    trees = {"features": groups, "reach_weight": 0.0}
+    return configure({"preset": "robust", "trees": trees, "training": fewer})
 
 
 def both_ways(folder: Path) -> tuple[Fold, Fold]:
@@ -163,6 +167,7 @@ def variants() -> Iterator[tuple[str, RunConfig]]:
     yield VARIANTS[0], replace(paper, pipeline=paper.pipeline.without_filter())
     for name in VARIANTS[1:]:
         yield name, configure({"preset": name})
+    yield UNLABELLED, configure({"preset": "robust", "training": {"source": "patch"}})
 
 
 def count_blind(train: Drives, test: Drives) -> Counted:

@@ -38,7 +38,7 @@ Frames = NDArray[np.int64]
 stand for a frame that a drive does not have."""
 
 
-def measured(folder: Path, _seeds: int) -> dict[str, Any]:
+def measured(folder: Path) -> dict[str, Any]:
     """Measure the filter with each factor of its odds before each classifier.
 
     Rates are pooled over pixels, as fractions; differences are of the filtered and the unfiltered

@@ -67,6 +67,12 @@ REPLAYS: Final[Mapping[str, Replay]] = {
         seeds=SEEDS_OF_ROBUST,
         drives=DEVELOPED,
     ),
+    "patch": Replay(
+        {"preset": "robust", "training": {"source": "patch"}},
+        "--preset robust --config patch.toml",
+        seeds=SEEDS_OF_ROBUST,
+        drives=DEVELOPED,
+    ),
 }
 
 
@@ -86,29 +92,6 @@ def replayed(replay: str, drive: Drive, sources: Sources) -> dict[str, Any]:
         reports=sources.work / f"{drive.name}.{replay}",
     )
     return kept(outcome.summary)
-
-
-def trained_elsewhere(drive: Drive, sources: Sources) -> dict[str, Any]:
-    """Train `robust` on another drive with each seed; return its ERR on this one.
-
-    The differences from the baseline, which is that other drive's mean truth, are of the first
-    seed.
-    """
-    teacher = DRIVES[TEACHER]
-    found = []
-    for seed in range(SEEDS_OF_ROBUST):
-        tables = {"preset": "robust", "labels": teacher.labels, "training": {"seed": seed}}
-        model = sources.work / f"{TEACHER}.{seed}.model"
-        if not model.exists():
-            roadeval.train([teacher.find(sources, TEACHER)], model, roadeval.configure(tables))
-        tables |= {"labels": drive.labels, "training": {"model": str(model)}}
-        outcome = roadeval.replay(
-            drive.find(sources, drive.name),
-            roadeval.configure(tables | {"output": {"record": "none"}}),
-            reports=sources.work / f"{drive.name}.elsewhere",
-        )
-        found.append(outcome.summary)
-    return of_others(found)
 
 
 def of_others(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

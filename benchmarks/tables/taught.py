@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 import roadeval
 from benchmarks.tables.drives import DRIVES, Drive, Sources
 from benchmarks.tables.idd import SEEDS_OF_ROBUST, read_drives
-from benchmarks.tables.measure import of_others
+from benchmarks.tables.measure import TEACHER, of_others
 from roadeval.training import save_model
 from roadeval.training.learning import train_on
 
 IDD_LITE: Final = "idd"
-PUPILS: Final = (
-    ("camvid_0016E5_15hz", "camvid_0006R0_1hz", False),
-    (IDD_LITE, "camvid_0016E5_15hz", False),
-    (IDD_LITE, "camvid_0006R0_1hz", False),
-    (IDD_LITE, "camvid_0016E5_15hz", True),
-    (IDD_LITE, "camvid_0006R0_1hz", True),
+PUPILS: Final[tuple[tuple[str, str, str | None], ...]] = (
+    ("camvid_0016E5_15hz", "camvid_0006R0_1hz", None),
+    (IDD_LITE, "camvid_0016E5_15hz", None),
+    (IDD_LITE, "camvid_0006R0_1hz", None),
+    (IDD_LITE, "camvid_0016E5_15hz", "truth"),
+    (IDD_LITE, "camvid_0006R0_1hz", "truth"),
+    (IDD_LITE, "camvid_0016E5_15hz", "patch"),
+    (IDD_LITE, "camvid_0006R0_1hz", "patch"),
 )
-"""Who teaches, which drive is scored, and whether its own first ten labelled frames are added."""
+"""Who teaches, which drive is scored, and by what it is adapted to its first ten frames."""
 
 
 def measured(sources: Sources, idd_lite: Path) -> Iterator[dict[str, Any]]:
@@ -29,32 +31,47 @@ def measured(sources: Sources, idd_lite: Path) -> Iterator[dict[str, Any]]:
     for teacher, pupil, adapt in PUPILS:
         outcomes = []
         for seed in range(SEEDS_OF_ROBUST):
-            path = sources.work / f"{teacher}.{seed}.model"
-            if not path.exists():
-                _teach(teacher, seed, path, sources, idd_lite)
-            training = {"seed": seed, "model": str(path), "adapt": adapt}
-            outcomes.append(_summary(DRIVES[pupil], training, sources))
+            model = model_of(teacher, seed, sources, idd_lite)
+            training = {"seed": seed, "model": str(model)}
+            if adapt is not None:
+                training |= {"adapt": True, "source": adapt}
+            outcomes.append(summary(DRIVES[pupil], {"training": training}, sources))
         yield {"teacher": teacher, "pupil": pupil, "adapt": adapt, **of_others(outcomes)}
 
 
-def _teach(teacher: str, seed: int, path: Path, sources: Sources, idd_lite: Path) -> None:
-    """Train on a log's frames as `roadeval train` draws them, or on IDD Lite's train part."""
+def trained_elsewhere(drive: Drive, sources: Sources) -> dict[str, Any]:
+    """Train `robust` on `TEACHER` with each seed; return its ERR on another drive.
+
+    The differences from the baseline, which is the teacher's mean truth, are of the first seed.
+    """
+    models = [model_of(TEACHER, seed, sources) for seed in range(SEEDS_OF_ROBUST)]
+    return of_others([summary(drive, {"training": {"model": str(m)}}, sources) for m in models])
+
+
+def model_of(teacher: str, seed: int, sources: Sources, idd_lite: Path | None = None) -> Path:
+    """Return the model of a log's frames as `roadeval train` draws them, or of IDD's train part.
+
+    Made where it is not there yet.
+    """
+    path = sources.work / f"{teacher}.{seed}.model"
+    if path.exists():
+        return path
     tables: dict[str, Any] = {"preset": "robust", "training": {"seed": seed}}
-    if teacher == IDD_LITE:
+    if idd_lite is not None and teacher == IDD_LITE:
         config = roadeval.configure(tables)
         frames = [frame for drive in read_drives(idd_lite).values() for frame in drive]
         save_model(train_on(frames, config.pipelines(), config.training), path)
-        return
+        return path
     drive = DRIVES[teacher]
     config = roadeval.configure(tables | {"labels": drive.labels})
     roadeval.train([drive.find(sources, teacher)], path, config)
+    return path
 
 
-def _summary(drive: Drive, training: dict[str, Any], sources: Sources) -> dict[str, Any]:
-    tables = {"preset": "robust", "labels": drive.labels, "training": training}
-    outcome = roadeval.replay(
-        drive.find(sources, drive.name),
-        roadeval.configure(tables | {"output": {"record": "none"}}),
-        reports=sources.work / f"{drive.name}.taught",
-    )
-    return outcome.summary
+def summary(drive: Drive, tables: Mapping[str, Any], sources: Sources) -> dict[str, Any]:
+    """Replay a drive with `robust` and some more settings; return its summary."""
+    given = {"preset": "robust", "labels": drive.labels, "output": {"record": "none"}, **tables}
+    reports = sources.work / f"{drive.name}.taught"
+    return roadeval.replay(
+        drive.find(sources, drive.name), roadeval.configure(given), reports=reports
+    ).summary

@@ -82,8 +82,9 @@ class TreesSettings:
         Of the features, drawn anew for each node, among which it chooses.
     reach_weight
         Of the distance d from the patch, 1 where roads end: ``reach_weight (1 - d)`` is added to
-        the log-odds. 0.5 changes next to nothing on cameras that taught the trees. For trees that
-        other cameras taught 1 to 4 may mend much.
+        the log-odds. Where the camera itself taught the trees, 0.5 changes next to nothing, but
+        that more of the dark road is missed, for shadows have edges; where others did, 1 to 4 may
+        mend much.
     threshold
         A pixel is road where it is more probable than this.
     """
