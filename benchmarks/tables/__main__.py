@@ -45,7 +45,7 @@ ON_IDD: Mapping[str, Callable[[Sources, Path], Any]] = {
     "idd": lambda _, folder: idd.measured(folder, SEEDS),
     "idd_features": lambda _, folder: idd.without_each_group(folder),
     "idd_filters": lambda _, folder: idd_filters.measured(folder),
-    "taught": lambda sources, folder: [*taught.measured(sources, folder)],
+    "taught": taught.measured,
     "reach_weights": reach_weights.measured,
 }
 WITHOUT_FILES = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,8 +26,9 @@ PUPILS: Final[tuple[tuple[str, str, str | None], ...]] = (
 """Who teaches, which drive is scored, and by what it is adapted to its first ten frames."""
 
 
-def measured(sources: Sources, idd_lite: Path) -> Iterator[dict[str, Any]]:
-    """Yield what each of `PUPILS` comes to, with each seed; the models are made once."""
+def measured(sources: Sources, idd_lite: Path) -> list[dict[str, Any]]:
+    """Return what each of `PUPILS` comes to, with each seed; the models are made once."""
+    rows = []
     for teacher, pupil, adapt in PUPILS:
         outcomes = []
         for seed in range(SEEDS_OF_ROBUST):
@@ -36,7 +37,9 @@ def measured(sources: Sources, idd_lite: Path) -> Iterator[dict[str, Any]]:
             if adapt is not None:
                 training |= {"adapt": True, "source": adapt}
             outcomes.append(summary(DRIVES[pupil], {"training": training}, sources))
-        yield {"teacher": teacher, "pupil": pupil, "adapt": adapt, **of_others(outcomes)}
+        about = {"teacher": teacher, "pupil": pupil, "adapt": adapt}
+        rows.append({**about, **of_others(outcomes)})
+    return rows
 
 
 def trained_elsewhere(drive: Drive, sources: Sources) -> dict[str, Any]:

@@ -25,14 +25,15 @@ FAINT: Final = 0.02
 WEIGHTS: Final = {"edge": 1.0, "relative_edge": 0.05, "hue_edge": 1.0, "yellow": 1.0, "dark": 1.0}
 """What each adds to the cost of a path."""
 SQUARED: Final = {"edge": 20.0, "relative_edge": 0.05}
-"""What the squares of some add to the cost of another path. It goes a long way through what is
-faint before it crosses anything steep: around the end of a kerb, not over it."""
+"""Weights of squared barriers in the costs of further paths. These go a long way through what is
+faint before they cross anything steep: around the end of a kerb, not over it."""
 
 
 def compute(scene: Scene) -> Sequence[Values]:
     """Return each barrier at a pixel, on its path from the patch, and from the middle outwards.
 
-    After them come the paths over the squares of some.
+    The distances over the squares of `SQUARED` come last. Each is ``(h, w)`` float32; distances
+    are those of `distance`, in pixels.
     """
     found = [greatest_of_four(plane) for plane in barriers(tones_of(scene.fine))]
     named = dict(zip(WEIGHTS, found, strict=True))

@@ -11,9 +11,9 @@ from typing import Final
 import numpy as np
 
 from roadeval.data.arrays import Values
-from roadeval.pipeline.beyond.ground.barriers import SQUARED, greatest_of_four
+from roadeval.pipeline.beyond.ground.barriers import SQUARED, barriers, greatest_of_four
 from roadeval.pipeline.beyond.ground.paths import distance
-from roadeval.pipeline.beyond.ground.scene import Scene, slopes_of, steepness, tones_of
+from roadeval.pipeline.beyond.ground.scene import Scene, tones_of
 
 OVER_EDGES: Final = 1.2
 """Where roads end by the distance over the edges of the working image, which grows with all that is
@@ -29,13 +29,17 @@ FEATURES: Final = ("paths.over_edges", "barriers.around_edge")
 
 def reach(scene: Scene) -> Values:
     """Return how far each pixel lies from the patch, ``(h, w)`` float32; roads end at about 1."""
-    fine = greatest_of_four(steepness(slopes_of(tones_of(scene.fine)[0])))
-    around = distance(np.square(fine) * np.float32(SQUARED["edge"]), scene.patch)
+    edge, *_ = barriers(tones_of(scene.fine))
+    steep = np.square(greatest_of_four(edge)) * np.float32(SQUARED["edge"])
+    around = distance(steep, scene.patch)
     return combined(distance(scene.edge, scene.patch), around)
 
 
 def combined(over: Values, around: Values) -> Values:
-    """Return the mean of the distances of `FEATURES`, each in units of where roads end by it."""
+    """Return ``(over / OVER_EDGES + around / AROUND_EDGES) / 2``, ``(h, w)`` float32 without a unit.
+
+    Both are ``(h, w)`` float32: the distances of `FEATURES`, in that order.
+    """
     mean: Values = np.float32(1 / 2) * (
         over / np.float32(OVER_EDGES) + around / np.float32(AROUND_EDGES)
     )
