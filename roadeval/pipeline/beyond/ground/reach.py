@@ -36,7 +36,7 @@ def reach(scene: Scene) -> Values:
 
 
 def combined(over: Values, around: Values) -> Values:
-    """Return ``(over / OVER_EDGES + around / AROUND_EDGES) / 2``, ``(h, w)`` float32 without a unit.
+    """Compute ``(over / OVER_EDGES + around / AROUND_EDGES) / 2``, ``(h, w)`` float32, no unit.
 
     Both are ``(h, w)`` float32: the distances of `FEATURES`, in that order.
     """
