@@ -89,8 +89,12 @@ def regions_table(
 def _note(findings: Findings) -> str:
     width = findings.summary["run"].get("evaluation", {}).get("boundary_width")
     near = f"within {width} pixels of" if width else "near"
-    return (
+    shadow = (
         "Shadow is what the filter took for shadow, right or wrong; where it is not true shadow, "
-        f"that is a finding of its own. Near the road's edge means {near} the border between road "
+        "that is a finding of its own. "
+    )
+    return (
+        f"{shadow if 'shadow' in findings.regions['region'].array else ''}"
+        f"Near the road's edge means {near} the border between road "
         "and non-road in the truth. Counts of all evaluated frames together; regions overlap."
     )

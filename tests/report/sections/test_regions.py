@@ -75,3 +75,10 @@ def test_the_width_of_the_edge_is_told_where_it_is_known():
     findings.summary["run"]["evaluation"] = {"boundary_width": 7}
     (note,) = (block.text for block in section(findings) if isinstance(block, Text))
     assert "within 7 pixels of the border" in note
+
+
+def test_shadow_is_explained_where_it_is_a_region():
+    for regions, told in ((("shadow", "boundary"), True), (("boundary", "interior"), False)):
+        blocks = section(some_findings(regions=table_of(*regions)))
+        (note,) = (block.text for block in blocks if isinstance(block, Text))
+        assert ("took for shadow" in note) == told
