@@ -164,6 +164,11 @@ def test_trees_for_other_features_are_a_misfit(forest):
         trees.bind(replace(SMALL, features=("place",)), forest)
 
 
+def test_trees_for_fewer_features_are_a_misfit(forest):
+    with pytest.raises(MisfitError, match="grown on 3 features"):
+        trees.bind(SMALL, replace(forest, feature=forest.feature % np.int32(3), inputs=3))
+
+
 @pytest.mark.parametrize("names", [("nose",), ("place", "place"), ()])
 def test_groups_must_be_known_and_named_once(names):
     with pytest.raises(ValueError, match=r"features"):
