@@ -495,7 +495,7 @@ def taught_by(numbers: Numbers) -> str:
 
 
 def weights(numbers: Numbers) -> str:
-    """Return ERR of `robust` with each weight of the distance from the patch."""
+    """Return ERR of `robust` with each weight of the distance from the patch; on IDD more."""
     drives = {name: drive.title for name, drive in DRIVES.items()}
     teachers = {
         taught.IDD_LITE: "IDD Lite",
@@ -505,10 +505,15 @@ def weights(numbers: Numbers) -> str:
     }
     pupils = {taught.IDD_LITE: "its other half", **drives}
     return _table(
-        [*("trained on", "scored on"), *(f"weight {each:g}" for each in reach_weights.WEIGHTS)],
+        [
+            *("trained on", "scored on", ""),
+            *(f"weight {each:g}" for each in reach_weights.WEIGHTS),
+        ],
         (
-            [teachers[row["teacher"]], pupils[row["pupil"]], *map(_percent, row["ERR"])]
+            [teachers[row["teacher"]], pupils[row["pupil"]], title, *map(_percent, row[rate])]
             for row in numbers["reach_weights"]
+            for rate, title in (("ERR", "ERR"), ("dark_missed", "dark road missed"))
+            if rate in row
         ),
     )
 

@@ -38,7 +38,7 @@ PAIRS: Final = (
 
 def measured(sources: Sources, idd_lite: Path) -> list[dict[str, Any]]:
     """Return ERR with each of `WEIGHTS`: on IDD's other half, and of `PAIRS`."""
-    rows = [{"teacher": HALF, "pupil": IDD_LITE, "ERR": _on_idd(idd_lite)}]
+    rows = [{"teacher": HALF, "pupil": IDD_LITE, **_on_idd(idd_lite)}]
     for teacher, pupil in PAIRS:
         own = teacher == OWN
         training = {} if own else {"model": str(model_of(teacher, 0, sources, idd_lite))}
@@ -50,18 +50,21 @@ def measured(sources: Sources, idd_lite: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def _on_idd(folder: Path) -> list[float]:
-    """Return ERR with each weight on one half of IDD's drives, of trees that the other taught."""
+def _on_idd(folder: Path) -> dict[str, list[float]]:
+    """Return rates with each weight on one half of IDD's drives, of trees that the other taught."""
     train, test = idd.both_ways(folder)[0]
     config = _robust(WEIGHTS[0])
     frames = [frame for drive in train.values() for frame in drive]
     learnt = fit(frames, {"it": config.pipeline}, config.training).parameters["it"]
     chains = [_robust(weight).pipeline.bind(learnt) for weight in WEIGHTS]
     counted = [
-        sum(idd.counts(idd.last(chain, frame), frame) for each in test.values() for frame in each)
+        np.sum([idd.counts(idd.last(chain, f), f) for each in test.values() for f in each], axis=0)
         for chain in chains
     ]
-    return [float(idd.err(np.asarray(each))) for each in counted]
+    return {
+        "ERR": [float(idd.err(each)) for each in counted],
+        "dark_missed": [float(idd.missed(each)) for each in counted],
+    }
 
 
 def _robust(weight: float) -> RunConfig:

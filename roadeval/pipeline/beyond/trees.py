@@ -1,9 +1,10 @@
 """Boosted trees on what is known of a pixel of the ground: how probable road is.
 
 The log-odds of road are the sum of many small decision trees, each of which was grown to mend what
-those before it leave [1]_, and of a term that is not learnt: ``x = sum + w (1 - d)`` with the
-distance d from the reference patch (`roadeval.pipeline.beyond.ground.reach`), and
-``p = 1 / (1 + exp(-x))``. It is computed on a working image.
+those before it leave [1]_, less a term that is not learnt: ``x = sum - w s max(d - 1, 0)`` with the
+distance d from the reference patch, 1 where roads end, and the share s of light
+(`roadeval.pipeline.beyond.ground.reach`); ``p = 1 / (1 + exp(-x))``. It is computed on a working
+image.
 
 References
 ----------
@@ -26,7 +27,7 @@ from roadeval.data.arrays import Flags, Floats, Values
 from roadeval.data.packed import Packed
 from roadeval.kernels.plain.trees import LEAVES
 from roadeval.pipeline.beyond.forest import Forest, grow
-from roadeval.pipeline.beyond.ground.reach import FEATURES, combined, reach
+from roadeval.pipeline.beyond.ground.reach import FEATURES, beyond, combined, inputs
 from roadeval.pipeline.beyond.ground.scene import scene_of
 from roadeval.pipeline.beyond.ground_features import GROUPS, at_samples, features, names_of
 from roadeval.pipeline.beyond.working_image import stretched
@@ -81,10 +82,9 @@ class TreesSettings:
     share
         Of the features, drawn anew for each node, among which it chooses.
     reach_weight
-        Of the distance d from the patch, 1 where roads end: ``reach_weight (1 - d)`` is added to
-        the log-odds. Where the camera itself taught the trees, 0.5 changes next to nothing, but
-        that more of the dark road is missed, for shadows have edges; where others did, 1 to 4 may
-        mend much.
+        Of the distance d from the patch, 1 where roads end: where there is light,
+        ``reach_weight max(d - 1, 0)`` is taken from the log-odds. It changes little where the
+        camera itself taught the trees; where others did, up to 4 may mend much.
     threshold
         A pixel is road where it is more probable than this.
     """
@@ -97,7 +97,7 @@ class TreesSettings:
     rate: Annotated[float, Field(gt=0, le=1)] = 0.1
     least: Annotated[int, Field(ge=1, le=10_000)] = 50
     share: Annotated[float, Field(gt=0, le=1)] = 0.33
-    reach_weight: Annotated[float, Field(ge=0, le=100)] = 0.5
+    reach_weight: Annotated[float, Field(ge=0, le=100)] = 1.0
     threshold: Annotated[float, Field(ge=0, le=1)] = 0.5
 
     @field_validator("features")
@@ -173,13 +173,14 @@ def bind(settings: TreesSettings, forest: Forest) -> Callable[[View], Output]:
     """Return the trees as a pure function of what they see; a `MisfitError`, see `check_fit`."""
     check_fit(forest, settings)
     names = names_of(settings.features)
-    distances = [names.index(name) for name in FEATURES if name in names]
+    known = [names.index(name) for name in FEATURES if name in names]
 
     def run(view: View) -> Output:
         scene, shape = scene_of(view.image, settings.width, settings.patch), view.image.shape
         seen = features(scene, settings.features)
-        far = combined(*seen[distances]) if len(distances) == len(FEATURES) else reach(scene)
-        odds = log_odds(seen, forest) + np.float32(settings.reach_weight) * (1 - far)
+        over, around, light = seen[known] if len(known) == len(FEATURES) else inputs(scene)
+        far = combined(over, around)
+        odds = log_odds(seen, forest) - np.float32(settings.reach_weight) * beyond(far, light)
         share = stretched(probability(odds), shape)
         codes = np.rint(share * np.float32(FULL)).astype(np.uint16)
         road = Packed.of(codes > round(settings.threshold * FULL))

@@ -185,20 +185,28 @@ def test_the_layers_are_those_that_are_announced(forest):
 VIEW = View.of(picture(9)[0])
 
 
-@pytest.mark.parametrize("groups", [("place",), ("place", "paths"), ("place", "barriers", "paths")])
-def test_reach_is_added_to_the_log_odds_whatever_the_trees_see(sample, groups):
+@pytest.mark.parametrize(
+    "groups", [("place",), ("place", "paths"), ("place", "barriers", "light", "paths")]
+)
+def test_lit_ground_beyond_reach_loses_log_odds_whatever_the_trees_see(sample, groups):
     without = replace(SMALL, features=groups, reach_weight=0.0)
     forest = trees.fit(sample, without)
     plain, more = (
         trees.bind(replace(without, reach_weight=weight), forest)(VIEW).probability / trees.FULL
         for weight in (0.0, 2.0)
     )
-    far = stretched(reach(scene_of(VIEW.image, SMALL.width, SMALL.patch)), VIEW.image.shape)
+    scene = scene_of(VIEW.image, SMALL.width, SMALL.patch)
+    light = scene.tones[0] - np.percentile(scene.tones[0][len(scene.tones[0]) // 2 :], 80)
+    lit = np.interp(light, [-0.8, -0.3], [0, 1])
+    expected = -2 * lit * np.maximum(reach(scene) - 1, 0)
     changed = np.log(more / (1 - more)) - np.log(plain / (1 - plain))
     # The picture is as large as the working image; a probability has a code of 16 bit.
     inside = (np.minimum(plain, more) > 0.01) & (np.maximum(plain, more) < 0.99)
+    assert VIEW.image.shape[:2] == scene.shape
     assert inside.mean() > 0.1
-    np.testing.assert_allclose(changed[inside], 2 * (1 - far[inside]), atol=0.01)
+    assert (expected[inside] < -0.1).mean() > 0.1
+    assert (expected[inside] == 0).mean() > 0.1
+    np.testing.assert_allclose(changed[inside], expected[inside], atol=0.01)
 
 
 # --- On top of what other drives have taught ------------------------------------------------------

@@ -22,10 +22,15 @@ PERCENTILES: Final = (50, 80)
 def compute(scene: Scene) -> Sequence[Values]:
     """Return log brightness less the lower half's, and the row's; and the row's median colour."""
     light = scene.tones[0]
-    levels = np.percentile(light[scene.shape[0] // 2 :], PERCENTILES)
-    against = [light - np.float32(level) for level in levels]
     row = light - light.mean(axis=1, keepdims=True)
-    return [*against, row, np.median(scene.colour, axis=1, keepdims=True)]
+    return [*light_over(scene, *PERCENTILES), row, np.median(scene.colour, axis=1, keepdims=True)]
+
+
+def light_over(scene: Scene, *percentiles: float) -> Sequence[Values]:
+    """Return log brightness less each percentile of the lower half's, ``(h, w)`` float32."""
+    light = scene.tones[0]
+    levels = np.percentile(light[scene.shape[0] // 2 :], percentiles)
+    return [light - np.float32(level) for level in levels]
 
 
 GROUP: Final = Group(

@@ -6,12 +6,14 @@ count: a verge as bright as the road is reached.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from roadeval.data.arrays import Values
 from roadeval.pipeline.beyond.ground.barriers import SQUARED, barriers, greatest_of_four
+from roadeval.pipeline.beyond.ground.light import light_over
 from roadeval.pipeline.beyond.ground.paths import distance
 from roadeval.pipeline.beyond.ground.scene import Scene, tones_of
 
@@ -23,20 +25,35 @@ AROUND_EDGES: Final = 2.0
 steep is, thin kerbs included. Both values are the best, or next to it, on the train part of IDD
 Lite, on CamVid 0016E5 and 0006R0 and on the demo drive; for working images of 160 columns, made of
 320 or more: edges of smaller images are blurred, and more is reached."""
-FEATURES: Final = ("paths.over_edges", "barriers.around_edge")
-"""The features of a pixel that are these two distances."""
+PERCENTILE: Final = 80
+"""Of the lower half's log brightness: about that of sunlit ground."""
+SHADE, SUN = -0.8, -0.3
+"""Log brightness over that percentile, up to which a pixel is taken to lie in the shade, and from
+which on in the light."""
+FEATURES: Final = (
+    "paths.over_edges",
+    "barriers.around_edge",
+    f"light.light_over_{PERCENTILE}th_percentile",
+)
+"""The features of a pixel that are the two distances, and its light."""
 
 
 def reach(scene: Scene) -> Values:
     """Return how far each pixel lies from the patch, ``(h, w)`` float32; roads end at about 1."""
+    over, around, _ = inputs(scene)
+    return combined(over, around)
+
+
+def inputs(scene: Scene) -> Sequence[Values]:
+    """Compute the planes of `FEATURES`, ``(h, w)`` float32 each."""
     edge, *_ = barriers(tones_of(scene.fine))
     steep = np.square(greatest_of_four(edge)) * np.float32(SQUARED["edge"])
-    around = distance(steep, scene.patch)
-    return combined(distance(scene.edge, scene.patch), around)
+    over, around = (distance(cost, scene.patch) for cost in (scene.edge, steep))
+    return over, around, *light_over(scene, PERCENTILE)
 
 
 def combined(over: Values, around: Values) -> Values:
-    """Compute ``(over / OVER_EDGES + around / AROUND_EDGES) / 2``, ``(h, w)`` float32, no unit.
+    """Compute ``d = (over / OVER_EDGES + around / AROUND_EDGES) / 2``, ``(h, w)`` float32, no unit.
 
     Both are ``(h, w)`` float32: the distances of `FEATURES`, in that order.
     """
@@ -44,3 +61,15 @@ def combined(over: Values, around: Values) -> Values:
         over / np.float32(OVER_EDGES) + around / np.float32(AROUND_EDGES)
     )
     return mean
+
+
+def beyond(far: Values, light: Values) -> Values:
+    """Compute ``s max(d - 1, 0)``: how far a pixel lies beyond the road's end, if it is lit.
+
+    The share s grows from 0 at `SHADE` to 1 at `SUN`: a shadow's edge lengthens the way into it,
+    so that in the shade the distance says little. All are ``(h, w)`` float32; d is `combined`,
+    ``light`` the last of `FEATURES`.
+    """
+    share = np.clip((light - np.float32(SHADE)) / np.float32(SUN - SHADE), 0, 1)
+    past: Values = share * np.maximum(far - np.float32(1), 0)
+    return past

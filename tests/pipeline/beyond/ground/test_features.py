@@ -18,7 +18,7 @@ from roadeval.pipeline.beyond.ground import (
     surroundings,
     texture,
 )
-from roadeval.pipeline.beyond.ground.reach import combined, reach
+from roadeval.pipeline.beyond.ground.reach import FEATURES, beyond, combined, inputs, reach
 from roadeval.pipeline.beyond.ground.scene import from_patch, scene_of, steepness, tones_of
 from roadeval.pipeline.beyond.ground_features import GROUPS, features, names_of
 from roadeval.pipeline.reference_patch import ReferencePatch
@@ -263,6 +263,14 @@ def test_reach_is_the_mean_of_two_distances_over_their_thresholds(scene):
     over, around = (found[names.index(n)] for n in ("paths.over_edges", "barriers.around_edge"))
     np.testing.assert_array_equal(reach(scene), combined(over, around))
     close(reach(scene), (over / 1.2 + around / 2) / 2)
+    for name, plane in zip(FEATURES, inputs(scene), strict=True):
+        np.testing.assert_array_equal(plane, found[names.index(name)])
+
+
+def test_only_lit_ground_lies_beyond_the_end_of_the_road():
+    far, light = np.meshgrid(np.float32([0, 1, 1.5, 3]), np.float32([-2, -0.8, -0.55, -0.3, 1]))
+    expected = np.outer([0, 0, 0.5, 1, 1], [0, 0, 0.5, 2])
+    close(beyond(far, light), expected)
 
 
 def test_a_line_of_one_fine_pixel_is_a_barrier_on_the_way():
