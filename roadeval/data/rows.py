@@ -25,7 +25,7 @@ class Rows:
     columns: Mapping[str, Cells]
 
     def __len__(self) -> int:
-        return len(next(iter(self.columns.values())))
+        return len(next(iter(self.columns.values()), ()))
 
     def __getitem__(self, name: str) -> Cells:
         return self.columns[name]

@@ -31,6 +31,13 @@ def final_stages(rows: Rows) -> dict[str, str]:
     return differences.final_stages((variant, stage) for variant, stage, _ in rows.masks())
 
 
+def finals(rows: Rows) -> Rows:
+    """Return the rows of each variant's final mask."""
+    last = final_stages(rows)
+    own = [places for variant, stage, places in rows.masks() if stage == last[variant]]
+    return rows.take(np.sort(np.concatenate(own)) if own else slice(0))
+
+
 def counts(rows: Rows) -> FourCounts:
     """Return the counts of rows, ``(n, 4)`` int64."""
     return np.stack([rows[name] for name in OUTCOMES], axis=1)

@@ -23,13 +23,11 @@ from roadeval.jobs.result import Result
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.comparison import as_dict, judged
 from roadeval.results.lines import window_rows
-from roadeval.results.reading import table_of
+from roadeval.results.reading import rows_of
 from roadeval.results.summary import json_text, plain
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from roadeval.report.blocks import Document
     from roadeval.report.sections.browse import BrowsedFrames
 
@@ -69,14 +67,14 @@ class Compared:
     recordings: Mapping[str, Path]
 
     @property
-    def windows(self) -> pd.DataFrame:
+    def windows(self) -> Rows:
         """ERR and the rest over the drive, with each result as a variant.
 
         Without rows for different drives.
         """
         size = self.comparison.settings.window
         found = _windows(self.sides, size) if self.comparison.same_drive else ()
-        return table_of("windows", window_rows(found))
+        return rows_of("windows", window_rows(found))
 
     @property
     def content(self) -> dict[str, Any]:

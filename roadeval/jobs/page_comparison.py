@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from roadeval.data import BASELINE, ERRORS, TRUTH
+import numpy as np
+
+from roadeval.data import BASELINE, ERRORS, TRUTH, Rows
+from roadeval.data.rows import joined
 from roadeval.evaluation.comparison import Side
 from roadeval.evaluation.comparison_result import Comparison
 from roadeval.evaluation.metrics import SHORT
@@ -21,9 +24,6 @@ from roadeval.report.figures.values import over_frames
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import LayerImage
 from roadeval.report.sections.browse import BrowsedFrames, FrameFacts, strip
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Inspect = Callable[[Path, int], str]
 """Returns the command that opens a frame of a recording."""
@@ -98,25 +98,25 @@ def _masks(sides: Sequence[Side]) -> Iterator[_Mask]:
                 yield _Mask(f"{side.label}: {variant}", side.label, variant, own)
 
 
-def _table(masks: Sequence[_Mask], sides: Mapping[str, Side]) -> pd.DataFrame:
+def _table(masks: Sequence[_Mask], sides: Mapping[str, Side]) -> Rows:
     """Return the rows of the masks on the frames that all have, each under its name as variant."""
-    import pandas as pd
-
     parts = []
     for mask in masks:
         rows = sides[mask.result].frames.of_variant(mask.variant)
         rows = rows.take(rows["stage"] == final_stages(rows)[mask.variant])
         known = {name: rows[name] for name in ("frame", "stamp_ns", *SHORT) if name in rows.columns}
-        parts.append(pd.DataFrame(known).assign(variant=mask.name, stage="final"))
-    whole = pd.concat(parts)
-    common = whole.groupby("frame")["variant"].nunique() == len(masks)
-    return whole[whole["frame"].isin(common.index[common])].sort_values("frame", kind="stable")
+        named = {"variant": np.full(len(rows), mask.name), "stage": np.full(len(rows), "final")}
+        parts.append(Rows({**known, **named}))
+    common = set.intersection(*(set(part["frame"].tolist()) for part in parts))
+    whole = joined(parts)
+    places = np.flatnonzero(np.isin(whole["frame"], [*common]))
+    return whole.take(places[np.argsort(whole["frame"][places], kind="stable")])
 
 
-def _facts(table: pd.DataFrame, masks: Sequence[_Mask], noteworthy: float) -> Iterator[FrameFacts]:
+def _facts(table: Rows, masks: Sequence[_Mask], noteworthy: float) -> Iterator[FrameFacts]:
     """Yield each frame with the masks' rates, and whether the first of them got worse or better."""
     base, new = masks[0].name, masks[1].name
-    names = [name for name in SHORT if name in table]
+    names = [name for name in SHORT if name in table.columns]
     for frame, stamp, rates in rates_by_frame(table, names):
         change = rates[new]["ERR"] - rates[base]["ERR"]
         said = [f"{new} {'worse' if change > 0 else 'better'}"] if abs(change) >= noteworthy else []

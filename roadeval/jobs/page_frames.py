@@ -33,8 +33,8 @@ def browsed(
     result: Result, inspect: Callable[[int], str] | None, strips: Sequence[Strip] = ()
 ) -> BrowsedFrames:
     """Collect what a page tells of a result's frames."""
-    frames = result.frames
-    variants = list(dict.fromkeys(frames["variant"])) if len(frames) else []
+    frames = result.rows
+    variants = frames.distinct("variant")
     return BrowsedFrames(
         frames=list(facts_of(result)),
         variants=variants,
@@ -54,15 +54,15 @@ def _final_masks(result: Result) -> list[str]:
 
 def facts_of(result: Result) -> Iterator[FrameFacts]:
     """Yield every frame of the table: those evaluated, or without truth those with pictures."""
-    frames = result.frames
+    frames = result.rows
     if not len(frames):
         stamps = result.recording.stamps if result.recording else {}
         yield from (FrameFacts(number, stamps[number], {}) for number in result.pictured)
         return
     settings = settings_of(result.summary)
     dark = _much_shadow(result)
-    names = [name for name in SHORT if name in frames]
-    for frame, stamp, rates in rates_by_frame(analysis.finals(frames), names):
+    names = [name for name in SHORT if name in frames.columns]
+    for frame, stamp, rates in rates_by_frame(scored.finals(frames), names):
         blind = rates.get(BASELINE)
         others = {name: each for name, each in rates.items() if name != BASELINE}
         yield FrameFacts(

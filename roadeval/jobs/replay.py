@@ -127,9 +127,9 @@ def _written(
         if config.output.figures:
             with results.explained():
                 curves = ThresholdData(
-                    results.table("probabilities"), facts.get("curves", {}), facts["totals"]
+                    results.rows("probabilities"), facts.get("curves", {}), facts["totals"]
                 )
-                data = FigureData(log.name, results.table("windows"), examples, curves)
+                data = FigureData(log.name, results.rows("windows"), examples, curves)
                 write_figures(results.folder, data)
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
     files = [to.reports / name for name in facts["files"]] + ([to.mcap] if to.mcap else [])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, FILTERED, UNFILTERED, TruthBits
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, Rows, TruthBits
 from roadeval.data.packed import Packed
 from roadeval.evaluation import analysis, counts, maps, scored
 from roadeval.evaluation.settings import settings_of
@@ -15,7 +15,7 @@ from roadeval.jobs.report_frames import FramePicker, evenly, variants_but_baseli
 from roadeval.jobs.result import Result
 from roadeval.report.findings import Commands, ErrorHeatmap, Findings, PairedComparison
 from roadeval.results.lines import change_rows, heat_rows, window_rows
-from roadeval.results.reading import table_of
+from roadeval.results.reading import rows_of, table_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,7 +63,7 @@ def collect(result: Result, commands: Commands | None = None) -> Findings:
         ],
         oracles=analysis.oracles(result.extra("oracles"), frames),
         beyond=summary.get("beyond", {}),
-        levels=result.extra("probabilities"),
+        levels=result.levels,
         sampled=sampled,
         examples=picker.examples(evenly(pictured, EXAMPLES)),
         thumbnails=picker.thumbnails(evenly(pictured, THUMBNAILS)),
@@ -83,14 +83,14 @@ def _pictured(result: Result) -> list[int]:
 # --- Tables ---------------------------------------------------------------------------------------
 
 
-def _windows(result: Result) -> tuple[pd.DataFrame, int]:
+def _windows(result: Result) -> tuple[Rows, int]:
     """Return the drive's windows and their size; longer ones where the drive is long."""
     size = settings_of(result.summary).window
     count = -(-result.frames["frame"].nunique() // size)
     if not count or (count <= WINDOWS and len(result.windows)):
         return result.windows, size
     size *= -(-count // WINDOWS)
-    return table_of("windows", window_rows(scored.windows(result.rows, size))), size
+    return rows_of("windows", window_rows(scored.windows(result.rows, size))), size
 
 
 def _paired(result: Result, changes: pd.DataFrame) -> Iterator[PairedComparison]:

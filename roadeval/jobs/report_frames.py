@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.data import BASELINE, ERRORS, FILTERED, TRUTH, UNFILTERED, LayerKind
+from roadeval.data import BASELINE, ERRORS, FILTERED, TRUTH, UNFILTERED, LayerKind, Rows
 from roadeval.evaluation import analysis, scored
 from roadeval.evaluation.metrics import SHORT
 from roadeval.jobs.result import Result
@@ -46,7 +46,7 @@ def str_keys(values: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def rates_by_frame(
-    table: pd.DataFrame, names: Sequence[str]
+    table: Rows, names: Sequence[str]
 ) -> Iterator[tuple[int, int, dict[str, dict[str, float]]]]:
     """Yield each frame's number and stamp, and the rates of its rows by variant.
 

@@ -144,9 +144,14 @@ class Result:
             return None
 
     @property
-    def windows(self) -> pd.DataFrame:
+    def windows(self) -> Rows:
         """The rows of ``windows.csv``; none of an incomplete run."""
-        return self._tables.windows
+        return self._tables.rows("windows")
+
+    @property
+    def levels(self) -> Rows:
+        """The rows of ``probabilities.csv``; none where no variant says how probable road is."""
+        return self._tables.rows("probabilities")
 
     @property
     def properties(self) -> Mapping[str, str | int | float]:

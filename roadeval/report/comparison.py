@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from roadeval.data import Rows
 from roadeval.data.words import listing, number, percent, points, timestamp
 from roadeval.evaluation.comparison_result import Comparison, MaskComparison
 from roadeval.evaluation.conditions import Judgement
@@ -34,9 +35,6 @@ from roadeval.results.comparison import judged, verdict, warnings
 from roadeval.results.comparison import where as told_where
 from roadeval.runtime.text import as_markdown
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 Inspect = Callable[[str, int], str]
 _COMMAND: Final = ("in the viewer",)
 OTHERS: Final = tuple(name for name in SHORT if name != "ERR")
@@ -46,7 +44,7 @@ OTHERS: Final = tuple(name for name in SHORT if name != "ERR")
 def document(
     comparison: Comparison,
     judgements: Sequence[Judgement],
-    windows: pd.DataFrame,
+    windows: Rows,
     inspect: Inspect | None = None,
 ) -> Document:
     """Return a comparison as a document.
@@ -98,7 +96,7 @@ def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
 def _blocks(
     comparison: Comparison,
     judgements: Sequence[Judgement],
-    windows: pd.DataFrame,
+    windows: Rows,
     inspect: Inspect | None,
 ) -> Iterator[Block]:
     yield Heading("What changed")

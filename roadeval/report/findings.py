@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from roadeval.data import Rows
 from roadeval.report.figures.figure import ExampleFrame, FigureData, ThresholdData
 from roadeval.report.images import LayerImage
 
@@ -163,7 +164,7 @@ class Findings:
     summary: Mapping[str, Any]
     properties: Mapping[str, Any]
     finals: Mapping[str, str]
-    windows: pd.DataFrame
+    windows: Rows
     window_size: int
     paired: Sequence[PairedComparison]
     regions: pd.DataFrame
@@ -173,7 +174,7 @@ class Findings:
     heatmaps: Sequence[ErrorHeatmap]
     oracles: pd.DataFrame
     beyond: Mapping[str, Mapping[str, Any]]
-    levels: pd.DataFrame
+    levels: Rows
     sampled: int
     examples: Sequence[ExampleFrame]
     thumbnails: Sequence[LayerImage]

@@ -108,11 +108,11 @@ class ResultsWriter:
         """Rows and SHA-256 of each table that has rows so far, as the summary states them."""
         return {name: table.stated for name, table in self._open.items() if table.rows}
 
-    def table(self, name: str) -> pd.DataFrame:
+    def rows(self, name: str) -> Rows:
         """Read back a table, to which nothing is added any more."""
         with self.explained():
             self._open[name].close()
-        return read_table(name, self._open[name].path, {"tables": self.tables})
+        return read_rows(name, self._open[name].path, {"tables": self.tables})
 
     def finish(self, summary: Mapping[str, Any], run_toml: str) -> dict[str, Any]:
         """Write the last files, and return the content of the summary.

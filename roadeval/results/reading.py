@@ -31,6 +31,8 @@ TYPES: Final = {
     Kind.FLAG: "bool",
 }
 """Each kind's type in Arrow."""
+ARRAYS: Final = {kind: str if name == "string" else name for kind, name in TYPES.items()}
+"""And in NumPy, see `Rows`."""
 
 NAMED: Final = 40
 """Letters of a wrong name that a message quotes."""
@@ -129,6 +131,18 @@ def table_of(name: str, rows: Iterable[Row]) -> pd.DataFrame:
     columns = [*zip(*rows, strict=True)] or [()] * len(schema)
     arrays = [pa.array(cells, kind) for cells, kind in zip(columns, schema.types, strict=True)]
     return _pandas(pa.Table.from_arrays(arrays, schema=schema))
+
+
+def rows_of(name: str, rows: Iterable[Row]) -> Rows:
+    """Return rows as `read_rows` would have read them back."""
+    columns = TABLES[name].columns
+    cells = [*zip(*rows, strict=True)] or [()] * len(columns)
+    return Rows(
+        {
+            column.name: np.array(each, ARRAYS[column.kind])
+            for column, each in zip(columns, cells, strict=True)
+        }
+    )
 
 
 def fingerprint(content: bytes) -> dict[str, Any]:

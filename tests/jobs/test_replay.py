@@ -3,6 +3,8 @@
 import json
 import re
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -678,3 +680,16 @@ def test_without_truth_there_is_no_rate_for_seeds_to_spread(tmp_path, monkeypatc
     assert len(fits) == 1
     assert "seeds" not in outcome.summary
     assert outcome.warnings[0].startswith("there is no road truth to score against")
+
+
+def test_tables_and_figures_alone_are_made_without_pandas(drive, tmp_path):
+    code = f"""
+import sys
+import roadeval
+
+config = roadeval.configure({{"output": {{"record": "none"}}}})
+made = roadeval.replay({str(drive)!r}, config, reports={str(tmp_path / "reports")!r})
+print("fig3a_error_rate.png" in made.summary["files"], "pandas" in sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "True False\n"

@@ -3,10 +3,13 @@
 import io
 import re
 
+import numpy as np
 import pandas as pd
 from pypdf import PdfReader
 
+from roadeval.data import Rows
 from roadeval.report.blocks import Cell, Document
+from roadeval.report.figures.figure import FigureData
 from roadeval.report.findings import Commands, Findings, PairedComparison
 
 
@@ -24,6 +27,16 @@ def text(content):
     """Every word of a PDF, with single spaces between them."""
     pages = (page.extract_text() for page in reader(content).pages)
     return re.sub(r"\s+", " ", " ".join(pages))
+
+
+def rows_of(table):
+    """A table's rows as `roadeval.results.reading.read_rows` reads them."""
+    return Rows({name: np.array(table[name].tolist()) for name in table})
+
+
+def figure_data(drive, windows, *more):
+    """What figures are drawn from, with the windows as a table."""
+    return FigureData(drive, rows_of(windows), *more)
 
 
 VARIANTS = ("filtered", "unfiltered", "blind")
@@ -78,7 +91,7 @@ def some_findings(**changes):
         },
         "properties": {},
         "finals": dict.fromkeys(VARIANTS, "post"),
-        "windows": pd.DataFrame(),
+        "windows": Rows({}),
         "window_size": 10,
         "paired": [],
         "regions": pd.DataFrame(),
@@ -91,7 +104,7 @@ def some_findings(**changes):
         "heatmaps": [],
         "oracles": pd.DataFrame(),
         "beyond": {},
-        "levels": pd.DataFrame(),
+        "levels": Rows({}),
         "sampled": 1200,
         "examples": [],
         "thumbnails": [],

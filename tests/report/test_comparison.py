@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pandas as pd
 
+from roadeval.data import Rows
 from roadeval.data.words import MINUS
 from roadeval.evaluation.comparison_result import (
     ComparedResult,
@@ -20,7 +21,7 @@ from roadeval.report.blocks import BulletList, Cell, Table, Text
 from roadeval.report.comparison import document, markdown
 from roadeval.report.pdf.typeset import pdf
 from roadeval.results.comparison import judged
-from tests.report.making import links_within, text
+from tests.report.making import links_within, rows_of, text
 
 
 def change_of(mean, low=None, high=None):
@@ -68,7 +69,9 @@ def blocks(kind, comparison):
 def windows():
     rates = {"ERR": 0.1, "FPR": 0.1, "FNR": 0.1}
     place = {"window": 0, "first_frame": 0, "last_frame": 9, "frames": 10, "stage": "post"}
-    return pd.DataFrame([{**place, "variant": name, **rates} for name in ("base", "new|er")])
+    return rows_of(
+        pd.DataFrame([{**place, "variant": name, **rates} for name in ("base", "new|er")])
+    )
 
 
 def test_markdown_tells_failures_first_and_keeps_names_from_breaking_the_table():
@@ -129,7 +132,7 @@ def test_different_drives_are_laid_side_by_side():
         "IoU": "80.00",
     }
     assert table.text_columns == range(3)
-    words = text(pdf(document(comparison, (), pd.DataFrame())))
+    words = text(pdf(document(comparison, (), Rows({}))))
     assert "Different drives, side by side: no difference is given." in words
     assert "11.20" in words
 
@@ -151,5 +154,5 @@ def test_of_a_frame_of_disagreement_the_sum_of_both_shares_is_bold():
 
 
 def test_its_contents_lead_to_its_parts():
-    made = document(a_comparison(), LIMITS, pd.DataFrame())
+    made = document(a_comparison(), LIMITS, Rows({}))
     assert links_within(pdf(made)) == 3

@@ -6,13 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.data import Mask, Rgb, Truth
+from roadeval.data import Mask, Rgb, Rows, Truth
 from roadeval.report.chart import Chart
 from roadeval.report.images import shrink
 from roadeval.runtime.discovery import found_in
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
 EXAMPLE_WIDTH: Final = 400
@@ -62,7 +61,7 @@ class ThresholdData:
         As ``totals`` there: every variant.
     """
 
-    levels: pd.DataFrame
+    levels: Rows
     quoted: Mapping[str, Mapping[str, Mapping[str, Any]]]
     totals: Mapping[str, Mapping[str, Mapping[str, Any]]]
 
@@ -84,7 +83,7 @@ class FigureData:
     """
 
     drive: str
-    windows: pd.DataFrame
+    windows: Rows
     examples: Sequence[ExampleFrame] = field(default=())
     thresholds: ThresholdData | None = None
 

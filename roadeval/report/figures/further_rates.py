@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from roadeval.evaluation.metrics import SHORT
 from roadeval.report.figures import fig3a_error_rate, fig3b_fp_fn_rate
 from roadeval.report.figures.figure import FigureData, FigureSpec
@@ -26,8 +28,9 @@ def further_rates(data: FigureData) -> Figure | None:
 def _names(data: FigureData) -> list[str]:
     drawn = {*fig3a_error_rate.AXES, *fig3b_fp_fn_rate.AXES}
     # Results that were made before a metric was added do not have it.
-    known = data.windows.dropna(axis="columns", how="all").columns
-    return [name for name in SHORT if name not in drawn and name in known]
+    windows = data.windows
+    known = (name for name in SHORT if name in windows.columns and name not in drawn)
+    return [name for name in known if not np.isnan(windows[name]).all()]
 
 
 FIGURE = FigureSpec(

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from roadeval.data import Rows
+from roadeval.data.rows import Cells
 from roadeval.data.words import listing
-from roadeval.evaluation.analysis import finals
+from roadeval.evaluation import scored
 from roadeval.evaluation.metrics import METRICS
 from roadeval.report.figures.legend import LegendStyle, room_in
 from roadeval.report.figures.style import Look, heading, looks
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -33,7 +34,7 @@ LEGEND: Final = LegendStyle(columns=3, handlelength=3.4)
 
 
 def rates_over_drive(
-    title: str, windows: pd.DataFrame, rates: Mapping[str, str], height: float
+    title: str, windows: Rows, rates: Mapping[str, str], height: float
 ) -> Figure | None:
     """Draw rates of each variant's final mask, one below the other.
 
@@ -52,17 +53,17 @@ def rates_over_drive(
 
     if not len(windows):
         return None
-    final = finals(windows)
-    rows = final.drop_duplicates("window").sort_values("window")
+    final = scored.finals(windows)
+    rows = final.take(np.unique(final["window"], return_index=True)[1])
     group = -(-len(rows) // CROWDED)
-    size, rest = rows["frames"].max(), rows["frames"].iloc[-1]
-    last, short = rows["window"].iloc[-1], ""
+    size, rest = rows["frames"].max(), rows["frames"][-1]
+    last, short = rows["window"][-1], ""
     if rest < size and group > 1:
-        final, rows = final[final["window"] < last], rows[:-1]
+        final, rows = final.take(final["window"] < last), rows.take(slice(-1))
         short = f"; a last row of {rest} is left out"
     elif rest < size:
         short = f"; the last row, drawn pale, holds {rest}"
-    names = [look.label for look in looks(list(dict.fromkeys(final["variant"]))).values()]
+    names = [look.label for look in looks(final.distinct("variant")).values()]
     lines = LEGEND.lines(LEGEND.short(names, ROOM), ROOM)
     height += LINE * (lines - 1)
     figure = Figure(figsize=(WIDTH, height))
@@ -79,8 +80,8 @@ def rates_over_drive(
     return figure
 
 
-def _subtitle(final: pd.DataFrame, rows: pd.DataFrame, group: int, rates: Collection[str]) -> str:
-    stages, size = ", ".join(dict.fromkeys(final["stage"])), rows["frames"].max()
+def _subtitle(final: Rows, rows: Rows, group: int, rates: Collection[str]) -> str:
+    stages, size = ", ".join(final.distinct("stage")), rows["frames"].max()
     each = f"each point is the mean of {size} frames" if size > 1 else "each point is one frame"
     if group > 1:
         each = f"each point averages {group} rows of {size} frames, the band spans them"
@@ -96,13 +97,14 @@ def _direction(rates: Collection[str]) -> str:
     return f"higher is better for {listing(rising)}, lower for the others"
 
 
-def _draw(ax: Axes, final: pd.DataFrame, rate: str, group: int, pale: int | None) -> None:
+def _draw(ax: Axes, final: Rows, rate: str, group: int, pale: int | None) -> None:
     from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
-    for name, look in looks(list(dict.fromkeys(final["variant"]))).items():
-        own = final[final["variant"] == name].sort_values("window")
+    for name, look in looks(final.distinct("variant")).items():
+        own = final.of_variant(name)
+        own = own.take(np.argsort(own["window"], kind="stable"))
         _line(ax, own["window"], 100 * own[rate], look, group, pale=pale)
-    values = 100 * final[rate].to_numpy(float)
+    values = 100 * final[rate]
     if np.isnan(values).all():
         ax.text(0.5, 0.5, "undefined on every frame", transform=ax.transAxes, ha="center")
     if not METRICS[rate].higher_is_better:
@@ -111,38 +113,46 @@ def _draw(ax: Axes, final: pd.DataFrame, rate: str, group: int, pale: int | None
     ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g} %"))
 
 
-def _line(
-    ax: Axes, x: pd.Series[float], y: pd.Series[float], look: Look, group: int, *, pale: int | None
-) -> None:
+def _line(ax: Axes, x: Cells, y: Cells, look: Look, group: int, *, pale: int | None) -> None:
     """Draw a variant's series; with too many rows to tell apart, their mean and range.
 
     ``pale`` is the number of a last row that does not count as much as the others.
     """
     if group > 1:
-        rows = np.arange(len(x)) // group
-        low, high = y.groupby(rows).min(), y.groupby(rows).max()
-        x, y = x.groupby(rows).mean(), y.groupby(rows).mean()
+        starts = np.arange(0, len(x), group)
+        low, high = np.fmin.reduceat(y, starts), np.fmax.reduceat(y, starts)
+        x, y = _means(x, starts), _means(y, starts)
         ax.fill_between(x, low, high, color=look.colour, alpha=0.15, linewidth=0)
     drawn: dict[str, Any] = {**look.line, **look.mark, "markersize": 5, "clip_on": False}
     every = -(-len(x) // MARKED)
-    if len(x) > 1 and x.iloc[-1] == pale:
+    if len(x) > 1 and x[-1] == pale:
         ax.plot(x[-2:], y[-2:], **drawn, alpha=PALE, markevery=[1], zorder=look.order - 1)
         x, y = x[:-1], y[:-1]
     ax.plot(x, y, **drawn, label=look.label, markevery=every, zorder=look.order)
 
 
-def _label_rows(ax: Axes, rows: pd.DataFrame, short: str) -> None:
+def _means(values: Cells, starts: Cells) -> Cells:
+    """Return the mean of each run of values that are known; NaN where none is."""
+    known = ~np.isnan(values)
+    sums = np.add.reduceat(np.where(known, values, 0.0), starts)
+    counts = np.add.reduceat(known.astype(int), starts)
+    means: Cells = np.full(len(starts), np.nan)
+    return np.divide(sums, counts, out=means, where=counts > 0)
+
+
+def _label_rows(ax: Axes, rows: Rows, short: str) -> None:
     """Write each row's frames below it; where there is no room, the first frame of some.
 
     ``short`` says what became of a last row of fewer frames.
     """
-    first, last = rows["first_frame"].astype(str), rows["last_frame"].astype(str)
-    spans = first.where(first == last, first + "\N{EN DASH}" + last)
+    ends = [*zip(rows["first_frame"].tolist(), rows["last_frame"].tolist(), strict=True)]
+    first = [str(begin) for begin, _ in ends]
+    spans = [str(a) if a == b else f"{a}\N{EN DASH}{b}" for a, b in ends]
     roomy = _step(spans) == 1
     labels = spans if roomy else first
     every = _step(labels)
-    numbers = rows["window"].to_numpy()
-    ax.set_xticks(numbers[::every], labels.tolist()[::every])
+    numbers = rows["window"]
+    ax.set_xticks(numbers[::every], labels[::every])
     margin = 0.5 if len(rows) < CROWDED else 0.005 * len(rows)
     ax.set_xlim(numbers[0] - margin, numbers[-1] + margin)
     size = rows["frames"].max()
@@ -150,9 +160,9 @@ def _label_rows(ax: Axes, rows: pd.DataFrame, short: str) -> None:
     ax.set_xlabel(what + short)
 
 
-def _step(labels: pd.Series[str]) -> int:
+def _step(labels: Sequence[str]) -> int:
     """Return n such that every nth label fits on 7 inches of axis at 8 points."""
-    room = max(int(7 / (0.075 * labels.str.len().max() + 0.12)), 1)
+    room = max(int(7 / (0.075 * max(map(len, labels)) + 0.12)), 1)
     return -(-len(labels) // room)
 
 

@@ -63,10 +63,11 @@ def _point(total: Mapping[str, Any]) -> MaskPoint:
 def thresholds_in(found: ThresholdData) -> dict[str, Thresholds]:
     """Return the thresholds of each variant that says how probable road is."""
     made = {}
-    for (variant, _), rows in found.levels.groupby(["variant", "stage"], sort=False):
+    for variant, _, places in found.levels.masks():
+        rows = found.levels.take(places)
         counts = np.zeros((2, LEVELS), np.int64)
-        counts[:, rows["level"]] = rows[["other", "road"]].to_numpy().T
-        made[str(variant)] = Thresholds.of(counts)
+        counts[:, rows["level"]] = rows["other"], rows["road"]
+        made[variant] = Thresholds.of(counts)
     return made
 
 
@@ -86,7 +87,7 @@ def _below(values: Sequence[float]) -> float:
 def curve_charts(data: FigureData) -> list[Chart]:
     """Return precision over recall, the ROC, and reliability; none without a probability."""
     found = data.thresholds
-    if found is None or found.levels.empty:
+    if found is None or not len(found.levels):
         return []
     drawn, masks, curves = variants_in(found), masks_in(found), thresholds_in(found)
     limits = limits_of(masks)

@@ -40,7 +40,7 @@ def curves(data: FigureData) -> Figure | None:
     from matplotlib.figure import Figure
 
     found = data.thresholds
-    if found is None or found.levels.empty:
+    if found is None or not len(found.levels):
         return None
     drawn, masks = variants_in(found), masks_in(found)
     labels = LEGEND.short([drawn[name].label for name in masks], ROOM)

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, colours
+from roadeval.data import BASELINE, Rows, colours
+from roadeval.data.rows import Cells
 from roadeval.data.words import in_percent
-from roadeval.evaluation.analysis import finals, merged
+from roadeval.evaluation import scored
+from roadeval.evaluation.analysis import merged
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.report.chart import Chart, ChartKind, HeatMap, Level, Series, thinned
 from roadeval.report.figures.style import Look, looks
@@ -26,23 +28,25 @@ STEPS: Final = 32
 """Of the scale that is drawn below a heat map."""
 
 
-def over_windows(windows: pd.DataFrame, rates: Sequence[str]) -> list[Chart]:
+def over_windows(windows: Rows, rates: Sequence[str]) -> list[Chart]:
     """Return a chart a rate: each variant's final mask, window by window."""
     if not len(windows):
         return []
-    final = finals(windows)
-    middle = (final["first_frame"] + final["last_frame"]) / 2
-    return _along(final.assign(x=middle), rates)
+    final = scored.finals(windows)
+    return _along(final, (final["first_frame"] + final["last_frame"]) / 2, rates)
 
 
-def over_frames(frames: pd.DataFrame, rates: Sequence[str]) -> list[Chart]:
+def over_frames(frames: Rows, rates: Sequence[str]) -> list[Chart]:
     """Return a chart a rate: each variant's final mask, frame by frame."""
-    final = finals(frames)
-    return _along(final.assign(x=final["frame"]), rates)
+    final = scored.finals(frames)
+    return _along(final, final["frame"], rates)
 
 
-def _along(table: pd.DataFrame, rates: Sequence[str]) -> list[Chart]:
-    names = list(dict.fromkeys(table["variant"]))
+def _along(final: Rows, x: Cells, rates: Sequence[str]) -> list[Chart]:
+    """Return a chart a rate of rows that lie at ``x`` along the drive."""
+    order = np.argsort(x, kind="stable")
+    rows = final.take(order).replace(x=x[order])
+    names = final.distinct("variant")
     return [
         Chart(
             f"{rate}: {METRICS[rate].in_words}",
@@ -50,12 +54,12 @@ def _along(table: pd.DataFrame, rates: Sequence[str]) -> list[Chart]:
             [
                 thinned(_series(name, look, own["x"], 100 * own[rate]))
                 for name, look in looks(names).items()
-                for own in [table[table["variant"] == name].sort_values("x")]
+                for own in [rows.of_variant(name)]
             ],
             from_zero=not METRICS[rate].higher_is_better,
         )
         for rate in rates
-        if rate in table
+        if rate in rows.columns
     ]
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+import numpy as np
+
 from roadeval.data.words import DASH, percent
 from roadeval.evaluation.metrics import FULL
 from roadeval.evaluation.settings import settings_of
@@ -69,9 +71,9 @@ def _tables(findings: Findings) -> Iterator[Block]:
     names = [*FULL]
     for place in range(0, len(names), together):
         yield _table(findings, names[place : place + together])
-    size = findings.window_size
+    size, windows = findings.window_size, findings.windows
     long = "" if size == PAPER_WINDOW else f" The paper's rows are of {PAPER_WINDOW}."
-    rest = findings.windows.sort_values("window")["frames"].iloc[-1]
+    rest = windows["frames"][windows["window"].argmax()]
     short = f" The last row holds {rest}." if rest < size else ""
     yield Text(
         f"Rows of {size} evaluated frames: the mean of the frames' rates in percent.{long}{short} "
@@ -81,23 +83,21 @@ def _tables(findings: Findings) -> Iterator[Block]:
 
 
 def _table(findings: Findings, rates: Sequence[str]) -> Table:
-    names = [*findings.finals]
-    found = {
-        (row["variant"], row["stage"], row["window"]): row
-        for row in findings.windows.to_dict("records")
-    }
+    windows, names = findings.windows, [*findings.finals]
+    masks = zip(*(windows[each] for each in ("variant", "stage", "window")), strict=True)
+    places = {mask: place for place, mask in enumerate(masks)}
+
+    def cell(name: str, window: int, rate: str) -> str:
+        place = places.get((name, findings.finals[name], window))
+        return percent(None if place is None else float(windows[rate][place]))
+
+    numbers, firsts = np.unique(windows["window"], return_index=True)
     rows: list[list[Cell | str]] = [
         [
-            _span(window["first_frame"], window["last_frame"]),
-            *(
-                percent(found.get((name, findings.finals[name], window["window"]), {}).get(rate))
-                for rate in rates
-                for name in names
-            ),
+            _span(windows["first_frame"][first], windows["last_frame"][first]),
+            *(cell(name, number, rate) for rate in rates for name in names),
         ]
-        for window in findings.windows.drop_duplicates("window")
-        .sort_values("window")
-        .to_dict("records")
+        for number, first in zip(numbers.tolist(), firsts, strict=True)
     ]
     whole = [percent(findings.total(name).get(rate)) for rate in rates for name in names]
     rows.append([Cell(text, bold=True) for text in ("all", *whole)])

@@ -21,11 +21,12 @@ from roadeval.report import figures as folder
 from roadeval.report.figures.fig2_masks import road_masks
 from roadeval.report.figures.fig3a_error_rate import error_rate
 from roadeval.report.figures.fig3b_fp_fn_rate import fp_fn_rate
-from roadeval.report.figures.figure import ExampleFrame, FigureData, figures
+from roadeval.report.figures.figure import ExampleFrame, figures
 from roadeval.report.figures.files import svg, svg_of, write_figures
 from roadeval.report.figures.picture import Picture
 from roadeval.report.figures.rates_over_drive import CROWDED, MARKED, rates_over_drive
 from roadeval.report.figures.style import RC, looks
+from tests.report.making import figure_data, rows_of
 
 NO_WINDOWS = pd.DataFrame()
 BY_DEFAULT = ("filtered", "unfiltered", "blind")
@@ -70,7 +71,7 @@ def an_example(frame: int = 7, *, truth: bool = True) -> ExampleFrame:
 
 
 def masks_of(examples: Sequence[ExampleFrame]) -> Figure:
-    figure = road_masks(FigureData("drive", NO_WINDOWS, examples))
+    figure = road_masks(figure_data("drive", NO_WINDOWS, examples))
     assert figure is not None
     return figure
 
@@ -101,7 +102,7 @@ def names(figure: Figure) -> list[str]:
 
 def test_figure_3a_shows_err_of_every_final_mask_in_percent() -> None:
     table = a_table(4)
-    (ax,) = error_rate(FigureData("drive", table)).axes
+    (ax,) = error_rate(figure_data("drive", table)).axes
     assert len(ax.lines) == 3
     for line, variant in zip(ax.lines, BY_DEFAULT, strict=True):
         own = table[(table["variant"] == variant) & (table["stage"] == "post")]
@@ -111,7 +112,7 @@ def test_figure_3a_shows_err_of_every_final_mask_in_percent() -> None:
 
 def test_figure_3b_shows_fpr_and_fnr_apart() -> None:
     table = a_table(4)
-    figure = fp_fn_rate(FigureData("drive", table))
+    figure = fp_fn_rate(figure_data("drive", table))
     for ax, rate in zip(figure.axes, ("FPR", "FNR"), strict=True):
         assert rate in ax.get_ylabel()
         for line, variant in zip(ax.lines, BY_DEFAULT, strict=True):
@@ -121,21 +122,23 @@ def test_figure_3b_shows_fpr_and_fnr_apart() -> None:
 
 def test_a_variant_without_post_is_shown_by_its_last_stage() -> None:
     table = a_table(2, ("net",)).query("stage == 'svm'")
-    (ax,) = error_rate(FigureData("drive", table)).axes
+    (ax,) = error_rate(figure_data("drive", table)).axes
     assert len(ax.lines) == 1
-    assert "svm" in texts(error_rate(FigureData("drive", table)))
+    assert "svm" in texts(error_rate(figure_data("drive", table)))
 
 
 def test_the_axes_of_two_rates_are_close_and_do_not_touch() -> None:
-    upper, lower = (ax.get_position() for ax in drawn(fp_fn_rate(FigureData("d", a_table(3)))).axes)
+    upper, lower = (
+        ax.get_position() for ax in drawn(fp_fn_rate(figure_data("d", a_table(3)))).axes
+    )
     gap = (upper.y0 - lower.y1) / upper.height
     assert 0.1 < gap < 0.2
 
 
 def test_the_title_names_the_drive() -> None:
     for figure in (
-        error_rate(FigureData("my_drive", a_table(2))),
-        road_masks(FigureData("my_drive", NO_WINDOWS, [an_example()])),
+        error_rate(figure_data("my_drive", a_table(2))),
+        road_masks(figure_data("my_drive", NO_WINDOWS, [an_example()])),
     ):
         assert "my_drive" in texts(figure)
 
@@ -152,7 +155,7 @@ def test_the_masks_stand_below_the_title_and_within_the_figure() -> None:
 
 
 def test_rates_are_in_percent_from_zero() -> None:
-    (ax,) = drawn(error_rate(FigureData("drive", a_table(4)))).axes
+    (ax,) = drawn(error_rate(figure_data("drive", a_table(4)))).axes
     labels = [label.get_text() for label in ax.get_yticklabels()]
     assert labels[0] == "0 %"
     assert all(label.endswith(" %") for label in labels)
@@ -168,26 +171,26 @@ def test_rates_are_in_percent_from_zero() -> None:
 )
 def test_the_subtitle_says_which_direction_is_better(rates: list[str], direction: str) -> None:
     table = a_table(3).eval("ACC = 1 - ERR")
-    figure = rates_over_drive("drive", table, {rate: rate for rate in rates}, 5)
+    figure = rates_over_drive("drive", rows_of(table), {rate: rate for rate in rates}, 5)
     assert figure is not None
     assert figure.texts[1].get_text().endswith(f"; {direction}")
 
 
 def test_rows_are_named_by_their_frames() -> None:
-    (ax,) = error_rate(FigureData("drive", a_table(3, last=1))).axes
+    (ax,) = error_rate(figure_data("drive", a_table(3, last=1))).axes
     assert [label.get_text() for label in ax.get_xticklabels()] == ["0–9", "10–19", "20"]  # noqa: RUF001
     assert ax.get_xlabel() == "Evaluated frames, 10 a row; the last row, drawn pale, holds 1"
 
 
 @pytest.mark.parametrize(("rows", "beside"), [(3, 0.5), (400, 2)])
 def test_the_rows_fill_the_width(rows: int, beside: float) -> None:
-    (ax,) = error_rate(FigureData("drive", a_table(rows))).axes
+    (ax,) = error_rate(figure_data("drive", a_table(rows))).axes
     assert ax.get_xlim() == pytest.approx((-beside, rows - 1 + beside))
 
 
 def test_a_short_last_row_is_drawn_pale() -> None:
     table = a_table(3, ("filtered",), last=1)
-    (ax,) = error_rate(FigureData("drive", table)).axes
+    (ax,) = error_rate(figure_data("drive", table)).axes
     pale, line = ax.lines
     err = 100 * table[table["stage"] == "post"]["ERR"].to_numpy()
     assert line.get_ydata() == pytest.approx(err[:2])
@@ -199,7 +202,7 @@ def test_a_short_last_row_is_drawn_pale() -> None:
 
 def test_a_short_last_row_is_no_part_of_a_mean_of_rows() -> None:
     table = a_table(CROWDED + 1, ("filtered",), last=1)
-    (ax,) = error_rate(FigureData("drive", table)).axes
+    (ax,) = error_rate(figure_data("drive", table)).axes
     (line,) = ax.lines
     assert line.get_xdata().max() < CROWDED
     assert ax.get_xlabel().endswith("; a last row of 1 is left out")
@@ -207,14 +210,14 @@ def test_a_short_last_row_is_no_part_of_a_mean_of_rows() -> None:
 
 @pytest.mark.parametrize("rows", [1, 2, 10, 12, 40, 400, 3600])
 def test_labels_never_touch_each_other(rows: int) -> None:
-    (ax,) = drawn(error_rate(FigureData("drive", a_table(rows)))).axes
+    (ax,) = drawn(error_rate(figure_data("drive", a_table(rows)))).axes
     boxes = [label.get_window_extent() for label in ax.get_xticklabels()]
     assert all(left.x1 < right.x0 for left, right in pairwise(boxes))
 
 
 @pytest.mark.parametrize("variants", [BY_DEFAULT, ("filtered", "unfiltered", "a", "b", "c", "d")])
 def test_the_legend_covers_nothing(variants: tuple[str, ...]) -> None:
-    figure = drawn(fp_fn_rate(FigureData("drive", a_table(5, variants))))
+    figure = drawn(fp_fn_rate(figure_data("drive", a_table(5, variants))))
     legend = figure.legends[0].get_window_extent()
     for other in [*figure.axes, *figure.texts]:
         assert not legend.overlaps(other.get_window_extent())
@@ -244,24 +247,24 @@ def test_the_colours_are_those_of_the_design() -> None:
 def test_an_undefined_rate_leaves_a_gap() -> None:
     table = a_table(3)
     table.loc[table["window"] == 1, "FNR"] = np.nan
-    line = fp_fn_rate(FigureData("drive", table)).axes[1].lines[0]
+    line = fp_fn_rate(figure_data("drive", table)).axes[1].lines[0]
     assert np.isnan(line.get_ydata()).tolist() == [False, True, False]
 
 
 def test_rates_of_nothing_but_zero_have_an_axis_of_half_a_percent() -> None:
-    (ax,) = error_rate(FigureData("drive", a_table(3).assign(ERR=0.0))).axes
+    (ax,) = error_rate(figure_data("drive", a_table(3).assign(ERR=0.0))).axes
     assert ax.get_ylim() == (0, 0.5)
 
 
 def test_a_rate_that_is_undefined_everywhere_says_so() -> None:
     table = a_table(3).assign(FNR=np.nan)
-    ax = drawn(fp_fn_rate(FigureData("drive", table))).axes[1]
+    ax = drawn(fp_fn_rate(figure_data("drive", table))).axes[1]
     assert ax.texts[0].get_text() == "undefined on every frame"
 
 
 def test_a_long_drive_is_drawn_as_means_with_their_range() -> None:
     table = a_table(3600)
-    figure = error_rate(FigureData("drive", table))
+    figure = error_rate(figure_data("drive", table))
     line, band = figure.axes[0].lines[0], figure.axes[0].collections[0]
     assert len(line.get_ydata()) == CROWDED
     assert CROWDED / line.get_markevery() == MARKED
@@ -353,7 +356,7 @@ def test_a_picture_covers_its_box_in_a_vector_file() -> None:
 
 
 def test_pixels_and_size_of_a_png_are_those_that_matplotlib_would_save(tmp_path: Path) -> None:
-    data = FigureData("drive", a_table(3))
+    data = figure_data("drive", a_table(3))
     write_figures(tmp_path, data)
     mine = Image.open(tmp_path / "fig3a_error_rate.png")
     content = BytesIO()
@@ -387,7 +390,8 @@ def twice(tmp_path_factory: pytest.TempPathFactory) -> list[list[Path]]:
     """The files of one drive, written twice."""
     folders = [tmp_path_factory.mktemp("figures") / "new" for _ in range(2)]
     return [
-        write_figures(folder, FigureData("drive", a_table(3), [an_example()])) for folder in folders
+        write_figures(folder, figure_data("drive", a_table(3), [an_example()]))
+        for folder in folders
     ]
 
 
@@ -415,7 +419,7 @@ def test_pdfs_embed_their_fonts_and_tell_no_date(twice: list[list[Path]]) -> Non
 
 
 def test_without_rates_only_masks_are_drawn(tmp_path: Path) -> None:
-    write_figures(tmp_path, FigureData("drive", a_table(0), [an_example(truth=False)]))
+    write_figures(tmp_path, figure_data("drive", a_table(0), [an_example(truth=False)]))
     assert {path.name for path in tmp_path.iterdir()} == {"fig2_masks.png", "fig2_masks.pdf"}
 
 
@@ -437,7 +441,7 @@ def test_a_figure_is_one_file_in_the_folder(
 ) -> None:
     (tmp_path / "fig1_rows.py").write_text(NEW_FIGURE)
     monkeypatch.setattr(folder, "__path__", [*folder.__path__, str(tmp_path)])
-    data = FigureData("drive", a_table(3))
+    data = figure_data("drive", a_table(3))
     paths = write_figures(tmp_path / "reports", data)
     assert [path.name for path in paths[:2]] == ["fig1_rows.png", "fig1_rows.pdf"]
     first = next(figure for figure in figures() if figure.in_report)

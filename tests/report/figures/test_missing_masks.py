@@ -1,8 +1,8 @@
 """Frames of which a variant has no mask, as another system's may lack."""
 
 import numpy as np
-import pandas as pd
 
+from roadeval.data import Rows
 from roadeval.report.figures.fig2_masks import road_masks
 from roadeval.report.figures.figure import ExampleFrame, FigureData
 from roadeval.report.images import faded
@@ -17,7 +17,7 @@ EXAMPLES = [
 
 
 def test_every_row_of_the_figure_has_every_variant():
-    figure = road_masks(FigureData("street", pd.DataFrame(), EXAMPLES))
+    figure = road_masks(FigureData("street", Rows({}), EXAMPLES))
     assert len(figure.artists) == 2 * len(["camera", "unfiltered", "net", "truth"])
     assert any("faded: there is no mask" in text.get_text() for text in figure.texts)
 

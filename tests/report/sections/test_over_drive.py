@@ -6,7 +6,7 @@ import pandas as pd
 from roadeval.report.blocks import Figure, ImageGrid, KeepTogether, Table, Text
 from roadeval.report.figures.figure import ExampleFrame
 from roadeval.report.sections.over_drive import section
-from tests.report.making import plain_rows, rates, some_findings, the
+from tests.report.making import plain_rows, rates, rows_of, some_findings, the
 
 
 def windows():
@@ -17,7 +17,7 @@ def windows():
             own = rates(err + window / 10, 0.4 + err, 0.5 + err)
             rows.append(place | {"variant": variant, "stage": "post"} | own)
             rows.append(place | {"variant": variant, "stage": "svm"} | rates(0.99, 0.98, 0.97))
-    return pd.DataFrame(rows)
+    return rows_of(pd.DataFrame(rows))
 
 
 def test_each_window_has_the_final_masks_rates_and_the_last_line_is_the_whole():
@@ -74,7 +74,7 @@ def test_rows_of_another_length_than_the_papers_are_told():
 
 def test_a_short_last_row_is_told():
     table = windows()
-    table.loc[table["window"] == 1, "frames"] = 1
+    table = table.replace(frames=np.where(table["window"] == 1, 1, 10))
     (note,) = (b.text for b in section(some_findings(windows=table)) if isinstance(b, Text))
     assert "The last row holds 1." in note
 
