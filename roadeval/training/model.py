@@ -25,10 +25,14 @@ from roadeval.runtime.files import check_input, put
 from roadeval.training.likeness import SIDE
 
 FORMAT: Final = "roadeval-model"
-VERSION: Final = 5
+VERSION: Final = 6
 """Of the file; raised when what a stage has learnt means something else, or something is added. In
 2 the machine of ``context`` knows the column below a pixel, in 3 there are fingerprints, in 4
-the trees of ``robust`` in its place, in 5 these say how many features they know."""
+the trees of ``robust`` in its place, in 5 these say how many features they know, in 6 what they
+know has another exposure."""
+CHANGED: Final = {"exposure": 6}
+"""Stages that change the image in another way from a version on: what was learnt of it before does
+not fit."""
 OLDEST: Final = 2
 """The earliest version that is read."""
 OWN: Final = ("prior", "fingerprints")
@@ -263,6 +267,9 @@ def _model(
     parts: dict[str, dict[str, dict[str, Any]]] = {variant: {} for variant in header.settings}
     if "fingerprints" not in arrays and content["version"] > OLDEST:
         raise ValueError("fingerprints are missing")
+    for stage, since in CHANGED.items():
+        if content["version"] < since and any(stage in each for each in header.settings.values()):
+            raise ValueError(f"{stage} does something else")
     for name in arrays.keys() - {*OWN}:
         variant, _, rest = name.partition("/")
         stage, _, entry = rest.partition("/")

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from roadeval.data import NON_ROAD, ROAD, Rgb, Truth
+from roadeval.pipeline.beyond.exposure import ExposureSettings, expose, gains
 from roadeval.pipeline.beyond.ground.reach import reach
 from roadeval.pipeline.beyond.ground.scene import scene_of
 from roadeval.pipeline.beyond.working_image import stretched
@@ -25,10 +26,13 @@ def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     """Guess the truth of an ``(H, W, 3)`` uint8 RGB image from its reference patch.
 
     Road (1) is the patch, and what lies below the horizon row and nearer to it than
-    ``settings.far``, see `reach`; all else is not (0). Returns ``(H, W)`` uint8.
+    ``settings.far``, see `reach`; all else is not (0). The patch sets the exposure, whatever the
+    pipeline sees. Returns ``(H, W)`` uint8.
     """
     height, width = image.shape[:2]
-    near = stretched(reach(scene_of(image, WIDTH, settings.patch)), image.shape) < settings.far
+    exposure = ExposureSettings(patch=settings.patch)
+    exposed = expose(image, gains(image, exposure), exposure.level)
+    near = stretched(reach(scene_of(exposed, WIDTH, settings.patch)), image.shape) < settings.far
     near[: round(settings.horizon * height)] = False
     near |= patch_mask(height, width, settings.patch) > 0
     return np.where(near, np.uint8(ROAD), np.uint8(NON_ROAD))

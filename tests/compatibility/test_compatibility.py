@@ -60,7 +60,7 @@ def test_all_that_a_report_needs_is_in_it(result):
     found = collect(Result(result))
     assert found.complete
     assert set(found.finals) == {"filtered", "unfiltered", "blind"}
-    assert not any(each.empty for each in (found.windows, found.changes, found.oracles))
+    assert all(len(each) for each in (found.windows, found.changes, found.oracles))
 
 
 def test_it_is_compared(made):

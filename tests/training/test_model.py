@@ -148,8 +148,8 @@ def test_an_array_that_hides_code_is_not_run(tmp_path):
     ("version", "why"),
     [
         (1, "made by an earlier version of roadeval; train it again"),
-        (99, "model format 99, this version reads 5; train it again"),
-        (None, "model format None, this version reads 5; train it again"),
+        (99, "model format 99, this version reads 6; train it again"),
+        (None, "model format None, this version reads 6; train it again"),
     ],
 )
 def test_another_version_is_refused_in_one_line(path, version, why):
@@ -199,11 +199,26 @@ def test_what_a_stage_learnt_in_an_earlier_version_is_told_to_be_of_one(
 
 
 def test_trees_of_version_4_did_not_say_how_many_features_they_know(tmp_path):
-    robust = configure({"preset": "robust", "trees": {"trees": 2, "features": ["place"]}})
+    trees = {"trees": 2, "features": ["place"]}
+    robust = configure({"chain": ("trees", "post"), "trees": trees})
     path = tmp_path / "old.model"
     save_model(fit([frame(n) for n in range(2)], robust.pipelines(), TrainingSettings()), path)
     of_version(path, 4, without="unfiltered/trees/inputs")
     with pytest.raises(RoadevalError, match=r"by an earlier version .*: inputs; train it again$"):
+        load_model(path)
+
+
+@pytest.mark.parametrize(("version", "fits"), [(5, False), (6, True)])
+def test_what_was_learnt_of_another_exposure_does_not_fit(tmp_path, version, fits):
+    chain = {"chain": ("exposure", "similarity", "svm", "post")}
+    path = tmp_path / "old.model"
+    pipelines = configure(chain).pipelines()
+    save_model(fit([frame(n) for n in range(2)], pipelines, TrainingSettings()), path)
+    of_version(path, version, without="")
+    if fits:
+        assert load_model(path).settings
+        return
+    with pytest.raises(RoadevalError, match=r"earlier version .*: exposure does something else;"):
         load_model(path)
 
 

@@ -2,6 +2,9 @@
 
 A classifier of colours learns the exposure and the camera along with the road. The reference patch,
 which is road in nearly every frame, is a measure of both.
+
+What is brighter than the patch is compressed and not clipped, so that it keeps its differences
+where the patch lies in the shade or on a dark vehicle.
 """
 
 from __future__ import annotations
@@ -31,8 +34,7 @@ class ExposureSettings:
     Parameters
     ----------
     level
-        Grey level, 0..255, that the patch's median gets: dark enough to leave what is brighter
-        than road its differences.
+        Grey level, 0..255, that the patch's median gets.
     channels
         ``each`` channel gets a gain of its own, so that the road turns grey under any light and
         camera; ``alike``: all get the one of the brightness.
@@ -81,9 +83,16 @@ def _median(image: Rgb, channel: int, patch: Mask) -> float:
     return float(np.searchsorted(counts, counts[-1] / 2))
 
 
-def expose(image: Rgb, gain: npt.NDArray[np.float64]) -> Rgb:
-    """Multiply the channels of an ``(H, W, 3)`` uint8 image by ``(3,)`` gains; rounded, clipped."""
-    table = np.rint(np.arange(256)[:, None] * gain).clip(0, 255).astype(np.uint8)
+def expose(image: Rgb, gain: npt.NDArray[np.float64], level: float) -> Rgb:
+    """Multiply the channels of an ``(H, W, 3)`` uint8 image by ``(3,)`` gains, and compress them.
+
+    A product x above the level l becomes ``l + r e / (e + r)``, with ``e = x - l`` and the room
+    ``r = 255 - l``: the slope is 1 at the level, and 255 is never reached. Rounded.
+    """
+    product = np.arange(256)[:, None] * gain
+    excess, room = np.maximum(product - level, 0), 255 - level
+    compressed = np.minimum(product, level) + room * excess / (excess + room)
+    table = np.rint(compressed).astype(np.uint8)
     exposed: Rgb = cv2.LUT(image, table[None])
     return exposed
 
@@ -93,7 +102,7 @@ def bind(settings: ExposureSettings, _parameters: None) -> Callable[[View], Outp
 
     def run(view: View) -> Output:
         gain = gains(view.image, settings)
-        image = expose(view.image, gain)
+        image = expose(view.image, gain, settings.level)
         facts = {f"{name}_gain": float(gain[c]) for c, name in enumerate(("red", "green", "blue"))}
         return Output((Layer(EXPOSED, image),), image=image, facts=facts)
 

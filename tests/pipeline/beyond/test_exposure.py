@@ -27,11 +27,22 @@ def test_the_patch_turns_grey():
     assert (run(image).image[patch] == 96).all()
 
 
-def test_each_channel_is_multiplied_and_clipped_everywhere():
+def test_each_channel_is_multiplied_everywhere():
     output = run(scene((48, 96, 192)))
-    assert output.image[0, 0].tolist() == [20, 200, 45]
+    assert output.image[0, 0, [0, 2]].tolist() == [20, 45]
     assert output.facts == {"red_gain": 2.0, "green_gain": 1.0, "blue_gain": 0.5}
-    assert run(scene((48, 96, 192), elsewhere=(200, 0, 1))).image[0, 0].tolist() == [255, 0, 0]
+
+
+def test_what_is_brighter_than_the_patch_is_compressed_and_keeps_its_order():
+    # 96 + 159 (x - 96) / (x - 96 + 159), with x of 200, of 2 * 200, and of 1.
+    found = run(scene((48, 96, 192), elsewhere=(200, 200, 1))).image[0, 0].tolist()
+    assert found == [200, 159, 0]
+    greys = np.repeat(np.arange(256, dtype=np.uint8)[:, None], 3, axis=1)[None]
+    tones = exposure.expose(greys, np.full(3, 3.0), 96.0)[0, :, 0].astype(int)
+    assert (np.diff(tones[:64]) >= 1).all()
+    assert (np.diff(tones) >= 0).all()
+    assert tones[32] == 96
+    assert tones[-1] < 255
 
 
 def test_alike_keeps_the_tint():

@@ -17,14 +17,15 @@ from roadeval.pipeline.beyond.ground.light import light_over
 from roadeval.pipeline.beyond.ground.paths import distance
 from roadeval.pipeline.beyond.ground.scene import Scene, tones_of
 
-OVER_EDGES: Final = 1.2
+OVER_EDGES: Final = 1.0
 """Where roads end by the distance over the edges of the working image, which grows with all that is
 crossed."""
-AROUND_EDGES: Final = 2.0
+AROUND_EDGES: Final = 1.5
 """And by that over the squared edges of the image at twice its size, which grows where something
 steep is, thin kerbs included. Both values are the best, or next to it, on the train part of IDD
 Lite, on CamVid 0016E5 and 0006R0 and on the demo drive; for working images of 160 columns, made of
-320 or more: edges of smaller images are blurred, and more is reached."""
+320 or more: edges of smaller images are blurred, and more is reached. And for images whose exposure
+is the patch's: it makes edges among what is brighter fainter."""
 PERCENTILE: Final = 80
 """Of the lower half's log brightness: about that of sunlit ground."""
 SHADE, SUN = -0.8, -0.3

@@ -262,7 +262,7 @@ def test_reach_is_the_mean_of_two_distances_over_their_thresholds(scene):
     names = names_of(GROUPS)
     over, around = (found[names.index(n)] for n in ("paths.over_edges", "barriers.around_edge"))
     np.testing.assert_array_equal(reach(scene), combined(over, around))
-    close(reach(scene), (over / 1.2 + around / 2) / 2)
+    close(reach(scene), (over / 1.0 + around / 1.5) / 2)
     for name, plane in zip(FEATURES, inputs(scene), strict=True):
         np.testing.assert_array_equal(plane, found[names.index(name)])
 
