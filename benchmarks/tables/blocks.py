@@ -495,7 +495,7 @@ def taught_by(numbers: Numbers) -> str:
 
 
 def weights(numbers: Numbers) -> str:
-    """Return ERR of `robust` with each weight of the distance from the patch; on IDD more."""
+    """Return rates of `robust` with each weight of the distance from the patch."""
     drives = {name: drive.title for name, drive in DRIVES.items()}
     teachers = {
         taught.IDD_LITE: "IDD Lite",
@@ -506,7 +506,7 @@ def weights(numbers: Numbers) -> str:
     pupils = {taught.IDD_LITE: "its other half", **drives}
     return _table(
         [
-            *("trained on", "scored on", ""),
+            *("trained on", "scored on", "rate"),
             *(f"weight {each:g}" for each in reach_weights.WEIGHTS),
         ],
         (

@@ -69,7 +69,7 @@ def measured(folder: Path, seeds: int) -> dict[str, Any]:
 def without_each_group(folder: Path) -> dict[str, Any]:
     """Return ERR of `robust`, and its change without each group of its features.
 
-    Without what the distance from the patch adds to the trees; with one seed and `FEWER_PIXELS`.
+    With a `reach_weight` of 0; with one seed and `FEWER_PIXELS`.
     Half of the drives learn, the others are scored.
     """
     folds = both_ways(folder)[:1]

@@ -1,4 +1,4 @@
-"""ERR of `robust` with several weights of the distance from the patch, at home and elsewhere.
+"""Rates of `robust` with several weights of the distance from the patch, at home and elsewhere.
 
 With one seed, and on IDD's own drives with fewer training pixels. What the trees have learnt is the
 same in a row: the setting is one of inference.
@@ -37,7 +37,7 @@ PAIRS: Final = (
 
 
 def measured(sources: Sources, idd_lite: Path) -> list[dict[str, Any]]:
-    """Return ERR with each of `WEIGHTS`: on IDD's other half, and of `PAIRS`."""
+    """Return ERR with each of `WEIGHTS`, on IDD's other half dark road missed besides."""
     rows = [{"teacher": HALF, "pupil": IDD_LITE, **_on_idd(idd_lite)}]
     for teacher, pupil in PAIRS:
         own = teacher == OWN

@@ -25,7 +25,7 @@ class Rows:
     columns: Mapping[str, Cells]
 
     def __len__(self) -> int:
-        return len(next(iter(self.columns.values()), ()))
+        return len(next(iter(self.columns.values())))
 
     def __getitem__(self, name: str) -> Cells:
         return self.columns[name]
@@ -39,7 +39,7 @@ class Rows:
         return self.take(self["variant"] == name)
 
     def replace(self, **columns: Cells) -> Rows:
-        """Return the rows with some columns in place of their own."""
+        """Return the rows with some columns added, or in place of their own."""
         return Rows({**self.columns, **columns})
 
     def distinct(self, name: str) -> list[Any]:

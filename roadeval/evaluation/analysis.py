@@ -36,7 +36,7 @@ def merged(chains: Iterable[Iterable[str]]) -> list[str]:
 
 
 def finals(frames: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of each variant's final mask, of a table with ``variant`` and ``stage``."""
+    """Return the rows of each variant's final mask, as `scored.finals` does for rows of arrays."""
     masks = frames[["variant", "stage"]].drop_duplicates()
     last = differences.final_stages(masks.itertuples(index=False))
     return frames[frames["stage"] == frames["variant"].map(last)]

@@ -31,8 +31,16 @@ def final_stages(rows: Rows) -> dict[str, str]:
     return differences.final_stages((variant, stage) for variant, stage, _ in rows.masks())
 
 
+def each_window(windows: Rows) -> Rows:
+    """Return one row of each window, in order, with the most ``frames`` that a mask has there."""
+    numbers, first, place = np.unique(windows["window"], return_index=True, return_inverse=True)
+    most = np.zeros(len(numbers), np.int64)
+    np.maximum.at(most, place, windows["frames"])
+    return windows.take(first).replace(frames=most)
+
+
 def finals(rows: Rows) -> Rows:
-    """Return the rows of each variant's final mask."""
+    """Return the rows of each variant's final mask; `analysis.finals` does so for a DataFrame."""
     last = final_stages(rows)
     own = [places for variant, stage, places in rows.masks() if stage == last[variant]]
     return rows.take(np.sort(np.concatenate(own)) if own else slice(0))

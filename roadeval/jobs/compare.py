@@ -197,7 +197,8 @@ def _page(compared: Compared, _: Paper, inspect: Inspect | None) -> bytes:
         return page(replace(made, blocks=[*made.blocks, *browse.section(frames)]))
 
     compared_at = compared.comparison, compared.sides, compared.recordings
-    return rendered(browsed(*compared_at, inspect, lambda frames: len(rendered(frames))))
+    frames = browsed(*compared_at, inspect, lambda frames: len(rendered(frames)))
+    return page(made) if frames is None else rendered(frames)
 
 
 def _document(compared: Compared, inspect: Inspect | None) -> Document:

@@ -11,10 +11,10 @@ import numpy as np
 
 from roadeval.data import BASELINE, ERRORS, TRUTH, Rows
 from roadeval.data.rows import joined
+from roadeval.evaluation import scored
 from roadeval.evaluation.comparison import Side
 from roadeval.evaluation.comparison_result import Comparison
 from roadeval.evaluation.metrics import SHORT
-from roadeval.evaluation.scored import final_stages
 from roadeval.jobs.page_frames import BYTES, PICTURED, fitting
 from roadeval.jobs.report_frames import rates_by_frame
 from roadeval.jobs.result import Result
@@ -48,7 +48,7 @@ def browsed(
     recordings: Mapping[str, Path],
     inspect: Inspect | None,
     taken: Callable[[BrowsedFrames], int] = lambda _frames: 0,
-) -> BrowsedFrames:
+) -> BrowsedFrames | None:
     """Collect the frames that all results have, the base's mask and the new ones' side by side.
 
     Parameters
@@ -66,6 +66,8 @@ def browsed(
         are there as keep it below `roadeval.jobs.page_frames.BYTES`.
     """
     masks = list(_masks(sides))
+    if not masks:
+        return None
     table = _table(masks, {side.label: side for side in sides})
     facts = list(_facts(table, masks, comparison.settings.noteworthy))
     album = _Album(masks, recordings, facts, inspect)
@@ -102,11 +104,9 @@ def _table(masks: Sequence[_Mask], sides: Mapping[str, Side]) -> Rows:
     """Return the rows of the masks on the frames that all have, each under its name as variant."""
     parts = []
     for mask in masks:
-        rows = sides[mask.result].frames.of_variant(mask.variant)
-        rows = rows.take(rows["stage"] == final_stages(rows)[mask.variant])
-        known = {name: rows[name] for name in ("frame", "stamp_ns", *SHORT) if name in rows.columns}
+        rows = scored.finals(sides[mask.result].frames.of_variant(mask.variant))
         named = {"variant": np.full(len(rows), mask.name), "stage": np.full(len(rows), "final")}
-        parts.append(Rows({**known, **named}))
+        parts.append(rows.replace(**named))
     common = set.intersection(*(set(part["frame"].tolist()) for part in parts))
     whole = joined(parts)
     places = np.flatnonzero(np.isin(whole["frame"], [*common]))
@@ -116,8 +116,7 @@ def _table(masks: Sequence[_Mask], sides: Mapping[str, Side]) -> Rows:
 def _facts(table: Rows, masks: Sequence[_Mask], noteworthy: float) -> Iterator[FrameFacts]:
     """Yield each frame with the masks' rates, and whether the first of them got worse or better."""
     base, new = masks[0].name, masks[1].name
-    names = [name for name in SHORT if name in table.columns]
-    for frame, stamp, rates in rates_by_frame(table, names):
+    for frame, stamp, rates in rates_by_frame(table, [*SHORT]):
         change = rates[new]["ERR"] - rates[base]["ERR"]
         said = [f"{new} {'worse' if change > 0 else 'better'}"] if abs(change) >= noteworthy else []
         yield FrameFacts(frame, stamp, rates, said)

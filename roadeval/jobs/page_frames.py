@@ -61,8 +61,7 @@ def facts_of(result: Result) -> Iterator[FrameFacts]:
         return
     settings = settings_of(result.summary)
     dark = _much_shadow(result)
-    names = [name for name in SHORT if name in frames.columns]
-    for frame, stamp, rates in rates_by_frame(scored.finals(frames), names):
+    for frame, stamp, rates in rates_by_frame(scored.finals(frames), [*SHORT]):
         blind = rates.get(BASELINE)
         others = {name: each for name, each in rates.items() if name != BASELINE}
         yield FrameFacts(

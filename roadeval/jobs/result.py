@@ -143,12 +143,12 @@ class Result:
         except RecordingError:
             return None
 
-    @property
+    @cached_property
     def windows(self) -> Rows:
         """The rows of ``windows.csv``; none of an incomplete run."""
         return self._tables.rows("windows")
 
-    @property
+    @cached_property
     def levels(self) -> Rows:
         """The rows of ``probabilities.csv``; none where no variant says how probable road is."""
         return self._tables.rows("probabilities")

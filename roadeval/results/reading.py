@@ -31,8 +31,8 @@ TYPES: Final = {
     Kind.FLAG: "bool",
 }
 """Each kind's type in Arrow."""
-ARRAYS: Final = {kind: str if name == "string" else name for kind, name in TYPES.items()}
-"""And in NumPy, see `Rows`."""
+ARRAYS: Final = TYPES | {Kind.NAME: "str", Kind.TEXT: "str"}
+"""And in NumPy."""
 
 NAMED: Final = 40
 """Letters of a wrong name that a message quotes."""

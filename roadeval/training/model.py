@@ -28,11 +28,11 @@ FORMAT: Final = "roadeval-model"
 VERSION: Final = 6
 """Of the file; raised when what a stage has learnt means something else, or something is added. In
 2 the machine of ``context`` knows the column below a pixel, in 3 there are fingerprints, in 4
-the trees of ``robust`` in its place, in 5 these say how many features they know, in 6 what they
-know has another exposure."""
+the trees of ``robust`` in its place, in 5 these say how many features they know, in 6 the
+stage ``exposure`` compresses what is bright."""
 CHANGED: Final = {"exposure": 6}
-"""Stages that change the image in another way from a version on: what was learnt of it before does
-not fit."""
+"""Stages that change the image in another way since a version: what was learnt before does not fit
+them."""
 OLDEST: Final = 2
 """The earliest version that is read."""
 OWN: Final = ("prior", "fingerprints")
@@ -193,17 +193,24 @@ def load_model(path: Path, stages: Iterable[Stage[Any, Any]] = ()) -> Model:
     version = header.get("version")
     if isinstance(version, int) and version < OLDEST:
         raise ModelError(f"{path}: made by an earlier version of roadeval; train it again")
-    if version not in range(OLDEST, VERSION + 1):
+    if not isinstance(version, int) or version not in range(OLDEST, VERSION + 1):
         raise ModelError(
             f"{path}: model format {version}, this version reads {VERSION}; train it again"
         )
     try:
-        return _model(header, arrays, {**STAGES, **{stage.name: stage for stage in stages}})
+        model = _model(header, arrays, {**STAGES, **{stage.name: stage for stage in stages}})
     except ValueError as error:
         why = "a damaged model file"
         if version != VERSION:  # a stage may be gone since, or learn something else
             why = "made by an earlier version of roadeval, or damaged"
         raise ModelError(f"{path}: {why}: {_line(error)}; train it again") from error
+    for stage, since in CHANGED.items():
+        if version < since and any(stage in settings for settings in model.settings.values()):
+            raise ModelError(
+                f"{path}: made by an earlier version of roadeval, whose stage {stage} changed the "
+                "image in another way; train it again"
+            )
+    return model
 
 
 def kept_model(path: Path, stages: tuple[Stage[Any, Any], ...] = ()) -> Model:
@@ -267,9 +274,6 @@ def _model(
     parts: dict[str, dict[str, dict[str, Any]]] = {variant: {} for variant in header.settings}
     if "fingerprints" not in arrays and content["version"] > OLDEST:
         raise ValueError("fingerprints are missing")
-    for stage, since in CHANGED.items():
-        if content["version"] < since and any(stage in each for each in header.settings.values()):
-            raise ValueError(f"{stage} does something else")
     for name in arrays.keys() - {*OWN}:
         variant, _, rest = name.partition("/")
         stage, _, entry = rest.partition("/")

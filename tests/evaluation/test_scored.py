@@ -54,6 +54,22 @@ def test_the_final_stage_is_post_or_else_the_last():
     assert scored.final_stages(rows) == {"filtered": "post", "mine": "crf"}
 
 
+def test_the_rows_of_final_masks_keep_their_order_in_the_table():
+    rows = rows_of(a_table({SVM: [1, 2], POST: [3, 4], ("mine", "net"): [5, 6]}))
+    mixed = rows.take(np.array([4, 2, 0, 3, 1, 5]))
+    found = scored.finals(mixed)
+    assert found["FP"].tolist() == [4, 5, 3, 6]
+    assert found["variant"].tolist() == ["filtered", "mine", "filtered", "mine"]
+    assert len(scored.finals(rows.take(slice(0)))) == 0
+
+
+def test_a_window_holds_the_frames_of_the_mask_that_has_most():
+    cells = {"window": [1, 0, 1, 0], "frames": [7, 10, 9, 8], "variant": ["a", "a", "b", "b"]}
+    each = scored.each_window(Rows({name: np.array(values) for name, values in cells.items()}))
+    assert each["window"].tolist() == [0, 1]
+    assert each["frames"].tolist() == [10, 9]
+
+
 def test_windows_of_the_table_are_those_of_the_run():
     board, frames = scored_drive()
     found = [asdict(window) for window in scored.windows(frames, 5)]

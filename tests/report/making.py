@@ -3,14 +3,14 @@
 import io
 import re
 
-import numpy as np
 import pandas as pd
 from pypdf import PdfReader
 
-from roadeval.data import Rows
 from roadeval.report.blocks import Cell, Document
 from roadeval.report.figures.figure import FigureData
 from roadeval.report.findings import Commands, Findings, PairedComparison
+from roadeval.results import reading
+from tests.evaluation.making import rows_of
 
 
 def a_document(*blocks, title="street"):
@@ -29,14 +29,13 @@ def text(content):
     return re.sub(r"\s+", " ", " ".join(pages))
 
 
-def rows_of(table):
-    """A table's rows as `roadeval.results.reading.read_rows` reads them."""
-    return Rows({name: np.array(table[name].tolist()) for name in table})
+NO_WINDOWS = reading.rows_of("windows", [])
+NO_LEVELS = reading.rows_of("probabilities", [])
 
 
 def figure_data(drive, windows, *more):
     """What figures are drawn from, with the windows as a table."""
-    return FigureData(drive, rows_of(windows), *more)
+    return FigureData(drive, rows_of(windows) if len(windows) else NO_WINDOWS, *more)
 
 
 VARIANTS = ("filtered", "unfiltered", "blind")
@@ -91,7 +90,7 @@ def some_findings(**changes):
         },
         "properties": {},
         "finals": dict.fromkeys(VARIANTS, "post"),
-        "windows": Rows({}),
+        "windows": NO_WINDOWS,
         "window_size": 10,
         "paired": [],
         "regions": pd.DataFrame(),
@@ -104,7 +103,7 @@ def some_findings(**changes):
         "heatmaps": [],
         "oracles": pd.DataFrame(),
         "beyond": {},
-        "levels": Rows({}),
+        "levels": NO_LEVELS,
         "sampled": 1200,
         "examples": [],
         "thumbnails": [],

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pandas as pd
 
-from roadeval.data import Rows
 from roadeval.data.words import MINUS
 from roadeval.evaluation.comparison_result import (
     ComparedResult,
@@ -21,7 +20,8 @@ from roadeval.report.blocks import BulletList, Cell, Table, Text
 from roadeval.report.comparison import document, markdown
 from roadeval.report.pdf.typeset import pdf
 from roadeval.results.comparison import judged
-from tests.report.making import links_within, rows_of, text
+from tests.evaluation.making import rows_of
+from tests.report.making import NO_WINDOWS, links_within, text
 
 
 def change_of(mean, low=None, high=None):
@@ -132,7 +132,7 @@ def test_different_drives_are_laid_side_by_side():
         "IoU": "80.00",
     }
     assert table.text_columns == range(3)
-    words = text(pdf(document(comparison, (), Rows({}))))
+    words = text(pdf(document(comparison, (), NO_WINDOWS)))
     assert "Different drives, side by side: no difference is given." in words
     assert "11.20" in words
 
@@ -154,5 +154,5 @@ def test_of_a_frame_of_disagreement_the_sum_of_both_shares_is_bold():
 
 
 def test_its_contents_lead_to_its_parts():
-    made = document(a_comparison(), LIMITS, Rows({}))
+    made = document(a_comparison(), LIMITS, NO_WINDOWS)
     assert links_within(pdf(made)) == 3

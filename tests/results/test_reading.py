@@ -8,7 +8,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from roadeval.results.reading import ResultsError, fingerprint, read_rows, read_table, table_of
+from roadeval.results.reading import (
+    ResultsError,
+    fingerprint,
+    read_rows,
+    read_table,
+    rows_of,
+    table_of,
+)
 from roadeval.results.schema import TABLES
 
 HEADER = TABLES["oracles"].header
@@ -72,6 +79,17 @@ def test_rows_make_the_table_that_their_text_would():
     made = table_of("oracles", [row])
     pd.testing.assert_frame_equal(made, read_table("oracles", HEADER + line(err="")))
     pd.testing.assert_frame_equal(table_of("oracles", []), read_table("oracles", ""))
+
+
+@pytest.mark.parametrize("errs", [[], [math.nan], [0.5, math.nan]])
+def test_rows_of_arrays_are_those_that_their_text_would_make(errs):
+    rows = [(1, "net", "svm", "post", 2, 4, 0, 0, 6, 0.5, e, 0.1, 0.2, 0.3, 0.25) for e in errs]
+    lines = [line(err="" if math.isnan(err) else str(err)) for err in errs]
+    made, read = rows_of("oracles", rows), read_rows("oracles", HEADER + "".join(lines))
+    assert len(made) == len(errs)
+    for name in TABLES["oracles"].names:
+        assert made[name].dtype.kind == read[name].dtype.kind
+        np.testing.assert_array_equal(made[name], read[name])
 
 
 MANY = "".join(

@@ -24,7 +24,7 @@ from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View
 
 EXPOSED: Final = LayerSpec("exposed", LayerKind.RGB, "Exposure by the reference patch", exact=False)
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Gain = Annotated[float, Field(gt=0, le=255)]
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
@@ -46,8 +46,8 @@ class ExposureSettings:
 
     level: Annotated[float, Field(gt=0, lt=255)] = 96.0
     channels: Literal["each", "alike"] = "each"
-    least: Positive = 0.25
-    greatest: Positive = 6.0
+    least: Gain = 0.25
+    greatest: Gain = 6.0
     patch: ReferencePatch = ReferencePatch()
 
     @model_validator(mode="after")
@@ -86,8 +86,9 @@ def _median(image: Rgb, channel: int, patch: Mask) -> float:
 def expose(image: Rgb, gain: npt.NDArray[np.float64], level: float) -> Rgb:
     """Multiply the channels of an ``(H, W, 3)`` uint8 image by ``(3,)`` gains, and compress them.
 
-    A product x above the level l becomes ``l + r e / (e + r)``, with ``e = x - l`` and the room
-    ``r = 255 - l``: the slope is 1 at the level, and 255 is never reached. Rounded.
+    A product x up to the level l, a grey level below 255, stays. Above it x becomes
+    ``l + r e / (e + r)``, with ``e = x - l`` and the room ``r = 255 - l``: the slope is 1 at the
+    level, and 255 is only approached. Then it is rounded.
     """
     product = np.arange(256)[:, None] * gain
     excess, room = np.maximum(product - level, 0), 255 - level

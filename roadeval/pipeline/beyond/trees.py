@@ -82,9 +82,10 @@ class TreesSettings:
     share
         Of the features, drawn anew for each node, among which it chooses.
     reach_weight
-        Of the distance d from the patch, 1 where roads end: where there is light,
-        ``reach_weight max(d - 1, 0)`` is taken from the log-odds. It changes little where the
-        camera itself taught the trees; where others did, up to 4 may mend much.
+        ``reach_weight`` times ``s max(d - 1, 0)`` is taken from the log-odds. The distance d from
+        the patch is 1 where roads end, after the stage ``exposure``; s is 1 in the light and 0 in
+        the shade. It changes little where the camera itself taught the trees; where others did,
+        up to 4 may mend much.
     threshold
         A pixel is road where it is more probable than this.
     """

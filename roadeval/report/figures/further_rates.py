@@ -27,10 +27,9 @@ def further_rates(data: FigureData) -> Figure | None:
 
 def _names(data: FigureData) -> list[str]:
     drawn = {*fig3a_error_rate.AXES, *fig3b_fp_fn_rate.AXES}
-    # Results that were made before a metric was added do not have it.
-    windows = data.windows
-    known = (name for name in SHORT if name in windows.columns and name not in drawn)
-    return [name for name in known if not np.isnan(windows[name]).all()]
+    # In results that were made before a metric was added it is undefined everywhere.
+    further = [name for name in SHORT if name not in drawn] if len(data.windows) else []
+    return [name for name in further if not np.isnan(data.windows[name]).all()]
 
 
 FIGURE = FigureSpec(

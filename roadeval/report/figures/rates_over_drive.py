@@ -54,7 +54,7 @@ def rates_over_drive(
     if not len(windows):
         return None
     final = scored.finals(windows)
-    rows = final.take(np.unique(final["window"], return_index=True)[1])
+    rows = scored.each_window(final)
     group = -(-len(rows) // CROWDED)
     size, rest = rows["frames"].max(), rows["frames"][-1]
     last, short = rows["window"][-1], ""

@@ -59,7 +59,6 @@ def _along(final: Rows, x: Cells, rates: Sequence[str]) -> list[Chart]:
             from_zero=not METRICS[rate].higher_is_better,
         )
         for rate in rates
-        if rate in rows.columns
     ]
 
 

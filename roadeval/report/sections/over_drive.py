@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-import numpy as np
-
 from roadeval.data.words import DASH, percent
+from roadeval.evaluation import scored
 from roadeval.evaluation.metrics import FULL
 from roadeval.evaluation.settings import settings_of
 from roadeval.report.blocks import (
@@ -71,9 +70,9 @@ def _tables(findings: Findings) -> Iterator[Block]:
     names = [*FULL]
     for place in range(0, len(names), together):
         yield _table(findings, names[place : place + together])
-    size, windows = findings.window_size, findings.windows
+    size = findings.window_size
     long = "" if size == PAPER_WINDOW else f" The paper's rows are of {PAPER_WINDOW}."
-    rest = windows["frames"][windows["window"].argmax()]
+    rest = scored.each_window(findings.windows)["frames"][-1]
     short = f" The last row holds {rest}." if rest < size else ""
     yield Text(
         f"Rows of {size} evaluated frames: the mean of the frames' rates in percent.{long}{short} "
@@ -91,13 +90,14 @@ def _table(findings: Findings, rates: Sequence[str]) -> Table:
         place = places.get((name, findings.finals[name], window))
         return percent(None if place is None else float(windows[rate][place]))
 
-    numbers, firsts = np.unique(windows["window"], return_index=True)
+    each = scored.each_window(windows)
+    spans = (each[name].tolist() for name in ("window", "first_frame", "last_frame"))
     rows: list[list[Cell | str]] = [
         [
-            _span(windows["first_frame"][first], windows["last_frame"][first]),
+            _span(first, last),
             *(cell(name, number, rate) for rate in rates for name in names),
         ]
-        for number, first in zip(numbers.tolist(), firsts, strict=True)
+        for number, first, last in zip(*spans, strict=True)
     ]
     whole = [percent(findings.total(name).get(rate)) for rate in rates for name in names]
     rows.append([Cell(text, bold=True) for text in ("all", *whole)])

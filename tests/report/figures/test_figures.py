@@ -21,14 +21,14 @@ from roadeval.report import figures as folder
 from roadeval.report.figures.fig2_masks import road_masks
 from roadeval.report.figures.fig3a_error_rate import error_rate
 from roadeval.report.figures.fig3b_fp_fn_rate import fp_fn_rate
-from roadeval.report.figures.figure import ExampleFrame, figures
+from roadeval.report.figures.figure import ExampleFrame, FigureData, figures
 from roadeval.report.figures.files import svg, svg_of, write_figures
 from roadeval.report.figures.picture import Picture
 from roadeval.report.figures.rates_over_drive import CROWDED, MARKED, rates_over_drive
 from roadeval.report.figures.style import RC, looks
-from tests.report.making import figure_data, rows_of
+from tests.evaluation.making import rows_of
+from tests.report.making import NO_WINDOWS, figure_data
 
-NO_WINDOWS = pd.DataFrame()
 BY_DEFAULT = ("filtered", "unfiltered", "blind")
 FILES = {
     f"{stem}.{kind}"
@@ -71,7 +71,7 @@ def an_example(frame: int = 7, *, truth: bool = True) -> ExampleFrame:
 
 
 def masks_of(examples: Sequence[ExampleFrame]) -> Figure:
-    figure = road_masks(figure_data("drive", NO_WINDOWS, examples))
+    figure = road_masks(FigureData("drive", NO_WINDOWS, examples))
     assert figure is not None
     return figure
 
@@ -138,7 +138,7 @@ def test_the_axes_of_two_rates_are_close_and_do_not_touch() -> None:
 def test_the_title_names_the_drive() -> None:
     for figure in (
         error_rate(figure_data("my_drive", a_table(2))),
-        road_masks(figure_data("my_drive", NO_WINDOWS, [an_example()])),
+        road_masks(FigureData("my_drive", NO_WINDOWS, [an_example()])),
     ):
         assert "my_drive" in texts(figure)
 
@@ -274,6 +274,18 @@ def test_a_long_drive_is_drawn_as_means_with_their_range() -> None:
     assert min(band_at_first) == pytest.approx(first.min())
     assert max(band_at_first) == pytest.approx(first.max())
     assert "averages 24 rows" in texts(figure)
+
+
+def test_what_is_undefined_is_no_part_of_a_mean_of_rows_and_the_order_of_the_table_none() -> None:
+    table = a_table(2 * CROWDED, ("filtered",))
+    table.loc[table["window"] == 1, "ERR"] = np.nan
+    table.loc[table["window"].isin([4, 5]), "ERR"] = np.nan
+    (ax,) = error_rate(figure_data("drive", table.sample(frac=1, random_state=0))).axes
+    drawn_y = ax.lines[0].get_ydata()
+    own = 100 * table[table["stage"] == "post"]["ERR"].to_numpy()
+    assert drawn_y[:2] == pytest.approx([own[0], own[2:4].mean()])
+    assert np.isnan(drawn_y[2])
+    assert drawn_y[3:5] == pytest.approx([own[6:8].mean(), own[8:10].mean()])
 
 
 def test_figure_2_has_a_row_a_frame_and_a_column_a_mask() -> None:

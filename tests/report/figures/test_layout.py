@@ -9,7 +9,6 @@ import pytest
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from roadeval.data import Rows
 from roadeval.evaluation.comparison_result import MaskComparison
 from roadeval.evaluation.metrics import METRICS, SHORT
 from roadeval.evaluation.uncertainty import Difference
@@ -22,7 +21,7 @@ from roadeval.report.figures.legend import LegendStyle
 from roadeval.report.figures.style import RC
 from roadeval.report.figures.thresholds import curves
 from roadeval.report.findings import ErrorHeatmap
-from tests.report.making import figure_data
+from tests.report.making import NO_WINDOWS, figure_data
 from tests.report.sections.test_thresholds import findings as curves_of
 
 LONG = "trained_on_every_drive_of_the_summer_and_adapted_to_this_one_a"
@@ -182,7 +181,7 @@ def test_the_legend_of_the_curves_over_thresholds_is_readable(variants):
     found = curves_of().figure_data.thresholds
     (mask,) = found.totals["blind"].values()
     totals = {name: {"post": mask} for name in variants}
-    assert_readable(curves(FigureData("drive", Rows({}), (), replace(found, totals=totals))))
+    assert_readable(curves(FigureData("drive", NO_WINDOWS, (), replace(found, totals=totals))))
 
 
 @pytest.mark.parametrize("variants", VARIANTS)
@@ -190,7 +189,7 @@ def test_the_legend_of_the_curves_over_thresholds_is_readable(variants):
 def test_the_pictures_of_figure_2_have_names_and_the_shape_of_the_image(variants, size):
     image, mask = np.full((*size, 3), 90, np.uint8), np.ones(size, np.uint8)
     example = ExampleFrame(999, image, mask, dict.fromkeys(variants, mask))
-    figure = road_masks(FigureData("drive", Rows({}), [example]))
+    figure = road_masks(FigureData("drive", NO_WINDOWS, [example]))
     assert_readable(figure)
     for picture in figure.artists:
         assert picture.box.height / picture.box.width == pytest.approx(size[0] / size[1])

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from roadeval.data import Rows
 from roadeval.report.figures.fig2_masks import road_masks
 from roadeval.report.figures.figure import ExampleFrame, FigureData
 from roadeval.report.images import faded
 from roadeval.report.sections.common import example_pictures
+from tests.report.making import NO_WINDOWS
 
 IMAGE = np.full((4, 6, 3), 105, np.uint8)
 MASK = np.ones((4, 6), np.uint8)
@@ -17,7 +17,7 @@ EXAMPLES = [
 
 
 def test_every_row_of_the_figure_has_every_variant():
-    figure = road_masks(FigureData("street", Rows({}), EXAMPLES))
+    figure = road_masks(FigureData("street", NO_WINDOWS, EXAMPLES))
     assert len(figure.artists) == 2 * len(["camera", "unfiltered", "net", "truth"])
     assert any("faded: there is no mask" in text.get_text() for text in figure.texts)
 

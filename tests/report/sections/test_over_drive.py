@@ -6,7 +6,8 @@ import pandas as pd
 from roadeval.report.blocks import Figure, ImageGrid, KeepTogether, Table, Text
 from roadeval.report.figures.figure import ExampleFrame
 from roadeval.report.sections.over_drive import section
-from tests.report.making import plain_rows, rates, rows_of, some_findings, the
+from tests.evaluation.making import rows_of
+from tests.report.making import plain_rows, rates, some_findings, the
 
 
 def windows():
@@ -77,6 +78,14 @@ def test_a_short_last_row_is_told():
     table = table.replace(frames=np.where(table["window"] == 1, 1, 10))
     (note,) = (b.text for b in section(some_findings(windows=table)) if isinstance(b, Text))
     assert "The last row holds 1." in note
+
+
+def test_a_variant_that_lacks_frames_makes_no_short_row():
+    table = windows()
+    lacking = (table["window"] == 1) & (table["variant"] == "filtered")
+    table = table.replace(frames=np.where(lacking, 7, 10))
+    (note,) = (b.text for b in section(some_findings(windows=table)) if isinstance(b, Text))
+    assert "The last row holds" not in note
 
 
 def test_the_paper_s_claims_stand_with_the_windows_that_bear_them_out():

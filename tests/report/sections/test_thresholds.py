@@ -6,7 +6,8 @@ import pytest
 from roadeval.data.words import DASH
 from roadeval.report.blocks import Figure, Table
 from roadeval.report.sections.thresholds import section
-from tests.report.making import plain_rows, rows_of, some_findings
+from tests.evaluation.making import rows_of
+from tests.report.making import plain_rows, some_findings
 
 BINS = [
     {"pixels": 10, "probability": 0.1, "road": 0.2},
@@ -25,12 +26,12 @@ QUOTED = {
 }
 LEVELS = [("filtered", "post", 20, 2, 8), ("filtered", "post", 230, 4, 1)]
 
-LEVEL = ["variant", "stage", "level", "road", "other"]
+COLUMNS = ["variant", "stage", "level", "road", "other"]
 
 
 def findings(**quoted):
     made = some_findings(
-        levels=rows_of(pd.DataFrame(LEVELS, columns=LEVEL)),
+        levels=rows_of(pd.DataFrame(LEVELS, columns=COLUMNS)),
         overlap={"filtered": {"post": {"F1": 0.81, "precision": 0.82, "IoU": 0.7}}},
     )
     counts = {"TP": 6, "TN": 6, "FP": 2, "FN": 1, "pooled_TPR": 0.83, "pooled_FPR": 0.25}

@@ -24,33 +24,35 @@ AROUND_EDGES: Final = 1.5
 """And by that over the squared edges of the image at twice its size, which grows where something
 steep is, thin kerbs included. Both values are the best, or next to it, on the train part of IDD
 Lite, on CamVid 0016E5 and 0006R0 and on the demo drive; for working images of 160 columns, made of
-320 or more: edges of smaller images are blurred, and more is reached. And for images whose exposure
-is the patch's: it makes edges among what is brighter fainter."""
+320 or more: edges of smaller images are blurred, and more is reached. They hold after the stage
+`exposure`, which weakens edges among what is brighter than the patch."""
 PERCENTILE: Final = 80
 """Of the lower half's log brightness: about that of sunlit ground."""
 SHADE, SUN = -0.8, -0.3
-"""Log brightness over that percentile, up to which a pixel is taken to lie in the shade, and from
-which on in the light."""
+"""Of the natural logarithm of brightness over that percentile: at or below `SHADE` a pixel counts
+as shade, at or above `SUN` as lit."""
 FEATURES: Final = (
     "paths.over_edges",
     "barriers.around_edge",
     f"light.light_over_{PERCENTILE}th_percentile",
 )
-"""The features of a pixel that are the two distances, and its light."""
+"""The features that are the two distances and the light of a pixel."""
 
 
 def reach(scene: Scene) -> Values:
     """Return how far each pixel lies from the patch, ``(h, w)`` float32; roads end at about 1."""
-    over, around, _ = inputs(scene)
-    return combined(over, around)
+    return combined(*_distances(scene))
 
 
 def inputs(scene: Scene) -> Sequence[Values]:
     """Compute the planes of `FEATURES`, ``(h, w)`` float32 each."""
+    return *_distances(scene), *light_over(scene, PERCENTILE)
+
+
+def _distances(scene: Scene) -> tuple[Values, Values]:
     edge, *_ = barriers(tones_of(scene.fine))
     steep = np.square(greatest_of_four(edge)) * np.float32(SQUARED["edge"])
-    over, around = (distance(cost, scene.patch) for cost in (scene.edge, steep))
-    return over, around, *light_over(scene, PERCENTILE)
+    return distance(scene.edge, scene.patch), distance(steep, scene.patch)
 
 
 def combined(over: Values, around: Values) -> Values:
@@ -65,7 +67,7 @@ def combined(over: Values, around: Values) -> Values:
 
 
 def beyond(far: Values, light: Values) -> Values:
-    """Compute ``s max(d - 1, 0)``: how far a pixel lies beyond the road's end, if it is lit.
+    """Compute ``s max(d - 1, 0)``: how far a pixel lies beyond the road's end, times its light.
 
     The share s grows from 0 at `SHADE` to 1 at `SUN`: a shadow's edge lengthens the way into it,
     so that in the shade the distance says little. All are ``(h, w)`` float32; d is `combined`,

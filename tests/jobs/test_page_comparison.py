@@ -1,0 +1,31 @@
+"""The frames of compared results on a page."""
+
+from roadeval.evaluation.comparison import Side, compare
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.jobs.page_comparison import browsed
+from tests.evaluation.making import a_table, rows_of
+
+
+def a_side(label, masks):
+    return Side(label, "street", "digest", rows_of(a_table(masks)))
+
+
+def page_of(base, new):
+    """What the page tells of the frames of two results without pictures."""
+    sides = [a_side("base", base), a_side("new", new)]
+    return browsed(compare(sides, EvaluationSettings()), sides, {}, None, lambda _: 0)
+
+
+def test_frames_that_both_results_have_stand_in_order_with_both_rates():
+    found = page_of({("net", "svm"): [9] * 12, ("net", "post"): [1] * 12}, {("net", "post"): [3]})
+    assert found.variants == ["base: net", "new: net"]
+    assert [frame.frame for frame in found.frames] == [0]
+    assert {name: rates["ERR"] for name, rates in found.frames[0].rates.items()} == {
+        "base: net": 0.01,
+        "new: net": 0.03,
+    }
+
+
+def test_results_without_a_variant_in_common_have_no_frames_to_show():
+    blind = {("blind", "post"): [5] * 12}
+    assert page_of({("net", "post"): [1] * 12, **blind}, {("other", "post"): [2], **blind}) is None
