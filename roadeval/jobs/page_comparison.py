@@ -51,6 +51,8 @@ def browsed(
 ) -> BrowsedFrames | None:
     """Collect the frames that all results have, the base's mask and the new ones' side by side.
 
+    None where no variant is in all of them.
+
     Parameters
     ----------
     comparison
