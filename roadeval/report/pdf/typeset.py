@@ -69,6 +69,11 @@ def page_of(svg: bytes) -> bytes:
     return _compiled(_FIGURE, {"figure.svg": svg})
 
 
+def picture_of(svg: bytes, dots_per_inch: int) -> bytes:
+    """Return a figure, given as SVG, as a PNG."""
+    return _compiled(_FIGURE, {"figure.svg": svg}, format="png", ppi=dots_per_inch)
+
+
 def write_file(path: Path, content: bytes) -> Path:
     """Write a report; an incomplete file never has its name.
 
@@ -86,15 +91,15 @@ def write_file(path: Path, content: bytes) -> Path:
     return path
 
 
-def _compiled(template: bytes, sources: Mapping[str, bytes]) -> bytes:
-    """Return what Typst makes of a template and the files that it reads."""
+def _compiled(template: bytes, sources: Mapping[str, bytes], **how: Any) -> bytes:
+    """Return what Typst makes of a template and the files that it reads: a PDF, if nothing else."""
     import typst
 
     with TemporaryDirectory(prefix="roadeval-") as folder:
         for name, content in {_TEMPLATE: template, **sources}.items():
             Path(folder, name).write_bytes(content)
         compiled: bytes = typst.compile(
-            Path(folder, _TEMPLATE), root=Path(folder), format="pdf", font_paths=_fonts()
+            Path(folder, _TEMPLATE), root=Path(folder), font_paths=_fonts(), **how
         )
     return compiled
 
