@@ -3,6 +3,7 @@
 import os
 import struct
 import zlib
+from itertools import pairwise
 
 import pytest
 
@@ -130,6 +131,47 @@ def test_a_table_keeps_its_rows_and_repeats_its_head_on_the_next_page():
     words = text(pdf(a_document(table)))
     assert all(f"frame {number} {number}.25" in words for number in range(100))
     assert words.count("percent") > 1
+
+
+LONG = "a_name_of_64_letters_" + 43 * "n"
+
+
+def places(content):
+    """Left edges in points of the first page's words, by the word."""
+    found = {}
+
+    def visit(said, matrix, in_text, *_):
+        if said.strip():
+            found[said.strip()] = matrix[0] * in_text[4] + matrix[4]
+
+    reader(content).pages[0].extract_text(visitor_text=visit)
+    return found
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        Table(["mask", "ERR", "FPR", "FNR"], [[LONG, "11.25", "22.50", "33.75"]]),
+        Table(["frames", LONG, "ERR", "FPR"], [["0-9", "11.25", "22.50", "33.75"]]),
+    ],
+    ids=["in a row", "above a column"],
+)
+def test_a_name_of_64_letters_leaves_numbers_their_room(table):
+    content = pdf(a_document(table))
+    edges = [places(content)[number] for number in ("11.25", "22.50", "33.75")]
+    assert min(right - left for left, right in pairwise(edges)) > 40
+    assert "".join(text(content).split()).count(LONG) == 1
+
+
+@pytest.mark.parametrize(
+    "block",
+    [Table(["setting", "value"], [["chain", LONG]], (0, 1)), ImageGrid([(LONG, a_png())], 1)],
+    ids=["a setting", "a picture"],
+)
+def test_a_name_of_64_letters_stays_in_its_column(block):
+    content = pdf(a_document(TwoColumns([block], [Text("beside")])))
+    lines = [edge for word, edge in places(content).items() if word in LONG]
+    assert len(lines) > 1
 
 
 def test_equal_pictures_are_kept_once():
