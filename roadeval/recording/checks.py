@@ -108,5 +108,6 @@ def can_be_read(path: Path) -> bool:
 
     It is read once in another process for that.
     """
-    probe = [sys.executable, "-c", _PROBE, str(path)]
+    # -P: a rerun.py that lies beside the recordings must not be what is imported.
+    probe = [sys.executable, "-P", "-c", _PROBE, str(path)]
     return subprocess.run(probe, check=False, capture_output=True).returncode == 0

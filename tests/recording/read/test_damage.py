@@ -137,6 +137,12 @@ def test_without_check_sums_another_process_tries_the_file_first(recording, tmp_
     assert Recording(recording.path).truth(4).shape == recording.truth(4).shape
 
 
+def test_a_module_beside_a_recording_is_not_run(recording, tmp_path, monkeypatch):
+    (tmp_path / "rerun.py").write_text("import os; os.abort()")
+    monkeypatch.chdir(tmp_path)
+    assert checks.can_be_read(recording.path)
+
+
 def test_a_name_that_is_not_utf8_is_refused(recording, tmp_path):
     path = tmp_path / "caf\udce9.rrd"
     path.write_bytes(recording.path.read_bytes())
