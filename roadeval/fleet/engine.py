@@ -86,6 +86,7 @@ def started(
     dask, distributed = _dask()
     with ExitStack() as stack:
         if scheduler is None:
+            stack.enter_context(_safe_path())
             stack.enter_context(dask.config.set(_LOCAL))
             count = workers or _processors()
             client = stack.enter_context(_local(distributed, count, memory_gib))
@@ -102,6 +103,23 @@ def started(
 def died(error: BaseException) -> bool:
     """Return whether an error says that the processes that worked on a task have died."""
     return type(error).__name__ in ("KilledWorker", "BrokenProcessPool", "TerminatedWorkerError")
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """Let Python processes that begin in the block import nothing from the current folder.
+
+    A worker is told this process's own path, but only by modules that it has to import first.
+    """
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["PYTHONSAFEPATH"]
+        else:
+            os.environ["PYTHONSAFEPATH"] = before
 
 
 @contextmanager
