@@ -10,6 +10,7 @@ become markup, and nothing is fetched from anywhere.
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Mapping
 from enum import StrEnum
 from functools import cache
@@ -55,8 +56,8 @@ class ReportError(RoadevalError):
 def pdf(document: Document, paper: Paper = Paper.A4) -> bytes:
     """Return a document as PDF; equal documents give equal bytes.
 
-    Fonts are Typst's own and, for the figures, Matplotlib's; never the machine's, so that a
-    document looks the same everywhere.
+    Fonts are Typst's own and, for the figures, DejaVu Sans; never the machine's, so that a document
+    looks the same everywhere. A letter that none of them has is an empty box.
     """
     page = {"paper": _TYPST_NAMES[paper], "colours": _COLOURS}
     data = _visible(document.as_json() | page)
@@ -106,12 +107,29 @@ def _compiled(template: bytes, sources: Mapping[str, bytes], **how: Any) -> byte
 
 @cache
 def _fonts() -> Any:
-    """Return Typst's own fonts and those that Matplotlib brings."""
+    """Return Typst's own fonts, and the DejaVu Sans that Matplotlib brings."""
     import typst
+
+    return typst.Fonts(include_system_fonts=False, font_paths=[_dejavu().name])
+
+
+@cache
+def _dejavu() -> TemporaryDirectory[str]:
+    """Return a folder of DejaVu Sans alone, which Typst reads as long as the process lives.
+
+    Matplotlib's own folder also has a font with a sign for every letter there is. A text of a
+    figure is set in one font, and if it had but one letter that DejaVu Sans lacks, as in a drive's
+    name, all of it would be such signs.
+    """
     from matplotlib import get_data_path
 
-    folder = Path(get_data_path(), "fonts", "ttf")
-    return typst.Fonts(include_system_fonts=False, font_paths=[str(folder)])
+    folder = TemporaryDirectory(prefix="roadeval-")
+    for font in Path(get_data_path(), "fonts", "ttf").glob("DejaVuSans*.ttf"):
+        try:
+            Path(folder.name, font.name).symlink_to(font)
+        except OSError:  # a system on which not everyone may link
+            shutil.copy(font, folder.name)
+    return folder
 
 
 def _visible(value: Any) -> Any:

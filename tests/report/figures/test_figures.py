@@ -434,6 +434,14 @@ def test_pdfs_embed_their_fonts_and_tell_no_date(twice: list[list[Path]]) -> Non
             assert b"CreationDate" not in content
 
 
+@pytest.mark.filterwarnings("ignore:Glyph")
+def test_a_letter_that_the_font_lacks_leaves_the_others_theirs(tmp_path: Path) -> None:
+    write_figures(tmp_path, figure_data("道路 Straße", a_table(3)))
+    fonts = (tmp_path / "fig3a_error_rate.pdf").read_bytes().split(b"/FontName")[1:]
+    assert fonts
+    assert all(b"+DejaVuSans" in font[:40] for font in fonts)
+
+
 def test_without_rates_only_masks_are_drawn(tmp_path: Path) -> None:
     write_figures(tmp_path, figure_data("drive", a_table(0), [an_example(truth=False)]))
     assert {path.name for path in tmp_path.iterdir()} == {"fig2_masks.png", "fig2_masks.pdf"}
