@@ -170,7 +170,7 @@ def failed(task: DriveTask, reason: str, exit_code: int = 1) -> Record:
     """Return the record of a drive that could not be used."""
     row = failed_row(task.entry, reason, exit_code, _begun(task)) | {
         "fold": task.fold,
-        "model": task.model,
+        "model": task.model or None,
     }
     rows = {"drives": cells("drives", [row]), "scores": [], "effects": [], "worst": []}
     return Record(task.entry.id, task.asked, _stamp(task.entry), rows)

@@ -15,6 +15,7 @@ from roadeval.config import RunConfig
 from roadeval.data import Frame
 from roadeval.errors import RoadevalError
 from roadeval.fleet.entry import DriveEntry
+from roadeval.fleet.errors import FleetError
 from roadeval.fleet.remote import staged, stamp
 from roadeval.jobs.identity import asked
 from roadeval.results.summary import json_text
@@ -85,7 +86,19 @@ def train_fold(task: FoldTask) -> FoldModel:
     """Train the model of a fold, unless it is there and nothing has changed.
 
     A drive without truth, or one that cannot be used, is passed by, and the next one is asked.
+
+    Raises
+    ------
+    FleetError
+        If the model cannot be written.
     """
+    try:
+        return _trained(task)
+    except OSError as error:
+        raise FleetError(f"{task.folder}: cannot be written: {error.strerror}") from error
+
+
+def _trained(task: FoldTask) -> FoldModel:
     wanted = _wanted(task)
     standing = _standing(task, wanted)
     if standing is not None:

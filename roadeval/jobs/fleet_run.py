@@ -17,7 +17,7 @@ from roadeval.fleet.entry import DriveEntry
 from roadeval.fleet.errors import FleetError
 from roadeval.fleet.folds import deal, shuffled
 from roadeval.jobs.fleet_drive import Done, DriveTask, done, failed, replay_drive, standing
-from roadeval.jobs.fleet_models import FoldTask, train_fold
+from roadeval.jobs.fleet_models import FoldModel, FoldTask, train_fold
 from roadeval.results.fleet.record import FAILED, recording_path
 
 
@@ -181,7 +181,8 @@ class FleetRun:
             for fold in range(settings.fleet.folds)
         ]
         self.show("training")
-        made = [future.result() for future in [engine.submit(train_fold, t) for t in training]]
+        futures = [engine.submit(train_fold, task) for task in training]
+        made = [self._model(future, fold) for fold, future in enumerate(futures)]
         tasks = []
         for entry in self.entries:
             fold = made[folds[entry.id]]
@@ -192,6 +193,13 @@ class FleetRun:
             else:
                 tasks.append(task)
         return tasks
+
+    def _model(self, future: Future[FoldModel], fold: int) -> FoldModel:
+        """Wait for the model of a fold; one that fails fails its drives alone."""
+        try:
+            return future.result()
+        except Exception as error:
+            return FoldModel(fold, "", self._reason(error, f"the model of fold {fold} was trained"))
 
     def _replay(self, engine: Executor, tasks: Sequence[DriveTask]) -> None:
         """Replay the tasks' drives, and take each result as it comes."""
@@ -209,23 +217,27 @@ class FleetRun:
     def _take(self, future: Future[Done], task: DriveTask) -> None:
         try:
             found = future.result()
-        except RoadevalError:
-            raise
-        except CancelledError as error:
-            raise FleetError(
-                f"{self.folder}: the workers have gone, or their scheduler; what is done is kept, "
-                "and the same command again does the rest"
-            ) from error
         except Exception as error:
-            reason = " ".join(f"{type(error).__name__}: {error}".split())
-            if died(error):
-                reason = (
-                    f"its worker process ended {ATTEMPTS} times while it was replayed, as it does "
-                    "where memory runs out"
-                )
-            self._fail(task, reason)
+            self._fail(task, self._reason(error, "it was replayed"))
         else:
             self.done[found.drive] = found
+
+    def _reason(self, error: Exception, doing: str) -> str:
+        """Return why a task has failed; what ends the whole run is raised."""
+        match error:
+            case RoadevalError():
+                raise error
+            case CancelledError():
+                raise FleetError(
+                    f"{self.folder}: the workers have gone, or their scheduler; what is done is "
+                    "kept, and the same command again does the rest"
+                ) from error
+        if died(error):
+            return (
+                f"its worker process ended {ATTEMPTS} times while {doing}, as it does where memory "
+                "runs out"
+            )
+        return " ".join(f"{type(error).__name__}: {error}".split())
 
     def _fail(self, task: DriveTask, reason: str) -> None:
         record = failed(task, reason)

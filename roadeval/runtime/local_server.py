@@ -13,17 +13,18 @@ from __future__ import annotations
 import hmac
 import re
 import secrets
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Final
+from typing import Any, Final
 from urllib.parse import urlsplit
 
 HOST: Final = "127.0.0.1"
-_SEGMENT: Final = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
-"""A part of a path: it begins with no dot."""
+_SEGMENT: Final = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{,199}")
+"""A part of a path: it begins with no dot, and is no longer than any name or number here."""
 _HEADERS: Final = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
@@ -117,8 +118,7 @@ class LocalServer:
     def __init__(self, answer: Answer, port: int = 0) -> None:
         self._token: Final = secrets.token_urlsafe(24)
         handler = partial(_Handler, answer=answer, token=self._token)
-        self._server: Final = ThreadingHTTPServer((HOST, port), handler)
-        self._server.daemon_threads = True
+        self._server: Final = _Server((HOST, port), handler)
 
     @property
     def address(self) -> str:
@@ -136,6 +136,17 @@ class LocalServer:
     def close(self) -> None:
         """Close the socket, so that its port is free."""
         self._server.server_close()
+
+
+class _Server(ThreadingHTTPServer):
+    """Takes connections, each in a thread."""
+
+    daemon_threads = True
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Tell of what went wrong with a connection, unless the browser has just left."""
+        if not isinstance(sys.exception(), ConnectionError | TimeoutError):
+            super().handle_error(request, client_address)
 
 
 class _Handler(BaseHTTPRequestHandler):

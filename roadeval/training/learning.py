@@ -176,7 +176,7 @@ def from_drives(
     if bare and insists and settings.source != "patch":
         raise TrainingError(
             f"{bare[0]}: no road truth to train on in the range; name its topic with "
-            'topics.truth, leave the drive out, or set training.source = "patch"'
+            '`topics.truth`, leave the drive out, or set training.source = "patch"'
         )
     guessed = bare and settings.source == "auto"
     guess = [f"no drive has road truth in the range: {BY_PATCH}"] if guessed else []

@@ -10,6 +10,7 @@ from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
+from zipfile import ZipFile
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +36,8 @@ CHANGED: Final = {"exposure": 6}
 them."""
 OLDEST: Final = 2
 """The earliest version that is read."""
+GREATEST_SIZE: Final = 1 << 29
+"""Bytes that a model's arrays may take; those of `roadeval train` take a few million."""
 OWN: Final = ("prior", "fingerprints")
 """The arrays that belong to no variant."""
 
@@ -195,7 +198,8 @@ def load_model(path: Path, stages: Iterable[Stage[Any, Any]] = ()) -> Model:
         raise ModelError(f"{path}: made by an earlier version of roadeval; train it again")
     if not isinstance(version, int) or version not in range(OLDEST, VERSION + 1):
         raise ModelError(
-            f"{path}: model format {version}, this version reads {VERSION}; train it again"
+            f"{path}: model format {version}, and this version reads {OLDEST} to {VERSION}; train "
+            "it again, or install a later version of roadeval"
         )
     try:
         model = _model(header, arrays, {**STAGES, **{stage.name: stage for stage in stages}})
@@ -235,6 +239,9 @@ def _kept(
 def _content(path: Path) -> tuple[Any, dict[str, npt.NDArray[Any]]]:
     try:
         check_input(path)
+        with ZipFile(path) as packed:
+            if sum(part.file_size for part in packed.infolist()) > GREATEST_SIZE:
+                raise ValueError("no model unpacks to so much")
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         # What does not begin as an array does comes out of the archive as bytes.

@@ -14,6 +14,7 @@ from roadeval import logs
 from roadeval.cli.app import main
 from roadeval.errors import RoadevalError
 from roadeval.jobs.fleet_inspect import recording_of, worst_frames
+from roadeval.jobs.fleet_models import train_fold
 from roadeval.logs import LogWriter
 from roadeval.results.fleet.record import record_path, recording_path
 from tests.e2e.commands import here
@@ -214,6 +215,47 @@ def test_no_drive_is_scored_by_a_model_that_saw_it(drives, tmp_path):
         assert not own & {*model["training_frames"]}
         others = [digests(Path(r["source"])) for r in rows if r is not row]
         assert {*model["training_frames"]} <= set.union(*others)
+
+
+class KilledWorker(Exception):  # noqa: N818 - as Dask calls it
+    """What Dask says of a task whose workers have died."""
+
+
+@pytest.fixture
+def two(tmp_path):
+    """Two drives, and settings that train a model for each on the other."""
+    for number, name in enumerate("xy"):
+        write(tmp_path / "logs" / f"{name}.mcap", 100 * number)
+    return [tmp_path / "logs"], roadeval.configure({**OPTIONS, "fleet": {"folds": 2}})
+
+
+def test_a_fold_whose_training_ends_its_workers_fails_its_own_drives_alone(two, tmp_path):
+    class Dying(Here):
+        def submit(self, do, /, task):
+            if do is not train_fold or task.fold == 0:
+                return super().submit(do, task)
+            future = Future()
+            future.set_exception(KilledWorker(task.fold))
+            return future
+
+    drives, config = two
+    found = roadeval.replay_fleet(drives, tmp_path / "f", config, executor=Dying())
+    assert found.counts == {"scored": 1, "failed": 1}
+    rows = pq.read_table(found.folder / "drives.parquet").to_pylist()
+    (row,) = [row for row in rows if row["status"] == "failed"]
+    assert row["reason"].startswith("its worker process ended 2 times while the model of fold 1")
+    assert row["model"] is None
+
+
+def test_a_fold_whose_model_cannot_be_written_is_told(two, tmp_path):
+    class Full(Here):
+        def submit(self, do, /, task):
+            task.path.parent.touch()
+            return super().submit(do, task)
+
+    drives, config = two
+    with pytest.raises(RoadevalError, match="cannot be written: File exists"):
+        roadeval.replay_fleet(drives, tmp_path / "f", config, executor=Full())
 
 
 def test_a_folder_with_folds_that_has_moved_is_looked_at_with_its_own_models(tmp_path):

@@ -2,7 +2,9 @@
 
 import http.client
 import socket
+import struct
 import threading
+import time
 from urllib.parse import urlsplit
 
 import pytest
@@ -14,6 +16,10 @@ def echo(request):
     """Answer with what was asked for."""
     if request.parts == ("nothing",):
         return NOT_FOUND
+    if request.parts == ("large",):
+        return Response(bytes(1 << 26))
+    if request.parts == ("defect",):
+        raise ZeroDivisionError
     return Response(repr((request.parts, request.acts, request.folder)).encode())
 
 
@@ -97,10 +103,39 @@ def test_to_act_takes_the_pages_own_origin(server):
 
 @pytest.mark.parametrize(
     "path",
-    ["../", "0/../../etc/passwd", "0/%2e%2e/x", "0//x", "0/.hidden", "0/a%2fb", "0/a\\..\\b", "~"],
+    [
+        "../",
+        "0/../../etc/passwd",
+        "0/%2e%2e/x",
+        "0//x",
+        "0/.hidden",
+        "0/a%2fb",
+        "0/a\\..\\b",
+        "~",
+        "9" * 300,
+    ],
 )
 def test_no_path_leads_anywhere_else(server, path):
     assert ask(server, path)[0] == 403
+
+
+@pytest.mark.parametrize(("path", "said"), [("large", ""), ("defect", "ZeroDivisionError")])
+def test_of_a_browser_that_leaves_nothing_is_said_and_of_a_defect_something(
+    server, path, said, capsys
+):
+    before = threading.active_count()
+    address = urlsplit(server.address)
+    asked = f"GET {address.path}{path} HTTP/1.1\r\nHost: {address.netloc}\r\n\r\n"
+    with socket.create_connection((address.hostname, address.port)) as connection:
+        connection.sendall(asked.encode())
+        connection.recv(1)
+        # Closed at once, with what was not read thrown away.
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    while threading.active_count() > before:
+        time.sleep(0.01)
+    err = capsys.readouterr().err
+    assert said in err if said else not err
+    assert ask(server, "0/")[0] == 200
 
 
 def test_a_body_is_taken_by_nobody(server):

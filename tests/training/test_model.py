@@ -2,9 +2,11 @@
 
 import dataclasses
 import json
+import tracemalloc
 from contextlib import nullcontext
 from pathlib import Path
 from unittest.mock import Mock
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from roadeval.config import configure
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.beyond.trees import TreesSettings
 from roadeval.training import Model, TrainingSettings, fit, load_model, save_model
-from roadeval.training.model import VERSION
+from roadeval.training.model import GREATEST_SIZE, VERSION
 from tests.training.making import frame, pipelines
 
 FEW = {"trees": {"trees": 10, "features": ["place"]}}
@@ -144,12 +146,15 @@ def test_an_array_that_hides_code_is_not_run(tmp_path):
         load_model(path)
 
 
+LATER = "this version reads 2 to 6; train it again, or install a later version of roadeval"
+
+
 @pytest.mark.parametrize(
     ("version", "why"),
     [
         (1, "made by an earlier version of roadeval; train it again"),
-        (99, "model format 99, this version reads 6; train it again"),
-        (None, "model format None, this version reads 6; train it again"),
+        (99, f"model format 99, and {LATER}"),
+        (None, f"model format None, and {LATER}"),
     ],
 )
 def test_another_version_is_refused_in_one_line(path, version, why):
@@ -157,6 +162,19 @@ def test_another_version_is_refused_in_one_line(path, version, why):
     with pytest.raises(RoadevalError) as caught:
         load_model(path)
     assert str(caught.value) == f"{path}: {why}"
+
+
+def test_an_archive_that_unpacks_to_more_than_any_model_is_not_unpacked(path):
+    with ZipFile(path, "a", ZIP_DEFLATED) as archive, archive.open("more.npy", "w") as file:
+        for _ in range(GREATEST_SIZE >> 20):
+            file.write(bytes(1 << 20))
+    tracemalloc.start()
+    try:
+        with pytest.raises(RoadevalError, match="not a model file, or a damaged one"):
+            load_model(path)
+        assert tracemalloc.get_traced_memory()[1] < 1 << 20
+    finally:
+        tracemalloc.stop()
 
 
 def of_version(path, version, *, without: str):
