@@ -28,6 +28,7 @@ from roadeval.evaluation.comparison_result import (
     RegionComparison,
     SettingsDiffer,
     TruthDiffers,
+    VariantLeftOut,
 )
 from roadeval.evaluation.differences import final_stages
 from roadeval.evaluation.frame_counts import sum_up
@@ -242,6 +243,10 @@ class _Pair:
             rest = len(side.frames.distinct("frame")) - both
             if rest:
                 yield FramesLeftOut(side.label, other.label, rest)
+        compared = {mask.variant for mask in self._common}
+        for variant in [] if self._across else base.frames.distinct("variant"):
+            if variant not in compared and variant in new.frames.distinct("variant"):
+                yield VariantLeftOut(base.label, new.label, variant)
         settings = _differing(base.asked, new.asked)
         if settings:
             yield SettingsDiffer(base.label, new.label, settings)

@@ -111,6 +111,15 @@ class FramesLeftOut:
 
 
 @dataclass(frozen=True, slots=True)
+class VariantLeftOut:
+    """A variant that two results have, but on no frame both."""
+
+    base: str
+    new: str
+    variant: str
+
+
+@dataclass(frozen=True, slots=True)
 class SettingsDiffer:
     """Settings that two results were not made with alike: both values by the setting's name."""
 
@@ -151,7 +160,15 @@ class EndMissing:
     result: str
 
 
-Note = FramesLeftOut | SettingsDiffer | TruthDiffers | LogUnknown | DrivesDiffer | EndMissing
+Note = (
+    FramesLeftOut
+    | VariantLeftOut
+    | SettingsDiffer
+    | TruthDiffers
+    | LogUnknown
+    | DrivesDiffer
+    | EndMissing
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from roadeval.recording import Recording
 from roadeval.report.browse import Strip
 from roadeval.report.figures.values import over_frames
 from roadeval.report.findings import NotableFrame
-from roadeval.report.images import LayerImage
+from roadeval.report.images import LayerImage, faded
 from roadeval.report.sections.browse import BrowsedFrames, FrameFacts, strip
 
 Inspect = Callable[[Path, int], str]
@@ -49,7 +49,7 @@ def browsed(
     inspect: Inspect | None,
     taken: Callable[[BrowsedFrames], int] = lambda _frames: 0,
 ) -> BrowsedFrames | None:
-    """Collect the frames that all results have, the base's mask and the new ones' side by side.
+    """Collect the frames that all results have of a variant, all their masks side by side.
 
     None where no variant is in all of them.
 
@@ -71,6 +71,9 @@ def browsed(
     if not masks:
         return None
     table = _table(masks, {side.label: side for side in sides})
+    masks = [mask for mask in masks if mask.name in table.distinct("variant")]
+    if not masks:
+        return None
     facts = list(_facts(table, masks, comparison.settings.noteworthy))
     album = _Album(masks, recordings, facts, inspect)
     wanted = dict.fromkeys(
@@ -103,24 +106,34 @@ def _masks(sides: Sequence[Side]) -> Iterator[_Mask]:
 
 
 def _table(masks: Sequence[_Mask], sides: Mapping[str, Side]) -> Rows:
-    """Return the rows of the masks on the frames that all have, each under its name as variant."""
+    """Return the rows of the masks, each under its name as variant.
+
+    Of a variant they are those of the frames on which all results have its mask.
+    """
     parts = []
-    for mask in masks:
-        rows = scored.finals(sides[mask.result].frames.of_variant(mask.variant))
-        named = {"variant": np.full(len(rows), mask.name), "stage": np.full(len(rows), "final")}
-        parts.append(rows.replace(**named))
-    common = set.intersection(*(set(part["frame"].tolist()) for part in parts))
+    for variant in dict.fromkeys(mask.variant for mask in masks):
+        own = [mask for mask in masks if mask.variant == variant]
+        found = [scored.finals(sides[mask.result].frames.of_variant(variant)) for mask in own]
+        common = [*set.intersection(*(set(rows["frame"].tolist()) for rows in found))]
+        for mask, rows in zip(own, found, strict=True):
+            there = rows.take(np.isin(rows["frame"], common))
+            named = {"variant": mask.name, "stage": "final"}
+            parts.append(
+                there.replace(**{key: np.full(len(there), name) for key, name in named.items()})
+            )
     whole = joined(parts)
-    places = np.flatnonzero(np.isin(whole["frame"], [*common]))
-    return whole.take(places[np.argsort(whole["frame"][places], kind="stable")])
+    return whole.take(np.argsort(whole["frame"], kind="stable"))
 
 
 def _facts(table: Rows, masks: Sequence[_Mask], noteworthy: float) -> Iterator[FrameFacts]:
     """Yield each frame with the masks' rates, and whether the first of them got worse or better."""
     base, new = masks[0].name, masks[1].name
     for frame, stamp, rates in rates_by_frame(table, [*SHORT]):
-        change = rates[new]["ERR"] - rates[base]["ERR"]
-        said = [f"{new} {'worse' if change > 0 else 'better'}"] if abs(change) >= noteworthy else []
+        said = []
+        if base in rates and new in rates:
+            change = rates[new]["ERR"] - rates[base]["ERR"]
+            if abs(change) >= noteworthy:
+                said = [f"{new} {'worse' if change > 0 else 'better'}"]
         yield FrameFacts(frame, stamp, rates, said)
 
 
@@ -154,19 +167,22 @@ class _Album:
         facts = self._facts.get(frame)
         if facts is None or not found or not all(frame in each.pictured for each in found):
             return None
-        names = [mask.name for mask in self._masks]
+        *_, last = (mask.name for mask in self._masks if mask.name in facts.rates)
         made = NotableFrame(
-            frame, facts.stamp_ns, names[-1], facts.rates, images=list(self._images(frame))
+            frame, facts.stamp_ns, last, facts.rates, images=list(self._images(facts))
         )
         command = self.command(frame) if self._inspect and self.newest else ""
         return strip(made, list(facts.rates), command)
 
-    def _images(self, frame: int) -> Iterator[LayerImage]:
-        first = self._recording(self._masks[0])
+    def _images(self, facts: FrameFacts) -> Iterator[LayerImage]:
+        first, frame = self._recording(self._masks[0]), facts.frame
         image = first.image(frame)
         yield LayerImage("camera", image)
         yield LayerImage("truth", image, TRUTH, first.truth(frame))
         for mask in self._masks:
+            if mask.name not in facts.rates:
+                yield LayerImage(f"{mask.name}: no mask", faded(image))
+                continue
             errors: Any = self._recording(mask).layer(mask.own, ERRORS.name, frame)
             yield LayerImage(f"{mask.name}: errors", image, ERRORS, errors)
 

@@ -18,6 +18,7 @@ from roadeval.evaluation.comparison_result import (
     Note,
     SettingsDiffer,
     TruthDiffers,
+    VariantLeftOut,
 )
 from roadeval.evaluation.conditions import Judgement
 from roadeval.evaluation.settings import EvaluationSettings
@@ -138,31 +139,34 @@ def note(told: Note) -> str:
     """Return a note on a comparison as a clause."""
     match told:
         case FramesLeftOut(result, other, frames):
-            return (
+            said = (
                 f"{frames} frames that {result} evaluated are left out against {other}, which "
                 "lacks them or trained on them"
             )
+        case VariantLeftOut(base, new, variant):
+            said = f"{variant} is left out: {base} and {new} have it on no frame both"
         case SettingsDiffer(base, new, settings):
             both = (f"`{name}` {_value(a)} and {_value(b)}" for name, (a, b) in settings.items())
-            return (
+            said = (
                 f"{base} and {new} were replayed with different settings ({', '.join(both)}): "
                 "part of the change may be theirs"
             )
         case TruthDiffers(base, new, frames, settings_differ):
             guess = "" if settings_differ else " (other labels or topics?)"
-            return (
+            said = (
                 f"the truth differs on {frames} frames between {base} and {new}{guess}: part of "
                 "the change may be the truth's"
             )
         case LogUnknown(result):
-            return f"{result} does not say which log it is of: nothing is subtracted"
+            said = f"{result} does not say which log it is of: nothing is subtracted"
         case EndMissing(result):
-            return f"{result} is a partial recording: the end of its drive is missing"
+            said = f"{result} is a partial recording: the end of its drive is missing"
         case DrivesDiffer(result, other):
-            return (
+            said = (
                 f"{result} and {other} are of different drives: side by side only, for a "
                 "difference would mix the scene with the method"
             )
+    return said
 
 
 def _value(value: Any) -> str:

@@ -16,9 +16,11 @@ from roadeval.evaluation.comparison_result import (
     Note,
     SettingsDiffer,
     TruthDiffers,
+    VariantLeftOut,
 )
 from roadeval.evaluation.conditions import Condition, ConditionError, judge
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.results.comparison import note
 from tests.evaluation.making import a_table, rows_of
 
 SETTINGS = EvaluationSettings()
@@ -48,6 +50,18 @@ def test_differences_are_new_minus_base_on_the_frames_that_both_have():
     assert change.base["ERR"] == pytest.approx(0.10)
     assert change.difference["ERR"].mean == pytest.approx(0.03)
     assert found.notes == (FramesLeftOut("base", "new", 2),)
+
+
+def test_a_variant_that_both_have_on_no_frame_both_is_told():
+    rows = rows_of(a_table({POST: [10] * 4, ("net", "post"): [20] * 4}))
+    net, frame = rows["variant"] == "net", rows["frame"]
+    sides = [
+        Side(name, "street", "d1", rows.take(~net | mine))
+        for name, mine in (("a", frame < 2), ("b", frame >= 2))
+    ]
+    found = compare(sides, SETTINGS)
+    assert found.notes == (VariantLeftOut("a", "b", "net"),)
+    assert note(found.notes[0]) == "net is left out: a and b have it on no frame both"
 
 
 def test_frames_are_matched_by_their_stamps_not_by_their_numbers():
@@ -251,8 +265,8 @@ def test_a_comparison_is_made_of_names_and_numbers_and_says_nothing():
     apart = compare([base, a_side("other", [10] * 12, digest="d2")], SETTINGS)
     unknown = compare([base, a_side("other", [10] * 12, digest=None)], SETTINGS)
     notes = [*found.notes, *apart.notes, *unknown.notes]
-    # Whether a run reached its end is not in its tables.
-    assert {type(note) for note in notes} == {*get_args(Note)} - {EndMissing}
+    # Whether a run reached its end is not in its tables, and a variant left out is tested above.
+    assert {type(each) for each in notes} == {*get_args(Note)} - {EndMissing, VariantLeftOut}
     (judgement,) = judge(found, [Condition.parse("post.filtered.ERR>1pp")], SETTINGS)
     for result in (found, apart, unknown, judgement):
         assert not [text for text in strings(astuple(result)) if " " in text]

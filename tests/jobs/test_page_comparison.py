@@ -26,6 +26,13 @@ def test_frames_that_both_results_have_stand_in_order_with_both_rates():
     }
 
 
+def test_a_variant_with_few_masks_takes_no_frame_from_the_others():
+    few, post = {("net", "post"): [1] * 2}, ("filtered", "post")
+    found = page_of({post: [4] * 12, **few}, {post: [5] * 12, **few})
+    assert [len(frame.rates) for frame in found.frames] == [4] * 2 + [2] * 10
+    assert found.frames[-1].rates.keys() == {"base: filtered", "new: filtered"}
+
+
 def test_results_without_a_variant_in_common_have_no_frames_to_show():
     blind = {("blind", "post"): [5] * 12}
     assert page_of({("net", "post"): [1] * 12, **blind}, {("other", "post"): [2], **blind}) is None
