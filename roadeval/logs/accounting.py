@@ -33,9 +33,9 @@ class Accounting:
     fringes
         By frame number and label topic: pixels ignored because their value is too far from every
         known one, and pixels in all. Only of images that have any.
-    truth_in_log, truth_unused
-        Truth messages, and those between the first and last paired one that belong to no image
-        (counted only if every frame is read).
+    truth_unused
+        Truth messages between the first and last paired one that belong to no image (counted only
+        if every frame is read).
     """
 
     in_log: int = 0
@@ -47,7 +47,6 @@ class Accounting:
     damaged: dict[int, str] = field(default_factory=dict)
     sizes: dict[int, tuple[int, int]] = field(default_factory=dict)
     fringes: dict[tuple[int, str], tuple[int, int]] = field(default_factory=dict)
-    truth_in_log: int = 0
     truth_unused: int = 0
 
     @property

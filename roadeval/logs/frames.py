@@ -39,12 +39,7 @@ class FrameStream:
         self._selection = selection
         self._numbers = numbers
         self._labels = self._label_readers(readers)
-        truth = self._labels.get(TRUTH)
-        self.accounting = Accounting(
-            in_log=len(self._images),
-            in_range=len(numbers),
-            truth_in_log=len(truth.reader) if truth else 0,
-        )
+        self.accounting = Accounting(in_log=len(self._images), in_range=len(numbers))
         self._span = span
         self._rules = FrameRules(
             limits=self._images.limits,

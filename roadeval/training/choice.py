@@ -41,17 +41,20 @@ class Chosen:
         Numbers of the frames beside them that are not evaluated.
     first
         Number of the first frame to evaluate; None if there is none.
+    undecodable
+        How many of the frames chosen do not train, for they cannot be decoded.
     """
 
     held: HeldFrames
     gap: frozenset[int]
     first: int | None
+    undecodable: int = 0
 
 
 def candidates_of(
     frames: Callable[[], Iterable[Readable]], *, labelled: bool
 ) -> tuple[Iterator[Readable], bool]:
-    """Return the frames that may train, and whether by their truth: all, where none has one."""
+    """Return the labelled frames and True; if there are none, all frames and False."""
     if labelled:
         with_truth = (frame for frame in frames() if frame.labelled)
         for first in with_truth:
@@ -118,7 +121,8 @@ def spread_out(
     if by_truth and trained and not left:
         raise _none_left(len(trained), len(near & {*range(len(every))}), len(every))
     beside = frozenset(each.number for place, each in enumerate(every) if place in near)
-    return Chosen(held, beside, left[0] if left else None)
+    lost = 0 if held.is_full else len(asked) - len(trained)
+    return Chosen(held, beside, left[0] if left else None, lost)
 
 
 def evenly(numbers: Sequence[int], count: int) -> list[int]:

@@ -97,6 +97,11 @@ def from_log(
     warnings = []
     if held.is_full:
         warnings.append(f"trained on {len(held.frames)} of {settings.frames} frames: {held.full()}")
+    if chosen.undecodable:
+        warnings.append(
+            f"trained on {len(held.frames)} frames: {chosen.undecodable} more of those at equal "
+            "distances cannot be decoded"
+        )
     warnings += _repeated(held.frames)
     if labelled and not by_truth:
         warnings.append(f"no frame of the range has road truth: {BY_PATCH}")

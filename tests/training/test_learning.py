@@ -84,8 +84,9 @@ def test_the_gap_beside_spread_frames_is_a_quarter_of_their_distance(count, expe
 
 def test_a_spread_frame_that_cannot_be_decoded_leaves_its_neighbours_to_evaluate():
     frames = log(12, broken=(4,))
-    _, schedule = learn(frames, frames=3, placement="spread", gap=1)
+    model, schedule = learn(frames, frames=3, placement="spread", gap=1)
     assert roles([f for f in frames if not f.broken], schedule) == "tgeeeegtgee"
+    assert "trained on 2 frames: 1 more of those at equal distances" in model.warnings[0]
 
 
 def test_spread_frames_that_leave_nothing_to_evaluate_are_an_error():

@@ -16,7 +16,8 @@ from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.runtime.extensions import whole
 
 NODES: Final = LEAVES
-"""Of a tree: one less than its leaves, and the rest never above their threshold."""
+"""Places for the nodes of a tree, which uses ``LEAVES - 1`` at most. Nothing exceeds the threshold
+of the others."""
 ALL: Final = (1 << LEAVES) - 1
 """The bits of all leaves."""
 
@@ -26,23 +27,23 @@ class Growth(Protocol):
 
     @property
     def trees(self) -> int:
-        """How many."""
+        """Number of trees."""
 
     @property
     def leaves(self) -> int:
-        """Of each, at most."""
+        """Most leaves of a tree."""
 
     @property
     def rate(self) -> float:
-        """Of learning."""
+        """Learning rate."""
 
     @property
     def least(self) -> int:
-        """Pixels of a leaf."""
+        """Least pixels of a leaf."""
 
     @property
     def share(self) -> float:
-        """Of the features, for each node."""
+        """Share of the features that each node chooses from."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,8 +10,6 @@ import numpy.typing as npt
 
 from roadeval.data import Rgb
 
-Map = npt.NDArray[np.float32]
-
 LOGS: Final = np.log(np.arange(256) + 8.0).astype(np.float32)
 """``(256,)`` float32: logarithm of a channel; eight grey levels more keep dark, noisy pixels from
 running away."""
