@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING
 
 from roadeval.errors import RoadevalError
 from roadeval.recording import RecordRule
-from roadeval.results.folder import CONTENT
+from roadeval.results.fleet.kind import FILES, is_fleet
+from roadeval.results.folder import CONTENT, belonging
+from roadeval.results.summary import SUMMARY
 from roadeval.runtime.claims import claimed
 from roadeval.runtime.files import check_file, check_folder, made, own_names, target_of
 from roadeval.runtime.folders import home_of, recover
@@ -91,13 +93,22 @@ def holding(*files: AnyPath, inputs: Iterable[AnyPath | None] = ()) -> Iterator[
 
 def _keep_apart(inputs: Iterable[AnyPath | None], outputs: Iterable[AnyPath | None]) -> None:
     """Refuse an output that would replace an input or another output."""
-    taken = {Path(path).resolve() for path in inputs if path is not None}
+    taken = {os.path.realpath(path) for path in inputs if path is not None}
+    taken |= {os.path.join(path, name) for path in taken for name in _content(Path(path))}
     for path in outputs:
         if path is None:
             continue
-        if Path(path).resolve() in taken:
+        place = os.path.realpath(path)
+        if place in taken:
             raise RoadevalError(f"{path}: is an input or another output; name a file of its own")
-        taken.add(Path(path).resolve())
+        taken.add(place)
+
+
+def _content(folder: Path) -> Iterable[str]:
+    """Return the names of the files by which a folder is a result or a fleet."""
+    if is_fleet(folder):
+        return FILES
+    return belonging(folder) if (folder / SUMMARY).is_file() else ()
 
 
 def _claim_file(claims: ExitStack, path: Path | None) -> bool:

@@ -3,6 +3,7 @@
 import builtins
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,30 @@ def test_they_land_under_the_drive_s_name_or_where_the_settings_say(tmp_path):
     own = Outputs.of(OutputSettings("a.rrd", "b", "c.mcap"), "drive")
     assert [str(own.recording), str(own.reports), str(own.mcap)] == ["a.rrd", "b", "c.mcap"]
     assert Outputs.of(OutputSettings("a.rrd", record="none"), "drive").recording is None
+
+
+@pytest.mark.parametrize(
+    ("sign", "own"), [("summary.json", "frames.csv"), ("fleet.json", "drives.parquet")]
+)
+def test_the_files_of_an_input_folder_are_inputs_and_others_may_lie_beside_them(
+    sign, own, tmp_path
+):
+    (tmp_path / sign).write_text("{}")
+    for name in (sign, own, "run.toml"):
+        with pytest.raises(RoadevalError, match="is an input or another output"):
+            holding(tmp_path / name, inputs=[tmp_path]).__enter__()
+    with holding(tmp_path / "report.pdf", inputs=[tmp_path]):
+        pass
+
+
+@pytest.mark.parametrize("name", ["recording", "reports", "mcap"])
+def test_a_loop_of_links_is_told(name, to, tmp_path):
+    (tmp_path / "loop").symlink_to("loop")
+    with (
+        pytest.raises(RoadevalError, match="loop"),
+        replace(to, **{name: tmp_path / "loop" / "x"}).holding(()),
+    ):
+        pass
 
 
 @pytest.mark.parametrize("name", ["recording", "reports", "mcap"])

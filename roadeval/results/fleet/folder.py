@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from roadeval.evaluation.conditions import Condition
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.fleet.conditions import DriveJudgement, judge_drives
-from roadeval.results.fleet.kind import FLEET, is_fleet
+from roadeval.results.fleet.kind import FLEET, JUNIT, METRICS, RUN, is_fleet
 from roadeval.results.fleet.metrics import flat_metrics, junit_xml
 from roadeval.results.fleet.record import RECORDS, Record, frames_path, read_record
 from roadeval.results.fleet.schema import FORMAT, TABLES
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-RUN: Final = "run.toml"
-METRICS: Final = "metrics.json"
-JUNIT: Final = "junit.xml"
 PATIENCE_S: Final = 0.2
 
 

@@ -7,9 +7,15 @@ from pathlib import Path
 from typing import Final
 
 from roadeval.errors import RoadevalError
+from roadeval.results.fleet.schema import TABLES
 
 FLEET: Final = "fleet.json"
 """The file that makes a folder a fleet's; written last."""
+RUN: Final = "run.toml"
+METRICS: Final = "metrics.json"
+JUNIT: Final = "junit.xml"
+FILES: Final = (FLEET, RUN, METRICS, JUNIT, *(f"{table}.parquet" for table in TABLES))
+"""The files of a fleet's folder."""
 
 
 def is_fleet(path: str | Path) -> bool:

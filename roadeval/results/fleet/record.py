@@ -89,8 +89,8 @@ class Record:
             "stamp": self.stamp,
             "rows": {name: [_plain(row) for row in rows] for name, rows in self.rows.items()},
         }
-        text = json.dumps(content, ensure_ascii=False, allow_nan=False)
-        put(record_path(folder, self.drive), text.encode("utf-8", "surrogateescape"))
+        # All in ASCII: the name of a file may hold bytes that are no text.
+        put(record_path(folder, self.drive), json.dumps(content, allow_nan=False).encode())
 
 
 def read_record(folder: Path, drive: str) -> Record | None:
