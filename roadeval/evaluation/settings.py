@@ -7,6 +7,8 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
+from roadeval.errors import RoadevalError
+
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class EvaluationSettings:
@@ -61,7 +63,17 @@ def settings_of(summary: Mapping[str, Any]) -> EvaluationSettings:
     """Return the settings that a summary was made with; the defaults where it states none.
 
     A setting that this version does not know is left out.
+
+    Raises
+    ------
+    RoadevalError
+        If they are damaged.
     """
     given = summary.get("run", {}).get("evaluation", {})
     known = {field.name for field in fields(EvaluationSettings)}
-    return EvaluationSettings(**{name: given[name] for name in known & given.keys()})
+    try:
+        return EvaluationSettings(**{name: given[name] for name in known & {*given}})
+    except (TypeError, ValueError) as error:
+        raise RoadevalError(
+            "a summary is damaged (`run.evaluation` is not what it must be); make the results anew"
+        ) from error

@@ -125,20 +125,25 @@ def _safe_path() -> Iterator[None]:
 @contextmanager
 def _local(distributed: Any, count: int, memory_gib: float | None) -> Iterator[Any]:
     limit = "auto" if memory_gib is None else math.floor(memory_gib * 2**30)
-    with (
-        distributed.LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            processes=True,
-            memory_limit=limit,
-            host="127.0.0.1",
-            dashboard_address="127.0.0.1:0",
-            worker_dashboard_address=None,
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        yield client
+    with ExitStack() as stack:
+        try:
+            cluster = distributed.LocalCluster(
+                n_workers=count,
+                threads_per_worker=1,
+                processes=True,
+                memory_limit=limit,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",
+                worker_dashboard_address=None,
+                silence_logs=logging.CRITICAL,
+            )
+            client = distributed.Client(stack.enter_context(cluster))
+        except (OSError, RuntimeError) as error:
+            raise FleetError(
+                f"the worker processes cannot be started ({error}): give them more memory, "
+                "processes or open files (see ulimit -a), or take fewer `fleet.workers`"
+            ) from error
+        yield stack.enter_context(client)
 
 
 @contextmanager

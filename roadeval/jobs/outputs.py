@@ -93,12 +93,13 @@ def holding(*files: AnyPath, inputs: Iterable[AnyPath | None] = ()) -> Iterator[
 
 def _keep_apart(inputs: Iterable[AnyPath | None], outputs: Iterable[AnyPath | None]) -> None:
     """Refuse an output that would replace an input or another output."""
-    taken = {os.path.realpath(path) for path in inputs if path is not None}
-    taken |= {os.path.join(path, name) for path in taken for name in _content(Path(path))}
+    # Of a loop of links pathlib makes an error of its own.
+    taken = {Path(os.path.realpath(path)) for path in inputs if path is not None}
+    taken |= {path / name for path in taken for name in _content(path)}
     for path in outputs:
         if path is None:
             continue
-        place = os.path.realpath(path)
+        place = Path(os.path.realpath(path))
         if place in taken:
             raise RoadevalError(f"{path}: is an input or another output; name a file of its own")
         taken.add(place)

@@ -25,6 +25,12 @@ LATER: Final = frozenset({"curves", "seeds", "claims", "methods", "masks", "tabl
 """Parts that not every summary has, so that readers must do without them: earlier versions did not
 write them, a recording has no files, and most runs train with one seed, have no network, and all
 masks in the log."""
+_LEVELS: Final = {
+    **dict.fromkeys(("drive", "frames", "training", "run", "versions", "log", "selection"), 1),
+    **dict.fromkeys(("beyond", "claims", "health", "seconds", "settings", "tables"), 2),
+    **dict.fromkeys(("totals", "difference", "against_blind", "seeds", "oracles"), 3),
+}
+"""Parts that are mappings, and how many levels of mappings they are at least."""
 _SELECTION: Final[Mapping[str, Mapping[str, str]]] = {
     "topics": {
         "image": "image_topic",
@@ -97,8 +103,12 @@ def parse_summary(text: str, where: object) -> dict[str, Any]:
     """
     try:
         summary = json.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise ResultsError(f"{where}: not a summary ({error}); make it anew") from error
+    if isinstance(summary, dict):
+        for part in summary.keys() & _LEVELS.keys():
+            if not _is_mapping(summary[part], _LEVELS[part]):
+                raise ResultsError(f"{where}: damaged (`{part}` is not what it must be)")
     form = summary.get("format") if isinstance(summary, dict) else None
     if form == {**FORMAT, "version": 1}:
         summary, form = _of_version_1(summary), {**FORMAT, "version": 2}
@@ -110,6 +120,13 @@ def parse_summary(text: str, where: object) -> dict[str, Any]:
             "make it anew with this version of roadeval replay"
         )
     return dict(summary)
+
+
+def _is_mapping(value: Any, levels: int) -> bool:
+    """Return whether a value is a mapping, and its values are, so many levels down."""
+    return isinstance(value, dict) and (
+        levels == 1 or all(_is_mapping(each, levels - 1) for each in value.values())
+    )
 
 
 def _of_version_1(summary: Mapping[str, Any]) -> dict[str, Any]:

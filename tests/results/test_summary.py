@@ -44,3 +44,25 @@ def test_another_version_is_refused_where_it_lies(version):
     text = json.dumps({"format": {**FORMAT, "version": version}})
     with pytest.raises(ResultsError, match=r"^new\.rrd: not a summary of format"):
         parse_summary(text, "new.rrd")
+
+
+@pytest.mark.parametrize(
+    ("part", "value"),
+    [
+        ("totals", {"blind": 5}),
+        ("totals", {"filtered": {"post": None}}),
+        ("seconds", {"filtered": 1.5}),
+        ("settings", -1),
+        ("tables", {"frames": 1.5}),
+        ("run", []),
+    ],
+)
+def test_a_part_of_another_shape_is_damage(part, value):
+    text = json.dumps({"format": FORMAT, part: value})
+    with pytest.raises(ResultsError, match=f"here: damaged .`{part}` is not what it must be"):
+        parse_summary(text, "here")
+
+
+def test_a_text_of_many_brackets_is_no_summary():
+    with pytest.raises(ResultsError, match="here: not a summary"):
+        parse_summary("[" * 100_000, "here")

@@ -23,6 +23,7 @@ from roadeval.results.reading import ResultsError
 from roadeval.results.summary import json_text, plain
 from roadeval.runtime.claims import claimed
 from roadeval.runtime.files import check_folder, put
+from roadeval.runtime.text import is_utf8
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,6 +52,11 @@ class FleetWriter:
         ResultsError
             If it is something else, or cannot be written to.
         """
+        if not is_utf8(str(self.folder)):
+            raise ResultsError(
+                f"{self.folder}: its bytes are not UTF-8, and Parquet files cannot be written "
+                "there: choose another name"
+            )
         with self._explained():
             check_folder(self.folder)
             if is_fleet(self.folder):
