@@ -165,12 +165,16 @@ def test_a_name_of_64_letters_leaves_numbers_their_room(table):
 
 @pytest.mark.parametrize(
     "block",
-    [Table(["setting", "value"], [["chain", LONG]], (0, 1)), ImageGrid([(LONG, a_png())], 1)],
-    ids=["a setting", "a picture"],
+    [
+        Table(["setting", "value"], [["chain", LONG]], (0, 1)),
+        ImageGrid([(LONG, a_png())], 1),
+        Command(f"roadeval report {2 * LONG}"),
+    ],
+    ids=["a setting", "a picture", "a command"],
 )
 def test_a_name_of_64_letters_stays_in_its_column(block):
     content = pdf(a_document(TwoColumns([block], [Text("beside")])))
-    lines = [edge for word, edge in places(content).items() if word in LONG]
+    lines = [edge for word, edge in places(content).items() if word in 2 * LONG]
     assert len(lines) > 1
 
 
