@@ -69,7 +69,15 @@ class Recorder:
         RecordingError
             If it cannot be written.
         """
-        self._make_file()
+        try:
+            self._make_file()
+            self._open()
+        except BaseException:  # an interrupt, too; it holds no frame
+            self._file.discard()
+            raise
+        return self
+
+    def _open(self) -> None:
         # The same input gives the same recording: its identity is its layout's, and properties
         # of the run, which Rerun would add, stay out.
         identity = hashlib.blake2b(self._layout.to_json().encode(), digest_size=16).hexdigest()
@@ -78,7 +86,6 @@ class Recorder:
         stream.send_recording_name(self._layout.drive)
         self._stream = stream
         self._log_static(static.before_the_first_frame(self._layout, self._encoder.codecs))
-        return self
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         if error is not None:

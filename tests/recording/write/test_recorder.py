@@ -15,6 +15,7 @@ import pytest
 
 from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError
 from roadeval.recording.read.rrd_file import RrdFile
+from roadeval.recording.screen import blueprint, static
 from roadeval.recording.write.batching import CHUNK_BYTES, PendingRows
 from roadeval.recording.write.recorder import LEAST_FREE, UNWRITTEN
 from roadeval.results.lines import lines
@@ -45,6 +46,18 @@ def test_a_recording_without_its_results_does_not_take_its_name(drive, tmp_path)
     with Recorder(tmp_path / "out.rrd", layout()) as recorder:
         recorder.write(recorder.encode(drive[0], lines(drive[0])))
     assert [path.name for path in tmp_path.iterdir()] == [recorder.partial.name]
+
+
+@pytest.mark.parametrize("place", ["arrange", "before_the_first_frame"])
+def test_an_interrupt_before_the_first_frame_leaves_nothing(place, tmp_path, monkeypatch):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    part = blueprint if place == "arrange" else static
+    monkeypatch.setattr(part, place, stop)
+    with pytest.raises(KeyboardInterrupt), Recorder(tmp_path / "out.rrd", layout()):
+        pass
+    assert not list(tmp_path.iterdir())
 
 
 def test_reruns_own_tool_finds_no_fault(recording):
