@@ -115,7 +115,9 @@ def replay_fleet(
     run = FleetRun(writer.folder, tuple(entries), config, on_progress, retry_failed)
     run.replay_all(executor)
     run.show("writing")
-    members = [Member(e.id, e.name, e.shown, e.group, e.tags) for e in entries]
+    members = [
+        Member(e.id, e.name, e.shown, e.group, e.tags, run.done[e.id].asked) for e in entries
+    ]
     text = run_toml(config, f"{len(entries)} drives", VERSION, "fleet")
     summary = writer.finish(members, config.evaluation, config.as_dict(), text, conditions)
     _judge_failures(run, config.fleet.max_failures)

@@ -84,14 +84,15 @@ class DriveTask:
 class Done:
     """The report of a drive that is done, to the command that replays the fleet.
 
-    ``err`` is the ERR by which the worst drives are kept; None where nothing was scored.
-    ``repeated`` tells that the drive was done before.
+    ``asked`` is what its record was made for, ``err`` the ERR by which the worst drives are kept;
+    None where nothing was scored. ``repeated`` tells that the drive was done before.
     """
 
     drive: str
     status: str
     reason: str
     frames: int
+    asked: str
     err: float | None
     repeated: bool = False
 
@@ -163,7 +164,8 @@ def done(record: Record, *, repeated: bool = False) -> Done:
     """Return what the fleet's command is told of a record."""
     names = ("status", "reason", "evaluated")
     status, reason, frames = (record.value(name) for name in names)
-    return Done(record.drive, status, reason or "", frames or 0, _err(record), repeated)
+    found = status, reason or "", frames or 0, record.asked
+    return Done(record.drive, *found, _err(record), repeated)
 
 
 def failed(task: DriveTask, reason: str, exit_code: int = 1) -> Record:

@@ -329,6 +329,26 @@ def test_a_full_disk_ends_the_run_and_what_was_done_before_stays(
     assert tables(folder) == tables(ran.folder)
 
 
+def test_a_record_that_another_command_has_made_meanwhile_is_not_mixed_with_ours(drives, tmp_path):
+    class Meanwhile(Here):
+        def submit(self, do, /, task):
+            future = super().submit(do, task)
+            if task.entry.name == "a":
+                shutil.copy(
+                    record_path(tmp_path / "other", task.entry.id),
+                    record_path(task.folder, task.entry.id),
+                )
+            return future
+
+    run(drives, tmp_path / "other", keep="none")
+    config = roadeval.configure({**OPTIONS, "frames": {"end": 3.0}})
+    with pytest.raises(
+        RoadevalError, match=r"another command has replayed a-.* with other settings"
+    ):
+        roadeval.replay_fleet([drives], tmp_path / "f", config, executor=Meanwhile())
+    assert not (tmp_path / "f" / "fleet.json").exists()
+
+
 def test_a_damaged_record_is_made_again(drives, ran, tmp_path):
     folder = copied(ran, tmp_path)
     drive = next(d["drive"] for d in ran.summary["drives"] if d["name"] == "a")

@@ -89,7 +89,8 @@ class FleetWriter:
             Judged on each drive, see `roadeval.results.fleet.conditions`.
         """
         with self._explained(), self._alone():
-            write_tables(self.folder, members, _Records(self.folder))
+            asked = {member.drive: member.asked for member in members}
+            write_tables(self.folder, members, _Records(self.folder, asked))
             judgements = [*judge_drives(self.folder, conditions, settings.least_frames)]
             summary = {
                 "format": FORMAT,
@@ -146,14 +147,20 @@ def _has_files(folder: Path) -> bool:
 class _Records(Mapping[str, Record]):
     """The records of a folder, read as they are needed: all together would fill the memory."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, asked: Mapping[str, str | None]) -> None:
         self._folder: Final = folder
+        self._asked: Final = asked
 
     def __getitem__(self, drive: str) -> Record:
         record = read_record(self._folder, drive)
         if record is None:
             raise ResultsError(
                 f"{self._folder}: the record of {drive} has gone; run the same command again"
+            )
+        if self._asked[drive] not in (None, record.asked):
+            raise ResultsError(
+                f"{self._folder}: another command has replayed {drive} with other settings "
+                "meanwhile; run the same command again, or give each a folder of its own"
             )
         return record
 

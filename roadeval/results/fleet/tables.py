@@ -38,6 +38,8 @@ class Member:
         See the columns of ``drives``.
     tags
         Values by the tags' keys.
+    asked
+        What its record was made for, as the command has seen it; None if it does not matter.
     """
 
     drive: str
@@ -45,6 +47,7 @@ class Member:
     source: str
     group: str | None = None
     tags: Mapping[str, str] = field(default_factory=dict)
+    asked: str | None = None
 
 
 def write_tables(folder: Path, members: Iterable[Member], records: Mapping[str, Record]) -> None:
