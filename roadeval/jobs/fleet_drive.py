@@ -36,7 +36,7 @@ from roadeval.version import VERSION
 
 PATIENCE_S: Final = 0.5
 """Between two looks whether another command has ended with a drive."""
-_FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS})
+_FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS})
 
 
 @dataclass(frozen=True, slots=True)

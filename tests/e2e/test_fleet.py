@@ -1,6 +1,8 @@
 """``roadeval fleet``: many drives, every one accounted for, and nothing done twice."""
 
+import errno
 import json
+import os
 import shutil
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
@@ -310,19 +312,21 @@ def test_a_folder_without_drives_is_one_line(tmp_path, capsys):
     assert not (tmp_path / "f").exists()
 
 
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EFBIG])
 def test_a_full_disk_ends_the_run_and_what_was_done_before_stays(
-    drives, ran, tmp_path, monkeypatch
+    number, drives, ran, tmp_path, monkeypatch
 ):
     folder = copied(ran, tmp_path)
     drive = next(d["drive"] for d in ran.summary["drives"] if d["name"] == "a")
     shutil.rmtree(folder / "results" / drive)
 
     def fail(*_):
-        raise OSError(28, "No space left on device")
+        raise OSError(number, os.strerror(number))
 
     with monkeypatch.context() as on_a_full_disk:
         on_a_full_disk.setattr("roadeval.results.folder.ResultsWriter.append", fail)
-        with pytest.raises(RoadevalError, match=r"f: cannot be written: No space left on device; "):
+        said = f"f: cannot be written: {os.strerror(number)}; "
+        with pytest.raises(RoadevalError, match=said):
             run(drives, folder)
     _, submitted = run(drives, folder, keep="worst:1")
     assert submitted == ["a"]
