@@ -6,6 +6,7 @@ It is built beside the one of its name, and replaces it as one: see `roadeval.ru
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -32,6 +33,10 @@ _UNLISTED: Final = frozenset(
 """The figures of version 0.1, whose summaries do not list the folder's files."""
 
 
+_NAME: Final = re.compile(r"\w[\w.-]{,99}", re.ASCII)
+"""A file's name as ours are: a summary from elsewhere may list anything."""
+
+
 def belonging(folder: Path) -> frozenset[str]:
     """Return the names of the files in a folder that are results, there or not."""
     try:
@@ -39,7 +44,7 @@ def belonging(folder: Path) -> frozenset[str]:
     except ResultsError:
         listed = None
     names = [str(name) for name in listed] if isinstance(listed, list) else []
-    plain = {name for name in names if Path(name).name == name != ".."}
+    plain = {name for name in names if _NAME.fullmatch(name)}
     return _UNLISTED | {SUMMARY, RUN, *(f"{table}.csv" for table in TABLES)} | plain
 
 
