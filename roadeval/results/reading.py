@@ -223,6 +223,8 @@ def _parsed(content: bytes, table: TableSchema) -> pa.Table:
     parsed = csv.read_csv(BytesIO(content), convert_options=options)
     if not content.endswith(b"\n"):
         raise ValueError("its last line is cut off")
+    if len({*parsed.column_names}) < len(parsed.column_names):
+        raise ValueError("a column stands there twice")
     lacking = [column for column in table.columns if column.name not in parsed.column_names]
     if missing := [column.name for column in lacking if column.kind is not Kind.RATE]:
         raise ValueError(f"no column {', '.join(missing)}")
