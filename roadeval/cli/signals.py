@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
@@ -16,6 +17,11 @@ EXIT_CODES: Final = {
 }
 
 
+GRACE_S: Final = 0.05
+"""Signals so soon after the first are the same wish: ``timeout`` sends one to the process and
+another to its group."""
+
+
 class Stopped(SystemExit):
     """The user or the system asked the process to stop."""
 
@@ -26,7 +32,7 @@ class Stopped(SystemExit):
 
 @contextmanager
 def raised() -> Iterator[None]:
-    """Turn the first SIGINT or SIGTERM into `Stopped`; a second one ends the process at once.
+    """Turn the first SIGINT or SIGTERM into `Stopped`; a later one ends the process at once.
 
     Python accepts handlers from the main thread only. In any other thread the signals keep the
     handlers that they have.
@@ -44,6 +50,9 @@ def raised() -> Iterator[None]:
 
 
 def _stop(number: int, _frame: FrameType | None) -> NoReturn:
+    for each in EXIT_CODES:
+        signal.signal(each, signal.SIG_IGN)
+    time.sleep(GRACE_S)
     for each in EXIT_CODES:
         signal.signal(each, signal.SIG_DFL)
     raise Stopped(EXIT_CODES[signal.Signals(number)])

@@ -2,6 +2,7 @@
 
 import os
 import signal
+from threading import Timer
 
 import pytest
 
@@ -28,7 +29,22 @@ def test_a_signal_is_raised_as_an_exception_that_runs_clean_up(number, code):
     assert tidied == ["closed"]
 
 
-def test_a_second_signal_would_end_the_process_at_once():
+def test_a_signal_that_comes_with_the_first_does_not_stop_the_clean_up():
+    tidied = []
+
+    def work():
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+        finally:
+            tidied.append("closed")
+
+    Timer(signals.GRACE_S / 2, os.kill, (os.getpid(), signal.SIGTERM)).start()
+    with pytest.raises(signals.Stopped), signals.raised():
+        work()
+    assert tidied == ["closed"]
+
+
+def test_a_later_signal_would_end_the_process_at_once():
     handlers = []
 
     def work():
