@@ -6,7 +6,6 @@ It is built beside the one of its name, and replaces it as one: see `roadeval.ru
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -33,8 +32,8 @@ _UNLISTED: Final = frozenset(
 """The figures of version 0.1, whose summaries do not list the folder's files."""
 
 
-_NAME: Final = re.compile(r"\w[\w.-]{,99}", re.ASCII)
-"""A file's name as ours are: a summary from elsewhere may list anything."""
+NAME_BYTES: Final = 255
+"""Of a file's name, at most, on the file systems that there are."""
 
 
 def belonging(folder: Path) -> frozenset[str]:
@@ -44,8 +43,14 @@ def belonging(folder: Path) -> frozenset[str]:
     except ResultsError:
         listed = None
     names = [str(name) for name in listed] if isinstance(listed, list) else []
-    plain = {name for name in names if _NAME.fullmatch(name)}
+    plain = {name for name in names if _is_name(name)}
     return _UNLISTED | {SUMMARY, RUN, *(f"{table}.csv" for table in TABLES)} | plain
+
+
+def _is_name(text: str) -> bool:
+    """Return whether a text can name a file of a folder: a summary may list anything."""
+    plain = Path(text).name == text != ".."
+    return plain and text.isprintable() and len(text.encode()) <= NAME_BYTES
 
 
 CONTENT: Final = Content(SUMMARY, belonging)

@@ -10,11 +10,12 @@ from roadeval.cli import signals
 from roadeval.cli.exit_codes import ExitCode
 
 
+@pytest.mark.parametrize("times", [1, 2])
 @pytest.mark.parametrize(
     ("number", "code"),
     [(signal.SIGINT, ExitCode.INTERRUPTED), (signal.SIGTERM, ExitCode.TERMINATED)],
 )
-def test_a_signal_is_raised_as_an_exception_that_runs_clean_up(number, code):
+def test_signals_at_once_are_raised_as_one_exception_that_runs_clean_up(number, code, times):
     tidied = []
 
     def work():
@@ -23,24 +24,11 @@ def test_a_signal_is_raised_as_an_exception_that_runs_clean_up(number, code):
         finally:
             tidied.append("closed")
 
+    for place in range(1, times):
+        Timer(place * signals.GRACE_S / 2, os.kill, (os.getpid(), number)).start()
     with pytest.raises(signals.Stopped) as stopped, signals.raised():
         work()
     assert stopped.value.exit_code == code
-    assert tidied == ["closed"]
-
-
-def test_a_signal_that_comes_with_the_first_does_not_stop_the_clean_up():
-    tidied = []
-
-    def work():
-        try:
-            os.kill(os.getpid(), signal.SIGTERM)
-        finally:
-            tidied.append("closed")
-
-    Timer(signals.GRACE_S / 2, os.kill, (os.getpid(), signal.SIGTERM)).start()
-    with pytest.raises(signals.Stopped), signals.raised():
-        work()
     assert tidied == ["closed"]
 
 

@@ -17,7 +17,7 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from roadeval.data import colours
 from roadeval.errors import RoadevalError
@@ -72,7 +72,7 @@ def page_of(svg: bytes) -> bytes:
 
 def picture_of(svg: bytes, dots_per_inch: int) -> bytes:
     """Return a figure, given as SVG, as a PNG."""
-    return _compiled(_FIGURE, {"figure.svg": svg}, format="png", ppi=dots_per_inch)
+    return _compiled(_FIGURE, {"figure.svg": svg}, "png", dots_per_inch)
 
 
 def write_file(path: Path, content: bytes) -> Path:
@@ -92,15 +92,24 @@ def write_file(path: Path, content: bytes) -> Path:
     return path
 
 
-def _compiled(template: bytes, sources: Mapping[str, bytes], **how: Any) -> bytes:
-    """Return what Typst makes of a template and the files that it reads: a PDF, if nothing else."""
+def _compiled(
+    template: bytes,
+    sources: Mapping[str, bytes],
+    kind: Literal["pdf", "png"] = "pdf",
+    dots_per_inch: int | None = None,
+) -> bytes:
+    """Return what Typst makes of a template and the files that it reads, as a PDF or PNG."""
     import typst
 
     with TemporaryDirectory(prefix="roadeval-") as folder:
         for name, content in {_TEMPLATE: template, **sources}.items():
             Path(folder, name).write_bytes(content)
         compiled: bytes = typst.compile(
-            Path(folder, _TEMPLATE), root=Path(folder), font_paths=_fonts(), **how
+            Path(folder, _TEMPLATE),
+            root=Path(folder),
+            font_paths=_fonts(),
+            format=kind,
+            ppi=dots_per_inch,
         )
     return compiled
 
