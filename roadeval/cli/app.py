@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import traceback
 from collections.abc import Callable, Sequence
 from functools import wraps
@@ -103,9 +104,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _run(arguments)
     streams.take_over(debug=messages.debug())
     memory.collect_rarely()
+    _without_blas_threads()
     code = _run(None)
     memory.collect_no_more()
     return code
+
+
+def _without_blas_threads() -> None:
+    """Let NumPy and SciPy start no threads when they are loaded, unless the user sets how many.
+
+    Each brings a BLAS library, whose threads spin for a twentieth of a second of a core before they
+    first sleep, and reserve 40 MB of addresses each. No matrix here is large enough to need them.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def _run(arguments: Sequence[str] | None) -> int:

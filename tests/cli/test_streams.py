@@ -78,3 +78,14 @@ def test_text_is_escaped_in_every_encoding_of_the_streams():
     assert (done.returncode, done.stdout) == (0, b"gr\\u00f6\\u00dfe \\udce9 \\u001b[2J\n")
     done = run("console.emit(json.dumps('gr\\xf6\\xdfe', ensure_ascii=False))", **plain)
     assert json.loads(done.stdout) == "größe"
+
+
+@pytest.mark.parametrize(("environment", "threads"), [({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2)])
+@pytest.mark.skipif(
+    sys.platform != "linux" or len(os.sched_getaffinity(0)) < 2,
+    reason="BLAS takes as many threads as there are cores, and Linux counts them",
+)
+def test_blas_starts_threads_only_where_the_user_asks_for_them(environment, threads, monkeypatch):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    counted = "import numpy; console.emit(str(len(os.listdir('/proc/self/task'))))"
+    assert int(run(counted, **environment).stdout) == threads

@@ -9,6 +9,7 @@ import struct
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -17,6 +18,7 @@ from roadeval.report.blocks import ImageFile
 from roadeval.report.figures.figure import FigureData, FigureSpec, figures
 from roadeval.report.figures.style import RC
 from roadeval.report.pdf.typeset import page_of, picture_of
+from roadeval.runtime.threads import ordered
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,7 +49,11 @@ def write_figures(folder: Path, data: FigureData) -> list[Path]:
         If the folder cannot be written to.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    return [path for figure in figures() for path in _write(folder, figure, data)]
+    # Typst, which sets the reports too, makes both files of one SVG in a few hundredths of a second
+    # and beside the drawing of the next figure; Matplotlib's own ways draw a figure once for each,
+    # and take ten times as long.
+    drawn = ((spec.name, image.content) for spec in figures() if (image := svg_of(spec, data)))
+    return [path for files in ordered(partial(_write, folder), drawn, 1) for path in files]
 
 
 def svg(draw: Callable[[], Figure]) -> ImageFile:
@@ -67,19 +73,16 @@ def svg_of(spec: FigureSpec, data: FigureData) -> ImageFile | None:
         return None if figure is None else ImageFile(_svg(figure))
 
 
-def _write(folder: Path, spec: FigureSpec, data: FigureData) -> Iterator[Path]:
-    with _style():
-        figure = spec.draw(data)
-        if figure is None:
-            return
-        # Typst, which sets the reports too, makes both of one SVG in a few hundredths of a second;
-        # Matplotlib's own ways draw the figure once for each, and take ten times as long.
-        drawn = _svg(figure)
-    files = {"png": _with_dpi(picture_of(drawn, _DPI)), "pdf": page_of(drawn)}
-    for kind, content in files.items():
-        path = folder / f"{spec.name}.{kind}"
+def _write(folder: Path, figure: tuple[str, bytes]) -> list[Path]:
+    """Write a figure's files, given its name and its SVG."""
+    name, svg = figure
+    files = {
+        folder / f"{name}.png": _with_dpi(picture_of(svg, _DPI)),
+        folder / f"{name}.pdf": page_of(svg),
+    }
+    for path, content in files.items():
         path.write_bytes(content)
-        yield path
+    return list(files)
 
 
 @contextmanager
