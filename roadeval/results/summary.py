@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,13 +19,21 @@ PARTS: Final = (
     *("format", "verdict", "drive", "frames", "totals", "beyond", "curves", "difference"),
     *("against_blind", "seeds", "oracles", "windows", "claims", "health", "training", "seconds"),
     *("warnings", "losses", "run", "settings", "methods", "versions", "log", "masks", "tables"),
-    "files",
+    *("files", "digest"),
 )
 """The parts of the summary, in the file's order."""
-LATER: Final = frozenset({"curves", "seeds", "claims", "methods", "masks", "tables", "files"})
+LATER: Final = frozenset(
+    {"curves", "seeds", "claims", "methods", "masks", "tables", "files", "digest"}
+)
 """Parts that not every summary has, so that readers must do without them: earlier versions did not
 write them, a recording has no files, and most runs train with one seed, have no network, and all
 masks in the log."""
+RESULTS: Final = (
+    *("verdict", "frames", "totals", "beyond", "curves", "difference", "against_blind", "seeds"),
+    *("oracles", "claims", "health", "warnings", "losses"),
+)
+"""Parts that tell what came out, of which ``digest`` is the check sum. The others tell where files
+lie and what was asked: whoever moves the files may mend those."""
 _LEVELS: Final = {
     **dict.fromkeys(("drive", "frames", "training", "run", "versions", "log", "selection"), 1),
     **dict.fromkeys(("beyond", "claims", "health", "seconds", "settings", "tables"), 2),
@@ -52,6 +61,12 @@ _SELECTION: Final[Mapping[str, Mapping[str, str]]] = {
     "output": {"record": "record"},
 }
 """What version 1 called the settings of a run, by their tables."""
+
+
+def digest_of(content: Mapping[str, Any], parts: Iterable[str]) -> str:
+    """Return the SHA-256 of some parts, as they stand in a JSON document; others may lack."""
+    told = {part: plain(content[part]) for part in parts if part in content}
+    return hashlib.sha256(json.dumps(told, allow_nan=False, sort_keys=True).encode()).hexdigest()
 
 
 def summary_text(parts: Mapping[str, Any]) -> str:
@@ -109,6 +124,11 @@ def parse_summary(text: str, where: object) -> dict[str, Any]:
         for part in summary.keys() & _LEVELS.keys():
             if not _is_mapping(summary[part], _LEVELS[part]):
                 raise ResultsError(f"{where}: damaged (`{part}` is not what it must be)")
+        if summary.get("digest") not in (None, digest_of(summary, RESULTS)):
+            raise ResultsError(
+                f"{where}: damaged (its numbers are not those that were written); make it anew "
+                "with roadeval replay"
+            )
     form = summary.get("format") if isinstance(summary, dict) else None
     if form == {**FORMAT, "version": 1}:
         summary, form = _of_version_1(summary), {**FORMAT, "version": 2}

@@ -1,11 +1,20 @@
 """Summaries read back, those of version 1 too."""
 
 import json
+import math
+from pathlib import Path
 
 import pytest
 
 from roadeval.results.reading import ResultsError
-from roadeval.results.summary import FORMAT, parse_summary
+from roadeval.results.summary import (
+    FORMAT,
+    RESULTS,
+    digest_of,
+    json_text,
+    parse_summary,
+    plain,
+)
 
 
 def test_a_summary_of_version_1_takes_todays_shape():
@@ -66,3 +75,36 @@ def test_a_part_of_another_shape_is_damage(part, value):
 def test_a_text_of_many_brackets_is_no_summary():
     with pytest.raises(ResultsError, match="here: not a summary"):
         parse_summary("[" * 100_000, "here")
+
+
+WRITTEN = {
+    "format": FORMAT,
+    "totals": {"filtered": {"post": {"ERR": 0.1, "frames": 100}}},
+    "claims": {"filtered": {"post": {}}},
+    "run": {"output": {"save": "out.rrd"}},
+}
+
+
+def test_a_number_that_was_changed_is_damage():
+    sealed = WRITTEN | {"digest": digest_of(WRITTEN, RESULTS)}
+    assert parse_summary(json.dumps(sealed), "here") == sealed
+    changed = json.dumps(sealed).replace("0.1", "0.3")
+    with pytest.raises(ResultsError, match=r"here: damaged \(its numbers are not those that"):
+        parse_summary(changed, "here")
+    lacking = {part: value for part, value in sealed.items() if part != "claims"}
+    with pytest.raises(ResultsError, match="here: damaged"):
+        parse_summary(json.dumps(lacking), "here")
+
+
+def test_where_files_lie_may_change_and_earlier_versions_have_no_digest():
+    sealed = WRITTEN | {"digest": digest_of(WRITTEN, RESULTS)}
+    moved = sealed | {"run": {"output": {"save": "elsewhere.rrd"}}}
+    assert parse_summary(json.dumps(moved), "here") == moved
+    assert parse_summary(json.dumps(WRITTEN).replace("0.1", "0.3"), "here")["totals"]
+
+
+def test_a_digest_is_that_of_what_json_gives_back():
+    written = {"totals": {"a": (1, math.nan, Path("b"), 1 / 3, "\u00e9\udce9")}, "run": 5}
+    read = json.loads(json_text(plain({"totals": {"a": [1, None, "b", 1 / 3, "x"]}})))
+    read["totals"]["a"][-1] = "\u00e9\udce9"
+    assert digest_of(written, ("totals",)) == digest_of(read, ("totals", "run"))

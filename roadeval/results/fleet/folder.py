@@ -19,8 +19,8 @@ from roadeval.results.fleet.record import RECORDS, Record, frames_path, read_rec
 from roadeval.results.fleet.schema import FORMAT, TABLES
 from roadeval.results.fleet.summary import summarise
 from roadeval.results.fleet.tables import Member, read_parquet, write_tables
-from roadeval.results.reading import ResultsError
-from roadeval.results.summary import json_text, plain
+from roadeval.results.reading import ResultsError, arrow_schema
+from roadeval.results.summary import digest_of, json_text, plain
 from roadeval.runtime.claims import claimed
 from roadeval.runtime.files import check_folder, put
 from roadeval.runtime.text import is_utf8
@@ -30,6 +30,10 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 PATIENCE_S: Final = 0.2
+RESULTS: Final = ("verdict", "counts", "frames", "rates", "effects", "strata", "conditions")
+"""Parts of ``fleet.json`` that tell what came out, of which ``digest`` is the check sum."""
+_ROWS: Final = ("drives", "rates", "effects", "strata", "conditions")
+"""Its parts that are lists of mappings."""
 
 
 class FleetWriter:
@@ -98,6 +102,7 @@ class FleetWriter:
                 "conditions": [_condition(each, judgements) for each in conditions],
                 "run": run,
             }
+            summary["digest"] = digest_of(summary, RESULTS)
             put(self.folder / RUN, run_toml.encode())
             metrics = json_text(plain(flat_metrics(summary)))
             put(self.folder / METRICS, metrics.encode())
@@ -243,8 +248,6 @@ class Fleet:
             table = read_parquet(path, columns)
         except FileNotFoundError:
             if name == "frames":
-                from roadeval.results.reading import arrow_schema
-
                 return arrow_schema(TABLES[name]).empty_table()
             raise ResultsError(f"{path}: is not there; run the fleet's command again") from None
         except (OSError, ValueError) as error:  # Arrow's too
@@ -255,6 +258,13 @@ class Fleet:
         lacking = [n for n in columns or TABLES[name].names if n not in table.column_names]
         if lacking:
             raise ResultsError(f"{path}: has no column {', '.join(lacking)}")
+        for field in arrow_schema(TABLES[name]):
+            name = field.name
+            if name in table.column_names and table.schema.field(name).type != field.type:
+                raise ResultsError(
+                    f"{path}: damaged (column {name} is not of type {field.type}); run the "
+                    "fleet's command again"
+                )
         return table
 
 
@@ -274,4 +284,17 @@ def _read(folder: Path) -> dict[str, Any]:
             f"{path}: not of format {FORMAT['name']} {FORMAT['version']}; another version of "
             "roadeval made it: use that one, or another folder"
         )
+    if reason := _damage(content):
+        raise ResultsError(f"{path}: damaged ({reason}); run the fleet's command again")
     return dict(content)
+
+
+def _damage(content: Mapping[str, Any]) -> str:
+    """Return what is wrong with the content of ``fleet.json``; nothing where it is whole."""
+    for part in _ROWS:
+        rows = content.get(part)
+        if not (isinstance(rows, list) and all(isinstance(row, dict) for row in rows)):
+            return f"`{part}` is not what it must be"
+    if content.get("digest") not in (None, digest_of(content, RESULTS)):
+        return "its numbers are not those that were written"
+    return ""

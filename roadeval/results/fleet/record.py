@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from roadeval.results.fleet.schema import FORMAT, RECORDED, TABLES
 from roadeval.results.reading import ResultsError
-from roadeval.results.summary import SUMMARY
+from roadeval.results.summary import SUMMARY, digest_of
 from roadeval.runtime.files import put
 
 RECORDS: Final = "records"
@@ -28,6 +28,9 @@ SCORED: Final = "scored"
 DAMAGED: Final = "damaged"
 UNSCORED: Final = "unscored"
 FAILED: Final = "failed"
+
+_KEPT: Final = ("drive", "asked", "stamp", "rows")
+"""Parts of a record's file of which ``digest`` is the check sum."""
 
 Cells = Sequence[Any]
 """A row's values in the order of its table's columns; None where there is none."""
@@ -89,6 +92,7 @@ class Record:
             "stamp": self.stamp,
             "rows": {name: [_plain(row) for row in rows] for name, rows in self.rows.items()},
         }
+        content["digest"] = digest_of(content, _KEPT)
         # All in ASCII: the name of a file may hold bytes that are no text.
         put(record_path(folder, self.drive), json.dumps(content, allow_nan=False).encode())
 
@@ -115,7 +119,10 @@ def _of(content: Any, drive: str) -> Record | None:
             "asked": str(asked),
             "stamp": dict() | None as stamp,
             "rows": dict(rows),
-        } if form == FORMAT and name == drive and _fits(rows):
+            "digest": str(digest),
+        } if (
+            form == FORMAT and name == drive and digest == digest_of(content, _KEPT) and _fits(rows)
+        ):
             return Record(name, asked, stamp, rows)
         case _:
             return None

@@ -107,14 +107,14 @@ def write_frames(
     OSError
         If they cannot be written.
     """
-    from pyarrow import csv, parquet
+    from pyarrow import csv
 
     path = frames_path(folder, drive)
     schema = _schema("frames", ())
     convert = csv.ConvertOptions(column_types=arrow_schema(OF_A_DRIVE["frames"]))
     with (
         replacing(path) as partial,
-        parquet.ParquetWriter(partial, schema, compression=COMPRESSION) as writer,
+        _written(partial, schema) as writer,
         csv.open_csv(results / "frames.csv", convert_options=convert) as batches,
     ):
         finals: dict[str, str] = {}
@@ -128,8 +128,15 @@ def read_parquet(path: Path, columns: list[str] | None = None) -> pa.Table:
     from pyarrow import parquet
 
     # As one file: of a path with "drive=" in it a column would be made.
-    with parquet.ParquetFile(path) as file:
+    with parquet.ParquetFile(path, page_checksum_verification=True) as file:
         return file.read(columns=columns)
+
+
+def _written(path: Path, schema: pa.Schema) -> parquet.ParquetWriter:
+    """Open a file for a table, whose pages have check sums: ZSTD's data has none here."""
+    from pyarrow import parquet
+
+    return parquet.ParquetWriter(path, schema, compression=COMPRESSION, write_page_checksum=True)
 
 
 class _Writer:
@@ -146,12 +153,8 @@ class _Writer:
         self._finished = False
 
     def __enter__(self) -> _Writer:
-        from pyarrow import parquet
-
         self._file.begin()
-        self._writer = parquet.ParquetWriter(
-            self._file.partial, self._schema, compression=COMPRESSION
-        )
+        self._writer = _written(self._file.partial, self._schema)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
