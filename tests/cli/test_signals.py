@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from threading import Timer
 
 import pytest
@@ -51,3 +53,28 @@ def test_the_earlier_handlers_come_back():
     with signals.raised():
         assert signal.getsignal(signal.SIGTERM) != before[1]
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+WHILE_IT_LOADS = """
+import os, signal, sys
+
+class Interrupt:
+    def find_spec(name, path, target=None):
+        if name == "roadeval.cli":
+            os.kill(os.getpid(), signal.SIGINT)
+
+signal.signal(signal.SIGINT, getattr(signal, sys.argv[1]))
+sys.meta_path.insert(0, Interrupt)
+sys.argv[1:] = ["--version"]
+from roadeval.__main__ import main
+sys.exit(main())
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="os.kill sends no SIGINT there")
+@pytest.mark.parametrize(("handler", "code"), [("default_int_handler", -2), ("SIG_IGN", 0)])
+def test_an_interrupt_while_the_program_loads_shows_no_traceback(handler, code):
+    done = subprocess.run(
+        [sys.executable, "-c", WHILE_IT_LOADS, handler], capture_output=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (code, b"")

@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from enum import StrEnum
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, gettempdir
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from roadeval.data import colours
@@ -98,10 +99,16 @@ def _compiled(
     kind: Literal["pdf", "png"] = "pdf",
     dots_per_inch: int | None = None,
 ) -> bytes:
-    """Return what Typst makes of a template and the files that it reads, as a PDF or PNG."""
+    """Return what Typst makes of a template and the files that it reads, as a PDF or PNG.
+
+    Raises
+    ------
+    ReportError
+        If these files cannot be written into the system's folder for temporary ones.
+    """
     import typst
 
-    with TemporaryDirectory(prefix="roadeval-") as folder:
+    with _explained(), TemporaryDirectory(prefix="roadeval-") as folder:
         for name, content in {_TEMPLATE: template, **sources}.items():
             Path(folder, name).write_bytes(content)
         compiled: bytes = typst.compile(
@@ -112,6 +119,17 @@ def _compiled(
             ppi=dots_per_inch,
         )
     return compiled
+
+
+@contextmanager
+def _explained() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise ReportError(
+            f"{gettempdir()}: figures and reports are put together there, and it cannot be written "
+            f"({error.strerror}); make room, or name another folder with TMPDIR"
+        ) from error
 
 
 @cache

@@ -2,6 +2,7 @@
 
 import os
 import struct
+import tempfile
 import zlib
 from itertools import pairwise
 
@@ -195,3 +196,9 @@ def test_a_folder_in_the_files_place_is_told_and_leaves_nothing_behind(tmp_path)
     with pytest.raises(ReportError, match=r"report\.pdf: cannot be written"):
         write_file(tmp_path / "report.pdf", b"x")
     assert [path.name for path in tmp_path.iterdir()] == ["report.pdf"]
+
+
+def test_a_temporary_folder_that_cannot_be_written_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
+    with pytest.raises(ReportError, match=r"gone: .*cannot be written \(No such.*TMPDIR"):
+        pdf(a_document())
