@@ -30,10 +30,10 @@ write them, a recording has no files, and most runs train with one seed, have no
 masks in the log."""
 RESULTS: Final = (
     *("verdict", "frames", "totals", "beyond", "curves", "difference", "against_blind", "seeds"),
-    *("oracles", "claims", "health", "warnings", "losses"),
+    *("oracles", "claims", "health", "training", "warnings", "losses", "settings", "methods"),
 )
-"""Parts that tell what came out, of which ``digest`` is the check sum. The others tell where files
-lie and what was asked: whoever moves the files may mend those."""
+"""Parts that tell what came out and by which method, of which ``digest`` is the check sum. The
+others tell where files lie and what was asked: whoever moves the files may mend those."""
 _LEVELS: Final = {
     **dict.fromkeys(("drive", "frames", "training", "run", "versions", "log", "selection"), 1),
     **dict.fromkeys(("beyond", "claims", "health", "seconds", "settings", "tables"), 2),
