@@ -11,7 +11,7 @@ from roadeval.pipeline.beyond.forest import ALL, NODES, Forest, grow
 from roadeval.pipeline.beyond.ground.reach import reach
 from roadeval.pipeline.beyond.ground.scene import scene_of
 from roadeval.pipeline.beyond.ground_features import at_samples, names_of
-from roadeval.pipeline.beyond.trees import TreesSettings
+from roadeval.pipeline.beyond.trees import TreesSettings, balanced_back
 from roadeval.pipeline.beyond.working_image import stretched
 from roadeval.pipeline.stage import MisfitError, TrainingSet, View
 
@@ -48,12 +48,15 @@ def features_and_road(seed=0, count=600):
     return values, values[:, 0] + values[:, 1] ** 2 > 0.5
 
 
+@pytest.mark.parametrize("weighted", [False, True])
 @pytest.mark.parametrize("leaves", [2, 5, 32])
-def test_the_arrays_say_what_scikit_learns_trees_say(leaves):
-    values, road = features_and_road()
+def test_the_arrays_say_what_scikit_learns_trees_say(leaves, weighted):
+    values, road = features_and_road(count=1000)
+    values[:, 1] = values[:, 1].round(1)  # few values, many times each
+    weights = balanced_back(road, 0.2) if weighted else None
     settings = replace(SMALL, leaves=leaves, share=1.0)
-    planes = np.ascontiguousarray(values.T).reshape(4, 20, 30)
-    found = trees.log_odds(planes, grow(values, road, None, settings, 0))
+    planes = np.ascontiguousarray(values.T).reshape(4, 20, 50)
+    found = trees.log_odds(planes, grow(values, road, weights, settings, 0))
     boosting = HistGradientBoostingClassifier(
         learning_rate=SMALL.rate,
         max_iter=SMALL.trees,
@@ -61,7 +64,7 @@ def test_the_arrays_say_what_scikit_learns_trees_say(leaves):
         min_samples_leaf=SMALL.least,
         early_stopping=False,
         random_state=0,
-    ).fit(values, road)
+    ).fit(values, road, sample_weight=weights)
     np.testing.assert_allclose(found.ravel(), boosting.decision_function(values), atol=1e-5)
 
 
@@ -96,7 +99,7 @@ def test_probability_is_the_logistic_function_and_does_not_overflow():
 
 def test_classes_weigh_what_the_frames_have_of_them():
     road = np.array([True, True, False, False])
-    weights = trees.balanced_back(road, 0.25)
+    weights = balanced_back(road, 0.25)
     np.testing.assert_allclose(weights, [0.5, 0.5, 1.5, 1.5])
 
 
