@@ -33,6 +33,13 @@ _REVERSED: Final = np.packbits(
 ).ravel()
 """Each byte with its bits the other way round."""
 
+_GATHERED: Final = {
+    2: ("<u4", 1 << 30 | 1 << 20 | 1 << 10 | 1, 24),
+    4: ("<u2", 1 << 12 | 1, 8),
+}
+"""How the labels of a byte, one in each byte of a little-endian word, come together in its highest
+byte: by a product, whose terms are the labels at their places, others below or beyond the word."""
+
 
 def encode(labels: npt.NDArray[np.uint8] | Packed, palette: Sequence[ColourWithOpacity]) -> bytes:
     """Encode ``(H, W)`` uint8 labels, each below ``len(palette)``, as a PNG file.
@@ -74,14 +81,18 @@ def _bits(colours: int) -> int:
 
 
 def _pack(labels: npt.NDArray[np.uint8], bits: int) -> npt.NDArray[np.uint8]:
+    """Return ``(H, W)`` labels with so many bits each, the leftmost in a byte's highest bits."""
     if bits == 1:
         return np.packbits(labels, axis=1)
-    per_byte = 8 // bits
-    padded = np.pad(labels, ((0, 0), (0, -labels.shape[1] % per_byte)))
-    packed = np.zeros((labels.shape[0], padded.shape[1] // per_byte), np.uint8)
-    for place in range(per_byte):
-        packed |= padded[:, place::per_byte] << (8 - bits * (place + 1))
-    return packed
+    if bits == 8:
+        return labels
+    word, factor, shift = _GATHERED[bits]
+    height, width = labels.shape
+    whole = np.zeros((height, -(-width * bits // 8), 8 // bits), np.uint8)
+    whole.reshape(height, -1)[:, :width] = labels
+    words = whole.view(word)[..., 0]
+    highest: npt.NDArray[np.integer] = words * words.dtype.type(factor) >> words.dtype.type(shift)
+    return highest.astype(np.uint8)
 
 
 def _chunk(name: bytes, body: bytes) -> bytes:
