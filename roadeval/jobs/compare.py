@@ -25,6 +25,7 @@ from roadeval.results.comparison import as_dict, judged
 from roadeval.results.lines import window_rows
 from roadeval.results.reading import rows_of
 from roadeval.results.summary import json_text, plain
+from roadeval.runtime.paths import Paths, listed
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ class Compared:
 
 
 def compare(
-    results: Sequence[str | Path],
+    results: Paths,
     *,
     variants: Sequence[str] | None = None,
     fail_if: Sequence[str] = (),
@@ -113,7 +114,7 @@ def compare(
         judged.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    opened = [Result(path) for path in results]
+    opened = [Result(path) for path in listed(results)]
     across = len(opened) == 1
     if across:
         (only,) = opened

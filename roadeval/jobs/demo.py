@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from roadeval.jobs.outputs import AnyPath, holding
+from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
+from roadeval.runtime.paths import AnyPath
 from roadeval.synth import RenderSettings, write_drive
 
 

@@ -15,11 +15,11 @@ from roadeval.evaluation.conditions import Condition
 from roadeval.fleet.errors import FleetError
 from roadeval.fleet.sources import find_drives
 from roadeval.jobs.fleet_run import FleetProgress, FleetRun, OnFleetProgress
-from roadeval.jobs.outputs import AnyPath
 from roadeval.results.fleet.conditions import check_conditions
 from roadeval.results.fleet.folder import FleetWriter
 from roadeval.results.fleet.record import DAMAGED, FAILED
 from roadeval.results.fleet.tables import Member
+from roadeval.runtime.paths import AnyPath, Paths, listed
 from roadeval.version import VERSION
 
 
@@ -63,7 +63,7 @@ class FleetOutcome:
 
 
 def replay_fleet(
-    drives: Sequence[AnyPath],
+    drives: Paths,
     output: AnyPath,
     config: RunConfig | None = None,
     *,
@@ -103,7 +103,7 @@ def replay_fleet(
         ``fleet.max_failures`` allows: then all that was done is kept.
     """
     config = (config or RunConfig()).resolved()
-    entries = find_drives([str(drive) for drive in drives])
+    entries = find_drives([str(drive) for drive in listed(drives)])
     if config.fleet.folds is not None and config.training.model is not None:
         raise FleetError(
             "`fleet.folds` and `training.model` do not go together: folds train models"

@@ -18,11 +18,10 @@ from roadeval.results.summary import SUMMARY
 from roadeval.runtime.claims import claimed
 from roadeval.runtime.files import check_file, check_folder, made, own_names, target_of
 from roadeval.runtime.folders import home_of, recover
+from roadeval.runtime.paths import AnyPath
 
 if TYPE_CHECKING:
     from roadeval.config import OutputSettings
-
-AnyPath = str | Path
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from roadeval import logs
-from roadeval.jobs.outputs import AnyPath, holding
+from roadeval.jobs.outputs import holding
+from roadeval.runtime.paths import AnyPath
 
 
 def pack(

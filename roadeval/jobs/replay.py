@@ -15,7 +15,7 @@ from roadeval.data import FrameResult
 from roadeval.jobs import summary
 from roadeval.jobs.examples import ExampleFrames
 from roadeval.jobs.identity import deciding
-from roadeval.jobs.outputs import AnyPath, Outputs
+from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.processing import process
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import Run, prepare
@@ -27,6 +27,7 @@ from roadeval.results.lines import sum_lines
 from roadeval.results.schema import TABLES
 from roadeval.results.summary import summary_text
 from roadeval.runtime.memory import trim
+from roadeval.runtime.paths import AnyPath
 from roadeval.version import VERSION
 
 OnFrame = Callable[[FrameResult], None]

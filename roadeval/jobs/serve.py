@@ -21,6 +21,7 @@ from roadeval.report.findings import Commands
 from roadeval.report.page.render import SCRIPT, STYLE, Place, code, page
 from roadeval.results.fleet.kind import is_fleet
 from roadeval.runtime.local_server import NOT_FOUND, PAGE, LocalServer, Request, Response, told
+from roadeval.runtime.paths import Paths, listed
 
 MakeCommands = Callable[[Result | Path], Commands]
 """Returns the commands that a page names, of a drive's result or of a fleet's folder."""
@@ -29,7 +30,7 @@ _PLACE: Final = Place("", "", "{}")
 
 
 def serve(
-    results: Sequence[str | Path],
+    results: Paths,
     on_address: Callable[[str], None],
     *,
     web: bool = False,
@@ -61,7 +62,7 @@ def serve(
 
 @contextmanager
 def serving(
-    results: Sequence[str | Path],
+    results: Paths,
     *,
     web: bool = False,
     commands: MakeCommands | None = None,
@@ -75,7 +76,7 @@ def serving(
     """
     with ExitStack() as stack:
         replayer = Replayer()
-        opened = [_opened(Path(path), commands, replayer) for path in results]
+        opened = [_opened(Path(path), commands, replayer) for path in listed(results)]
         viewer = steered.BrowserViewer() if web else steered.WindowViewer()
         stack.callback(viewer.close)
         for each in opened:

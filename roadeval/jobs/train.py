@@ -9,20 +9,21 @@ from pathlib import Path
 from roadeval import logs
 from roadeval.config import ConfigError, RunConfig
 from roadeval.data import Frame
-from roadeval.jobs.outputs import AnyPath, holding
+from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
+from roadeval.runtime.paths import AnyPath, Paths, listed
 from roadeval.training import Model, TrainingError, learning, save_model
 from roadeval.training.held import HeldFrames
 
 
 def train(
-    drives: Sequence[AnyPath],
+    drives: Paths,
     output: AnyPath,
     config: RunConfig | None = None,
     *,
     on_progress: OnProgress = ignore,
 ) -> Model:
-    """Train every variant on some drives, and write the model file.
+    """Train every variant on one drive or some, and write the model file.
 
     From each drive ``training.frames`` labelled frames are taken, spread evenly over the
     selected range. Frames without truth are taken where ``training.source`` is ``patch``, or
@@ -35,9 +36,9 @@ def train(
     RoadevalError
         If some drives have truth and others none, or there is nothing to learn.
     """
-    config = config or RunConfig()
-    with holding(output, inputs=drives):
-        model = _learnt(drives, config, on_progress)
+    config, paths = config or RunConfig(), listed(drives)
+    with holding(output, inputs=paths):
+        model = _learnt(paths, config, on_progress)
         save_model(model, Path(output))
         return model
 

@@ -138,3 +138,7 @@ def test_a_replay_takes_what_is_asked_of_its_drive(drives, tmp_path):
     assert done.summary["frames"]["evaluated"] == 3
     assert done.summary["run"]["labels"]["road"] == (3,)
     assert "drives" not in done.summary["run"]
+
+
+def test_one_drive_needs_no_list(drives, tmp_path):
+    assert train(str(drives[0]), tmp_path).digests == train(drives[:1], tmp_path).digests
