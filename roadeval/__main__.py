@@ -2,6 +2,7 @@
 
 import signal
 import sys
+from contextlib import suppress
 
 
 def main() -> int:
@@ -12,7 +13,8 @@ def main() -> int:
     it is ignored, as behind ``nohup``, it stays so.
     """
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        with suppress(ValueError):  # only the main thread can
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
     from roadeval.cli import app
 
     return app.main()

@@ -36,6 +36,9 @@ FIRST = (
 LIGHT: Final = frozenset({"info", "config", "pack"})
 """Commands that load neither Rerun nor Arrow, and live with half a gigabyte of addresses."""
 
+THREADS: Final = {"OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS"}
+"""The variables that OpenBLAS obeys, the first one before the others."""
+
 app = typer.Typer(
     add_completion=False,
     rich_markup_mode=None,
@@ -113,10 +116,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _without_blas_threads() -> None:
     """Let NumPy and SciPy start no threads when they are loaded, unless the user sets how many.
 
-    Each brings a BLAS library, whose threads spin for a twentieth of a second of a core before they
-    first sleep, and reserve 40 MB of addresses each. No matrix here is large enough to need them.
+    Each brings an OpenBLAS, whose threads spin for a twentieth of a second of a core before they
+    first sleep, and reserve 40 MB of addresses each. No matrix of ours is large enough for them.
     """
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if not THREADS & os.environ.keys():
+        os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 
 def _run(arguments: Sequence[str] | None) -> int:

@@ -30,10 +30,11 @@ write them, a recording has no files, and most runs train with one seed, have no
 masks in the log."""
 RESULTS: Final = (
     *("verdict", "frames", "totals", "beyond", "curves", "difference", "against_blind", "seeds"),
-    *("oracles", "claims", "health", "training", "warnings", "losses", "settings", "methods"),
+    *("oracles", "windows", "claims", "health", "warnings", "losses", "settings", "methods"),
 )
-"""Parts that tell what came out and by which method, of which ``digest`` is the check sum. The
-others tell where files lie and what was asked: whoever moves the files may mend those."""
+"""Parts that tell what came out and by which method, of which ``digest`` holds a checksum. Whoever
+moves or renames files may mend what the others say of them."""
+ALTERED: Final = "its content is not what was written"
 _LEVELS: Final = {
     **dict.fromkeys(("drive", "frames", "training", "run", "versions", "log", "selection"), 1),
     **dict.fromkeys(("beyond", "claims", "health", "seconds", "settings", "tables"), 2),
@@ -63,10 +64,24 @@ _SELECTION: Final[Mapping[str, Mapping[str, str]]] = {
 """What version 1 called the settings of a run, by their tables."""
 
 
-def digest_of(content: Mapping[str, Any], parts: Iterable[str]) -> str:
-    """Return the SHA-256 of some parts, as they stand in a JSON document; others may lack."""
-    told = {part: plain(content[part]) for part in parts if part in content}
-    return hashlib.sha256(json.dumps(told, allow_nan=False, sort_keys=True).encode()).hexdigest()
+def digest_of(content: Mapping[str, Any], parts: Iterable[str]) -> dict[str, Any]:
+    """Return the ``digest`` of a JSON document: which parts it covers, and their SHA-256."""
+    covered = [part for part in parts if part in content]
+    told = json.dumps(
+        {part: plain(content[part]) for part in covered}, allow_nan=False, sort_keys=True
+    )
+    return {"parts": covered, "sha256": hashlib.sha256(told.encode()).hexdigest()}
+
+
+def is_as_written(content: Mapping[str, Any]) -> bool:
+    """Return whether a document agrees with its ``digest``, which earlier versions do not have."""
+    stated = content.get("digest")
+    if stated is None:
+        return True
+    try:
+        return bool(stated == digest_of(content, stated["parts"]))
+    except (TypeError, KeyError, RecursionError):  # the digest is damaged, or a part is endless
+        return False
 
 
 def summary_text(parts: Mapping[str, Any]) -> str:
@@ -124,11 +139,6 @@ def parse_summary(text: str, where: object) -> dict[str, Any]:
         for part in summary.keys() & _LEVELS.keys():
             if not _is_mapping(summary[part], _LEVELS[part]):
                 raise ResultsError(f"{where}: damaged (`{part}` is not what it must be)")
-        if summary.get("digest") not in (None, digest_of(summary, RESULTS)):
-            raise ResultsError(
-                f"{where}: damaged (its numbers are not those that were written); make it anew "
-                "with roadeval replay"
-            )
     form = summary.get("format") if isinstance(summary, dict) else None
     if form == {**FORMAT, "version": 1}:
         summary, form = _of_version_1(summary), {**FORMAT, "version": 2}
@@ -139,6 +149,8 @@ def parse_summary(text: str, where: object) -> dict[str, Any]:
             f"{where}: not a summary of format {FORMAT['name']} {FORMAT['version']}; "
             "make it anew with this version of roadeval replay"
         )
+    if not is_as_written(summary):
+        raise ResultsError(f"{where}: damaged ({ALTERED}); make it anew with roadeval replay")
     return dict(summary)
 
 

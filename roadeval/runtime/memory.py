@@ -23,7 +23,8 @@ _LACKING: Final = re.compile(
 )
 COLLECT_EVERY: Final = 400_000
 """Objects that are new between two searches for cycles; Python's own choice is 700. A run of 100
-frames makes fewer, nearly all of which stay, and of a long one some 50 a frame stay."""
+frames with the default preset makes fewer, nearly all of which stay; of a long one 10 to 50 a frame
+stay."""
 TRIM_EVERY: Final = 256
 """Items of a long loop between two trims: one takes ten milliseconds, in which no other thread gets
 memory."""

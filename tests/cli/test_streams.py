@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from roadeval.cli.app import THREADS
 from roadeval.cli.exit_codes import ExitCode
 
 SAYS = "console.emit('gr\\xf6\\xdfe \\udce9 \\x1b[2J'); messages.warning('beware')"
@@ -80,12 +81,16 @@ def test_text_is_escaped_in_every_encoding_of_the_streams():
     assert json.loads(done.stdout) == "größe"
 
 
-@pytest.mark.parametrize(("environment", "threads"), [({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2)])
+@pytest.mark.parametrize(
+    ("environment", "threads"),
+    [({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2), ({"OMP_NUM_THREADS": "2"}, 2)],
+)
 @pytest.mark.skipif(
     sys.platform != "linux" or len(os.sched_getaffinity(0)) < 2,
     reason="BLAS takes as many threads as there are cores, and Linux counts them",
 )
 def test_blas_starts_threads_only_where_the_user_asks_for_them(environment, threads, monkeypatch):
-    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    for name in THREADS:
+        monkeypatch.delenv(name, raising=False)
     counted = "import numpy; console.emit(str(len(os.listdir('/proc/self/task'))))"
     assert int(run(counted, **environment).stdout) == threads

@@ -21,7 +21,7 @@ def import_all():
         if module.name not in left_out:
             import_module(module.name)
 
-left_out = {"roadeval.__main__"}
+left_out = set()
 if find_spec("roadeval.kernels._loops") is None:
     left_out.add("roadeval.kernels.compiled")
 

@@ -89,7 +89,7 @@ def test_a_number_that_was_changed_is_damage():
     sealed = WRITTEN | {"digest": digest_of(WRITTEN, RESULTS)}
     assert parse_summary(json.dumps(sealed), "here") == sealed
     changed = json.dumps(sealed).replace("0.1", "0.3")
-    with pytest.raises(ResultsError, match=r"here: damaged \(its numbers are not those that"):
+    with pytest.raises(ResultsError, match=r"here: damaged \(its content is not what was"):
         parse_summary(changed, "here")
     lacking = {part: value for part, value in sealed.items() if part != "claims"}
     with pytest.raises(ResultsError, match="here: damaged"):
@@ -105,6 +105,29 @@ def test_where_files_lie_may_change_and_earlier_versions_have_no_digest():
 
 def test_a_digest_is_that_of_what_json_gives_back():
     written = {"totals": {"a": (1, math.nan, Path("b"), 1 / 3, "\u00e9\udce9")}, "run": 5}
-    read = json.loads(json_text(plain({"totals": {"a": [1, None, "b", 1 / 3, "x"]}})))
-    read["totals"]["a"][-1] = "\u00e9\udce9"
-    assert digest_of(written, ("totals",)) == digest_of(read, ("totals", "run"))
+    read = json.loads(json_text(plain(written)))
+    assert digest_of(written, ("totals",)) == digest_of(read, ("totals", "other"))
+
+
+def test_a_damaged_digest_is_damage_and_another_format_is_told_as_such():
+    for digest in ("x", {}, {"parts": 5, "sha256": ""}, {"parts": [[]], "sha256": ""}):
+        with pytest.raises(ResultsError, match="here: damaged"):
+            parse_summary(json.dumps(WRITTEN | {"digest": digest}), "here")
+        later = {"format": {**FORMAT, "version": 4}, "digest": digest}
+        with pytest.raises(ResultsError, match="not a summary of format"):
+            parse_summary(json.dumps(later), "here")
+
+
+def test_parts_that_a_later_version_covers_are_checked_by_this_one():
+    later = WRITTEN | {"new": [1, 2]}
+    sealed = later | {"digest": digest_of(later, ("totals", "new"))}
+    assert parse_summary(json.dumps(sealed), "here") == sealed
+    with pytest.raises(ResultsError, match="damaged"):
+        parse_summary(json.dumps(sealed | {"new": [1, 3]}), "here")
+
+
+def test_a_part_without_end_is_damage():
+    deep = 800 * "[" + 800 * "]"
+    text = json.dumps(WRITTEN | {"digest": digest_of(WRITTEN, RESULTS)}).replace("0.1", deep)
+    with pytest.raises(ResultsError, match="here: damaged"):
+        parse_summary(text, "here")

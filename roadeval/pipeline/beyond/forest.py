@@ -133,11 +133,11 @@ def grow(
     Parameters
     ----------
     values
-        ``(n, F)`` features.
+        ``(n, F)`` features, finite.
     road
         ``(n,)`` labels; both occur.
     weights
-        ``(n,)`` of the pixels; None: all weigh the same.
+        ``(n,)`` of the pixels, above 0; None: all weigh the same.
     settings
         Of the growing.
     seed
@@ -151,10 +151,13 @@ def grow(
     from threadpoolctl import threadpool_limits
 
     # scikit-learn's own way to weighted quantiles takes several times as long as all trees.
-    weigh = np.ones(len(values)) if weights is None else weights
-    edges = [_edges(feature, weigh) for feature in values.T]
+    pixel_weights = np.ones(len(values)) if weights is None else weights
+    edges = [bin_edges(feature, pixel_weights) for feature in values.T]
     bins = np.column_stack(
-        [np.searchsorted(*each).astype(np.uint8) for each in zip(edges, values.T, strict=True)]
+        [
+            np.searchsorted(own, feature).astype(np.uint8)
+            for own, feature in zip(edges, values.T, strict=True)
+        ]
     )
     # Only here: the import takes a second, and a model from a file does not need it.
     boosting = whole("sklearn.ensemble").HistGradientBoostingClassifier(
@@ -174,11 +177,18 @@ def grow(
     return Forest(feature, threshold, kept, leaves, offset, values.shape[1])
 
 
-def _edges(feature: Values, weights: Floats) -> Values:
-    """Return what parts a feature's ``(n,)`` values into bins, ascending.
+def bin_edges(feature: Values, weights: Floats) -> Values:
+    """Return the values that part a feature into bins, ascending, at most ``BINS - 1``.
 
     Bin i holds what is above edge i - 1, and at most edge i: a value alone where there are few of
     them, else values of equal weight together, up to a weighted quantile (averaged inverted CDF).
+
+    Parameters
+    ----------
+    feature
+        ``(n,)`` finite values.
+    weights
+        ``(n,)`` of the pixels, above 0.
     """
     order = np.argsort(feature)
     ascending: Values = feature[order]
@@ -191,7 +201,9 @@ def _edges(feature: Values, weights: Floats) -> Values:
         below, above = (
             ascending[np.searchsorted(sums, wanted, side)] for side in ("left", "right")
         )
-    edges: Values = np.unique((below + above) / np.float32(2))
+    middle = ((below.astype(np.float64) + above) / 2).astype(np.float32)
+    # Between two neighbours there is no number: the lower one parts them.
+    edges: Values = np.unique(np.where(middle < above, middle, below))
     return edges
 
 
@@ -205,7 +217,7 @@ def _arrays(
     values[: len(leaves)] = nodes["value"][list(leaves)]
     inner = np.flatnonzero(nodes["is_leaf"] == 0)
     feature[: len(inner)] = nodes["feature_idx"][inner]
-    # A node's threshold lies between two bins: of what is below it the upper edge counts.
+    # A node's threshold, rounded down, is the last bin that goes left: its edge is the feature's.
     threshold[: len(inner)] = [
         edges[node["feature_idx"]][int(node["num_threshold"])] for node in nodes[inner]
     ]

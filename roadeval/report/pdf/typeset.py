@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import json
 import shutil
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from enum import StrEnum
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from tempfile import TemporaryDirectory, gettempdir
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from roadeval.data import colours
@@ -127,8 +128,9 @@ def _explained() -> Iterator[None]:
         yield
     except OSError as error:
         raise ReportError(
-            f"{gettempdir()}: figures and reports are put together there, and it cannot be written "
-            f"({error.strerror}); make room, or name another folder with TMPDIR"
+            f"{tempfile.tempdir or 'no folder for temporary files'}: figures and reports are put "
+            f"together there, and it cannot be written ({error.strerror}); make room, or name "
+            "another folder with TMPDIR"
         ) from error
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -15,12 +15,19 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.fleet.conditions import DriveJudgement, judge_drives
 from roadeval.results.fleet.kind import FLEET, JUNIT, METRICS, RUN, is_fleet
 from roadeval.results.fleet.metrics import flat_metrics, junit_xml
-from roadeval.results.fleet.record import RECORDS, Record, frames_path, read_record
+from roadeval.results.fleet.record import RECORDS, Record, read_record
 from roadeval.results.fleet.schema import FORMAT, TABLES
 from roadeval.results.fleet.summary import summarise
-from roadeval.results.fleet.tables import Member, read_parquet, write_tables
+from roadeval.results.fleet.tables import (
+    AGAIN,
+    Member,
+    read_frames,
+    read_parquet,
+    read_whole,
+    write_tables,
+)
 from roadeval.results.reading import ResultsError, arrow_schema
-from roadeval.results.summary import digest_of, json_text, plain
+from roadeval.results.summary import ALTERED, digest_of, is_as_written, json_text, plain
 from roadeval.runtime.claims import claimed
 from roadeval.runtime.files import check_folder, put
 from roadeval.runtime.text import is_utf8
@@ -31,7 +38,7 @@ if TYPE_CHECKING:
 
 PATIENCE_S: Final = 0.2
 RESULTS: Final = ("verdict", "counts", "frames", "rates", "effects", "strata", "conditions")
-"""Parts of ``fleet.json`` that tell what came out, of which ``digest`` is the check sum."""
+"""Parts of ``fleet.json`` that tell what came out, of which ``digest`` holds a checksum."""
 _ROWS: Final = ("drives", "rates", "effects", "strata", "conditions")
 """Its parts that are lists of mappings."""
 
@@ -64,7 +71,8 @@ class FleetWriter:
         with self._explained():
             check_folder(self.folder)
             if is_fleet(self.folder):
-                _read(self.folder)
+                with suppress(ValueError, RecursionError):  # damage: it is written anew
+                    _check_format(path := self.folder / FLEET, json.loads(path.read_bytes()))
             elif not (self.folder / RECORDS).is_dir() and _has_files(self.folder):
                 raise ResultsError(
                     f"{self.folder}: holds other files and is no fleet's folder; name a new one"
@@ -231,44 +239,28 @@ class Fleet:
 
     def frames(self, drive: str) -> pd.DataFrame:
         """Read the rows of a drive's frames, by its name in the fleet; empty if none was scored."""
-        path = frames_path(self.path, drive)
-        frame: pd.DataFrame = self._read(path, "frames").to_pandas()
+        try:
+            table = read_frames(self.path, drive)
+        except FileNotFoundError:
+            table = arrow_schema(TABLES["frames"]).empty_table()
+        frame: pd.DataFrame = table.to_pandas()
         return frame
 
     def table(self, name: str, columns: list[str] | None = None) -> pa.Table:
         """Read a table, or some columns of it, as Arrow has them."""
-        return self._read(self.path / f"{name}.parquet", name, columns)
+        path = self.path / f"{name}.parquet"
+        try:
+            return read_whole(path, name, columns)
+        except FileNotFoundError:
+            raise ResultsError(f"{path}: is not there; {AGAIN}") from None
 
     def _pandas(self, name: str) -> pd.DataFrame:
         frame: pd.DataFrame = self.table(name).to_pandas()
         return frame
 
-    def _read(self, path: Path, name: str, columns: list[str] | None = None) -> pa.Table:
-        try:
-            table = read_parquet(path, columns)
-        except FileNotFoundError:
-            if name == "frames":
-                return arrow_schema(TABLES[name]).empty_table()
-            raise ResultsError(f"{path}: is not there; run the fleet's command again") from None
-        except (OSError, ValueError) as error:  # Arrow's too
-            reason = str(error).partition("\n")[0]
-            raise ResultsError(
-                f"{path}: damaged ({reason}); run the fleet's command again"
-            ) from error
-        lacking = [n for n in columns or TABLES[name].names if n not in table.column_names]
-        if lacking:
-            raise ResultsError(f"{path}: has no column {', '.join(lacking)}")
-        for field in arrow_schema(TABLES[name]):
-            name = field.name
-            if name in table.column_names and table.schema.field(name).type != field.type:
-                raise ResultsError(
-                    f"{path}: damaged (column {name} is not of type {field.type}); run the "
-                    "fleet's command again"
-                )
-        return table
-
 
 def _read(folder: Path) -> dict[str, Any]:
+    """Read ``fleet.json``; a `ResultsError` if it is not there, damaged or of another format."""
     path = folder / FLEET
     try:
         content = json.loads(path.read_bytes())
@@ -276,17 +268,21 @@ def _read(folder: Path) -> dict[str, Any]:
         raise ResultsError(
             f"{folder}: no fleet here ({FLEET}: {error.strerror}); make one with roadeval fleet"
         ) from error
-    except ValueError as error:
-        raise ResultsError(f"{path}: damaged ({error}); run the fleet's command again") from error
+    except (ValueError, RecursionError) as error:
+        raise ResultsError(f"{path}: damaged ({error}); {AGAIN}") from error
+    _check_format(path, content)
+    if reason := _damage(content):
+        raise ResultsError(f"{path}: damaged ({reason}); {AGAIN}")
+    return dict(content)
+
+
+def _check_format(path: Path, content: Any) -> None:
     form = content.get("format") if isinstance(content, dict) else None
     if form != FORMAT:
         raise ResultsError(
             f"{path}: not of format {FORMAT['name']} {FORMAT['version']}; another version of "
             "roadeval made it: use that one, or another folder"
         )
-    if reason := _damage(content):
-        raise ResultsError(f"{path}: damaged ({reason}); run the fleet's command again")
-    return dict(content)
 
 
 def _damage(content: Mapping[str, Any]) -> str:
@@ -295,6 +291,4 @@ def _damage(content: Mapping[str, Any]) -> str:
         rows = content.get(part)
         if not (isinstance(rows, list) and all(isinstance(row, dict) for row in rows)):
             return f"`{part}` is not what it must be"
-    if content.get("digest") not in (None, digest_of(content, RESULTS)):
-        return "its numbers are not those that were written"
-    return ""
+    return "" if is_as_written(content) else ALTERED

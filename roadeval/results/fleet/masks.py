@@ -10,7 +10,7 @@ import numpy as np
 from roadeval.data.counts import OUTCOMES
 from roadeval.evaluation.drives_comparison_result import Mask, MaskFrames
 from roadeval.results.fleet.record import frames_path
-from roadeval.results.fleet.tables import read_parquet
+from roadeval.results.fleet.tables import AGAIN, read_frames
 from roadeval.results.reading import ResultsError
 
 _COLUMNS: Final = ["stamp_ns", "variant", "stage", *OUTCOMES]
@@ -24,16 +24,12 @@ def read_masks(folder: Path, drive: str) -> dict[Mask, MaskFrames]:
     ResultsError
         If they are not there, or damaged.
     """
-    path = frames_path(folder, drive)
     try:
-        table = read_parquet(path, _COLUMNS)
-        counts = np.stack([table[name].to_numpy() for name in OUTCOMES], axis=1)
-        stamps = table["stamp_ns"].to_numpy()
+        table = read_frames(folder, drive, _COLUMNS)
     except FileNotFoundError:
-        raise ResultsError(f"{path}: is not there; run the fleet's command again") from None
-    except (OSError, ValueError, KeyError) as error:  # Arrow's too
-        reason = str(error).partition("\n")[0]
-        raise ResultsError(f"{path}: damaged ({reason}); run the fleet's command again") from error
+        raise ResultsError(f"{frames_path(folder, drive)}: is not there; {AGAIN}") from None
+    counts = np.stack([table[name].to_numpy() for name in OUTCOMES], axis=1)
+    stamps = table["stamp_ns"].to_numpy()
     codes, masks = _codes(table)
     return {
         mask: MaskFrames(stamps[own], counts[own])

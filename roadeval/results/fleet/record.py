@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from roadeval.results.fleet.schema import FORMAT, RECORDED, TABLES
 from roadeval.results.reading import ResultsError
-from roadeval.results.summary import SUMMARY, digest_of
+from roadeval.results.summary import SUMMARY, digest_of, is_as_written
 from roadeval.runtime.files import put
 
 RECORDS: Final = "records"
@@ -30,7 +30,7 @@ UNSCORED: Final = "unscored"
 FAILED: Final = "failed"
 
 _KEPT: Final = ("drive", "asked", "stamp", "rows")
-"""Parts of a record's file of which ``digest`` is the check sum."""
+"""Parts of a record's file of which ``digest`` holds a checksum."""
 
 Cells = Sequence[Any]
 """A row's values in the order of its table's columns; None where there is none."""
@@ -105,7 +105,7 @@ def read_record(folder: Path, drive: str) -> Record | None:
         return None
     except OSError as error:
         raise ResultsError(f"{record_path(folder, drive)}: {error.strerror}") from error
-    except ValueError:
+    except (ValueError, RecursionError):
         return None  # not ours, or not whole: it is made again
     return _of(content, drive)
 
@@ -119,9 +119,13 @@ def _of(content: Any, drive: str) -> Record | None:
             "asked": str(asked),
             "stamp": dict() | None as stamp,
             "rows": dict(rows),
-            "digest": str(digest),
+            "digest": {"parts": list(parts)},
         } if (
-            form == FORMAT and name == drive and digest == digest_of(content, _KEPT) and _fits(rows)
+            form == FORMAT
+            and name == drive
+            and parts == [*_KEPT]
+            and is_as_written(content)
+            and _fits(rows)
         ):
             return Record(name, asked, stamp, rows)
         case _:

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from roadeval.results.fleet.record import Record, frames_path
+from roadeval.results.fleet.record import Record, frames_path, record_path
 from roadeval.results.fleet.schema import FORMAT, LIGHT, RECORDED, TABLES, TAG
-from roadeval.results.reading import arrow_schema
+from roadeval.results.reading import ResultsError, arrow_schema
 from roadeval.results.schema import TABLES as OF_A_DRIVE
 from roadeval.runtime.files import NewFile, replacing
 
@@ -24,6 +24,7 @@ WORST: Final = 50
 BATCH: Final = 50_000
 """Rows of a table that wait in memory."""
 COMPRESSION: Final = "zstd"
+AGAIN: Final = "run the fleet's command again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +124,55 @@ def write_frames(
             writer.write_table(_with_light(batch, finals, lights, schema))
 
 
+def read_whole(
+    path: Path, name: str, columns: list[str] | None = None, remedy: str = AGAIN
+) -> pa.Table:
+    """Read a table of a fleet's folder that others may have damaged since.
+
+    Parameters
+    ----------
+    path
+        The file.
+    name
+        The table's, in `roadeval.results.fleet.schema.TABLES`.
+    columns
+        Which are needed; all by default.
+    remedy
+        What the user can do where it is damaged.
+
+    Raises
+    ------
+    FileNotFoundError
+        If it is not there.
+    ResultsError
+        If it cannot be read, or lacks a column, or one is of another type.
+    """
+    import pyarrow as pa
+
+    try:
+        table = read_parquet(path, columns)
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError, pa.ArrowException) as error:
+        reason = str(error).partition("\n")[0]
+        raise ResultsError(f"{path}: damaged ({reason}); {remedy}") from error
+    for column in arrow_schema(TABLES[name]):
+        if column.name not in table.column_names:
+            if columns is None or column.name in columns:
+                raise ResultsError(f"{path}: has no column {column.name}")
+        elif table.schema.field(column.name).type != column.type:
+            raise ResultsError(
+                f"{path}: damaged (column {column.name} is not of type {column.type}); {remedy}"
+            )
+    return table
+
+
+def read_frames(folder: Path, drive: str, columns: list[str] | None = None) -> pa.Table:
+    """Read the rows of a drive's frames, by its name in the fleet; see `read_whole`."""
+    remedy = f"remove {record_path(folder, drive)} and {AGAIN}"
+    return read_whole(frames_path(folder, drive), "frames", columns, remedy)
+
+
 def read_parquet(path: Path, columns: list[str] | None = None) -> pa.Table:
     """Read a table; an OSError or ValueError if it cannot be read."""
     from pyarrow import parquet
@@ -133,7 +183,7 @@ def read_parquet(path: Path, columns: list[str] | None = None) -> pa.Table:
 
 
 def _written(path: Path, schema: pa.Schema) -> parquet.ParquetWriter:
-    """Open a file for a table, whose pages have check sums: ZSTD's data has none here."""
+    """Open a file for a table, whose pages have checksums: Arrow's ZSTD has none."""
     from pyarrow import parquet
 
     return parquet.ParquetWriter(path, schema, compression=COMPRESSION, write_page_checksum=True)

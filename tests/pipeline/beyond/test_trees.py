@@ -7,7 +7,7 @@ import pytest
 from sklearn.ensemble import HistGradientBoostingClassifier
 
 from roadeval.pipeline.beyond import trees
-from roadeval.pipeline.beyond.forest import ALL, NODES, Forest, grow
+from roadeval.pipeline.beyond.forest import ALL, BINS, NODES, Forest, bin_edges, grow
 from roadeval.pipeline.beyond.ground.reach import reach
 from roadeval.pipeline.beyond.ground.scene import scene_of
 from roadeval.pipeline.beyond.ground_features import at_samples, names_of
@@ -52,7 +52,7 @@ def features_and_road(seed=0, count=600):
 @pytest.mark.parametrize("leaves", [2, 5, 32])
 def test_the_arrays_say_what_scikit_learns_trees_say(leaves, weighted):
     values, road = features_and_road(count=1000)
-    values[:, 1] = values[:, 1].round(1)  # few values, many times each
+    values = values.round(1)  # so few that scikit-learn's own bins are the same in each version
     weights = balanced_back(road, 0.2) if weighted else None
     settings = replace(SMALL, leaves=leaves, share=1.0)
     planes = np.ascontiguousarray(values.T).reshape(4, 20, 50)
@@ -66,6 +66,33 @@ def test_the_arrays_say_what_scikit_learns_trees_say(leaves, weighted):
         random_state=0,
     ).fit(values, road, sample_weight=weights)
     np.testing.assert_allclose(found.ravel(), boosting.decision_function(values), atol=1e-5)
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+def test_bins_of_many_values_weigh_the_same(weighted):
+    rng = np.random.default_rng(0)
+    feature = rng.normal(size=3001).astype(np.float32)
+    weights = rng.uniform(0.5, 2, 3001) if weighted else np.ones(3001)
+    edges, sums = bin_edges(feature, weights), np.cumsum(weights[np.argsort(feature)])
+    assert len(edges) == BINS - 1
+    for number, edge in enumerate(edges, 1):
+        wanted = sums[-1] * number / BINS
+        first = next(i for i, each in enumerate(sums) if each >= wanted)
+        assert edge == np.sort(feature)[first]
+
+
+@pytest.mark.parametrize(
+    ("feature", "edges"),
+    [
+        ([5, 5, 5], []),
+        ([3, 1, 1, 2], [1.5, 2.5]),
+        ([1, np.nextafter(np.float32(1), np.float32(2))], [1]),
+        ([2e38, 3.4e38], [2.7e38]),
+    ],
+)
+def test_bins_of_few_values_part_each_from_the_next(feature, edges):
+    found = bin_edges(np.array(feature, np.float32), np.ones(len(feature)))
+    np.testing.assert_array_equal(found, np.array(edges, np.float32))
 
 
 def test_the_same_seed_grows_the_same_trees(sample, forest):

@@ -198,6 +198,13 @@ def test_a_folder_in_the_files_place_is_told_and_leaves_nothing_behind(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["report.pdf"]
 
 
+def test_where_no_temporary_folder_can_be_written_this_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(tempfile, "_candidate_tempdir_list", lambda: [str(tmp_path / "gone")])
+    with pytest.raises(ReportError, match=r"no folder for temporary files: .*TMPDIR"):
+        pdf(a_document())
+
+
 def test_a_temporary_folder_that_cannot_be_written_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
     with pytest.raises(ReportError, match=r"gone: .*cannot be written \(No such.*TMPDIR"):

@@ -8,6 +8,8 @@ import pytest
 from pyarrow import parquet
 
 from roadeval import Fleet
+from roadeval.results.fleet import tables
+from roadeval.results.fleet.masks import read_masks
 from roadeval.results.reading import ResultsError
 from tests.results.fleet.making import fleet_of
 
@@ -35,7 +37,7 @@ def test_what_was_written_is_read(folder):
 def test_a_result_that_was_changed_is_damage(folder, part):
     told = json.loads((folder / "fleet.json").read_text())[part]
     change(folder / "fleet.json", **{part: told[1:] if isinstance(told, list) else 5})
-    with pytest.raises(ResultsError, match=r"fleet\.json: damaged .its numbers are not those that"):
+    with pytest.raises(ResultsError, match=r"fleet\.json: damaged .its content is not what was"):
         Fleet(folder)
 
 
@@ -51,6 +53,47 @@ def test_a_part_of_another_shape_is_damage(folder, part, value):
     change(folder / "fleet.json", **{part: value, "digest": None})
     with pytest.raises(ResultsError, match=f"damaged .`{part}` is not what it must be"):
         Fleet(folder)
+
+
+def test_damage_is_mended_by_the_same_command(folder):
+    change(folder / "fleet.json", verdict="Better.")
+    with pytest.raises(ResultsError, match="run the fleet's command again"):
+        Fleet(folder)
+    assert Fleet(fleet_of(folder, 5)).summary["verdict"] != "Better."
+    (folder / "fleet.json").write_text("{")
+    assert len(Fleet(fleet_of(folder, 5)).drives) == 5
+
+
+def test_another_version_s_folder_is_not_written_to(folder):
+    change(folder / "fleet.json", format={"name": "roadeval-fleet", "version": 9})
+    with pytest.raises(ResultsError, match="another version of roadeval made it"):
+        fleet_of(folder, 5)
+
+
+def test_a_damaged_table_of_frames_says_what_makes_it_anew(folder):
+    drive = Fleet(folder).drives.query("status == 'scored'").drive.iloc[0]
+    path = folder / "frames" / f"drive={drive}" / "frames.parquet"
+    column = parquet.ParquetFile(path).metadata.row_group(0).column(0)
+    begin = column.dictionary_page_offset or column.data_page_offset
+    content = bytearray(path.read_bytes())
+    content[begin + column.total_compressed_size - 1] ^= 1
+    path.write_bytes(content)
+    remedy = f"remove .*records/{drive}.json and run the fleet's command again"
+    with pytest.raises(ResultsError, match=remedy):
+        Fleet(folder).frames(drive)
+    words = pa.table({name: ["x"] for name in parquet.read_schema(path).names})
+    parquet.write_table(words, path)
+    with pytest.raises(ResultsError, match="column stamp_ns is not of type int64"):
+        read_masks(folder, drive)
+
+
+def test_a_footer_that_arrow_does_not_understand_is_damage(folder, monkeypatch):
+    def fail(*_):
+        raise pa.ArrowNotImplementedError("unknown encoding")
+
+    monkeypatch.setattr(tables, "read_parquet", fail)
+    with pytest.raises(ResultsError, match=r"damaged \(unknown encoding\); run the fleet"):
+        Fleet(folder).table("scores")
 
 
 @pytest.mark.parametrize("table", ["drives", "scores", "effects"])
