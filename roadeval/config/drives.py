@@ -45,7 +45,7 @@ class DriveSettings:
             If the entry has no path, or a table that holds for the whole run.
         """
         path = tables.get("path")
-        if not isinstance(path, str) or not path:
+        if not isinstance(path, str) or not path or "\0" in path:
             raise ConfigError(f"{where}: path must name a log, or several as *.mcap")
         rest = {key: value for key, value in tables.items() if key != "path"}
         check_tables(rest, OF_A_LOG, f"{where} {path}")

@@ -34,6 +34,7 @@ NOT_UTF8: Final = (
     "its bytes are not UTF-8, which no configuration can hold: choose another name, or set "
     "PYTHONUTF8=1 where the system speaks another encoding"
 )
+NUL: Final = "holds a zero byte, which no name and no path can"
 QUOTED: Final = 60
 """Letters of a wrong value that a message quotes."""
 FORMER: Final = {"effective_frames": "least_frames"}
@@ -75,6 +76,8 @@ def override(settings: Any, tables: Mapping[str, Any], table: str, where: str = 
     for path, text in _texts(merged):
         if not is_utf8(text):
             raise ConfigError(named(table, path, where) + NOT_UTF8)
+        if "\0" in text:
+            raise ConfigError(named(table, path, where) + NUL)
     try:
         # As JSON, for then a list is a tuple and a table a dataclass, but true is no number.
         json = _JSON.dump_json(merged, fallback=str)

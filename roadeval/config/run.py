@@ -43,6 +43,7 @@ from roadeval.config.variants import (
     preset_of,
     variants_of,
 )
+from roadeval.data import FINAL_STAGE
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.logs.settings import FrameSettings, LabelSettings, MaskSettings, TopicSettings
@@ -134,8 +135,15 @@ class RunConfig:
     def resolved(self) -> RunConfig:
         """Return the configuration with settings stated that stages find in files.
 
-        A `RoadevalError` if a file cannot be used.
+        A `RoadevalError` if a file cannot be used, or a variant's final stage has no mask to start
+        from.
         """
+        for name, pipeline in self.pipelines().items():
+            if len(pipeline.masks()) < 2:  # the final one, and one before it
+                raise ConfigError(
+                    f"variant {name}: its chain ({', '.join(pipeline.chain)}) has no stage before "
+                    f"{FINAL_STAGE} that makes a road mask"
+                )
         return self._with_pipelines(Pipeline.resolved)
 
     def without_places(self) -> RunConfig:

@@ -57,6 +57,15 @@ class FleetOutcome:
         return [text for each in self.summary["conditions"] for text in each["holds"].values()]
 
     @property
+    def unjudged(self) -> list[str]:
+        """The conditions that could be judged on no drive, with the reason on the first."""
+        return [
+            f"{each['condition']}: {next(iter(each['not_judged'].values()))}"
+            for each in self.summary["conditions"]
+            if each["not_judged"] and not each["judged"]
+        ]
+
+    @property
     def lost(self) -> bool:
         """Whether a drive failed, or a part of one was lost."""
         return bool(self.counts.get(FAILED) or self.counts.get(DAMAGED))

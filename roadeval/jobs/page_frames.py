@@ -205,6 +205,7 @@ def _chosen(result: Result, count: int) -> list[int]:
     there = [number for number in result.pictured if number in scored_frames]
     pictured = there or [*result.pictured]
     variants = [name for name in rows.distinct("variant") if name != BASELINE]
+    count = min(count, len(pictured))
     spread = evenly(pictured, count)
     if not variants:
         return spread

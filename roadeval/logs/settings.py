@@ -64,7 +64,7 @@ class TopicSettings:
     truth: str | None = None
     shadow: str | None = None
     masks: Mapping[str, str] = field(default_factory=dict)
-    sync_tolerance_ms: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
+    sync_tolerance_ms: Annotated[float, Field(ge=0, le=86_400_000)] | None = None
     resize_truth: bool = False
 
 

@@ -181,6 +181,30 @@ def test_the_two_variants_differ_by_the_filter_alone():
     assert filtered.pipeline.without_filter() == unfiltered.pipeline
 
 
+@pytest.mark.parametrize("chain", [["post"], ["shadow", "post"], ["exposure", "post"]])
+def test_a_chain_without_a_mask_cannot_run(chain):
+    wrong = "has no stage before post that makes a road mask"
+    with pytest.raises(ConfigError, match=wrong):
+        configure({"chain": chain}).resolved()
+    own = {"variants": {"own": {"chain": chain}}}
+    with pytest.raises(ConfigError, match=f"variant own: .*{wrong}"):
+        configure(own).resolved()
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {"training": {"model": "a\0b"}},
+        {"output": {"save": "\0"}},
+        {"masks": {"m": {"path": "a\0"}}},
+        {"drives": [{"path": "a\0"}]},
+    ],
+)
+def test_a_path_with_a_zero_byte_is_refused(tables):
+    with pytest.raises(ConfigError, match=r"zero byte|must name a log"):
+        configure(tables)
+
+
 def test_a_chain_without_a_filter_is_one_variant():
     assert [v.name for v in configure({"preset": "robust"}).variants()] == ["unfiltered"]
 

@@ -12,7 +12,7 @@ from roadeval.report.chart import Chart, ChartKind, Series
 from roadeval.report.page.files import write_page
 from roadeval.results.fleet.folder import Fleet
 from tests.e2e.commands import here
-from tests.fixtures.browser import missing, violations
+from tests.fixtures.browser import missing, violations, wait_until
 from tests.report.making import a_document
 from tests.report.page.test_render import JPEG
 from tests.results.fleet.making import fleet_of
@@ -111,7 +111,7 @@ def test_frames_are_filtered_by_variant_rate_condition_and_note(drive, watched):
     assert 0 < len(rates) < everything
     assert min(rates) >= 20
     tab.click(".filters [type=reset]")
-    tab.wait_for_function("document.querySelectorAll('.frames tr[hidden]').length === 0")
+    wait_until(tab, "document.querySelectorAll('.frames tr[hidden]').length === 0")
     tab.select_option("[name=condition]", label="the filter helps")
     notes = shown(tab, ".frames tbody td:last-child")
     assert 0 < len(notes) < everything
@@ -358,7 +358,7 @@ def test_of_500_drives_something_is_seen_within_a_second(many, watched):
     paints = []
     for _ in range(3):
         tab = watched(many.as_uri()).tab
-        tab.wait_for_function(f"() => {PAINT}")
+        wait_until(tab, PAINT)
         paints.append(tab.evaluate(f"() => {PAINT}.startTime"))
     # The best of three: other work of the machine is not the page's.
     assert min(paints) < 1000

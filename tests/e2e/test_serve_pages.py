@@ -11,7 +11,7 @@ import pytest
 import roadeval
 from tests.e2e.serving import serving, status
 from tests.e2e.test_fleet import Here, write
-from tests.fixtures.browser import missing, violations
+from tests.fixtures.browser import missing, violations, wait_until
 
 if reason := missing():
     pytest.skip(reason, allow_module_level=True)
@@ -44,7 +44,7 @@ def test_every_frame_has_its_pictures_when_it_is_asked_for(address, demo, watche
         seen.tab.locator(f"#frame-{number} .tile img").first.wait_for()
         assert frame(seen.tab) == number
         loaded = "each => each.complete && each.naturalWidth > 0"
-        seen.tab.wait_for_function(f"({loaded})(document.querySelector('.views .above'))")
+        wait_until(seen.tab, f"({loaded})(document.querySelector('.views .above'))")
     seen.tab.keyboard.press("ArrowRight")
     seen.tab.locator(f"#frame-{number + 1} .tile").first.wait_for()
     assert seen.complaints == []

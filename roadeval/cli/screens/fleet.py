@@ -85,7 +85,12 @@ def show_effects(effects: Sequence[Mapping[str, Any]], out: Console) -> None:
 
 
 def problems(outcome: FleetOutcome) -> Iterator[str]:
-    """Yield a sentence for each reason why drives failed, with the first drives of it."""
+    """Yield what to know first, and why drives failed, with the first drives of each reason."""
+    yield from outcome.summary["warnings"]
+    for condition in outcome.summary["conditions"]:
+        if condition["judged"] and (missing := [*condition["not_judged"].values()]):
+            more = f" (and {len(missing) - 1} more drives)" if missing[1:] else ""
+            yield f"{condition['condition']}: {missing[0]}{more}"
     reasons = Counter(_reason(drive, text, outcome) for drive, text in outcome.problems.items())
     for reason, count in reasons.items():
         drives = [d for d, text in outcome.problems.items() if _reason(d, text, outcome) == reason]

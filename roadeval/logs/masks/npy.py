@@ -59,6 +59,9 @@ def _head(data: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
 def _samples(pixels: npt.NDArray[Any]) -> tuple[str, npt.NDArray[Any]]:
     """Return the name of an encoding, and the numbers as it has them."""
     if pixels.dtype.kind == "f":
+        wrong = pixels[~(np.isfinite(pixels) & (pixels >= 0))]
+        if wrong.size:
+            raise BadMessage(f"it holds {wrong[0]}, which is neither a class nor a confidence")
         return "32FC1", pixels.astype("<f4")
     if pixels.dtype.itemsize == 1 and pixels.dtype.kind in "bu":
         return "mono8", pixels.astype("u1")

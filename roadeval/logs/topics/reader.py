@@ -148,6 +148,8 @@ class TopicReader:
                 stamp = self._decoder(position).stamp(data)
             except (FrameError, BadMessage):
                 stamp = UNREADABLE
+            if not UNREADABLE <= stamp < 2**63:  # no time that a table could hold
+                stamp = UNREADABLE
             self._stamps[position] = stamp
         return stamp
 

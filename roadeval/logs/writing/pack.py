@@ -82,8 +82,8 @@ def pack(
         If there is nothing to pack, a file is unreadable, or no mask belongs to an image.
     """
     images, output = Path(images), Path(output)
-    if rate_hz is not None and not 0 < rate_hz <= 1000:
-        raise LogError(f"{rate_hz:g} images a second: must be above 0 and at most 1000")
+    if rate_hz is not None and not 1e-4 <= rate_hz <= 1000:
+        raise LogError(f"{rate_hz:g} images a second: must be at least 0.0001 and at most 1000")
     if images.suffix.lower() in VIDEO_SUFFIXES and images.is_file():
         if masks is not None:
             raise LogError(f"{images}: masks go with a folder of images, not with a video")

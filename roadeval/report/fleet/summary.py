@@ -172,6 +172,7 @@ def _warnings(findings: FleetFindings) -> Iterator[str]:
             "these is evaluated): the rates say how well it does on a road that it has seen."
         )
     yield from _worse_than_baseline(told)
+    yield from told.get("warnings", ())  # earlier versions have none
 
 
 def _drives(count: int) -> str:

@@ -37,7 +37,9 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 PATIENCE_S: Final = 0.2
-RESULTS: Final = ("verdict", "counts", "frames", "rates", "effects", "strata", "conditions")
+RESULTS: Final = (
+    *("verdict", "counts", "frames", "rates", "effects", "strata", "conditions", "warnings"),
+)
 """Parts of ``fleet.json`` that tell what came out, of which ``digest`` holds a checksum."""
 _ROWS: Final = ("drives", "rates", "effects", "strata", "conditions")
 """Its parts that are lists of mappings."""
@@ -149,6 +151,7 @@ def _condition(condition: Condition, judgements: Sequence[DriveJudgement]) -> di
     return {
         "condition": condition.text,
         "judged": sum(each.holds is not None for each in own),
+        "not_judged": {each.drive: each.sentence for each in own if each.holds is None},
         "holds": {each.drive: each.sentence for each in own if each.holds},
     }
 

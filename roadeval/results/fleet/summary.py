@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
@@ -29,6 +30,8 @@ from roadeval.version import VERSION
 
 TESTED: Final = "ERR"
 """The rate whose differences are findings, as on a drive."""
+WARNINGS: Final = 5
+"""Kinds of warnings of single drives that the summary has."""
 Rows = list[dict[str, Any]]
 
 
@@ -36,12 +39,15 @@ def summarise(
     folder: Path, members: Sequence[Member], settings: EvaluationSettings
 ) -> dict[str, Any]:
     """Return the content of ``fleet.json``, but for its format and settings, from the tables."""
-    columns = ["drive", "status", "reason", "evaluated", *(column.name for column in LIGHT)]
+    columns = ["drive", "status", "reason", "evaluated", "sha256", "warnings"]
+    columns += [column.name for column in LIGHT]
     drives: Rows = read_parquet(folder / "drives.parquet", columns).to_pylist()
     known = {member.drive: member for member in members}
     across = AcrossSettings(confidence=settings.confidence)
     effects = _final_effects(folder)
-    found = [_across(key, rows, known, across) for key, rows in effects.items()]
+    copies = _copies(drives)
+    groups = {drive: member.group or copies.get(drive, drive) for drive, member in known.items()}
+    found = [_across(key, rows, groups, across) for key, rows in effects.items()]
     summary: dict[str, Any] = {
         "version": VERSION,
         "drives": [_member(member) for member in members],
@@ -50,9 +56,46 @@ def summarise(
         "failed": {d["drive"]: d["reason"] for d in drives if d["status"] == FAILED},
         "rates": _rates(folder),
         "effects": found,
-        "strata": _strata(effects, drives, known, across),
+        "strata": _strata(effects, drives, known, groups, across),
+        "warnings": [*_of_copies(copies), *_of_drives(drives)],
     }
     return {"verdict": verdict_of(summary, settings)} | summary
+
+
+def _copies(drives: Rows) -> dict[str, str]:
+    """Return drives whose log is another one's, byte for byte, and the first of these."""
+    logs: dict[str, str] = {}
+    for row in drives:
+        if row["sha256"]:
+            logs.setdefault(row["sha256"], row["drive"])
+    firsts = {row["drive"]: str(logs.get(row["sha256"], row["drive"])) for row in drives}
+    return {drive: first for drive, first in firsts.items() if drive != first}
+
+
+def _of_copies(copies: Mapping[str, str]) -> Iterator[str]:
+    if copies:
+        copy, of = next(iter(copies.items()))
+        count = len(copies)
+        rest = f" and {count - 1} more are copies of others" if count > 1 else ""
+        yield (
+            f"{copy} is a copy of {of}, byte for byte{rest}: differences count copies as one "
+            "drive, means of rates do not"
+        )
+
+
+def _of_drives(drives: Rows) -> Iterator[str]:
+    """Yield the drives' own warnings, those that differ by numbers alone together."""
+    alike: dict[str, list[tuple[str, str]]] = {}
+    for row in drives:
+        for sentence in (row["warnings"] or "").splitlines():
+            alike.setdefault(re.sub(r"\d+", "", sentence), []).append((row["drive"], sentence))
+    ranked = sorted(alike.values(), key=lambda own: -len(own))
+    for own in ranked[:WARNINGS]:
+        drive, sentence = own[0]
+        more = f" (and {len(own) - 1} more alike)" if len(own) > 1 else ""
+        yield f"{drive}{more}: {sentence}"
+    if len(ranked) > WARNINGS:
+        yield f"{len(ranked) - WARNINGS} other warnings of drives: see drives.parquet"
 
 
 def drive_effect(row: Mapping[str, Any], group: str | None, *, counted: bool) -> DriveEffect:
@@ -87,10 +130,10 @@ def _final_effects(folder: Path) -> dict[Key, Rows]:
 
 
 def _across(
-    key: Key, rows: Rows, known: Mapping[str, Member], settings: AcrossSettings
+    key: Key, rows: Rows, groups: Mapping[str, str], settings: AcrossSettings
 ) -> dict[str, Any]:
     kind, variant, stage, base, metric = key
-    effects = [drive_effect(row, known[row["drive"]].group, counted=True) for row in rows]
+    effects = [drive_effect(row, groups[row["drive"]], counted=True) for row in rows]
     better = METRICS[metric].higher_is_better
     across = across_drives(effects, settings, higher_is_better=better)
     named = {"kind": kind, "variant": variant, "stage": stage, "base": base, "metric": metric}
@@ -101,6 +144,7 @@ def _strata(
     effects: Mapping[Key, Rows],
     drives: Rows,
     known: Mapping[str, Member],
+    groups: Mapping[str, str],
     settings: AcrossSettings,
 ) -> Rows:
     """Divide the drives by each tag and by the measured light, for each difference of ERR."""
@@ -110,7 +154,7 @@ def _strata(
     for (kind, variant, stage, base, metric), rows in effects.items():
         if metric != TESTED:
             continue
-        own = [drive_effect(row, known[row["drive"]].group, counted=False) for row in rows]
+        own = [drive_effect(row, groups[row["drive"]], counted=False) for row in rows]
         tags = {key: [known[e.drive].tags.get(key) for e in own] for key in keys}
         conditions = {c.name: [light[e.drive][c.name] for e in own] for c in LIGHT}
         named = {"kind": kind, "variant": variant, "stage": stage, "base": base, "metric": metric}

@@ -54,7 +54,7 @@ def sentence(found: Mapping[str, Any], what: str, settings: EvaluationSettings) 
     """
     over, rate = _drives(found["drives"]), f"{found['metric']} of {found['stage']}"
     if found["clusters"] < found["drives"]:
-        over += f" in {found['clusters']} groups"
+        over += f" in {found['clusters']} group{'s' * (found['clusters'] != 1)}"
     counted = f"worse on {found['worse']}, better on {found['better']}"
     mean, low, high = (found[name] for name in ("mean", "low", "high"))
     verb, size = ("raises" if (mean or 0) > 0 else "lowers"), _percent(abs(mean or 0))

@@ -66,3 +66,9 @@ def test_a_head_that_claims_too_much_is_refused_before_anything_is_read():
     head = file_of(np.zeros((1, 1), "u1")).replace(b"(1, 1), }", b"(9999, 9999), }")
     with pytest.raises(ImageError, match="more than the 1000 pixels"):
         npy_picture(head, LIMITS)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, -1.0])
+def test_a_fraction_that_is_no_confidence_is_refused(value):
+    with pytest.raises(BadMessage, match="neither a class nor a confidence"):
+        npy_picture(file_of(np.array([[0.5, value]])), LIMITS)
