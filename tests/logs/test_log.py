@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -197,6 +198,19 @@ def test_a_stamp_that_cannot_be_read_is_told_from_every_time(
 
         monkeypatch.setattr(reader, "message", message)
         assert [reader.stamp(i) for i in (0, 1, 2, 1)] == [0, UNREADABLE, 2, UNREADABLE]
+
+
+@pytest.mark.parametrize("stamp", [2**63 - 1, 2**63, 10**40, -(10**40)])
+def test_a_stamp_beyond_all_clocks_cannot_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stamp: int
+) -> None:
+    path = ros2_log(tmp_path / "drive.mcap", [("/cam", 1, compressed(1, jpeg(grey(9))))])
+    with open_log(path) as log:
+        reader = log._readers["/cam"]
+        monkeypatch.setattr(
+            reader, "_decoder", lambda _: SimpleNamespace(stamp=lambda _data: stamp)
+        )
+        assert reader.stamp(0) == (stamp if stamp == 2**63 - 1 else UNREADABLE)
 
 
 def test_truth_of_another_size_is_refused_and_the_remedy_named(tmp_path: Path) -> None:

@@ -133,8 +133,8 @@ def _how_sure(told: Mapping[str, Any]) -> str:
         return ""
     first = effects[0]
     groups = (
-        f" The {first['drives']} drives are {first['clusters']} groups: drives of a group count "
-        "as one."
+        f" The {first['drives']} drives count as {first['clusters']}: those of a group are one, and "
+        "so are copies of a log."
         if first["clusters"] < first["drives"]
         else ""
     )
@@ -172,7 +172,7 @@ def _warnings(findings: FleetFindings) -> Iterator[str]:
             "these is evaluated): the rates say how well it does on a road that it has seen."
         )
     yield from _worse_than_baseline(told)
-    yield from told.get("warnings", ())  # earlier versions have none
+    yield from (f"{sentence}." for sentence in told.get("warnings", ()))
 
 
 def _drives(count: int) -> str:

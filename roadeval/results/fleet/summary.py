@@ -76,10 +76,10 @@ def _of_copies(copies: Mapping[str, str]) -> Iterator[str]:
     if copies:
         copy, of = next(iter(copies.items()))
         count = len(copies)
-        rest = f" and {count - 1} more are copies of others" if count > 1 else ""
+        more = f", and {count - 1} more are copies, too" if count > 1 else ""
         yield (
-            f"{copy} is a copy of {of}, byte for byte{rest}: differences count copies as one "
-            "drive, means of rates do not"
+            f"{copy} is a copy of {of}, byte for byte{more}: differences count copies as one "
+            "drive, the means of rates do not"
         )
 
 
