@@ -43,6 +43,8 @@ class FleetOutcome:
         Why drives failed, by the drives' names in the fleet.
     summary
         The content of ``fleet.json``.
+    unused
+        Settings of single drives (`RunConfig.drives`) that hold for none of these, by their paths.
     """
 
     folder: Path
@@ -50,6 +52,7 @@ class FleetOutcome:
     replayed: int
     problems: Mapping[str, str]
     summary: Mapping[str, Any]
+    unused: Sequence[str] = ()
 
     @property
     def held(self) -> list[str]:
@@ -133,7 +136,12 @@ def replay_fleet(
     counts = Counter(each.status for each in run.done.values())
     problems = {d.drive: d.reason for d in run.done.values() if d.status == FAILED}
     replayed = sum(not each.repeated for each in run.done.values())
-    return FleetOutcome(writer.folder, counts, replayed, problems, summary)
+    unused = [
+        each.path
+        for each in config.drives
+        if not any(each.holds_for(entry.source) for entry in entries)
+    ]
+    return FleetOutcome(writer.folder, counts, replayed, problems, summary, unused)
 
 
 def _judge_failures(run: FleetRun, allowed: str | None) -> None:

@@ -86,6 +86,8 @@ def show_effects(effects: Sequence[Mapping[str, Any]], out: Console) -> None:
 
 def problems(outcome: FleetOutcome) -> Iterator[str]:
     """Yield what to know first, and why drives failed, with the first drives of each reason."""
+    for path in outcome.unused:
+        yield f"the settings for {path} hold for none of these drives"
     yield from outcome.summary["warnings"]
     for condition in outcome.summary["conditions"]:
         if condition["judged"] and (missing := [*condition["not_judged"].values()]):

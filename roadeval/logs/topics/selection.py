@@ -35,6 +35,8 @@ from roadeval.logs.topics.reader import TopicReader
 if TYPE_CHECKING:
     from roadeval.logs.topics.mask_source import MaskSource
 
+ALONE_NS: Final = 50_000_000
+"""Half the period of a camera of 10 Hz."""
 LOOKED_AT: Final = 10
 """Label images at the log's start, and as many spread over it, that settle what values mean."""
 
@@ -224,9 +226,14 @@ def clock_of(reader: TopicReader) -> Clock:
 
 
 def tolerance(reader: TopicReader, asked_ms: float | None) -> int:
-    """Return the tolerance asked for, or else half the frame period, in nanoseconds."""
+    """Return the tolerance asked for, or else half the frame period, in nanoseconds.
+
+    An image alone has no period; what is within `ALONE_NS` of it belongs to it.
+    """
     if asked_ms is not None:
         return round(asked_ms * 1e6)
+    if len(reader) == 1:
+        return ALONE_NS
     period = median_period(reader.log_times)
     if period == 0:
         stamps = sorted(reader.stamp(position) for position in range(min(LOOKED_AT, len(reader))))

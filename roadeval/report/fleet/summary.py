@@ -133,8 +133,8 @@ def _how_sure(told: Mapping[str, Any]) -> str:
         return ""
     first = effects[0]
     groups = (
-        f" The {first['drives']} drives count as {first['clusters']}: those of a group are one, and "
-        "so are copies of a log."
+        f" The {first['drives']} drives count as {first['clusters']}: those of a group are one, "
+        "and so are copies of a log."
         if first["clusters"] < first["drives"]
         else ""
     )

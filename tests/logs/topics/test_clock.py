@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from roadeval.logs.topics.pairing import UNREADABLE
-from roadeval.logs.topics.selection import Clock, clock_of, tolerance
+from roadeval.logs.topics.selection import ALONE_NS, Clock, clock_of, tolerance
 
 BAD = UNREADABLE
 TIMES = [100, 200, 300]
@@ -47,6 +47,8 @@ def test_stamps_count_unless_they_are_zero_or_equal(stamps, times, clock):
         ([0, 1000, 2000, 3000], [7, 7, 7, 7], None, 500),
         ([0, BAD, 2000, BAD], [7, 7, 7, 7], None, 1000),
         ([0, 1000, 2000, 3000], TIMES, 1.5, 1_500_000),
+        ([1000], [100], None, ALONE_NS),
+        ([1000], [100], 1.5, 1_500_000),
     ],
 )
 def test_half_the_frame_period_may_lie_between_an_image_and_its_label(
