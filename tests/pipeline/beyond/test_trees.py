@@ -86,7 +86,9 @@ def test_bins_of_many_values_weigh_the_same(weighted):
     [
         ([5, 5, 5], []),
         ([3, 1, 1, 2], [1.5, 2.5]),
-        ([1, np.nextafter(np.float32(1), np.float32(2))], [1]),
+        # Neighbours among the numbers; the middle of the latter two rounds to the upper one.
+        ([1, 1 + 2**-23], [1]),
+        ([1 + 2**-23, 1 + 2**-22], [1 + 2**-23]),
         ([2e38, 3.4e38], [2.7e38]),
     ],
 )
