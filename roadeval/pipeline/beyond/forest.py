@@ -189,6 +189,11 @@ def bin_edges(feature: Values, weights: Floats) -> Values:
         ``(n,)`` finite values.
     weights
         ``(n,)`` of the pixels, above 0.
+
+    Returns
+    -------
+    Values
+        ``(e,)`` float32, each once; none where all values are equal.
     """
     order = np.argsort(feature)
     ascending: Values = feature[order]

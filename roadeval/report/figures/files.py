@@ -47,6 +47,8 @@ def write_figures(folder: Path, data: FigureData) -> list[Path]:
     ------
     OSError
         If the folder cannot be written to.
+    ReportError
+        If the system's folder for temporary files cannot be.
     """
     folder.mkdir(parents=True, exist_ok=True)
     # Typst, which sets the reports too, makes both files of one SVG in a few hundredths of a second
