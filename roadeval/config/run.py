@@ -221,6 +221,11 @@ class RunConfig:
         base = replace(self, labels=labels)
         return base.override(drive.tables, drive.where)
 
+    def unused(self, drives: Iterable[str | os.PathLike[str]]) -> list[str]:
+        """Return the paths of those settings of single drives that hold for none of these."""
+        there = [*drives]
+        return [own.path for own in self.drives if not any(map(own.holds_for, there))]
+
     def ignored(self) -> tuple[str, ...]:
         """Name what presets of further variants ask for, and what holds for the whole run."""
         return tuple(

@@ -136,11 +136,7 @@ def replay_fleet(
     counts = Counter(each.status for each in run.done.values())
     problems = {d.drive: d.reason for d in run.done.values() if d.status == FAILED}
     replayed = sum(not each.repeated for each in run.done.values())
-    unused = [
-        each.path
-        for each in config.drives
-        if not any(each.holds_for(entry.source) for entry in entries)
-    ]
+    unused = config.unused(entry.source for entry in entries)
     return FleetOutcome(writer.folder, counts, replayed, problems, summary, unused)
 
 

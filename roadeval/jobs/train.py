@@ -129,10 +129,9 @@ def _lost(drawn: Mapping[Path, _Drawn]) -> Iterator[str]:
 
 def _require_a_drive_for_each(config: RunConfig, drives: Sequence[AnyPath]) -> None:
     """Refuse settings of single drives that hold for none of these."""
-    for each in config.drives:
-        if not any(each.holds_for(drive) for drive in drives):
-            names = ", ".join(map(str, drives))
-            raise ConfigError(f"`drives` {each.path}: is none of the drives {names}")
+    for path in config.unused(drives):
+        names = ", ".join(map(str, drives))
+        raise ConfigError(f"`drives` {path}: is none of the drives {names}")
 
 
 def _understood(selection: logs.Selection, own: RunConfig) -> Iterator[str]:
