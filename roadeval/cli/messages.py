@@ -14,6 +14,8 @@ from roadeval.cli.options import with_flags
 from roadeval.runtime.text import visible, visible_lines
 
 PROGRAM: Final = "roadeval"
+LONGEST: Final = 5_000
+"""Letters of a sentence that are shown: a damaged or hostile file may hold names of any length."""
 
 
 def error(sentence: object) -> None:
@@ -71,8 +73,14 @@ def one_line(sentence: object) -> str:
     return " ".join(line.strip() for line in str(sentence).splitlines())
 
 
+def _shortened(sentence: str) -> str:
+    """Leave out the middle of a sentence that nobody would read to its end."""
+    half = LONGEST // 2
+    return sentence if len(sentence) <= LONGEST else f"{sentence[:half]} ... {sentence[-half:]}"
+
+
 def _write(kind: str, style: str, sentence: object) -> None:
-    said = visible(str(sentence))
+    said = visible(_shortened(str(sentence)))
     try:
         from rich.text import Text
 

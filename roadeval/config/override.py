@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import takewhile
 from json import dumps
 from typing import Any, Final
 
@@ -17,6 +18,7 @@ PLAIN_WORDS: Final[Mapping[str, str]] = {
     "float_": "must be a number",
     "finite_number": "must be a finite number",
     "bool_": "must be true or false",
+    "string_pattern": "must match {pattern}",
     "string_": "must be text",
     "tuple_type": "must be a list",
     "dict_type": "must be a table",
@@ -95,9 +97,10 @@ def named(table: str, keys: Sequence[str | int], where: str) -> str:
     >>> named("post", ("patch", "top"), "wide.toml")
     'wide.toml: [post] patch.top: '
     """
-    key = ".".join(part for part in keys if isinstance(part, str))
-    items = [part + 1 for part in keys if isinstance(part, int)]
-    item = f", item {items[0]}" if items else ""
+    # After an item's number comes which of its types the validating library tried.
+    names = list(takewhile(lambda part: isinstance(part, str), keys))
+    key, rest = ".".join(map(str, names)), keys[len(names) :]
+    item = f", item {int(rest[0]) + 1}" if rest else ""
     if where:
         return f"{where}: [{table}] {key}{item}{': ' if key else ''}"
     return f"`{table}.{key}`{item}: " if key else ""

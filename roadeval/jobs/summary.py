@@ -111,8 +111,16 @@ def _missing(run: Run) -> Iterator[str]:
             without = f"{name}: {missing} of the {seen.read} frames read have no mask of it"
             rest = "it is scored on the others alone" if name in totals else "it has no score"
             yield f"{without}: {rest}"
-        if name in elsewhere and (unused := elsewhere[name].pairing.unused):
-            yield f"{name}: {unused} files of {elsewhere[name].where} belong to no frame"
+        if name not in elsewhere:
+            continue
+        pairing, where = elsewhere[name].pairing, elsewhere[name].where
+        if pairing.unsure:
+            yield (
+                f"{name}: the last {pairing.unsure} frames of the log have no mask of {where}: an "
+                "unknown number of images or masks is lost before them, and numbers pair them"
+            )
+        if pairing.unused:
+            yield f"{name}: {pairing.unused} files of {where} belong to no frame"
 
 
 def _masks(run: Run) -> dict[str, Any]:

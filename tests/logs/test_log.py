@@ -71,6 +71,15 @@ def test_an_unlabelled_log_works(tmp_path: Path) -> None:
     assert any("no truth" in reason for reason in selection.reasons)
 
 
+def test_a_topic_is_not_scored_against_itself(tmp_path: Path) -> None:
+    with open_log(drive(tmp_path / "drive.mcap", STAMPS, STAMPS)) as log:
+        own = TopicSettings(image="/labels", truth="/labels")
+        with pytest.raises(LogError, match=r"`topics.truth` /labels: it is the image's own topic"):
+            log.select(own)
+        with pytest.raises(LogError, match=r"`topics.masks` net: /labels is the truth"):
+            log.select(TopicSettings(masks={"net": "/labels"}))
+
+
 def test_frames_can_be_read_again(tmp_path: Path) -> None:
     path = drive(tmp_path / "drive.mcap", STAMPS)
     with open_log(path) as log:

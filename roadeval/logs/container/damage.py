@@ -5,9 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
+
+import numpy as np
 
 from roadeval.logs.container.file import Container
+from roadeval.logs.container.scan import Gap
 from roadeval.logs.times import NS
+
+ANYWHERE: Final = int(np.iinfo(np.int64).min)
+"""A log time before all others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,15 +82,44 @@ def damage_of(container: Container) -> tuple[Damage, ...]:
     return tuple(sorted(found, key=lambda damage: damage.offset))
 
 
+def sure_until(container: Container) -> int | None:
+    """Return the log time up to which messages have the positions at which they were written.
+
+    Where messages are lost and nothing tells how many, those after them have other positions. None
+    where all are sure; damage that may lie anywhere gives a time before all others.
+    """
+    if _shift(container):
+        return ANYWHERE
+    ends: list[int] = []
+    for gap in container.scan.gaps:
+        if gap.lossy:
+            before, after = _before(container, gap), gap.after_ns
+            if before is None:
+                return ANYWHERE
+            ends.append(before if after is None else min(before, after) - 1)
+    for number, chunk in enumerate(container.chunks):
+        unlisted = chunk.offset in container.reader.bad and not container.scan.indexes[number]
+        if unlisted or chunk.offset in container.reader.kept:
+            ends.append(chunk.start - 1)
+    if not ends and any(_missing(container)):
+        return ANYWHERE
+    return min(ends, default=None)
+
+
 def _gaps(container: Container) -> Iterator[Damage]:
-    last = container.chunks[-1] if container.chunks else None
     for gap in container.scan.gaps:
         if gap.offset in container.reader.bad and not gap.lossy:
             continue
-        before = gap.before_ns
-        if last is not None and last.cut and last.offset == gap.offset:
-            before = container.saved_ns or before
-        yield Damage(container.path, gap.offset, gap.reason, gap.lossy, before, gap.after_ns)
+        span = (_before(container, gap), gap.after_ns)
+        yield Damage(container.path, gap.offset, gap.reason, gap.lossy, *span)
+
+
+def _before(container: Container, gap: Gap) -> int | None:
+    """Return the log time of the last message before a gap, those saved of a cut chunk included."""
+    last = container.chunks[-1] if container.chunks else None
+    if last is not None and last.cut and last.offset == gap.offset:
+        return container.saved_ns or gap.before_ns
+    return gap.before_ns
 
 
 def _bad_chunks(container: Container) -> Iterator[Damage]:

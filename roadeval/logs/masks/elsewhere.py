@@ -15,7 +15,7 @@ from roadeval.logs.masks.folder import MaskFolder
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.messages.pixels import size_of
 from roadeval.logs.settings import MaskSettings
-from roadeval.logs.topics.confidence import Confidence
+from roadeval.logs.topics.confidence import TOP, Confidence, holds_fractions
 from roadeval.logs.topics.label_meaning import understand
 from roadeval.logs.topics.label_reader import LabelPictures, Times, clocks_of
 from roadeval.logs.topics.labels import Meaning, seen_in
@@ -28,6 +28,8 @@ _TOPIC_OF_A_LOG: Final = re.compile(r"(.+\.mcap|.{2,}(?=:/)):(.+)")
 """A letter alone before the colon is a disk's."""
 _CLASSES: Final = 64
 """Values of more than so many kinds may be confidences."""
+_BYTE: Final = 255
+"""Greatest code of a confidence map of 16 bits that was made for 8."""
 _ONES: Final = (1, 257)
 """Greatest codes of a confidence map whose greatest value is 1, of 16 and of 8 bits."""
 
@@ -55,7 +57,7 @@ def of_folder(
     if folder.by == "stamp":
         pairing = _by_time(images, folder, selection)
     else:
-        pairing = _by_number(len(images), folder, settings)
+        pairing = _by_number(images, folder, settings)
     why = f"{len(folder)} files, paired by {folder.by}"
     meaning = _meaning(folder, settings, selection)
     return MaskSource(folder.name, folder, meaning, pairing, why, lambda: folder.digest)
@@ -80,8 +82,11 @@ def of_topic(
     if settings.images is not None:
         raise LogError("images are for a folder of masks: those of a log have no names")
     if settings.pair == "number":
-        numbers = range(-settings.first, len(reader) - settings.first)
-        pairing = MaskPairing((Times(range(len(images))), Times(numbers)), 0, 0)
+        numbers = Times(range(-settings.first, len(reader) - settings.first), reader.sure)
+        frames = Times(range(len(images)), images.sure)
+        lost = reader.sure - settings.first if reader.sure < len(reader) else len(images)
+        unsure = len(images) - max(0, min(images.sure, lost))
+        pairing = MaskPairing((frames, numbers), 0, 0, unsure)
     else:
         pairing = _by_time(images, reader, selection)
     by = settings.pair or str(selection.clock)
@@ -133,15 +138,25 @@ def _span(stamps: list[int]) -> str:
     return f"{stamps[0]} to {stamps[1]} ns"
 
 
-def _by_number(frames: int, folder: MaskFolder, settings: MaskSettings) -> MaskPairing:
-    """Pair by frame numbers; a `LogError` if none is a frame's, or they look shifted by one."""
+def _by_number(images: TopicReader, folder: MaskFolder, settings: MaskSettings) -> MaskPairing:
+    """Pair by frame numbers; a `LogError` if none is a frame's, or they look shifted by one.
+
+    Frames after the loss of an unknown number of images have no number that is sure, and no mask.
+    """
     keys, first = folder.log_times, settings.first
+    frames, sure = len(images), images.sure
+    named, cut = folder.images, images.expected() != frames
+    if named is not None and (named < frames or (named > frames and not cut)):
+        raise LogError(
+            f"{folder.name}: {settings.images} holds {named} images and the log {frames}, so it "
+            "was not made of all of them: leave out images, and pair masks by number or stamp"
+        )
     inside = int(np.count_nonzero((keys >= 0) & (keys < frames)))
     if not inside:
         theirs = f"{keys[0] + first} to {keys[-1] + first}" if len(keys) else "none"
-        named = "no image has the name of one" if folder.by == "name" else f"theirs are {theirs}"
+        what = "no image has the name of one" if folder.by == "name" else f"theirs are {theirs}"
         raise LogError(
-            f"{folder.name}: no mask belongs to a frame by {folder.by}: {named}, and the frames' "
+            f"{folder.name}: no mask belongs to a frame by {folder.by}: {what}, and the frames' "
             f"numbers are {first} to {first + frames - 1}"
         )
     if folder.by == "number" and (keys[0], keys[-1]) == (1, frames) and len(keys) == frames:
@@ -150,14 +165,15 @@ def _by_number(frames: int, folder: MaskFolder, settings: MaskSettings) -> MaskP
             f"{first} to {first + frames - 1}: if its masks begin at the first frame, set first = "
             f"{first + 1} in [masks]"
         )
-    return MaskPairing((Times(range(frames)), folder), 0, len(folder) - inside + folder.nameless)
+    unused = len(folder) - inside + folder.nameless if sure == frames else 0
+    return MaskPairing((Times(range(frames), sure), folder), 0, unused, frames - sure)
 
 
 def _meaning(pictures: LabelPictures, settings: MaskSettings, selection: Selection) -> Meaning:
     """Look at some masks: their size must fit, and their values be known."""
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     seen: list[int] = []
-    problem = ""
+    problem, fractions = "", False
     for picture in samples(pictures):
         try:
             _check_size(picture, pictures.name, selection)
@@ -165,6 +181,7 @@ def _meaning(pictures: LabelPictures, settings: MaskSettings, selection: Selecti
                 seen += seen_in(picture, settings.labels, pictures.name, pictures.limits)
             else:
                 seen.append(int(confidence.read(picture, pictures.limits).max()))
+                fractions |= holds_fractions(picture)
         except BadMessage as error:
             problem = problem or str(error)
     if not seen:
@@ -173,6 +190,11 @@ def _meaning(pictures: LabelPictures, settings: MaskSettings, selection: Selecti
         return _understood(settings, seen, pictures.name)
     if max(seen) in _ONES:
         raise LogError(f"{pictures.name} holds only 0 and 1, as masks do: leave out the threshold")
+    if 0 < max(seen) <= _BYTE and not fractions:
+        raise LogError(
+            f"{pictures.name} holds no confidence above {max(seen) / TOP:.4f}: whole numbers of 16 "
+            "bits count as shares of 65535; write those from 0 to 255 with 8 bits"
+        )
     return confidence
 
 

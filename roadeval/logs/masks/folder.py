@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -51,6 +51,8 @@ class MaskFolder:
         On the images.
     nameless
         Further files, whose name no image has.
+    images
+        How many images the folder holds whose names they have; None where names mean nothing.
     """
 
     path: Path
@@ -59,11 +61,17 @@ class MaskFolder:
     by: str
     limits: Limits
     nameless: int = 0
+    images: int | None = None
 
     @property
     def name(self) -> str:
         """The folder, for messages."""
         return visible(str(self.path))
+
+    @property
+    def sure(self) -> int:
+        """All of them: their keys are their names."""
+        return len(self.files)
 
     def __len__(self) -> int:
         return len(self.files)
@@ -125,20 +133,25 @@ def open_folder(path: Path, settings: MaskSettings, limits: Limits) -> MaskFolde
     if path.suffix == ".mcap" and path.is_file():
         raise LogError(f"{path}: a log; name a topic of it, as {path}:/topic")
     files = listed(path, MASKS)
-    by, keys = _keys(files, settings)
+    named = None if settings.images is None else _places(Path(settings.images))
+    by, keys = _keys(files, settings, named)
     places = sorted(keys, key=keys.__getitem__)
     for one, other in pairwise(places):
         if keys[one] == keys[other]:
             both = f"{visible(one.name)} and {visible(other.name)}"
             raise LogError(f"{path}: {both} belong to the same frame, by {by}")
     in_order = np.array([keys[file] for file in places], np.int64)
-    return MaskFolder(path, tuple(places), in_order, by, limits, len(files) - len(places))
+    nameless, images = len(files) - len(places), None if named is None else len(named)
+    return MaskFolder(path, tuple(places), in_order, by, limits, nameless, images)
 
 
-def _keys(files: Sequence[Path], settings: MaskSettings) -> tuple[str, dict[Path, int]]:
+def _keys(
+    files: Sequence[Path], settings: MaskSettings, named: Mapping[str, int] | None
+) -> tuple[str, dict[Path, int]]:
     """Return what the keys are, and that of each file that has one."""
-    if settings.images is not None:
-        return "name", _by_image(files, Path(settings.images))
+    if named is not None:
+        places = {file: named.get(file.stem, named.get(bare(file))) for file in files}
+        return "name", {file: place for file, place in places.items() if place is not None}
     times = {file: time for file in files if (time := time_in(bare(file))) is not None}
     are_times = len(times) == len(files) and all(len(bare(file)) > SHORT for file in files)
     if settings.pair == "number" or (settings.pair is None and not are_times):
@@ -156,19 +169,13 @@ def _number(file: Path) -> int:
     return int(found[1])
 
 
-def _by_image(files: Sequence[Path], folder: Path) -> dict[Path, int]:
-    """Return for each mask the place of the image of its name."""
+def _places(folder: Path) -> dict[str, int]:
+    """Return the place of each image of a folder by its name, without its ending."""
     images, _ = ordered(listed(folder, IMAGES))
     names = [image.stem for image in images]
     if len(set(names)) < len(names):
         raise LogError(f"{folder}: two of its images have the same name")
-    places = {name: place for place, name in enumerate(names)}
-    found = {}
-    for file in files:
-        place = places.get(file.stem, places.get(bare(file)))
-        if place is not None:
-            found[file] = place
-    return found
+    return {name: place for place, name in enumerate(names)}
 
 
 def _content(file: Path) -> bytes:

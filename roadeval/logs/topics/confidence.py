@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, TypeGuard
 
 import numpy as np
 
@@ -16,6 +16,11 @@ from roadeval.logs.messages.pixels import lossy_format, to_labels
 
 TOP: Final = np.iinfo(np.uint16).max
 """The code of certainty."""
+
+
+def holds_fractions(picture: Picture) -> TypeGuard[RawPicture]:
+    """Return whether numbers of a picture have fractions, and are not whole."""
+    return isinstance(picture, RawPicture) and format_of(picture).dtype == "f4"
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +49,7 @@ class Confidence:
         """
         if name := lossy_format(picture):
             raise BadMessage(f"a {name}, whose compression changes confidences")
-        if isinstance(picture, RawPicture) and format_of(picture).dtype == "f4":
+        if holds_fractions(picture):
             values = rows_of(picture, format_of(picture), limits)
             if not ((values >= 0) & (values <= 1)).all():
                 raise BadMessage("it holds a confidence that is not from 0 to 1")

@@ -13,7 +13,7 @@ from roadeval.logs.errors import FrameError
 from roadeval.logs.messages.pictures import Picture
 from roadeval.logs.messages.video import PictureSequence
 from roadeval.logs.topics.labels import Label, Meaning
-from roadeval.logs.topics.pairing import Pairing, Stamps
+from roadeval.logs.topics.pairing import UNREADABLE, Pairing, Stamps
 from roadeval.logs.topics.reader import TopicReader
 from roadeval.logs.topics.selection import Clock
 
@@ -36,6 +36,10 @@ class LabelPictures(PictureSequence, Stamps, Protocol):
     def log_times(self) -> npt.NDArray[np.int64]:
         """``(n,)`` int64, rising."""
 
+    @property
+    def sure(self) -> int:
+        """How many of them, from the first one on, surely have the positions they were made at."""
+
     def __len__(self) -> int: ...
 
     def place(self, position: int) -> str:
@@ -44,17 +48,28 @@ class LabelPictures(PictureSequence, Stamps, Protocol):
 
 
 class Times:
-    """Other numbers in place of stamps, for logs whose stamps are all zero or equal."""
+    """Other numbers in place of stamps, for logs whose stamps are all zero or equal.
 
-    def __init__(self, times: Sequence[int] | npt.NDArray[np.int64]) -> None:
+    Parameters
+    ----------
+    times
+        By position, rising.
+    sure
+        How many of them are known; the others count as unreadable. By default all are.
+    """
+
+    def __init__(
+        self, times: Sequence[int] | npt.NDArray[np.int64], sure: int | None = None
+    ) -> None:
         self._times = times
+        self._sure = len(times) if sure is None else sure
 
     def __len__(self) -> int:
         return len(self._times)
 
     def stamp(self, position: int) -> int:
-        """Return the number at a position."""
-        return int(self._times[position])
+        """Return the number at a position, or `UNREADABLE`."""
+        return int(self._times[position]) if position < self._sure else UNREADABLE
 
 
 def clocks_of(images: TopicReader, labels: LabelPictures, clock: Clock) -> Clocks:
@@ -65,7 +80,7 @@ def clocks_of(images: TopicReader, labels: LabelPictures, clock: Clock) -> Clock
         return Times(images.log_times), Times(labels.log_times)
     # Without any time, order means something only if there is a label for each image.
     count = len(labels) if len(images) == len(labels) else 0
-    return Times(range(len(images))), Times(range(count))
+    return Times(range(len(images)), images.sure), Times(range(count), min(count, labels.sure))
 
 
 class LabelReader:

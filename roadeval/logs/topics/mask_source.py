@@ -23,11 +23,15 @@ class MaskPairing:
         How far a pair may be apart.
     unused
         Masks that belong to no frame of the log, as far as that is known beforehand.
+    unsure
+        Frames without a mask for want of a number that is sure: an unknown number of images, or of
+        the other log's masks, is lost before them.
     """
 
     clocks: Clocks
     tolerance: int
     unused: int
+    unsure: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from mcap.records import Channel, Schema
 
 from roadeval.images import Limits
+from roadeval.logs.container.damage import sure_until
 from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError
@@ -160,6 +161,18 @@ class TopicReader:
     def expected(self) -> int:
         """How many messages there should be, by the files' own statistics."""
         return sum(s.container.expected.get(s.channel_id, 0) for s in self.channels)
+
+    @property
+    def sure(self) -> int:
+        """How many messages, from the first one on, surely have the positions they were written at.
+
+        Damage may have taken an unknown number of messages before the others.
+        """
+        ends = [sure_until(source.container) for source in self.channels]
+        known = [end for end in ends if end is not None]
+        if not known:
+            return len(self)
+        return int(np.searchsorted(self.log_times, min(known), side="right"))
 
     def readable(self) -> int:
         """Messages that are in the log, less those in chunks found to be damaged."""

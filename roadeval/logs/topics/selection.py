@@ -147,6 +147,7 @@ def settle(
         name: Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")
         for name, topic in asked.masks.items()
     }
+    _check_roles(image, truth, {f"`topics.masks` {name}": mask for name, mask in masks.items()})
     look = partial(_label_topic, readers, image, resize=asked.resize_truth, several=several)
     return Selection(
         image=image,
@@ -160,6 +161,15 @@ def settle(
         scale=scale,
         no_truth="" if truth.topic else truth.why,
     )
+
+
+def _check_roles(image: TopicInfo, truth: Choice, masks: Mapping[str, Choice]) -> None:
+    """Refuse, as a `LogError`, what would be scored against itself."""
+    if truth.topic == image:
+        raise LogError(f"`topics.truth` {image.name}: it is the image's own topic")
+    for setting, mask in masks.items():
+        if truth.topic is not None and mask.topic == truth.topic:
+            raise LogError(f"{setting}: {truth.topic.name} is the truth that it is held against")
 
 
 def _label_topic(

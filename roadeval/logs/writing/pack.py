@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from roadeval.images import ImageError, Limits, to_png
+from roadeval.images import ImageError, ImageFormat, Limits, format_of, size_of, to_png
 from roadeval.logs.errors import LogError
 from roadeval.logs.image_folder import IMAGES, by_name, listed, ordered
 from roadeval.logs.times import NS
@@ -23,7 +23,6 @@ NAMED: Final = 3
 LABEL_DELAY_NS: Final = 1
 """A label is logged right after its image."""
 
-_VERBATIM: Final = {".jpg": "jpeg", ".jpeg": "jpeg", ".png": "png"}
 GREATEST: Final = 1 << 30
 """Most pixels of an image that is converted."""
 
@@ -147,14 +146,30 @@ def _pack_video(video: Path, output: Path, rate_hz: float | None) -> PackResult:
 
 def _image(file: Path) -> tuple[bytes, str]:
     """Read an image file as it is, or as a PNG if viewers would not know its format."""
-    name = _VERBATIM.get(file.suffix.lower())
-    return (_read(file), name) if name else (_as_png(file), "png")
+    data = _read(file)
+    format_ = _format(file, data)
+    if format_.media_type is None:
+        return _as_png(file, data), "png"
+    return data, format_.media_type.removeprefix("image/")
 
 
 def _label(file: Path) -> bytes:
-    if _VERBATIM.get(file.suffix.lower()) == "jpeg":
+    data = _read(file)
+    format_ = _format(file, data)
+    if format_.name == "JPEG":
         raise LogError(f"{file}: a JPEG blurs its labels; masks must be PNG or another lossless")
-    return _read(file) if file.suffix.lower() == ".png" else _as_png(file)
+    return data if format_.name == "PNG" else _as_png(file, data)
+
+
+def _format(file: Path, data: bytes) -> ImageFormat:
+    """Return the format of an image file, whatever its ending, after a look at its head."""
+    try:
+        size_of(data)
+    except ImageError as error:
+        raise LogError(f"{file}: {error}") from error
+    format_ = format_of(data)
+    assert format_ is not None
+    return format_
 
 
 def _read(file: Path) -> bytes:
@@ -165,8 +180,8 @@ def _read(file: Path) -> bytes:
         raise LogError(f"{file}: {error.strerror}") from error
 
 
-def _as_png(file: Path) -> bytes:
+def _as_png(file: Path, data: bytes) -> bytes:
     try:
-        return to_png(_read(file), Limits(GREATEST))
+        return to_png(data, Limits(GREATEST))
     except ImageError as error:
         raise LogError(f"{file}: {error}") from error

@@ -108,6 +108,31 @@ def test_what_cannot_be_packed_is_refused(tmp_path: Path) -> None:
     assert not out.exists()
 
 
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"no image", "a.png: 8 bytes that are no image of a known format"),
+        (b"", "a.png: 0 bytes"),
+        (png(grey(9))[:20], "a.png: a damaged PNG"),
+    ],
+)
+def test_an_image_file_that_is_none_is_named(tmp_path: Path, content: bytes, message: str) -> None:
+    good = folder(tmp_path / "images", {"a.png": png(grey(9))})
+    bad = folder(tmp_path / "bad", {"a.png": content})
+    with pytest.raises(LogError, match=message):
+        pack(bad, tmp_path / "a.mcap")
+    with pytest.raises(LogError, match=message):
+        pack(good, tmp_path / "a.mcap", masks=bad)
+    assert not (tmp_path / "a.mcap").exists()
+
+
+def test_what_an_image_is_counts_and_not_what_its_name_says(tmp_path: Path) -> None:
+    images = folder(tmp_path / "images", {"a.png": jpeg(grey(9)), "b.jpg": png(grey(8))})
+    with open_log(pack(images, tmp_path / "a.mcap").path) as log:
+        formats = [frame.decode().media_type for frame in log.frames(log.select())]
+    assert formats == ["image/jpeg", "image/png"]
+
+
 def test_a_file_that_is_no_video_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.mp4").write_bytes(b"no video")
     with pytest.raises(LogError, match="not a readable video"):
