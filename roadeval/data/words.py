@@ -44,6 +44,15 @@ def points(difference: float | None, digits: int = 2) -> str:
     return text[1:] if float(text) == 0 else text.replace("-", MINUS)
 
 
+def plain_points(difference: float | None, digits: int = 2) -> str:
+    """Return `points` with the minus sign that every terminal has, and a script can search for.
+
+    >>> plain_points(-0.079)
+    '-7.90'
+    """
+    return points(difference, digits).replace(MINUS, "-")
+
+
 def interval(low: float | None, high: float | None, digits: int = 2) -> str:
     """Return an interval of a difference of two fractions in percentage points.
 

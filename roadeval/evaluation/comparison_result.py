@@ -54,6 +54,11 @@ class MaskComparison:
     new: Mapping[str, float]
     difference: Mapping[str, Difference]
 
+    @property
+    def name(self) -> str:
+        """The result and its variant, which may be called the same."""
+        return self.result if self.result == self.variant else f"{self.result}: {self.variant}"
+
 
 @dataclass(frozen=True, slots=True)
 class MovedFrame:

@@ -40,15 +40,39 @@ class Degree(Enum):
 def degree_of(difference: Difference, settings: EvaluationSettings) -> Degree:
     """Return what is known of a difference, by its corrected p-value where it has one."""
     p = difference.p if difference.p_holm is None else difference.p_holm
-    if difference.frames == 0:
+    return degree(
+        difference.frames,
+        difference.low,
+        difference.high,
+        p,
+        confidence=difference.confidence,
+        negligible=settings.negligible,
+    )
+
+
+def degree(
+    count: int,
+    low: float | None,
+    high: float | None,
+    p: float | None,
+    *,
+    confidence: float,
+    negligible: float,
+) -> Degree:
+    """Return what is known of a difference of so many frames, or drives.
+
+    ``low`` and ``high`` are the ends of its interval, ``p`` the probability of one as large by
+    chance; None where there are too few.
+    """
+    if not count:
         return Degree.UNDEFINED
-    if difference.low is None or difference.high is None or p is None:
+    if low is None or high is None or p is None:
         return Degree.FEW
-    if difference.low == difference.high == 0:
+    if low == high == 0:
         return Degree.SAME
-    if p < 1 - difference.confidence:
+    if p < 1 - confidence:
         return Degree.SURE
-    if max(-difference.low, difference.high) <= settings.negligible:
+    if max(-low, high) <= negligible:
         return Degree.LITTLE
     return Degree.PROBABLE if p <= PROBABLY else Degree.UNKNOWN
 

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from roadeval.data import BASELINE
-from roadeval.data.words import MINUS, percent, points
+from roadeval.data.words import percent, plain_points
 from roadeval.evaluation.comparison_result import (
     Comparison,
     DrivesDiffer,
@@ -101,9 +101,9 @@ def judged(judgement: Judgement) -> str:
     after = f"{percent(judgement.after)} %"
     if not condition.is_change:
         return f"{rate} is {after}: {condition.text} {holds}"
-    change = f"{_points(judgement.after - judgement.before)} pp"
+    change = f"{plain_points(judgement.after - judgement.before)} pp"
     if condition.surely:
-        change += f" [{_points(judgement.low)}, {_points(judgement.high)}]"
+        change += f" [{plain_points(judgement.low)}, {plain_points(judgement.high)}]"
     before = f"{percent(judgement.before)} %"
     return f"{rate} changed by {change} ({before} to {after}): {condition.text} {holds}"
 
@@ -119,8 +119,8 @@ def _change(row: MaskComparison, settings: EvaluationSettings) -> str:
     change = row.difference["ERR"]
     name = row.result if row.result == row.variant else f"{row.variant} of {row.result}"
     better = "worse" if change.mean > 0 else "better"
-    mean = f"ERR {_points(change.mean)} pp"
-    sure = f"{mean} [{_points(change.low)}, {_points(change.high)}]"
+    mean = f"ERR {plain_points(change.mean)} pp"
+    sure = f"{mean} [{plain_points(change.low)}, {plain_points(change.high)}]"
     most = percent(max(-(change.low or 0), change.high or 0))
     ways = what_would_tell(change)
     clauses = {
@@ -174,8 +174,3 @@ def _value(value: Any) -> str:
     if value is None or value in ({}, [], ()):
         return "not given"
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _points(difference: float | None) -> str:
-    """Write a change as sentences do: in ASCII, so that a script can search for it."""
-    return points(difference).replace(MINUS, "-")

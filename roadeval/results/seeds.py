@@ -8,7 +8,7 @@ from statistics import median
 from typing import Any, Final
 
 from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
-from roadeval.data.words import defined, listing, percent
+from roadeval.data.words import defined, listing, percent, plain_points
 
 JUDGED: Final = "ERR"
 """The rate of the sentence."""
@@ -76,8 +76,8 @@ def sentence(seeds: Mapping[str, Any]) -> str:
     effects = seeds["difference"].get(FINAL_STAGE, {}).get(JUDGED, ())
     if effect := Spread.of(effects):
         parts.append(
-            f"{FILTERED} minus {UNFILTERED} {_points(effect.least)} to "
-            f"{_points(effect.greatest)} pp (middle {_points(effect.middle)})"
+            f"{FILTERED} minus {UNFILTERED} {plain_points(effect.least)} to "
+            f"{plain_points(effect.greatest)} pp (middle {plain_points(effect.middle)})"
         )
     begin = f"With {seeds_in_words(seeds)} of the training"
     if not parts:
@@ -86,7 +86,3 @@ def sentence(seeds: Mapping[str, Any]) -> str:
         f"{begin} {JUDGED} of {FINAL_STAGE} is: {listing(parts)}. Tables and recording are those "
         f"of seed {seeds['seeds'][0]}."
     )
-
-
-def _points(fraction: float) -> str:
-    return f"{100 * fraction:+.2f}"  # the verdict's minus sign, which every terminal has

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED
-from roadeval.data.words import in_percent
+from roadeval.data.words import in_percent, plain_points
 from roadeval.evaluation.differences import DriveDifferences, final_stages
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference
@@ -103,8 +103,7 @@ class _Told:
         return f"{in_percent(fraction):.{self._digits}f}"
 
     def _signed(self, fraction: float) -> str:
-        text = f"{in_percent(fraction):+.{self._digits}f}"
-        return text if float(text) else text[1:]
+        return plain_points(fraction, self._digits)
 
 
 def _alone(totals: Mapping[str, Mapping[str, Any]], stages: Mapping[str, str]) -> str:

@@ -197,7 +197,7 @@ def forest(changes: Sequence[MaskComparison]) -> Figure:
         ax.grid(axis="x")
         ax.grid(visible=False, axis="y")
     first = next(iter(grid.values()))
-    first.set_yticks(range(len(changes)), _beside(map(_name, changes)))
+    first.set_yticks(range(len(changes)), _beside(row.name for row in changes))
     first.set_ylim(len(changes) - 0.5, -0.5)
     place_rows(figure, grid.values(), 18.7 * len(changes) + LETTERS, top=EDGE + LINE, bottom=TICKED)
     return figure
@@ -240,11 +240,6 @@ def _rate_axes(*, sharey: bool = False) -> tuple[Figure, dict[str, Axes]]:
 def _beside(names: Iterable[str]) -> list[str]:
     """Return names as they are written left of the axes."""
     return [fitting(name, NAMES * WIDTH * INCH) for name in names]
-
-
-def _name(row: MaskComparison) -> str:
-    same = row.result == row.variant
-    return row.result if same else f"{row.result}: {row.variant}"
 
 
 def _marks(ax: Axes, x: Any, y: Any, look: Look) -> None:

@@ -61,7 +61,7 @@ def changes(finals: Sequence[MaskComparison]) -> list[Chart]:
                     "change", CHANGE, range(len(finals)), [r.difference[rate] for r in finals]
                 )
             ],
-            names=[_name(row) for row in finals],
+            names=[row.name for row in finals],
             unit="pp",
         )
         for rate in SHORT
@@ -106,7 +106,3 @@ def _intervals(name: str, colour: str, places: Sequence[int], found: Sequence[In
 
 def _end(value: float | None) -> float:
     return math.nan if value is None else 100 * value
-
-
-def _name(row: MaskComparison) -> str:
-    return row.result if row.result == row.variant else f"{row.result}: {row.variant}"

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 from roadeval.data import BASELINE
-from roadeval.data.words import MINUS, percent, points
+from roadeval.data.words import percent, plain_points
 from roadeval.evaluation.comparison_result import SettingsDiffer
 from roadeval.evaluation.drives_comparison_result import (
     FALSE,
@@ -234,16 +234,11 @@ def judged(judgement: FleetJudgement, comparison: FleetComparison) -> str:
     after = f"{percent(judgement.after)} %"
     if not condition.is_change:
         return f"{rate} is {after} {over}: {condition.text} {holds}"
-    change = f"{_points(judgement.change)} pp"
+    change = f"{plain_points(judgement.change)} pp"
     if condition.surely:
-        change += f" [{_points(judgement.low)}, {_points(judgement.high)}]"
+        change += f" [{plain_points(judgement.low)}, {plain_points(judgement.high)}]"
     before = f"{percent(judgement.before)} %"
     return f"{rate} changed by {change} {over} ({before} to {after}): {condition.text} {holds}"
-
-
-def _points(difference: float | None) -> str:
-    """Write a change in ASCII, so that a script can search for it."""
-    return points(difference).replace(MINUS, "-")
 
 
 def _stratum(each: FleetStratum) -> dict[str, Any]:

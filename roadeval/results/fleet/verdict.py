@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from roadeval.data.words import in_percent
+from roadeval.data.words import in_percent, plain_points
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.certainty import PROBABLY, Degree
+from roadeval.results.certainty import Degree, degree
 
 RATE: Final = "ERR"
 NOTHING: Final = "Nothing to tell: no drive of the fleet was scored."
@@ -59,13 +59,13 @@ def sentence(found: Mapping[str, Any], what: str, settings: EvaluationSettings) 
     mean, low, high = (found[name] for name in ("mean", "low", "high"))
     verb, size = ("raises" if (mean or 0) > 0 else "lowers"), _percent(abs(mean or 0))
     bound = "" if low is None else _percent(max(-low, high))
-    ends = "" if low is None else f"between {_signed(low)} and {_signed(high)} pp"
+    ends = "" if low is None else f"between {plain_points(low)} and {plain_points(high)} pp"
     sizes = "" if low is None else _sizes(mean, low, high)
     return {
         Degree.UNDEFINED: f"Nothing to compare: no drive has {rate} with and without {what}.",
         Degree.FEW: (
             f"{over} are too few to tell of others ({found['clusters_needed']} are needed): "
-            f"{what} changes {rate} by {_signed(mean or 0)} pp on average, {counted}."
+            f"{what} changes {rate} by {plain_points(mean or 0)} pp on average, {counted}."
         ),
         Degree.SAME: f"Over {over} {what} leaves {rate} of every drive as it is.",
         Degree.SURE: f"Over {over} {what} {verb} {rate} by {size} pp {sizes}: {counted}.",
@@ -77,9 +77,9 @@ def sentence(found: Mapping[str, Any], what: str, settings: EvaluationSettings) 
         ),
         Degree.UNKNOWN: (
             f"Cannot tell over {over} whether {what} changes {rate}: by {ends} "
-            f"({_signed(mean or 0)} on average), {counted}."
+            f"({plain_points(mean or 0)} on average), {counted}."
         ),
-    }[degree(found, settings)]
+    }[_degree(found, settings)]
 
 
 def _sizes(mean: float, low: float, high: float) -> str:
@@ -88,20 +88,10 @@ def _sizes(mean: float, low: float, high: float) -> str:
     return f"[{', '.join(map(_percent, ends))}]"
 
 
-def degree(found: Mapping[str, Any], settings: EvaluationSettings) -> Degree:
-    """Return how sure a difference over drives is."""
-    if not found["drives"]:
-        return Degree.UNDEFINED
+def _degree(found: Mapping[str, Any], settings: EvaluationSettings) -> Degree:
     low, high, p = (found[name] for name in ("low", "high", "p"))
-    if low is None or high is None or p is None:
-        return Degree.FEW
-    if low == high == 0:
-        return Degree.SAME
-    if p < 1 - found["confidence"]:
-        return Degree.SURE
-    if max(-low, high) <= settings.negligible:
-        return Degree.LITTLE
-    return Degree.PROBABLE if p <= PROBABLY else Degree.UNKNOWN
+    confidence, negligible = found["confidence"], settings.negligible
+    return degree(found["drives"], low, high, p, confidence=confidence, negligible=negligible)
 
 
 def _drives(count: int) -> str:
@@ -110,8 +100,3 @@ def _drives(count: int) -> str:
 
 def _percent(fraction: float) -> str:
     return f"{in_percent(fraction):.2f}"
-
-
-def _signed(fraction: float) -> str:
-    text = f"{in_percent(fraction):+.2f}"
-    return text if float(text) else text[1:]
