@@ -4,7 +4,8 @@ The log-odds of road are the sum of many small decision trees, each of which was
 those before it leave [1]_, less a term that is not learnt: ``x = sum - w s max(d - 1, 0)`` with the
 distance d from the reference patch, 1 where roads end, and the share s of light
 (`roadeval.pipeline.beyond.ground.reach`); ``p = 1 / (1 + exp(-x))``. It is computed on a working
-image.
+image, and brought to the camera's pixels by the edges of its image
+(`roadeval.pipeline.beyond.guided`).
 
 References
 ----------
@@ -30,6 +31,7 @@ from roadeval.pipeline.beyond.forest import Forest, grow
 from roadeval.pipeline.beyond.ground.reach import FEATURES, beyond, combined, inputs
 from roadeval.pipeline.beyond.ground.scene import scene_of
 from roadeval.pipeline.beyond.ground_features import GROUPS, at_samples, features, names_of
+from roadeval.pipeline.beyond.guided import guided
 from roadeval.pipeline.beyond.working_image import stretched
 from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.stage import (
@@ -182,7 +184,7 @@ def bind(settings: TreesSettings, forest: Forest) -> Callable[[View], Output]:
         over, around, light = seen[known] if len(known) == len(FEATURES) else inputs(scene)
         far = combined(over, around)
         odds = log_odds(seen, forest) - np.float32(settings.reach_weight) * beyond(far, light)
-        share = stretched(probability(odds), shape)
+        share = np.clip(guided(probability(odds), scene.image, view.image), 0, 1)
         codes = np.rint(share * np.float32(FULL)).astype(np.uint16)
         road = Packed.of(codes > round(settings.threshold * FULL))
         shown = (
