@@ -12,6 +12,7 @@ from pathlib import Path
 
 from roadeval.config import RunConfig
 from roadeval.errors import RoadevalError
+from roadeval.fleet.copies import groups_of
 from roadeval.fleet.engine import ATTEMPTS, died, started
 from roadeval.fleet.entry import DriveEntry
 from roadeval.fleet.errors import FleetError
@@ -167,8 +168,8 @@ class FleetRun:
         """Train the folds' models, and return the tasks of the drives with them."""
         settings = self.config
         assert settings.fleet.folds is not None
-        groups = {entry.id: entry.group or entry.id for entry in self.entries}
-        folds = deal(groups, settings.fleet.folds, settings.training.seed)
+        self.show("looking")
+        folds = deal(groups_of(self.entries), settings.fleet.folds, settings.training.seed)
         by_id = {entry.id: entry for entry in self.entries}
         asked = [by_id[drive] for drive in shuffled(by_id, settings.training.seed)]
         training = [

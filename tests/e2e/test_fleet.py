@@ -221,6 +221,18 @@ def test_no_drive_is_scored_by_a_model_that_saw_it(drives, tmp_path):
         assert {*model["training_frames"]} <= set.union(*others)
 
 
+def test_no_copy_of_a_drive_is_scored_by_a_model_that_saw_the_drive(tmp_path):
+    folder = tmp_path / "logs"
+    write(folder / "a.mcap", 0)
+    for name in ("b", "c"):
+        (folder / f"{name}.mcap").write_bytes((folder / "a.mcap").read_bytes())
+    write(folder / "d.mcap", 100)
+    found, _ = run(folder, tmp_path / "f", executor=ThreadTasks(), folds=2)
+    *copies, other = pq.read_table(found.folder / "drives.parquet").to_pylist()
+    assert {row["fold"] for row in copies} == {1 - other["fold"]}
+    assert [row["evaluated"] for row in copies] == 3 * [FRAMES]
+
+
 class KilledWorker(Exception):  # noqa: N818 - as Dask calls it
     """What Dask says of a task whose workers have died."""
 
