@@ -38,6 +38,12 @@ def take_over(*, debug: bool) -> None:
         os.environ.pop(name, None)
 
 
+def taken_over() -> bool:
+    """Return whether the process is the command's own, and not that of who calls it from Python."""
+    buffer = getattr(sys.stderr, "buffer", None)
+    return isinstance(getattr(buffer, "raw", None), _Lossy)
+
+
 def _fill_closed() -> None:
     """Open what the process was started without, so that no file of ours takes its number.
 

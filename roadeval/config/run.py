@@ -132,6 +132,11 @@ class RunConfig:
         """Return the pipeline of every variant, by name."""
         return {variant.name: variant.pipeline for variant in self.variants()}
 
+    def others_code(self) -> list[str]:
+        """Return the digests of the files with stages that are not roadeval's own, in order."""
+        stages = (stage for pipeline in self.pipelines().values() for stage in pipeline.stages())
+        return sorted({stage.code for stage in stages if stage.code})
+
     def resolved(self) -> RunConfig:
         """Return the configuration with settings stated that stages find in files.
 

@@ -52,6 +52,5 @@ def asked(
     parts = [VERSION, of, json.dumps(settings.as_dict(), sort_keys=True), model]
     if masks:
         parts.append(json.dumps(masks, sort_keys=True))
-    stages = (stage for pipeline in config.pipelines().values() for stage in pipeline.stages())
-    parts += sorted({stage.code for stage in stages if stage.code})
+    parts += config.others_code()
     return hashlib.blake2b("\n".join(parts).encode(), digest_size=16).hexdigest()

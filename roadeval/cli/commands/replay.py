@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from roadeval.cli import arguments, console, messages, progress
+from roadeval.cli import arguments, console, messages, progress, streams
 from roadeval.cli.options import Given, takes
+
+if TYPE_CHECKING:
+    from roadeval.config import RunConfig
 
 
 @takes(
@@ -29,6 +32,7 @@ def replay(
     from roadeval.jobs.replay import replay as run
     from roadeval.results.summary import summary_text
 
+    _spare_pandas(config)
     with progress.watched(quiet) as watch:
         found = run(drive, config, on_progress=watch)
     if json:
@@ -41,6 +45,14 @@ def replay(
     for warning in found.warnings:
         messages.warning(warning)
     return messages.losses(found.losses)
+
+
+def _spare_pandas(config: RunConfig) -> None:
+    """Let the recording be made without pandas, unless code of somebody else may need it."""
+    if streams.taken_over() and config.output.record != "none" and not config.others_code():
+        from roadeval.runtime.arrow import leave_out_pandas
+
+        leave_out_pandas()
 
 
 COMMAND: Final = replay

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from roadeval.data.words import in_percent
-from roadeval.evaluation.comparison_result import MaskComparison
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.uncertainty import Difference
 from roadeval.report.chart import Chart, ChartKind, Level, Series
@@ -21,6 +20,9 @@ from roadeval.report.figures.forest import (
     limits,
 )
 from roadeval.report.figures.style import FAINT, looks
+
+if TYPE_CHECKING:
+    from roadeval.evaluation.comparison_result import MaskComparison
 
 MEAN: Final = "mean over drives"
 CHANGE: Final = FAINT
