@@ -29,10 +29,10 @@ class _NoPandas(MetaPathFinder):
 def leave_out_pandas() -> None:
     """Let Arrow not find pandas when it looks for it, so that it does not import it.
 
-    That takes a fifth of a second or more, and 45 MB, and Arrow does it for every recording. It looks
-    once; what needs pandas, as ``to_pandas``, imports it all the same. But arrays of pandas' own
-    count as any sequence then, and its missing values as any object, so this is for processes in
-    which nobody gives Arrow such. Where pandas is imported already, it is found.
+    That takes a fifth of a second or more, and 45 MB, and Arrow does it for every recording. It
+    looks once; what needs pandas, as ``to_pandas``, imports it all the same. But arrays of pandas'
+    own count as any sequence then, and its missing values as any object, so this is for processes
+    in which nobody gives Arrow such. Where pandas is imported already, it is found.
     """
     import numpy as np
     import pyarrow as pa
