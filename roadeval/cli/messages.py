@@ -80,7 +80,7 @@ def _shortened(sentence: str) -> str:
 
 
 def _write(kind: str, style: str, sentence: object) -> None:
-    said = visible(_shortened(str(sentence)))
+    said = _shortened(visible(str(sentence)))
     try:
         from rich.text import Text
 

@@ -62,8 +62,8 @@ class FleetSettings:
     ----------
     folds
         Deal the drives, or their groups, into so many folds: each is scored by a model that
-        learnt from the other folds. None: ``training.model`` scores all, or each drive trains its
-        own.
+        learnt from the other folds. Copies of one log are of one group. None: ``training.model``
+        scores all, or each drive trains its own.
     training_drives
         Drives that the model of a fold learns from, at most; drawn by ``training.seed``, groups
         in turn. Their training frames are held decoded.

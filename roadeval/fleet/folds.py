@@ -43,7 +43,7 @@ def deal(groups: Mapping[str, str], folds: int, seed: int) -> dict[str, int]:
     if len(names) < folds:
         raise FleetError(
             f"`fleet.folds`: {folds} folds need as many drives with truth, or groups of them, "
-            f"and there are {len(names)}"
+            f"and there are {len(names)} (copies of one log count as one)"
         )
     fold = {name: place % folds for place, name in enumerate(names)}
     return {drive: fold[group] for drive, group in groups.items()}

@@ -116,8 +116,8 @@ def _missing(run: Run) -> Iterator[str]:
         pairing, where = elsewhere[name].pairing, elsewhere[name].where
         if pairing.unsure:
             yield (
-                f"{name}: the last {pairing.unsure} frames of the log have no mask of {where}: an "
-                "unknown number of images or masks is lost before them, and numbers pair them"
+                f"{name}: the last {pairing.unsure} frames of the log have no mask of {where}: "
+                "numbers pair them, and an unknown number of images or masks is lost before them"
             )
         if pairing.unused:
             yield f"{name}: {pairing.unused} files of {where} belong to no frame"

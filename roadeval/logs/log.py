@@ -90,7 +90,7 @@ class Log:
             Container(f, _is_image, message_is_whole, keep_corrupt=limits.keep_damaged)
             for f in files
         ]
-        self._readers = topic_readers(self._containers, limits)
+        self._readers = topic_readers(self._containers, limits, lacks_files=bool(damage))
         self.topics: tuple[TopicInfo, ...] = tuple(
             describe_topic(reader) for _, reader in sorted(self._readers.items())
         )
@@ -212,6 +212,9 @@ class Log:
             )
             self._beside.append(other)
             topic = named(other.topics, place[1], "topic").name
+            truth = selection.truth and selection.truth.topic.name
+            if topic == truth and other.path.resolve() == self.path.resolve():
+                raise LogError(f"{topic} is the truth that it is held against")
             reader = other._readers[topic]
             return of_topic(
                 reader,

@@ -31,8 +31,8 @@ def leave_out_pandas() -> None:
 
     That takes a fifth of a second or more, and 45 MB, and Arrow does it for every recording. It
     looks once; what needs pandas, as ``to_pandas``, imports it all the same. But arrays of pandas'
-    own count as any sequence then, and its missing values as any object, so this is for processes
-    in which nobody gives Arrow such. Where pandas is imported already, it is found.
+    own count as any sequence then, and its missing values as any object: call this only in a
+    process that gives Arrow no objects of pandas'. Where pandas is imported already, it is found.
     """
     import numpy as np
     import pyarrow as pa

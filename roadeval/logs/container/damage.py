@@ -13,7 +13,7 @@ from roadeval.logs.container.file import Container
 from roadeval.logs.container.scan import Gap
 from roadeval.logs.times import NS
 
-ANYWHERE: Final = int(np.iinfo(np.int64).min)
+BEFORE_ALL: Final = int(np.iinfo(np.int64).min)
 """A log time before all others."""
 
 
@@ -89,21 +89,42 @@ def sure_until(container: Container) -> int | None:
     where all are sure; damage that may lie anywhere gives a time before all others.
     """
     if _shift(container):
-        return ANYWHERE
+        return BEFORE_ALL
     ends: list[int] = []
     for gap in container.scan.gaps:
         if gap.lossy:
-            before, after = _before(container, gap), gap.after_ns
+            before, after = _before(container, gap), _least_after(container, gap.offset)
             if before is None:
-                return ANYWHERE
+                return BEFORE_ALL
             ends.append(before if after is None else min(before, after) - 1)
     for number, chunk in enumerate(container.chunks):
-        unlisted = chunk.offset in container.reader.bad and not container.scan.indexes[number]
-        if unlisted or chunk.offset in container.reader.kept:
+        damaged = chunk.offset in container.reader.bad or chunk.offset in container.reader.kept
+        if damaged and not _is_listed(container, number):
             ends.append(chunk.start - 1)
     if not ends and any(_missing(container)):
-        return ANYWHERE
+        return BEFORE_ALL
     return min(ends, default=None)
+
+
+def _least_after(container: Container, offset: int) -> int | None:
+    """Return the least log time of what lies behind a byte; None if nothing does."""
+    times = [chunk.start for chunk in container.chunks if chunk.offset > offset]
+    for values in container.scan.loose.values():
+        times += [time for time, at in zip(values[::2], values[1::2], strict=True) if at > offset]
+    return min(times, default=None)
+
+
+def _is_listed(container: Container, number: int) -> bool:
+    """Return whether all messages of a chunk have their positions, by its message indexes."""
+    index = container.scan.indexes[number] or {}
+    filed = {
+        channel_id: sum(len(entries) for chunk, entries in log.blocks if chunk == number)
+        for channel_id, log in container.logs.items()
+        if log.wanted
+    }
+    return bool(index) and all(
+        filed.get(channel_id, len(entries)) >= len(entries) for channel_id, entries in index.items()
+    )
 
 
 def _gaps(container: Container) -> Iterator[Damage]:

@@ -22,7 +22,7 @@ from roadeval.logs.topics.labels import Meaning, seen_in
 from roadeval.logs.topics.mask_source import MaskPairing, MaskSource
 from roadeval.logs.topics.pairing import UNREADABLE
 from roadeval.logs.topics.reader import TopicReader
-from roadeval.logs.topics.selection import Selection, samples
+from roadeval.logs.topics.selection import Clock, Selection, samples
 
 _TOPIC_OF_A_LOG: Final = re.compile(r"(.+\.mcap|.{2,}(?=:/)):(.+)")
 """A letter alone before the colon is a disk's."""
@@ -82,7 +82,7 @@ def of_topic(
     if settings.images is not None:
         raise LogError("images are for a folder of masks: those of a log have no names")
     if settings.pair == "number":
-        numbers = Times(range(-settings.first, len(reader) - settings.first), reader.sure)
+        numbers = Times(range(-settings.first, reader.sure - settings.first))
         frames = Times(range(len(images)), images.sure)
         lost = reader.sure - settings.first if reader.sure < len(reader) else len(images)
         unsure = len(images) - max(0, min(images.sure, lost))
@@ -131,7 +131,8 @@ def _by_time(images: TopicReader, masks: LabelPictures, selection: Selection) ->
             f"{masks.name}: no mask belongs to a frame: theirs are from {_span(theirs)}, the "
             f"frames from {_span(frames)}, by {selection.clock}"
         )
-    return MaskPairing(clocks, selection.tolerance_ns, 0)
+    sure = min(images.sure, masks.sure) if selection.clock is Clock.ORDER else len(images)
+    return MaskPairing(clocks, selection.tolerance_ns, 0, len(images) - sure)
 
 
 def _span(stamps: list[int]) -> str:
@@ -149,7 +150,7 @@ def _by_number(images: TopicReader, folder: MaskFolder, settings: MaskSettings) 
     if named is not None and (named < frames or (named > frames and not cut)):
         raise LogError(
             f"{folder.name}: {settings.images} holds {named} images and the log {frames}, so it "
-            "was not made of all of them: leave out images, and pair masks by number or stamp"
+            "was not made of all of them: leave `images` out, and pair masks by number or stamp"
         )
     inside = int(np.count_nonzero((keys >= 0) & (keys < frames)))
     if not inside:

@@ -80,7 +80,7 @@ def clocks_of(images: TopicReader, labels: LabelPictures, clock: Clock) -> Clock
         return Times(images.log_times), Times(labels.log_times)
     # Without any time, order means something only if there is a label for each image.
     count = len(labels) if len(images) == len(labels) else 0
-    return Times(range(len(images)), images.sure), Times(range(count), min(count, labels.sure))
+    return Times(range(len(images)), images.sure), Times(range(min(count, labels.sure)))
 
 
 class LabelReader:

@@ -62,10 +62,21 @@ class TopicReader:
         ``(n,)`` int64 nanoseconds, ascending; equal ones in the order of the file.
     """
 
-    def __init__(self, name: str, channels: Sequence[FileChannel], limits: Limits) -> None:
+    def __init__(
+        self,
+        name: str,
+        channels: Sequence[FileChannel],
+        limits: Limits,
+        files: Sequence[Container],
+        *,
+        lacks_files: bool,
+    ) -> None:
         self.name = name
         self.channels = channels
         self.limits = limits
+        # A file that is damaged may have lost the topic itself.
+        self._files = files
+        self._lacks_files = lacks_files
         self._decoders: dict[int, Decoder | BadMessage] = {}
         rows = [np.empty((0, 4), np.int64)]
         for number, source in enumerate(channels):
@@ -168,11 +179,12 @@ class TopicReader:
 
         Damage may have taken an unknown number of messages before the others.
         """
-        ends = [sure_until(source.container) for source in self.channels]
-        known = [end for end in ends if end is not None]
-        if not known:
+        ends = [end for end in map(sure_until, self._files) if end is not None]
+        if self._lacks_files:
+            return 0
+        if not ends:
             return len(self)
-        return int(np.searchsorted(self.log_times, min(known), side="right"))
+        return int(np.searchsorted(self.log_times, min(ends), side="right"))
 
     def readable(self) -> int:
         """Messages that are in the log, less those in chunks found to be damaged."""
@@ -202,10 +214,18 @@ class TopicReader:
         return FrameError(f"{self.name} message {position}: {reason}")
 
 
-def topic_readers(containers: Sequence[Container], limits: Limits) -> dict[str, TopicReader]:
-    """Return a reader for each topic, over the channels that carry it in the files' order."""
+def topic_readers(
+    containers: Sequence[Container], limits: Limits, *, lacks_files: bool
+) -> dict[str, TopicReader]:
+    """Return a reader for each topic, over the channels that carry it in the files' order.
+
+    ``lacks_files`` says whether there are files of the log that cannot be read at all.
+    """
     channels: dict[str, list[FileChannel]] = {}
     for container in containers:
         for channel_id, channel in sorted(container.channels.items()):
             channels.setdefault(channel.topic, []).append(FileChannel(container, channel_id))
-    return {topic: TopicReader(topic, found, limits) for topic, found in channels.items()}
+    return {
+        topic: TopicReader(topic, found, limits, containers, lacks_files=lacks_files)
+        for topic, found in channels.items()
+    }

@@ -4,7 +4,7 @@ The log-odds of road are the sum of many small decision trees, each of which was
 those before it leave [1]_, less a term that is not learnt: ``x = sum - w s max(d - 1, 0)`` with the
 distance d from the reference patch, 1 where roads end, and the share s of light
 (`roadeval.pipeline.beyond.ground.reach`); ``p = 1 / (1 + exp(-x))``. It is computed on a working
-image, and brought to the camera's pixels by the edges of its image
+image, and brought to the camera's pixels along the edges of its image
 (`roadeval.pipeline.beyond.guided`).
 
 References

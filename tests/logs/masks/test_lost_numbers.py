@@ -1,5 +1,6 @@
 """Masks that numbers pair with frames, in logs that have lost some of their images."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,9 @@ WHOLE = ("ok", "unchunked", "noindex", "nostats", "dataend_crc_bad", "trunc_last
 NUMBERED = ("chunk_crc_field_bad", "chunk_data_flip_lz4")
 """Damage of which the index tells how many messages it took."""
 CUT = {"trunc_midchunk": 36, "trunc_unchunked": 28}
-HOLES = {"zero_hole": 6, "huge_len_msg_unchunked": 5}
-"""Damage that took an unknown number of messages, by the first frame that is lost."""
+HOLES = {"zero_hole": (6, 32), "huge_len_msg_unchunked": (5, 34)}
+"""Damage that took an unknown number of messages: the first frame that is lost, and how many are
+left after it."""
 
 
 def marked(number: int) -> bytes:
@@ -94,10 +96,9 @@ def test_what_is_cut_off_shifts_no_number(masks, tmp_path, name):
 
 @pytest.mark.parametrize("name", HOLES)
 def test_after_a_loss_of_unknown_length_no_frame_has_a_mask(masks, tmp_path, name):
-    found, unsure = paired(damaged(tmp_path, name), by_number(masks))
-    first = HOLES[name]
-    assert found == {number: number for number in range(first)}
-    assert unsure >= FRAMES - first - 3
+    first, left = HOLES[name]
+    own = {number: number for number in range(first)}
+    assert paired(damaged(tmp_path, name), by_number(masks)) == (own, left)
 
 
 @pytest.mark.parametrize("twice", [False, True])
@@ -109,16 +110,80 @@ def test_a_chunk_that_lacks_or_is_there_twice_leaves_no_number_sure(masks, tmp_p
     assert paired(path, by_number(masks))[0] == {}
 
 
-def test_masks_of_another_log_lose_their_numbers_too(masks, tmp_path):
-    other = damaged(tmp_path, "zero_hole")
-    (tmp_path / "whole").mkdir()
-    path = saved(tmp_path / "whole", good())
+def test_a_hole_among_chunks_out_of_order_leaves_no_number_sure_that_lies_behind_it(
+    masks, tmp_path
+):
+    numbers = [10, 11, 0, 1, 12, 13, *range(2, 10), *range(14, FRAMES)]
+    data = broken.log(numbers).bytes()
+    begin, end, last = chunk(1, data), chunk(2, data), chunk(19, data)
+    without_summary = over(data, begin, bytes(end - begin))[:last]
+    assert paired(saved(tmp_path, without_summary), by_number(masks))[0] == {}
+
+
+@pytest.mark.parametrize("verified", [False, True])
+@pytest.mark.parametrize("name", NUMBERED)
+def test_damaged_chunks_that_are_kept_shift_no_number_before_or_after_they_are_read(
+    masks, tmp_path, name, verified
+):
+    with open_log(damaged(tmp_path, name), keep_corrupt=True) as log:
+        if verified:
+            log.verify()
+        selection = log.select(masks={"net": by_number(masks)})
+    assert selection.elsewhere["net"].pairing.unsure == 0
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "content"),
+    [
+        (0, lambda data: bytes(len(data))),
+        (1, lambda data: bytes(len(data))),
+        (1, lambda data: b""),
+        (1, lambda data: data[:8]),
+        (0, lambda data: data[:60]),
+    ],
+    ids=["first zeroed", "zeroed", "empty", "nothing in it", "without a topic"],
+)
+def test_a_file_of_a_split_log_that_is_lost_leaves_no_number_sure(masks, tmp_path, spoilt, content):
+    parts = [range(14), range(14, 28), range(28, FRAMES)]
+    for place, part in enumerate(parts):
+        data = broken.log([*part]).bytes()
+        whole = tmp_path / f"drive_{place}.mcap"
+        whole.write_bytes(content(data) if place == spoilt else data)
+    found, unsure = paired(tmp_path, by_number(masks))
+    assert (found, unsure) == ({}, FRAMES - len(parts[spoilt]))
+
+
+def test_what_a_split_log_lost_at_the_end_of_a_file_shifts_no_number_before_it(masks, tmp_path):
+    for place, part in enumerate((range(14), range(14, FRAMES))):
+        data = broken.log([*part]).bytes()
+        whole = tmp_path / f"drive_{place}.mcap"
+        whole.write_bytes(data[: chunk(3, data) - 1] if place == 0 else data)
+    found, unsure = paired(tmp_path, by_number(masks))
+    assert found == {number: number for number in range(6)}
+    assert unsure == FRAMES - 14
+
+
+@pytest.mark.parametrize("later_ns", [0, -(10**12), 10**12])
+def test_masks_of_another_log_lose_their_numbers_too(tmp_path, later_ns):
+    """Whatever the log times of the other log."""
+    made = broken.log()
+    moved = [replace(each, log_time=each.log_time + later_ns) for each in made.messages]
+    data = replace(made, messages=tuple(moved)).bytes()
+    begin, end = chunk(3, data), chunk(4, data)
+    other = tmp_path / "other.mcap"
+    other.write_bytes(over(data, begin, bytes(end - begin)))
     settings = MaskSettings(path=f"{other}:{broken.MASK}", pair="number")
-    with open_log(path) as log:
+    with open_log(saved(tmp_path, good())) as log:
         selection = log.select(masks={"net": settings})
         seen = [frame.number for frame in log.frames(selection) if "net" in frame.labels]
     assert seen == list(range(6))
     assert selection.elsewhere["net"].pairing.unsure == FRAMES - 6
+
+
+def test_the_truth_is_not_held_against_itself_by_the_log_s_own_path(tmp_path):
+    path = saved(tmp_path, good())
+    with open_log(path) as log, pytest.raises(LogError, match="is the truth that it is held"):
+        log.select(masks={"net": MaskSettings(path=f"{path}:{broken.MASK}")})
 
 
 @pytest.mark.parametrize("count", [FRAMES - 1, FRAMES + 1])
