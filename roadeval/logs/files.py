@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -15,6 +16,8 @@ _HEAD: Final = 64
 """Bytes by which a file is recognised."""
 _DAMAGED: Final = 2
 """Bytes of the first eight that may be wrong in what still counts as an MCAP file."""
+
+_NUMBERED: Final = re.compile(r"(.*_)(\d{1,9})\.mcap")
 
 _OTHERS: Final = (
     (0, b"#ROSBAG V", "a ROS 1 bag: mcap convert {path} {stem}.mcap"),
@@ -39,7 +42,8 @@ _OTHERS: Final = (
 def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     """List the MCAP files of a log: the file itself, or a rosbag2 folder's in natural order.
 
-    A file in a folder that is no MCAP file is left out, and returned as damage.
+    A file in a folder that is no MCAP file is left out, and returned as damage, and so is one that
+    is not there though those before and after it are: a recorder numbers its files from 0.
 
     Raises
     ------
@@ -59,7 +63,19 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
             damage.append(Damage(file, 0, str(error).removeprefix(f"{file}: ")))
     if not files:
         raise LogError(f"{path}: {damage[0]}" if damage else _empty_folder(path))
-    return files, damage
+    there = [*files, *(each.path for each in damage)]
+    lacking = (Damage(file, 0, "the file is missing") for file in _missing(there))
+    return files, [*damage, *lacking]
+
+
+def _missing(files: Sequence[Path]) -> Iterator[Path]:
+    """Yield the files that lack among ``NAME_0.mcap``, ``NAME_1.mcap`` and so on."""
+    found = [match for file in files if (match := _NUMBERED.fullmatch(file.name))]
+    numbers = {int(match[2]) for match in found}
+    one_name = len({match[1] for match in found}) == 1
+    if one_name and len(found) == len(files) and 0 in numbers and max(numbers) < 2 * len(files):
+        lacking = sorted({*range(max(numbers))} - numbers)
+        yield from (files[0].with_name(f"{found[0][1]}{number}.mcap") for number in lacking)
 
 
 def natural(path: Path) -> list[tuple[int, str]]:

@@ -205,6 +205,26 @@ def test_a_folder_of_split_files_is_one_log(tmp_path: Path) -> None:
         assert chatter.count == messages
 
 
+def test_a_file_that_lacks_between_the_others_is_told(tmp_path: Path) -> None:
+    names = split_bag()
+    for name in names:
+        make(f"real/rosbag2/{name}", tmp_path)
+    folder = tmp_path / "real" / "rosbag2"
+    middle = sorted(folder.glob("*_1.mcap"))[0]
+    middle.unlink()
+    with open_log(folder) as log:
+        assert log.losses[0] == f"{middle.name}: the file is missing (byte 0)"
+
+
+@pytest.mark.parametrize("names", [("a_1", "a_3"), ("a_0", "b_2"), ("a_0", "a_20240101"), ("a_0",)])
+def test_names_that_are_no_recorders_lack_nothing(tmp_path: Path, names: tuple[str, ...]) -> None:
+    log = LOGS["broken/ok.mcap"].data()
+    for name in names:
+        (tmp_path / f"{name}.mcap").write_bytes(log)
+    with open_log(tmp_path) as opened:
+        assert opened.losses == ()
+
+
 @broken(["chunk_crc_field_bad"])
 def test_data_of_a_wrong_checksum_is_kept_on_demand(log: Path) -> None:
     with open_log(log, keep_corrupt=True) as opened:

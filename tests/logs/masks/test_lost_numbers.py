@@ -140,15 +140,19 @@ def test_damaged_chunks_that_are_kept_shift_no_number_before_or_after_they_are_r
         (1, lambda data: b""),
         (1, lambda data: data[:8]),
         (0, lambda data: data[:60]),
+        (1, None),
     ],
-    ids=["first zeroed", "zeroed", "empty", "nothing in it", "without a topic"],
+    ids=["first zeroed", "zeroed", "empty", "nothing in it", "without a topic", "missing"],
 )
 def test_a_file_of_a_split_log_that_is_lost_leaves_no_number_sure(masks, tmp_path, spoilt, content):
     parts = [range(14), range(14, 28), range(28, FRAMES)]
     for place, part in enumerate(parts):
         data = broken.log([*part]).bytes()
         whole = tmp_path / f"drive_{place}.mcap"
-        whole.write_bytes(content(data) if place == spoilt else data)
+        if place != spoilt:
+            whole.write_bytes(data)
+        elif content is not None:
+            whole.write_bytes(content(data))
     found, unsure = paired(tmp_path, by_number(masks))
     assert (found, unsure) == ({}, FRAMES - len(parts[spoilt]))
 
