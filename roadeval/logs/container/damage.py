@@ -100,7 +100,10 @@ def sure_until(container: Container) -> int | None:
     for number, chunk in enumerate(container.chunks):
         damaged = chunk.offset in container.reader.bad or chunk.offset in container.reader.kept
         if damaged and not _is_listed(container, number):
-            ends.append(chunk.start - 1)
+            ends.append(min([chunk.start, *_times(container, number)]) - 1)
+    # Their channel's number may be what is damaged.
+    unnamed = container.logs.keys() - container.channels.keys()
+    ends += [container.logs[channel_id].first_ns - 1 for channel_id in unnamed]
     if not ends and any(_missing(container)):
         return BEFORE_ALL
     return min(ends, default=None)
@@ -112,6 +115,12 @@ def _least_after(container: Container, offset: int) -> int | None:
     for values in container.scan.loose.values():
         times += [time for time, at in zip(values[::2], values[1::2], strict=True) if at > offset]
     return min(times, default=None)
+
+
+def _times(container: Container, number: int) -> list[int]:
+    """Return the least log time of each channel in a chunk, which damage may have changed."""
+    blocks = (block for log in container.logs.values() for block in log.blocks)
+    return [int(entries[:, 0].min()) for chunk, entries in blocks if chunk == number]
 
 
 def _is_listed(container: Container, number: int) -> bool:

@@ -5,11 +5,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.opcode import Opcode
+from mcap.writer import CompressionType, IndexType
 
 from roadeval.data import Frame
 from roadeval.logs import FrameError, LogError, MaskSettings, open_log
 from tests.fixtures import broken
-from tests.fixtures.broken import FRAMES, HEIGHT, WIDTH, chunk, good, length_of, message, over
+from tests.fixtures.broken import (
+    FRAMES,
+    HEAD,
+    HEIGHT,
+    WIDTH,
+    chunk,
+    good,
+    inside,
+    length_of,
+    message,
+    over,
+)
 from tests.fixtures.writing import START
 from tests.logs.making import png
 
@@ -118,6 +131,24 @@ def test_a_hole_among_chunks_out_of_order_leaves_no_number_sure_that_lies_behind
     begin, end, last = chunk(1, data), chunk(2, data), chunk(19, data)
     without_summary = over(data, begin, bytes(end - begin))[:last]
     assert paired(saved(tmp_path, without_summary), by_number(masks))[0] == {}
+
+
+def test_a_message_whose_channel_is_damaged_leaves_no_number_after_it_sure(masks, tmp_path):
+    data = good("unchunked")
+    found, _ = paired(
+        saved(tmp_path, over(data, message(13, data) + HEAD, b"\7")), by_number(masks)
+    )
+    assert found == {number: number for number in range(13)}
+
+
+def test_times_that_damage_has_changed_leave_no_number_after_them_sure(masks, tmp_path):
+    """The chunk is kept, and a message in it is logged at 0 now."""
+    data = broken.log(compression=CompressionType.NONE, index_types=IndexType.NONE).bytes()
+    image = next(at for at in inside(data, chunk(7, data)) if data[at] == Opcode.MESSAGE)
+    path = saved(tmp_path, over(data, image + HEAD + 2 + 4, bytes(8)))
+    with open_log(path, keep_corrupt=True) as log:
+        selection = log.select(masks={"net": by_number(masks)})
+        assert not any("net" in frame.labels for frame in log.frames(selection))
 
 
 @pytest.mark.parametrize("verified", [False, True])
