@@ -317,7 +317,7 @@ def test_with_assets_the_script_is_in_a_file_and_works_as_well(demo, tmp_path, w
     seen = watched((tmp_path / "page.html").as_uri())
     assert seen.complaints == []
     assert seen.tab.locator(".strip").count() == 3
-    assert seen.tab.locator(".views .above").evaluate("each => each.naturalWidth") > 0
+    wait_until(seen.tab, "document.querySelector('.views .above').naturalWidth > 0")
     before = frame(seen.tab)
     seen.tab.keyboard.press("ArrowLeft")
     seen.tab.keyboard.press("ArrowRight")
@@ -336,7 +336,8 @@ def test_a_fleets_page_has_every_drive_and_finds_one(fleet, watched):
     assert len(shown(seen.tab, "#all-drives tbody tr")) == 1
     pictures = seen.tab.locator(".grid img")
     assert pictures.count() > 5
-    assert pictures.first.evaluate("each => each.naturalWidth") > 0
+    pictures.first.scroll_into_view_if_needed()
+    wait_until(seen.tab, "document.querySelector('.grid img').naturalWidth > 0")
     (folder,) = fleet.parent.glob("index.files-*")
     assert all(url.startswith((fleet.as_uri(), folder.as_uri())) for url in seen.requests)
     assert seen.complaints == []

@@ -55,7 +55,7 @@ def test_without_a_script_a_frame_is_a_page_of_its_own(address, watched):
     tab = watched(f"{address}0/", java_script_enabled=False).tab
     tab.locator(".frames tr.pictured a").first.click()
     tab.wait_for_load_state()  # with its pictures
-    assert tab.locator(".strip .tile img").first.evaluate("each => each.naturalWidth") > 0
+    wait_until(tab, "document.querySelector('.strip .tile img').naturalWidth > 0")
 
 
 def test_where_there_is_no_screen_the_page_says_what_to_do_instead(demo, watched, monkeypatch):
