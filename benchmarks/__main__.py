@@ -10,6 +10,7 @@ import json
 import os
 import platform
 import tempfile
+from contextlib import nullcontext
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -18,7 +19,7 @@ from typing import Any
 from benchmarks import drives, processes
 from benchmarks.drives import Source
 from benchmarks.plainly import PlainWay
-from benchmarks.replaying import Held, Whole, floor, hold, loop, whole
+from benchmarks.replaying import Held, Whole, floor, hold, library_codecs, loop, whole
 from benchmarks.timing import Spread, ratios, table, timed
 from roadeval import logs
 from roadeval.config import configure
@@ -33,8 +34,8 @@ from roadeval.results.lines import lines
 from roadeval.runtime.threads import one_thread_each
 
 Rows = list[dict[str, Any]]
-PAIRS = 3
-"""Of loop and floor, for each `--repeat`: they take seconds, and a machine slows down for as long.
+TURNS = 3
+"""Of loop and floors, for each `--repeat`: they take seconds, and a machine slows down for as long.
 """
 PARTS = ("replay", "stages", "plain", "reading", "process")
 
@@ -88,11 +89,16 @@ def _replay(drive: Path, held: Held, folder: Path, jobs: int, options: argparse.
     run, count = configure({"run": {"jobs": jobs}}), len(held.files)
     for work in (loop, whole):
         work(drive, run, folder)  # warms the caches
-    pairs = [
-        (loop(drive, run, folder), floor(held, folder, jobs)) for _ in range(PAIRS * options.repeat)
+    turns = [
+        (
+            loop(drive, run, folder),
+            floor(held, folder, jobs, library_codecs()),
+            floor(held, folder, jobs, nullcontext()),
+        )
+        for _ in range(TURNS * options.repeat)
     ]
-    loops = [mine.wall for mine, _ in pairs]
-    floors = [its.wall for _, its in pairs]
+    loops, floors, own_floors = ([each.wall for each in way] for way in zip(*turns, strict=True))
+    loops_cpu, floors_cpu, _ = ([each.cpu for each in way] for way in zip(*turns, strict=True))
     wholes = [whole(drive, run, folder).wall for _ in range(options.repeat)]
     loop_s, floor_s = Spread.of(loops).median, Spread.of(floors).median
     once = Spread.of([seconds - loop_s for seconds in wholes])
@@ -103,7 +109,8 @@ def _replay(drive: Path, held: Held, folder: Path, jobs: int, options: argparse.
         "floor ms/frame": Spread.of([1e3 * seconds / count for seconds in floors]),
         "loop ms/frame": Spread.of([1e3 * seconds / count for seconds in loops]),
         "loop / floor": ratios(loops, floors),
-        "loop / floor, CPU": ratios([mine.cpu for mine, _ in pairs], [its.cpu for _, its in pairs]),
+        "loop / floor, CPU": ratios(loops_cpu, floors_cpu),
+        "loop / floor of own codecs": ratios(loops, own_floors),
         "whole / floor": Spread.of([seconds / floor_s for seconds in wholes]),
         "once, s": once,
         "whole <= 1.5 floor from": f"{once.median / spare * count:.0f} frames"

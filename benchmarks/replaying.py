@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -21,12 +23,16 @@ from roadeval.jobs import summary
 from roadeval.jobs.processing import process
 from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import prepare
-from roadeval.recording import RecordRule, recorder_for
+from roadeval.recording import RecordRule, png, recorder_for
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.lines import lines, sum_lines
 from roadeval.runtime.threads import ordered
 
 ALL: Final = RecordRule.parse("all")
+NOISY: Final = (
+    *(cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_PAETH),
+    *(cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE),
+)
 HELD_BYTES: Final = 400 << 20
 """Of layers computed beforehand and held for the floor, which goes round them."""
 
@@ -91,8 +97,31 @@ def _bytes(result: FrameResult) -> int:
     return sum(c.bits.nbytes if isinstance(c, Packed) else c.nbytes for c in contents)
 
 
-def floor(held: Held, folder: Path, jobs: int) -> Cost:
-    """Decode every file, encode and write the held layers, and no more."""
+@contextmanager
+def library_codecs() -> Iterator[None]:
+    """Have PNG files encoded by OpenCV and zlib alone meanwhile.
+
+    OpenCV with the settings that make its smallest file of a noisy map, zlib with the recording's
+    own. A floor of these stays what it is when the recording's encoder becomes faster.
+    """
+    own = png.zlib, png.encode_levels
+
+    def by_opencv(levels: np.ndarray, _filter: png.Filter) -> bytes:
+        channels = levels if levels.ndim == 2 else cv2.cvtColor(levels, cv2.COLOR_RGB2BGR)
+        return cv2.imencode(".png", channels, NOISY)[1].tobytes()
+
+    png.zlib, png.encode_levels = zlib, by_opencv
+    try:
+        yield
+    finally:
+        png.zlib, png.encode_levels = own
+
+
+def floor(held: Held, folder: Path, jobs: int, codecs: AbstractContextManager[None]) -> Cost:
+    """Decode every file, encode and write the held layers, and no more.
+
+    ``codecs`` is `library_codecs`, or a `nullcontext` for the recording's own encoder.
+    """
 
     def work(item: tuple[int, tuple[bytes, ...], FrameResult]) -> Any:
         number, files, result = item
@@ -102,7 +131,7 @@ def floor(held: Held, folder: Path, jobs: int) -> Cost:
 
     recorder = recorder_for(folder / "floor.rrd", held.layout, ALL)
     meter = Meter()
-    with recorder:
+    with codecs, recorder:
         for encoded in ordered(work, held.frames(), jobs):
             recorder.write(encoded)
         recorder.finish({})

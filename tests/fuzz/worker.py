@@ -31,7 +31,7 @@ INSTRUMENTED: Final = (
         "roadeval.images",
         "roadeval.logs",
         "roadeval.recording.codecs",
-        "roadeval.recording.indexed_png",
+        "roadeval.recording.png",
     ),
     *("roadeval.recording.layout", "roadeval.recording.read", "roadeval.results"),
     *("roadeval.training.model", "roadeval.config", "mcap", "mcap_ros1", "mcap_ros2"),

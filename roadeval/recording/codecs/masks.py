@@ -14,7 +14,7 @@ import numpy.typing as npt
 from roadeval import images
 from roadeval.data import LayerSpec
 from roadeval.data.packed import Packed
-from roadeval.recording import indexed_png
+from roadeval.recording import png
 from roadeval.recording.codecs.codec import Array, limits_for
 
 
@@ -54,7 +54,7 @@ class MaskCodec:
         """
         if self._places is not None and not isinstance(array, Packed):
             array = np.asarray(cv2.LUT(array, self._places), np.uint8)
-        return indexed_png.encode(array, [c.rgba for c in self.spec.classes])
+        return png.encode_labels(array, [c.rgba for c in self.spec.classes])
 
     def columns(self, payloads: list[bytes]) -> Any:
         """Return columns of encoded images."""
