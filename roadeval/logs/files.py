@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from pathlib import Path
 from typing import Final
 
@@ -16,6 +16,12 @@ _HEAD: Final = 64
 """Bytes by which a file is recognised."""
 _DAMAGED: Final = 2
 """Bytes of the first eight that may be wrong in what still counts as an MCAP file."""
+
+_NOTE: Final = 16 << 20
+"""Bytes of ``metadata.yaml`` that are read: those of a hundred thousand files."""
+# rosbag2 writes this one way. A parser of YAML would know them all, and ends the process on some.
+_LIST: Final = re.compile(r"^ *relative_file_paths:[ \r]*\n((?: *- .*\n?)+)", re.MULTILINE)
+_ITEM: Final = re.compile(r"^ *-(.*)$", re.MULTILINE)
 
 _NUMBERED: Final = re.compile(r"(.*_)(\d{1,9})\.mcap")
 
@@ -43,7 +49,8 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     """List the MCAP files of a log: the file itself, or a rosbag2 folder's in natural order.
 
     A file in a folder that is no MCAP file is left out, and returned as damage, and so is one that
-    is not there though those before and after it are: a recorder numbers its files from 0.
+    is not there though the folder's ``metadata.yaml`` lists it, or though those before and after it
+    are: a recorder numbers its files from 0.
 
     Raises
     ------
@@ -63,9 +70,9 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
             damage.append(Damage(file, 0, str(error).removeprefix(f"{file}: ")))
     if not files:
         raise LogError(f"{path}: {damage[0]}" if damage else _empty_folder(path))
-    there = [*files, *(each.path for each in damage)]
-    lacking = (Damage(file, 0, "the file is missing") for file in _missing(there))
-    return files, [*damage, *lacking]
+    there = {*files, *(each.path for each in damage)}
+    lacking = sorted({*_missing([*there]), *_listed(path, there)} - there, key=natural)
+    return files, [*damage, *(Damage(file, 0, _why_unread(file)) for file in lacking)]
 
 
 def _missing(files: Sequence[Path]) -> Iterator[Path]:
@@ -76,6 +83,35 @@ def _missing(files: Sequence[Path]) -> Iterator[Path]:
     if one_name and len(found) == len(files) and 0 in numbers and max(numbers) < 2 * len(files):
         lacking = sorted({*range(max(numbers))} - numbers)
         yield from (files[0].with_name(f"{found[0][1]}{number}.mcap") for number in lacking)
+
+
+def _listed(folder: Path, there: Set[Path]) -> set[Path]:
+    """Return the files of which a recorder noted that the log consists, by what it called them.
+
+    None where there is no such note, or it knows none of those that are ``there``: then it is about
+    other files.
+    """
+    try:
+        with (folder / "metadata.yaml").open("rb") as file:
+            note = file.read(_NOTE).decode(errors="replace")
+    except OSError:
+        return set()
+    block = _LIST.search(note)
+    names = [] if block is None else _ITEM.findall(block[1])
+    # Earlier recorders wrote the folder before the name.
+    files = {folder / Path(name.strip(" \r'\"")).name for name in names}
+    return files if files & there else set()
+
+
+def _why_unread(file: Path) -> str:
+    """Return why a file of a folder is no part of the log that was read."""
+    if not file.exists():
+        return "the file is missing"
+    try:
+        _check(file)
+    except LogError as error:
+        return str(error).removeprefix(f"{file}: ")
+    return "the file is not called *.mcap"
 
 
 def natural(path: Path) -> list[tuple[int, str]]:

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from time import monotonic
 
 import pytest
 
@@ -223,6 +224,84 @@ def test_names_that_are_no_recorders_lack_nothing(tmp_path: Path, names: tuple[s
         (tmp_path / f"{name}.mcap").write_bytes(log)
     with open_log(tmp_path) as opened:
         assert opened.losses == ()
+
+
+NOTE = """\
+rosbag2_bagfile_information:
+  version: 9
+  storage_identifier: mcap
+  relative_file_paths:
+    - {}
+  files:
+    - path: a_0.mcap
+      message_count: 80
+"""
+
+
+@pytest.mark.parametrize(
+    ("listed", "there", "told"),
+    [
+        ("a_0.mcap a_1.mcap", "a_0.mcap a_1.mcap", ""),
+        ("a_0.mcap a_1.mcap a_2.mcap", "a_0.mcap", "a_1.mcap a_2.mcap"),
+        ("a_0.mcap a_1.mcap", "a_1.mcap", "a_0.mcap"),
+        ("bag/a_0.mcap bag/a_1.mcap", "a_1.mcap", "a_0.mcap"),
+        ("'a_0.mcap' \"a_1.mcap\"", "a_1.mcap", "a_0.mcap"),
+        ("a_0.mcap a_1.mcap", "a_0.mcap a_1.mcap added.mcap", ""),
+        ("a_0.mcap a_1.mcap a_3.mcap", "a_0.mcap a_3.mcap", "a_1.mcap a_2.mcap"),
+        ("a_0.mcap a_1.mcap", "renamed.mcap", ""),
+    ],
+)
+def test_a_file_that_a_recorder_lists_and_that_lacks_is_told(
+    tmp_path: Path, listed: str, there: str, told: str
+) -> None:
+    for name in there.split():
+        (tmp_path / name).write_bytes(LOGS["broken/ok.mcap"].data())
+    for end in ("\n", "\r\n"):
+        note = NOTE.format("\n    - ".join(listed.split())).replace("\n", end)
+        (tmp_path / "metadata.yaml").write_bytes(note.encode())
+        with open_log(tmp_path) as log:
+            missing = [each for each in log.losses if "images kept" not in each]
+            assert missing == [f"{name}: the file is missing (byte 0)" for name in told.split()]
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        (b"\x28\xb5\x2f\xfd" + bytes(99), "compressed as a whole by zstd"),
+        (LOGS["broken/ok.mcap"].data(), "the file is not called *.mcap"),
+    ],
+)
+def test_a_file_that_a_recorder_lists_and_that_is_not_read_is_told(
+    tmp_path: Path, data: bytes, told: str
+) -> None:
+    (tmp_path / "a_0.mcap").write_bytes(LOGS["broken/ok.mcap"].data())
+    (tmp_path / "a_1.mcap.zstd").write_bytes(data)
+    (tmp_path / "metadata.yaml").write_text(NOTE.format("a_0.mcap\n    - a_1.mcap.zstd"))
+    with open_log(tmp_path) as log:
+        assert log.losses[0].startswith("a_1.mcap.zstd: ")
+        assert told in log.losses[0]
+
+
+@pytest.mark.parametrize(
+    "note",
+    [
+        b"",
+        b"\xff\xfe\x00relative_file_paths",
+        b"relative_file_paths: [a_0.mcap, a_1.mcap]\n",
+        b"  relative_file_paths:\n    - \n    - ..\n    - /\n",
+        b"  relative_file_paths:\n" + b"    - [\n" * 200_000,
+        b" " * 5_000_000,
+        b"  relative_file_paths:\n    - a" + b" " * 5_000_000 + b"a\n",
+    ],
+    ids=["empty", "no text", "in one line", "no names", "deep", "blank", "wide"],
+)
+def test_a_note_that_says_nothing_of_files_is_no_loss(tmp_path: Path, note: bytes) -> None:
+    (tmp_path / "a_0.mcap").write_bytes(LOGS["broken/ok.mcap"].data())
+    (tmp_path / "metadata.yaml").write_bytes(note)
+    start = monotonic()
+    with open_log(tmp_path) as log:
+        assert log.losses == ()
+    assert monotonic() - start < 5
 
 
 @broken(["chunk_crc_field_bad"])
