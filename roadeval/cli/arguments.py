@@ -17,12 +17,18 @@ if TYPE_CHECKING:
     from roadeval.report.pdf.typeset import Paper
 
 Drive = Annotated[
-    Path, typer.Argument(metavar="DRIVE", show_default=False, help="A camera log (MCAP).")
+    Path,
+    typer.Argument(
+        metavar="DRIVE", show_default=False, help="A camera log (MCAP).", readable=False
+    ),
 ]
 Result = Annotated[
     Path,
     typer.Argument(
-        metavar="RESULT", show_default=False, help="A recording (.rrd), or a results folder."
+        metavar="RESULT",
+        show_default=False,
+        help="A recording (.rrd), or a results folder.",
+        readable=False,
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result on stdout as JSON.")]

@@ -66,7 +66,14 @@ class Option:
 
     def parameter(self) -> inspect.Parameter:
         """Return the parameter that Typer makes the option of."""
-        option = typer.Option(*self.flags, metavar=self.metavar, show_default=False, help=self.help)
+        # Whoever opens a file tells whether it can be read, as of any other problem with it.
+        option = typer.Option(
+            *self.flags,
+            metavar=self.metavar,
+            show_default=False,
+            help=self.help,
+            readable=False,
+        )
         return inspect.Parameter(
             self.argument,
             inspect.Parameter.KEYWORD_ONLY,

@@ -62,7 +62,11 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
         return [path], []
     files: list[Path] = []
     damage: list[Damage] = []
-    for file in sorted(path.glob("*.mcap"), key=natural):
+    try:
+        found = [file for file in path.iterdir() if file.suffix == ".mcap"]
+    except OSError as error:
+        raise LogError(f"{path}: {error.strerror or error}") from error
+    for file in sorted(found, key=natural):
         try:
             _check(file)
             files.append(file)

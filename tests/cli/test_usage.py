@@ -1,5 +1,7 @@
 """What can be seen to be wrong without opening a file is wrong usage: exit code 2."""
 
+import os
+
 import pytest
 
 from roadeval.cli.app import main
@@ -78,3 +80,26 @@ def test_options_that_do_not_go_together_are_told_without_calling_a_value_invali
     assert main(words) == 2
     told = f"roadeval: error: {said}; see 'roadeval {words[0]} --help'\n"
     assert capsys.readouterr().err == told
+
+
+UNREADABLE = {
+    "info": ["{}"],
+    "replay": ["{}"],
+    "report": ["{}"],
+    "inspect": ["{}"],
+    "compare": ["{}", "{}"],
+    "serve": ["{}"],
+    "train": ["{}", "-o", "a.model"],
+    "pack": ["{}", "-o", "a.mcap"],
+    "config": ["--config", "{}"],
+}
+
+
+@pytest.mark.parametrize("command", UNREADABLE)
+def test_a_file_that_may_not_be_read_is_no_wrong_usage(command, tmp_path, monkeypatch, capsys):
+    file = tmp_path / "locked.mcap"
+    file.write_bytes(b"nothing that any command can use")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("os.access", lambda path, mode, **how: mode != os.R_OK)
+    assert main([command, *(word.format(file) for word in UNREADABLE[command])]) == 1
+    assert capsys.readouterr().err.startswith("roadeval: error: ")

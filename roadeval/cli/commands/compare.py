@@ -33,6 +33,7 @@ Results = Annotated[
         show_default=False,
         help="Recordings or results folders; of a single one its variants are compared. Or two "
         "fleets.",
+        readable=False,
     ),
 ]
 Variants = Annotated[
@@ -52,6 +53,7 @@ Outputs = Annotated[
         metavar="FILE",
         callback=_ending,
         help="Write it as .pdf, .html, .md or .json, by the ending. Repeatable.",
+        readable=False,
     ),
 ]
 

@@ -15,7 +15,10 @@ DEFAULT: Final = Path("recordings", "demo.mcap")
 
 def demo(
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DRIVE.mcap", help="Where the log lands.")
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="DRIVE.mcap", help="Where the log lands.", readable=False
+        ),
     ] = DEFAULT,
     seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Another drive.")] = 0,
     quiet: arguments.Quiet = False,

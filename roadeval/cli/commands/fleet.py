@@ -37,6 +37,7 @@ def fleet(
             "--output",
             metavar="FOLDER",
             help="Where all results land; what is done there already is not done again.",
+            readable=False,
         ),
     ],
     given: Given,

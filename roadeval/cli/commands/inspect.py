@@ -36,6 +36,7 @@ Screenshot = Annotated[
         "--screenshot",
         metavar="FILE.png",
         help="No window: draw it into a file instead. Without a frame, the worst pictured.",
+        readable=False,
     ),
 ]
 
@@ -47,6 +48,7 @@ def inspect(
             metavar="RESULT",
             show_default=False,
             help="A recording (.rrd), a results folder, or a fleet's folder.",
+            readable=False,
         ),
     ],
     *,

@@ -15,16 +15,24 @@ def pack(
     images: Annotated[
         Path,
         typer.Argument(
-            metavar="IMAGES", show_default=False, help="A folder of images, or a video file."
+            metavar="IMAGES",
+            show_default=False,
+            help="A folder of images, or a video file.",
+            readable=False,
         ),
     ],
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DRIVE.mcap", help="Where the log lands.")
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="DRIVE.mcap", help="Where the log lands.", readable=False
+        ),
     ],
     *,
     truth: Annotated[
         Path | None,
-        typer.Option("--truth", metavar="MASKS", help="A folder of masks, paired by name."),
+        typer.Option(
+            "--truth", metavar="MASKS", help="A folder of masks, paired by name.", readable=False
+        ),
     ] = None,
     rate: Annotated[
         float | None,

@@ -35,6 +35,7 @@ def report(
             callback=_ending,
             help="A page to browse where it ends in .html. Default: reports/<recording>.pdf, or "
             "report.pdf in the folder given.",
+            readable=False,
         ),
     ] = None,
     paper: arguments.PaperSize = "a4",

@@ -19,6 +19,7 @@ def serve(
             metavar="RESULT...",
             show_default=False,
             help="Recordings (.rrd), results folders, or fleets' folders.",
+            readable=False,
         ),
     ],
     *,

@@ -19,11 +19,17 @@ from roadeval.cli.options import Given, takes
 )
 def train(
     paths: Annotated[
-        list[Path], typer.Argument(metavar="DRIVE", help="Camera logs (MCAP), mostly with truth.")
+        list[Path],
+        typer.Argument(
+            metavar="DRIVE", help="Camera logs (MCAP), mostly with truth.", readable=False
+        ),
     ],
     *,
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="MODEL", help="Where the model lands.")
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="MODEL", help="Where the model lands.", readable=False
+        ),
     ],
     given: Given,
     quiet: arguments.Quiet = False,

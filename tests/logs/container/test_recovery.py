@@ -226,6 +226,15 @@ def test_names_that_are_no_recorders_lack_nothing(tmp_path: Path, names: tuple[s
         assert opened.losses == ()
 
 
+def test_a_folder_that_may_not_be_listed_says_so(tmp_path: Path, monkeypatch) -> None:
+    def refuse(path: Path) -> None:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "iterdir", refuse)
+    with pytest.raises(LogError, match=f"^{re.escape(str(tmp_path))}: Permission denied$"):
+        open_log(tmp_path)
+
+
 NOTE = """\
 rosbag2_bagfile_information:
   version: 9
