@@ -67,8 +67,8 @@ def read_table(
     Raises
     ------
     ResultsError
-        If the table is empty, cut off, lacks a column, holds a value of another type, or is not
-        the one of which the summary tells.
+        If the table is empty, cut off, lacks a column, holds a row twice or a value of another
+        type, or is not the one of which the summary tells.
     """
     import pyarrow as pa
 
@@ -109,12 +109,15 @@ def _read(name: str, source: Path | str, summary: Mapping[str, Any] | None) -> p
         content = b""
     except OSError as error:
         raise ResultsError(f"{where}: {error.strerror}") from error
-    if summary and "tables" in summary:
-        _check(where, content, summary["tables"].get(name))
+    stated = None if summary is None else summary.get("tables")
+    if stated is not None:
+        _check(where, content, stated.get(name))
     if not content:
         # Arrow's own `empty_table` imports pandas.
         return pa.Table.from_batches([], _coded(table))
     try:
+        if stated is None:
+            _check_lines(content)
         return _parsed(content, table)
     except ValueError as error:  # Arrow's too
         reason = str(error).partition("\n")[0]
@@ -234,6 +237,13 @@ def _parsed(content: bytes, table: TableSchema) -> pa.Table:
     for column in lacking:
         parsed = parsed.append_column(column.name, pa.nulls(len(parsed), pa.float64()))
     return parsed
+
+
+def _check_lines(content: bytes) -> None:
+    """Refuse, as a ValueError, a table with a line twice: each begins with what it is of."""
+    lines = content.splitlines()
+    if len({*lines}) < len(lines):
+        raise ValueError("a row stands there twice")
 
 
 def _check_cells(column: Column, cells: pa.ChunkedArray) -> None:

@@ -124,6 +124,7 @@ def test_rows_are_those_of_the_table(text):
         (f"{HEADER}{line(tp='')}", "column TP lacks a value"),
         ("frame,variant\n1,net\n", "no column oracle, stage, TP"),
         ("frame,frame\n1,1\n", "a column stands there twice"),
+        (HEADER + line(1) + line(2) + line(1), "a row stands there twice"),
     ],
 )
 def test_a_damaged_file_is_named_in_one_line(text, why, tmp_path):
