@@ -26,11 +26,11 @@ from roadeval.runtime.files import check_input, put
 from roadeval.training.likeness import SIDE
 
 FORMAT: Final = "roadeval-model"
-VERSION: Final = 6
+VERSION: Final = 7
 """Of the file; raised when what a stage has learnt means something else, or something is added. In
 2 the machine of ``context`` knows the column below a pixel, in 3 there are fingerprints, in 4
 the trees of ``robust`` in its place, in 5 these say how many features they know, in 6 the
-stage ``exposure`` compresses what is bright."""
+stage ``exposure`` compresses what is bright, in 7 there is a network beside the trees."""
 CHANGED: Final = {"exposure": 6}
 """Stages that change the image in another way since a version: what was learnt before does not fit
 them."""

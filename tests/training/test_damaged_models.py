@@ -193,7 +193,9 @@ def test_trees_that_were_grown_on_other_features_end_with_one_line_and_code_1(
     pipelines = configure(SMALL).pipelines()
     sound = fit([frame(n) for n in range(3)], pipelines, TrainingSettings())
     forest = sound.parameters["unfiltered"]["trees"]
-    beyond = replace(forest, feature=forest.feature + np.int32(3), inputs=6)
+    twice = {name: np.tile(getattr(forest, name), 2) for name in ("lowest", "scale", "planes")}
+    twice["ranks"] = np.tile(forest.ranks, (1, 2, 1))
+    beyond = replace(forest, feature=forest.feature + np.int32(3), inputs=6, **twice)
     save_model(replace(sound, parameters={"unfiltered": {"trees": beyond}}), Path("x.model"))
     words = ["replay", str(DEMO), "--config", str(small), "--model", "x.model", "--quiet"]
     assert main([*words, "--save", "x.rrd", "--reports", "x"]) == 1

@@ -1,10 +1,11 @@
 """Boosted trees on what is known of a pixel of the ground: how probable road is.
 
-The log-odds of road are the sum of many small decision trees, each of which was grown to mend what
-those before it leave [1]_, less a term that is not learnt: ``x = sum - w s max(d - 1, 0)`` with the
-distance d from the reference patch, 1 where roads end, and the share s of light
-(`roadeval.pipeline.beyond.ground.reach`); ``p = 1 / (1 + exp(-x))``. It is computed on a working
-image, and brought to the camera's pixels along the edges of its image
+The log-odds of road are the weighted mean of two opinions: the sum of many small decision trees,
+each of which was grown to mend what those before it leave [1]_, and a network with one hidden layer
+(`roadeval.pipeline.beyond.hidden_layer`). A term that is not learnt is taken from them:
+``x = mean - w s max(d - 1, 0)`` with the distance d from the reference patch, 1 where roads end,
+and the share s of light (`roadeval.pipeline.beyond.ground.reach`); ``p = 1 / (1 + exp(-x))``. It is
+computed on a working image, and brought to the camera's pixels along the edges of its image
 (`roadeval.pipeline.beyond.guided`).
 
 References
@@ -27,11 +28,13 @@ from roadeval.data import Layer, LayerKind, LayerSpec, Rgb, mask_spec
 from roadeval.data.arrays import Flags, Floats, Values
 from roadeval.data.packed import Packed
 from roadeval.kernels.plain.trees import LEAVES
-from roadeval.pipeline.beyond.forest import Forest, grow
-from roadeval.pipeline.beyond.ground.reach import FEATURES, beyond, combined, inputs
+from roadeval.pipeline.beyond.blend import Blend
+from roadeval.pipeline.beyond.forest import grow
+from roadeval.pipeline.beyond.ground.reach import FEATURES, beyond, combined, inputs, lit
 from roadeval.pipeline.beyond.ground.scene import scene_of
 from roadeval.pipeline.beyond.ground_features import GROUPS, at_samples, features, names_of
 from roadeval.pipeline.beyond.guided import guided
+from roadeval.pipeline.beyond.hidden_layer import train
 from roadeval.pipeline.beyond.working_image import stretched
 from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.stage import (
@@ -45,6 +48,8 @@ from roadeval.pipeline.stage import (
 
 FULL: Final = 65535
 """The code of probability 1."""
+IN_LIGHT, IN_SHADE = 2 / 3, 1 / 3
+"""The network's weight."""
 FARTHEST: Final = 3.0
 """Of the distances from the patch as they are shown."""
 
@@ -83,6 +88,12 @@ class TreesSettings:
         Training pixels of a leaf, mirrored ones included, at least.
     share
         Of the features, drawn anew for each node, among which it chooses.
+    hidden
+        Planes of the network. What a decision costs grows with them, too.
+    passes
+        Of the network's training through as many pixels as were sampled.
+    noise
+        Deviation of what is added in training to each input of the network, -1 to 1.
     reach_weight
         ``reach_weight`` times ``s max(d - 1, 0)`` is taken from the log-odds. The distance d from
         the patch is 1 where roads end, after the stage ``exposure``; s is 1 in the light and 0 in
@@ -100,6 +111,9 @@ class TreesSettings:
     rate: Annotated[float, Field(gt=0, le=1)] = 0.1
     least: Annotated[int, Field(ge=1, le=10_000)] = 50
     share: Annotated[float, Field(gt=0, le=1)] = 0.33
+    hidden: Annotated[int, Field(ge=1, le=1024)] = 64
+    passes: Annotated[int, Field(ge=1, le=1000)] = 12
+    noise: Annotated[float, Field(ge=0, le=10)] = 0.1
     reach_weight: Annotated[float, Field(ge=0, le=100)] = 1.0
     threshold: Annotated[float, Field(ge=0, le=1)] = 0.5
 
@@ -118,8 +132,8 @@ def see(settings: TreesSettings, image: Rgb) -> Values:
     return features(scene_of(image, settings.width, settings.patch), settings.features)
 
 
-def fit(sample: TrainingSet, settings: TreesSettings) -> Forest:
-    """Grow the trees on the sampled pixels and their mirror images.
+def fit(sample: TrainingSet, settings: TreesSettings) -> Blend:
+    """Grow the trees, and train the network, on the sampled pixels and their mirror images.
 
     The sample has as many pixels of road as of the rest. Where the frames' share of road is known,
     the classes weigh as much as they have there.
@@ -128,20 +142,22 @@ def fit(sample: TrainingSet, settings: TreesSettings) -> Forest:
     return _grown(np.concatenate(values), sample, settings)
 
 
-def adapt(base: Forest, sample: TrainingSet, settings: TreesSettings) -> Forest:
-    """Grow trees on a drive's own pixels, for which what ``base`` says is one more feature."""
+def adapt(base: Blend, sample: TrainingSet, settings: TreesSettings) -> Blend:
+    """Learn from a drive's own pixels, for which what ``base`` says is one more feature."""
     if base.base:
         raise MisfitError("the model was adapted to a drive already; train it again")
     check_fit(base, settings)
     values = np.concatenate(at_samples(sample, partial(see, settings)))
-    known = base.sums(np.ascontiguousarray(values.T))
+    by_feature = np.ascontiguousarray(values.T)
+    known = base.opinions(by_feature, network_weight(by_feature, settings))
     return _grown(np.column_stack([values, known]), sample, settings).on_top(base)
 
 
-def _grown(values: Values, sample: TrainingSet, settings: TreesSettings) -> Forest:
+def _grown(values: Values, sample: TrainingSet, settings: TreesSettings) -> Blend:
     road = np.concatenate([sample.road, sample.road])
     weights = None if sample.share is None else balanced_back(road, sample.share)
-    return grow(values, road, weights, settings, sample.seed)
+    forest = grow(values, road, weights, settings, sample.seed)
+    return Blend.of(forest, train(values, road, weights, settings, sample.seed))
 
 
 def balanced_back(road: Flags, share: float) -> Floats:
@@ -151,7 +167,7 @@ def balanced_back(road: Flags, share: float) -> Floats:
     return weights
 
 
-def check_fit(forest: Forest, settings: TreesSettings) -> None:
+def check_fit(forest: Blend, settings: TreesSettings) -> None:
     """Raise a `MisfitError` if the trees were grown on more or fewer features of a pixel."""
     known = len(names_of(settings.features))
     if forest.inputs != known:
@@ -161,9 +177,25 @@ def check_fit(forest: Forest, settings: TreesSettings) -> None:
         )
 
 
-def log_odds(planes: Values, forest: Forest) -> Values:
+def network_weight(values: Values, settings: TreesSettings) -> Values | float:
+    """Return the network's weight in the mean for ``(F, n)`` features, ``(n,)`` float32.
+
+    Trees that fit their few frames to the last pixel are surer of themselves than they should be,
+    by a factor of two or more, and would outvote the network: it has two thirds in the light, and
+    one third in the shade, where it misses more road.
+    """
+    names = names_of(settings.features)
+    if FEATURES[-1] not in names:
+        return IN_LIGHT
+    share = lit(values[names.index(FEATURES[-1])])
+    weight: Values = np.float32(IN_SHADE) + np.float32(IN_LIGHT - IN_SHADE) * share
+    return weight
+
+
+def log_odds(planes: Values, forest: Blend, settings: TreesSettings) -> Values:
     """Compute the log-odds of road from `features`, ``(F, h, w)``; ``(h, w)`` float32."""
-    return forest.sums(planes.reshape(len(planes), -1)).reshape(planes.shape[1:])
+    values = planes.reshape(len(planes), -1)
+    return forest.opinions(values, network_weight(values, settings)).reshape(planes.shape[1:])
 
 
 def probability(odds: Values) -> Values:
@@ -172,7 +204,7 @@ def probability(odds: Values) -> Values:
     return result
 
 
-def bind(settings: TreesSettings, forest: Forest) -> Callable[[View], Output]:
+def bind(settings: TreesSettings, forest: Blend) -> Callable[[View], Output]:
     """Return the trees as a pure function of what they see; a `MisfitError`, see `check_fit`."""
     check_fit(forest, settings)
     names = names_of(settings.features)
@@ -183,7 +215,8 @@ def bind(settings: TreesSettings, forest: Forest) -> Callable[[View], Output]:
         seen = features(scene, settings.features)
         over, around, light = seen[known] if len(known) == len(FEATURES) else inputs(scene)
         far = combined(over, around)
-        odds = log_odds(seen, forest) - np.float32(settings.reach_weight) * beyond(far, light)
+        opinion = log_odds(seen, forest, settings)
+        odds = opinion - np.float32(settings.reach_weight) * beyond(far, light)
         share = np.clip(guided(probability(odds), scene.image, view.image), 0, 1)
         codes = np.rint(share * np.float32(FULL)).astype(np.uint16)
         road = Packed.of(codes > round(settings.threshold * FULL))
@@ -210,7 +243,7 @@ STAGE: Final = Stage(
     layers=layers,
     fit=fit,
     adapt=adapt,
-    parameters=Forest,
+    parameters=Blend,
     oracle=perfect_mask,
     inference_only=("reach_weight", "threshold"),
 )

@@ -7,7 +7,8 @@ import pytest
 from sklearn.ensemble import HistGradientBoostingClassifier
 
 from roadeval.pipeline.beyond import trees
-from roadeval.pipeline.beyond.forest import ALL, BINS, NODES, Forest, bin_edges, grow
+from roadeval.pipeline.beyond.blend import Blend
+from roadeval.pipeline.beyond.forest import ALL, BINS, NODES, bin_edges, grow
 from roadeval.pipeline.beyond.ground.reach import reach
 from roadeval.pipeline.beyond.ground.scene import scene_of
 from roadeval.pipeline.beyond.ground_features import at_samples, names_of
@@ -55,8 +56,7 @@ def test_the_arrays_say_what_scikit_learns_trees_say(leaves, weighted):
     values = values.round(1)  # so few that scikit-learn's own bins are the same in each version
     weights = balanced_back(road, 0.2) if weighted else None
     settings = replace(SMALL, leaves=leaves, share=1.0)
-    planes = np.ascontiguousarray(values.T).reshape(4, 20, 50)
-    found = trees.log_odds(planes, grow(values, road, weights, settings, 0))
+    found = grow(values, road, weights, settings, 0).sums(np.ascontiguousarray(values.T))
     boosting = HistGradientBoostingClassifier(
         learning_rate=SMALL.rate,
         max_iter=SMALL.trees,
@@ -65,7 +65,7 @@ def test_the_arrays_say_what_scikit_learns_trees_say(leaves, weighted):
         early_stopping=False,
         random_state=0,
     ).fit(values, road, sample_weight=weights)
-    np.testing.assert_allclose(found.ravel(), boosting.decision_function(values), atol=1e-5)
+    np.testing.assert_allclose(found, boosting.decision_function(values), atol=1e-5)
 
 
 @pytest.mark.parametrize("weighted", [False, True])
@@ -99,7 +99,7 @@ def test_bins_of_few_values_part_each_from_the_next(feature, edges):
 
 def test_the_same_seed_grows_the_same_trees(sample, forest):
     again = trees.fit(sample, SMALL)
-    for field in fields(Forest):
+    for field in fields(Blend):
         np.testing.assert_array_equal(getattr(again, field.name), getattr(forest, field.name))
     other = trees.fit(replace(sample, seed=1), SMALL)
     assert (other.feature != forest.feature).any()
@@ -196,9 +196,9 @@ def test_trees_for_other_features_are_a_misfit(forest):
         trees.bind(replace(SMALL, features=("place",)), forest)
 
 
-def test_trees_for_fewer_features_are_a_misfit(forest):
+def test_trees_for_fewer_features_are_a_misfit(sample):
     with pytest.raises(MisfitError, match="grown on 3 features"):
-        trees.bind(SMALL, replace(forest, feature=forest.feature % np.int32(3), inputs=3))
+        trees.bind(SMALL, trees.fit(sample, replace(SMALL, features=("place",))))
 
 
 @pytest.mark.parametrize("names", [("nose",), ("place", "place"), ()])

@@ -66,13 +66,20 @@ def combined(over: Values, around: Values) -> Values:
     return mean
 
 
+def lit(light: Values) -> Values:
+    """Return the share s of light, which grows from 0 at `SHADE` to 1 at `SUN`.
+
+    ``light`` is the last of `FEATURES`, float32 of any shape.
+    """
+    share: Values = np.clip((light - np.float32(SHADE)) / np.float32(SUN - SHADE), 0, 1)
+    return share
+
+
 def beyond(far: Values, light: Values) -> Values:
     """Compute ``s max(d - 1, 0)``: how far a pixel lies beyond the road's end, times its light.
 
-    The share s grows from 0 at `SHADE` to 1 at `SUN`: a shadow's edge lengthens the way into it,
-    so that in the shade the distance says little. All are ``(h, w)`` float32; d is `combined`,
-    ``light`` the last of `FEATURES`.
+    A shadow's edge lengthens the way into it, so that in the shade the distance says little. All
+    are ``(h, w)`` float32; d is `combined`, s `lit`, ``light`` the last of `FEATURES`.
     """
-    share = np.clip((light - np.float32(SHADE)) / np.float32(SUN - SHADE), 0, 1)
-    past: Values = share * np.maximum(far - np.float32(1), 0)
+    past: Values = lit(light) * np.maximum(far - np.float32(1), 0)
     return past

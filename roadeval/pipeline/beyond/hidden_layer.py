@@ -1,0 +1,178 @@
+"""A network with one hidden layer as plain arrays, and how it is trained.
+
+It sees each feature as its rank among the training pixels: a distance that grows without bound, or
+an odd light, then moves no input further than any other value does. Trees err in steps, along
+single features; planes through all of them at once err elsewhere, so that the mean of both errs
+less.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data.arrays import Flags, Floats, Values
+from roadeval.pipeline.parameters import check_arrays
+from roadeval.runtime.extensions import whole
+
+CODES: Final = 256
+"""Equal steps of a feature between its outer percentiles; each has a rank."""
+OUTER: Final = 0.5
+"""The lower of these percentiles. What is beyond them counts as they do."""
+LEAST: Final = 1e-6
+"""Between the percentiles of a feature that hardly varies."""
+PENALTY: Final = 0.1
+"""Of the squared weights (scikit-learn's ``alpha``)."""
+BATCH: Final = 256
+"""Pixels between two steps of the training, at most."""
+STEPS: Final = 150
+"""In a pass, at least, as long as that leaves each `FEWEST` pixels."""
+FEWEST: Final = 16
+STEP: Final = 0.002
+"""Of Adam's steps, at first; they shrink to nothing in equal parts from pass to pass."""
+
+Codes = npt.NDArray[np.uint8]
+
+
+class Training(Protocol):
+    """Settings of the training, see `roadeval.pipeline.beyond.trees.TreesSettings`."""
+
+    @property
+    def hidden(self) -> int:
+        """Number of planes."""
+
+    @property
+    def passes(self) -> int:
+        """How often as many pixels are drawn as there are."""
+
+    @property
+    def noise(self) -> float:
+        """Deviation of what is added to each rank."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HiddenLayer:
+    """Rectified planes through ranks, and their weighted sum.
+
+    Parameters
+    ----------
+    lowest, scale
+        ``(F,)`` float32: a feature x has the code ``scale (x - lowest)``, rounded, 0 to 255.
+    ranks
+        ``(F, CODES)`` float32: what each code counts for, -1 to 1.
+    planes, bias, weights
+        ``(K, F)``, ``(K,)``, ``(K,)`` float32.
+    shift
+        Where the sum begins.
+    """
+
+    lowest: Values
+    scale: Values
+    ranks: Values
+    planes: Values
+    bias: Values
+    weights: Values
+    shift: float
+
+    def __post_init__(self) -> None:
+        check_arrays(self, np.float32, lowest=("F",), scale=("F",), ranks=("F", CODES))
+        check_arrays(self, np.float32, planes=("K", "F"), bias=("K",), weights=("K",), shift=())
+
+    def sums(self, values: Values) -> Values:
+        """Return the log-odds of each pixel of ``(F, n)`` features, ``(n,)`` float32."""
+        seen = ranked(values, self.lowest, self.scale, self.ranks)
+        inner: Values = self.planes @ seen
+        inner += self.bias[:, None]
+        np.maximum(inner, 0, out=inner)
+        total: Values = self.weights @ inner
+        return total + np.float32(self.shift)
+
+
+def train(
+    values: Values, road: Flags, weights: Floats | None, settings: Training, seed: int
+) -> HiddenLayer:
+    """Train a network with scikit-learn's Adam, by one thread.
+
+    Each pass draws pixels anew by their weights, and adds other noise to their ranks: few frames
+    show few values of what is the same all over a frame, and nothing shall hang on their digits.
+
+    Parameters
+    ----------
+    values
+        ``(n, F)`` features, finite.
+    road
+        ``(n,)`` labels; both occur.
+    weights
+        ``(n,)`` of the pixels, above 0; None: all weigh the same.
+    settings
+        Of the training.
+    seed
+        Of all draws.
+    """
+    from threadpoolctl import threadpool_limits
+
+    lowest, highest = np.percentile(values, [OUTER, 100 - OUTER], axis=0).astype(np.float32)
+    scale = np.float32(CODES - 1) / np.maximum(highest - lowest, np.float32(LEAST))
+    features = np.ascontiguousarray(values.T)
+    ranks = np.stack([_ranks(each) for each in codes_of(features, lowest, scale)])
+    seen = np.ascontiguousarray(ranked(features, lowest, scale, ranks).T)
+    rng, count = np.random.default_rng(seed), len(road)
+    chances = None if weights is None else weights / weights.sum()
+    network = whole("sklearn.neural_network").MLPClassifier(
+        (settings.hidden,),
+        alpha=PENALTY,
+        batch_size=min(count, max(FEWEST, min(BATCH, count // STEPS))),
+        learning_rate_init=STEP,
+        random_state=seed,
+    )
+    with threadpool_limits(1, "blas"):
+        for number in range(settings.passes):
+            drawn = rng.choice(count, count, p=chances)
+            noise = rng.standard_normal((count, seen.shape[1]), dtype=np.float32)
+            noise *= np.float32(settings.noise)
+            noise += seen[drawn]
+            if number:
+                left = 1 - number / settings.passes
+                network._optimizer.learning_rate_init = STEP * left
+            network.partial_fit(noise, road[drawn], classes=[False, True])
+    (planes, out), (bias, shift) = network.coefs_, network.intercepts_
+    return HiddenLayer(
+        lowest,
+        scale,
+        ranks,
+        np.ascontiguousarray(planes.T, np.float32),
+        bias.astype(np.float32),
+        np.ascontiguousarray(out[:, 0], np.float32),
+        float(shift.item()),
+    )
+
+
+def codes_of(values: Values, lowest: Values, scale: Values) -> Codes:
+    """Return the codes of ``(F, n)`` features, see `HiddenLayer`."""
+    found: Codes = np.empty(values.shape, np.uint8)
+    for place, feature, least, step in zip(found, values, lowest, scale, strict=True):
+        steps = (feature - least) * step
+        steps += np.float32(0.5)
+        place[...] = np.clip(steps, 0, CODES - 1, out=steps)
+    return found
+
+
+def ranked(values: Values, lowest: Values, scale: Values, ranks: Values) -> Values:
+    """Return the ranks of ``(F, n)`` features, ``(F, n)`` float32."""
+    codes = codes_of(values, lowest, scale)
+    found: Values = np.empty(values.shape, np.float32)
+    for place, code, rank in zip(found, codes, ranks, strict=True):
+        place[...] = cv2.LUT(code[None], rank[None])[0]
+    return found
+
+
+def _ranks(codes: Codes) -> Values:
+    """Return for each code the share of pixels below it less that above it, ``(CODES,)``."""
+    counts = np.bincount(codes, minlength=CODES)
+    below = np.cumsum(counts) - counts
+    ranks: Values = ((2 * below + counts) / len(codes) - 1).astype(np.float32)
+    return ranks

@@ -1,0 +1,155 @@
+"""The network beside the trees, and the mean of both."""
+
+import warnings
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from sklearn.neural_network import MLPClassifier
+
+from roadeval.pipeline.beyond.blend import Blend
+from roadeval.pipeline.beyond.forest import grow
+from roadeval.pipeline.beyond.ground.reach import SHADE, SUN
+from roadeval.pipeline.beyond.ground_features import GROUPS, names_of
+from roadeval.pipeline.beyond.hidden_layer import CODES, HiddenLayer, codes_of, train
+from roadeval.pipeline.beyond.trees import TreesSettings, balanced_back, network_weight
+
+SMALL = TreesSettings(trees=10, leaves=8, least=5, hidden=32, passes=100, noise=0.1)
+
+
+def features_and_road(seed=0, count=1000):
+    values = np.random.default_rng(seed).normal(size=(count, 4)).astype(np.float32)
+    return values, values[:, 0] + values[:, 1] ** 2 > 0.5
+
+
+def planes_of(values):
+    return np.ascontiguousarray(values.T)
+
+
+@pytest.fixture(scope="module")
+def network():
+    return train(*features_and_road(), None, SMALL, 0)
+
+
+def test_it_learns_what_no_plane_alone_parts(network):
+    values, road = features_and_road(seed=1)
+    assert ((network.sums(planes_of(values)) > 0) == road).mean() > 0.9
+
+
+def test_the_same_seed_trains_the_same_network(network):
+    again = train(*features_and_road(), None, SMALL, 0)
+    for field in fields(HiddenLayer):
+        np.testing.assert_array_equal(getattr(again, field.name), getattr(network, field.name))
+    assert (train(*features_and_road(), None, SMALL, 1).planes != network.planes).any()
+
+
+def test_what_is_beyond_all_that_was_seen_counts_as_the_outermost(network):
+    values = np.array([[50, 1e30], [0, 0], [0, 0], [0, 0]], np.float32)
+    first, second = network.sums(values)
+    assert first == second
+
+
+def test_ranks_are_even_and_codes_hold_the_range(network):
+    assert (np.diff(network.ranks) >= 0).all()
+    assert np.abs(network.ranks).max() <= 1
+    values, _ = features_and_road()
+    codes = codes_of(planes_of(values), network.lowest, network.scale)
+    ranks = np.take_along_axis(network.ranks, codes.astype(np.intp), axis=1)
+    np.testing.assert_allclose(ranks.mean(axis=1), 0, atol=1e-3)
+    np.testing.assert_allclose(np.square(ranks).mean(axis=1), 1 / 3, atol=0.01)
+
+
+def test_a_feature_that_never_varies_does_no_harm():
+    values, road = features_and_road()
+    values[:, 3] = 7
+    found = train(values, road, None, SMALL, 0).sums(planes_of(values))
+    assert np.isfinite(found).all()
+    assert ((found > 0) == road).mean() > 0.9
+
+
+def test_rarer_road_is_less_probable():
+    values, road = features_and_road()
+    few, many = (
+        train(values, road, balanced_back(road, share), SMALL, 0).sums(planes_of(values))
+        for share in (0.05, 0.95)
+    )
+    assert few.mean() < many.mean() - 1
+
+
+def test_a_blend_is_the_weighted_mean(network):
+    values, road = features_and_road()
+    forest = grow(values, road, None, SMALL, 0)
+    seen = planes_of(values)
+    trees, other = forest.sums(seen), network.sums(seen)
+    blend = Blend.of(forest, network)
+    for weight in (0, 0.25, 1, np.linspace(0, 1, len(other), dtype=np.float32)):
+        expected = trees + np.float32(weight) * (other - trees)
+        np.testing.assert_allclose(blend.opinions(seen, weight), expected, rtol=1e-4, atol=1e-5)
+
+
+def test_the_sum_is_that_of_scikit_learn():
+    values, road = features_and_road()
+    machine = MLPClassifier((3,), max_iter=5, random_state=0)
+    ranks = np.linspace(-1, 1, CODES, dtype=np.float32)[None].repeat(4, axis=0)
+    lowest = np.full(4, -4, np.float32)
+    scale = np.full(4, (CODES - 1) / 8, np.float32)
+    seen = np.take_along_axis(
+        ranks, np.rint((values.T + 4) * 255 / 8).clip(0, 255).astype(int), axis=1
+    ).T
+    with warnings.catch_warnings(action="ignore"):
+        machine.fit(seen, road)
+    (planes, out), (bias, shift) = machine.coefs_, machine.intercepts_
+    ours = HiddenLayer(
+        lowest,
+        scale,
+        ranks,
+        np.ascontiguousarray(planes.T, np.float32),
+        bias.astype(np.float32),
+        out[:, 0].astype(np.float32),
+        float(shift[0]),
+    )
+    probability = machine.predict_proba(seen)[:, 1]
+    expected = np.log(probability / (1 - probability))
+    np.testing.assert_allclose(ours.sums(planes_of(values)), expected, rtol=1e-3, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("light", "weight"), [(-2, 1 / 3), (SHADE, 1 / 3), (-0.55, 1 / 2), (SUN, 2 / 3), (1, 2 / 3)]
+)
+def test_the_network_has_less_to_say_in_the_shade(light, weight):
+    names = names_of(tuple(GROUPS))
+    values = np.zeros((len(names), 1), np.float32)
+    values[names.index("light.light_over_80th_percentile")] = light
+    assert network_weight(values, TreesSettings()) == pytest.approx(weight)
+
+
+def test_without_a_feature_that_tells_light_the_weight_is_that_in_the_light():
+    assert network_weight(np.zeros((3, 1), np.float32), TreesSettings(features=("place",))) == 2 / 3
+
+
+def test_a_blend_on_top_sees_what_the_blend_below_gives():
+    values, road = features_and_road()
+    below = Blend.of(grow(values, road, None, SMALL, 0), train(values, road, None, SMALL, 0))
+    known = below.opinions(planes_of(values), 0.5)
+    more = np.column_stack([values, known])
+    above = Blend.of(grow(more, road, None, SMALL, 1), train(more, road, None, SMALL, 1))
+    both = above.on_top(below)
+    assert both.inputs == below.inputs
+    found, expected = both.opinions(planes_of(values), 0.5), above.opinions(planes_of(more), 0.5)
+    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({"ranks": np.zeros((1, 4, CODES - 1), np.float32)}, "ranks has the shape"),
+        ({"planes": np.full((1, 32, 4), np.nan, np.float32)}, "not finite"),
+        ({"bias": np.zeros((1, 31), np.float32)}, "weights has the shape|bias has the shape"),
+        ({"shift": np.zeros(2, np.float32)}, "shift has the shape"),
+    ],
+)
+def test_networks_that_no_training_gives_are_refused(network, changed, why):
+    values, road = features_and_road()
+    blend = Blend.of(grow(values, road, None, SMALL, 0), network)
+    with pytest.raises(ValueError, match=why):
+        replace(blend, **changed)
