@@ -6,8 +6,8 @@ python -m benchmarks.tables --measure   replays the drives and writes the number
 
 A drive comes from the folder named for it; see PRESETS.md for where to get them. ``--measure NAME``
 measures one drive, ``idd``, ``idd_features``, ``idd_filters``, ``synthetic_shadow``,
-``stage_times``, ``elsewhere``, ``taught``, ``covered`` or ``reach_weights``, and leaves the other
-numbers as they are.
+``stage_times``, ``elsewhere``, ``taught`` or ``reach_weights``, and leaves the other numbers as
+they are.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.tables import (
-    covered,
     idd,
     idd_filters,
     reach_weights,
@@ -47,7 +46,6 @@ ON_IDD: Mapping[str, Callable[[Sources, Path], Any]] = {
     "idd_features": lambda _, folder: idd.without_each_group(folder),
     "idd_filters": lambda _, folder: idd_filters.measured(folder),
     "taught": taught.measured,
-    "covered": covered.measured,
     "reach_weights": reach_weights.measured,
 }
 WITHOUT_FILES = {

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any, Final
 
-from benchmarks.tables import covered, idd, idd_filters, reach_weights, taught
+from benchmarks.tables import idd, idd_filters, reach_weights, taught
 from benchmarks.tables.drives import DRIVES, Drive
 from benchmarks.tables.measure import REPLAYS, STRANGERS, TEACHER, command
 from roadeval.results.claims import WORDS
@@ -518,22 +518,6 @@ def weights(numbers: Numbers) -> str:
     )
 
 
-def on_covered_ground(numbers: Numbers) -> str:
-    """Return rates of `robust` where the patch is no bare road, by share of covered frames."""
-    found = numbers["covered"]
-    views = {"bare": "as it is", "painted": "a red cycle box and marks before the vehicle"}
-    rows = [
-        [DRIVES[name].title, title, *map(_spread, by_view[view])]
-        for name, by_view in found["painted"].items()
-        for view, title in views.items()
-    ]
-    for place, title in enumerate(("a vehicle covers the patch", "the patch is road")):
-        shown = f"half of IDD Lite, {found['idd']['frames'][place]} frames"
-        rows.append([shown, title, *(_percent(each[place]) for each in found["idd"]["ERR"])])
-    heads = (f"{share:g} of the training frames" for share in covered.SHARES)
-    return _table(["`robust`: ERR, %", "the ground", *heads], rows)
-
-
 def flicker(numbers: Numbers) -> str:
     """Return how much of each mask changes from frame to frame."""
     drive = "camvid_0016E5_15hz"
@@ -569,7 +553,6 @@ BLOCKS: Final = {
     "aims": Block(aims, (ROBUST, f"{MEASURE} idd")),
     "elsewhere": Block(elsewhere, (f"{MEASURE} elsewhere",)),
     "taught": Block(taught_by, (f"{MEASURE} taught",)),
-    "covered": Block(on_covered_ground, (f"{MEASURE} covered",)),
     "reach_weights": Block(weights, (f"{MEASURE} reach_weights",)),
     "flicker": Block(flicker, (PAPER, ROBUST)),
 }

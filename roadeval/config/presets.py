@@ -25,7 +25,7 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
     "gated": {"chain": ("gated", "similarity", "svm", "post")},
     "robust": {
         "chain": ("exposure", "trees", "post"),
-        "training": {"pixels_per_class": 1000, "max_pixels": 50_000, "covered": 0.5},
+        "training": {"pixels_per_class": 1000, "max_pixels": 50_000},
         "post": {"region": "all"},
     },
 }

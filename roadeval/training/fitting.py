@@ -16,7 +16,6 @@ from roadeval.errors import RoadevalError
 from roadeval.pipeline.chain import Pipeline
 from roadeval.pipeline.stage import StageError, TrainingSet, View
 from roadeval.runtime.threads import ordered
-from roadeval.training.covering import Shown, covered
 from roadeval.training.likeness import fingerprint
 from roadeval.training.model import Model
 from roadeval.training.sampling import sample
@@ -65,7 +64,9 @@ def fit(
     """
     learning = {name: pipeline for name, pipeline in pipelines.items() if pipeline.learning()}
     source, truths = _truths(frames, settings)
-    samples = _sampled(frames, truths, source, settings) if learning else None
+    samples = _sampled(frames, truths, settings) if learning else None
+    if samples is not None and source == "truth":
+        samples = dataclasses.replace(samples, share=_share_of_road(truths))
     parameters: dict[str, dict[str, Any]] = {name: {} for name in pipelines}
     warnings: list[str] = []
     if samples is not None:
@@ -100,14 +101,10 @@ def _truths(frames: Sequence[Frame], settings: TrainingSettings) -> tuple[str, l
 
 
 def _sampled(
-    frames: Sequence[Frame], truths: list[Truth], source: str, settings: TrainingSettings
+    frames: Sequence[Frame], truths: list[Truth], settings: TrainingSettings
 ) -> TrainingSet:
     """Draw the pixels that every variant learns from."""
-    shown, share = [Shown(f.image, t) for f, t in zip(frames, truths, strict=True)], None
-    if source == "truth":  # a guess has no share to be trusted, and no edge to cut along
-        share = _share_of_road(truths)
-        shown += covered(shown, settings.covered, settings.patch, settings.seed)
-    pixels = sample([each.truth for each in shown], settings)
+    pixels = sample(truths, settings)
     if not len(pixels.road):
         numbers = f"{frames[0].number} to {frames[-1].number}"
         raise TrainingError(
@@ -115,9 +112,8 @@ def _sampled(
             "them; choose other frames with `frames.start` or `training.frames`, or give "
             "`training.model`"
         )
-    places = pixels.frame, pixels.row, pixels.column
-    images = tuple(each.image for each in shown)
-    return TrainingSet(images, *places, pixels.road, settings.seed, share)
+    images = tuple(frame.image for frame in frames)
+    return TrainingSet(images, pixels.frame, pixels.row, pixels.column, pixels.road, settings.seed)
 
 
 def _share_of_road(truths: Sequence[Truth]) -> float:

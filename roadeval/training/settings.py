@@ -46,9 +46,6 @@ class TrainingSettings:
     max_pixels
         Upper bound over all frames and both classes: the SVM's training time grows with its
         square.
-    covered
-        Share of the training frames that are shown once more with paint, a shadow or an obstacle
-        in front of the vehicle, where they have truth; see `roadeval.training.covering`.
     seed
         Of the draw.
     seeds
@@ -74,7 +71,6 @@ class TrainingSettings:
     gap: Annotated[int, Field(ge=0, le=1_000_000_000)] | None = None
     pixels_per_class: Annotated[int, Field(ge=1, le=1_000_000_000)] = 200
     max_pixels: Annotated[int, Field(ge=2, le=100_000)] = 8000
-    covered: Annotated[float, Field(ge=0, le=1)] = 0.0
     seed: Annotated[int, Field(ge=0, le=GREATEST_SEED)] = 0
     seeds: Annotated[int, Field(ge=1, le=100)] = 1
     patch: ReferencePatch = ReferencePatch()
