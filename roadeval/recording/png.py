@@ -34,7 +34,7 @@ _GREY, _COLOUR, _PALETTE = 0, 2, 3
 
 
 class Filter(IntEnum):
-    """What is taken from each byte of a row, as the row's first byte names it."""
+    """Filters of a row: what is subtracted from each byte, by their numbers in the file."""
 
     LEFT = 1
     """The byte of the pixel to the left: for few levels in wide areas."""
