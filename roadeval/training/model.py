@@ -23,6 +23,7 @@ from roadeval.pipeline.parameters import check_arrays, check_range
 from roadeval.pipeline.stage import Stage
 from roadeval.pipeline.stages import STAGES
 from roadeval.runtime.files import check_input, put
+from roadeval.training.arrays import arrays_of, from_arrays
 from roadeval.training.likeness import SIDE
 
 FORMAT: Final = "roadeval-model"
@@ -149,12 +150,10 @@ def save_model(model: Model, path: Path) -> None:
     arrays: dict[str, npt.NDArray[Any]] = {}
     for variant, stages in model.parameters.items():
         for stage, parameters in stages.items():
-            for entry in dataclasses.fields(parameters):
-                arrays[f"{variant}/{stage}/{entry.name}"] = np.asarray(
-                    getattr(parameters, entry.name)
-                )
-    own = {name: getattr(model, name) for name in OWN}
-    arrays |= {name: array for name, array in own.items() if array is not None}
+            own = arrays_of(parameters)
+            arrays |= {f"{variant}/{stage}/{name}": array for name, array in own.items()}
+    shared = {name: getattr(model, name) for name in OWN}
+    arrays |= {name: array for name, array in shared.items() if array is not None}
     header = {
         "format": FORMAT,
         "version": VERSION,
@@ -304,13 +303,8 @@ def _parameters(
     kind = None if stage is None else stage.parameters
     if kind is None:
         raise ValueError(f"{where} is no stage that learns")
-    names = {entry.name for entry in dataclasses.fields(kind)}
-    if names != arrays.keys():
-        wrong = ", ".join(sorted(names ^ arrays.keys()))
-        raise ValueError(f"arrays of {where} are missing or unknown: {wrong}")
-    values = {name: array if array.ndim else array.item() for name, array in arrays.items()}
     try:
-        return kind(**values)
+        return from_arrays(kind, arrays)
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from error
 

@@ -62,12 +62,7 @@ class Forest:
     offset
         Where the sum begins.
     inputs
-        How many features of a pixel there were to choose from, what `base` gives not counted.
-    base
-        So many trees at the beginning are those of other drives: what they give, from
-        ``base_offset`` on, is one more feature of the trees after them, and is not in the sum.
-    base_offset
-        0 where there are none.
+        How many features of a pixel there were to choose from.
     """
 
     feature: Indices
@@ -76,51 +71,27 @@ class Forest:
     values: Values
     offset: float
     inputs: int
-    base: int = 0
-    base_offset: float = 0.0
 
     def __post_init__(self) -> None:
         check_arrays(self, np.int32, feature=("T", NODES))
         check_arrays(self, np.uint32, kept=(len(self.feature), NODES))
         check_arrays(self, np.float32, threshold=(len(self.feature), NODES))
         check_arrays(self, np.float32, values=(len(self.feature), LEAVES), offset=())
-        check_arrays(self, np.float32, inputs=(), base=(), base_offset=())
+        check_arrays(self, np.float32, inputs=())
+        if not isinstance(self.inputs, int):
+            raise ValueError("inputs is no whole number")
         check_range("offset", self.offset, -GREATEST, GREATEST)
-        check_range("base", self.base, 0, len(self.feature) - 1)
         check_range("inputs", self.inputs, 1, GREATEST)
-        for name in ("inputs", "base"):
-            if not isinstance(getattr(self, name), int):
-                raise ValueError(f"{name} is no whole number")
-        check_range("feature", self.feature[: self.base], 0, self.inputs - 1)
-        # What `base` gives comes after the features of a pixel.
-        last = self.inputs - (self.base == 0)
-        check_range("feature", self.feature[self.base :], 0, last)
-        check_range("base_offset", self.base_offset, -GREATEST, GREATEST)
+        check_range("feature", self.feature, 0, self.inputs - 1)
         if not (self.kept >> np.uint32(LEAVES - 1)).all():
             raise ValueError("kept rules out a tree's last leaf, and so may leave none")
 
     def sums(self, values: Values) -> Values:
         """Return the sum for each pixel of ``(inputs, n)`` features, ``(n,)`` float32."""
-        if self.base:
-            first = self._sum(values, slice(self.base), self.base_offset)
-            values = np.concatenate([values, first[None]])
-        return self._sum(values, slice(self.base, None), self.offset)
-
-    def _sum(self, values: Values, trees: slice, offset: float) -> Values:
         total: Values = KERNELS.tree_sum(
-            values, self.feature[trees], self.threshold[trees], self.kept[trees], self.values[trees]
+            values, self.feature, self.threshold, self.kept, self.values
         )
-        return total + np.float32(offset)
-
-    def on_top(self, base: Forest) -> Forest:
-        """Return both in one: the last feature of these trees is the sum of those."""
-        both = (
-            np.concatenate([getattr(forest, name) for forest in (base, self)])
-            for name in ("feature", "threshold", "kept", "values")
-        )
-        feature, threshold, kept, values = both
-        known = base.inputs, len(base.feature), base.offset
-        return Forest(feature, threshold, kept, values, self.offset, *known)
+        return total + np.float32(self.offset)
 
 
 def grow(

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data.arrays import Flags, Floats, Values
-from roadeval.pipeline.parameters import check_arrays
+from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.runtime.extensions import whole
 
 CODES: Final = 256
@@ -79,8 +79,23 @@ class HiddenLayer:
     shift: float
 
     def __post_init__(self) -> None:
-        check_arrays(self, np.float32, lowest=("F",), scale=("F",), ranks=("F", CODES))
-        check_arrays(self, np.float32, planes=("K", "F"), bias=("K",), weights=("K",), shift=())
+        check_arrays(
+            self,
+            np.float32,
+            lowest=("F",),
+            scale=("F",),
+            ranks=("F", CODES),
+            planes=("K", "F"),
+            bias=("K",),
+            weights=("K",),
+            shift=(),
+        )
+        check_range("shift", self.shift, -GREATEST, GREATEST)
+
+    @property
+    def inputs(self) -> int:
+        """How many features of a pixel it sees."""
+        return len(self.lowest)
 
     def sums(self, values: Values) -> Values:
         """Return the log-odds of each pixel of ``(F, n)`` features, ``(n,)`` float32."""

@@ -28,7 +28,7 @@ from roadeval.data import Layer, LayerKind, LayerSpec, Rgb, mask_spec
 from roadeval.data.arrays import Flags, Floats, Values
 from roadeval.data.packed import Packed
 from roadeval.kernels.plain.trees import LEAVES
-from roadeval.pipeline.beyond.blend import Blend
+from roadeval.pipeline.beyond.blend import Blend, Stack
 from roadeval.pipeline.beyond.forest import grow
 from roadeval.pipeline.beyond.ground.reach import FEATURES, beyond, combined, inputs, lit
 from roadeval.pipeline.beyond.ground.scene import scene_of
@@ -132,32 +132,32 @@ def see(settings: TreesSettings, image: Rgb) -> Values:
     return features(scene_of(image, settings.width, settings.patch), settings.features)
 
 
-def fit(sample: TrainingSet, settings: TreesSettings) -> Blend:
+def fit(sample: TrainingSet, settings: TreesSettings) -> Stack:
     """Grow the trees, and train the network, on the sampled pixels and their mirror images.
 
     The sample has as many pixels of road as of the rest. Where the frames' share of road is known,
     the classes weigh as much as they have there.
     """
     values = at_samples(sample, partial(see, settings))
-    return _grown(np.concatenate(values), sample, settings)
+    return Stack(_grown(np.concatenate(values), sample, settings))
 
 
-def adapt(base: Blend, sample: TrainingSet, settings: TreesSettings) -> Blend:
-    """Learn from a drive's own pixels, for which what ``base`` says is one more feature."""
-    if base.base:
+def adapt(known: Stack, sample: TrainingSet, settings: TreesSettings) -> Stack:
+    """Learn from a drive's own pixels, for which what is known already is one more feature."""
+    if known.base is not None:
         raise MisfitError("the model was adapted to a drive already; train it again")
-    check_fit(base, settings)
+    check_fit(known, settings)
     values = np.concatenate(at_samples(sample, partial(see, settings)))
     by_feature = np.ascontiguousarray(values.T)
-    known = base.opinions(by_feature, network_weight(by_feature, settings))
-    return _grown(np.column_stack([values, known]), sample, settings).on_top(base)
+    given = known.log_odds(by_feature, network_weight(by_feature, settings))
+    return Stack(_grown(np.column_stack([values, given]), sample, settings), known.top)
 
 
 def _grown(values: Values, sample: TrainingSet, settings: TreesSettings) -> Blend:
     road = np.concatenate([sample.road, sample.road])
     weights = None if sample.share is None else balanced_back(road, sample.share)
     forest = grow(values, road, weights, settings, sample.seed)
-    return Blend.of(forest, train(values, road, weights, settings, sample.seed))
+    return Blend(forest, train(values, road, weights, settings, sample.seed))
 
 
 def balanced_back(road: Flags, share: float) -> Floats:
@@ -167,12 +167,12 @@ def balanced_back(road: Flags, share: float) -> Floats:
     return weights
 
 
-def check_fit(forest: Blend, settings: TreesSettings) -> None:
+def check_fit(learnt: Stack, settings: TreesSettings) -> None:
     """Raise a `MisfitError` if the trees were grown on more or fewer features of a pixel."""
     known = len(names_of(settings.features))
-    if forest.inputs != known:
+    if learnt.inputs != known:
         raise MisfitError(
-            f"the model's trees were grown on {forest.inputs} features of a pixel, and this "
+            f"the model's trees were grown on {learnt.inputs} features of a pixel, and this "
             f"version computes {known}; train it again"
         )
 
@@ -192,10 +192,10 @@ def network_weight(values: Values, settings: TreesSettings) -> Values | float:
     return weight
 
 
-def log_odds(planes: Values, forest: Blend, settings: TreesSettings) -> Values:
+def log_odds(planes: Values, learnt: Stack, settings: TreesSettings) -> Values:
     """Compute the log-odds of road from `features`, ``(F, h, w)``; ``(h, w)`` float32."""
     values = planes.reshape(len(planes), -1)
-    return forest.opinions(values, network_weight(values, settings)).reshape(planes.shape[1:])
+    return learnt.log_odds(values, network_weight(values, settings)).reshape(planes.shape[1:])
 
 
 def probability(odds: Values) -> Values:
@@ -204,9 +204,9 @@ def probability(odds: Values) -> Values:
     return result
 
 
-def bind(settings: TreesSettings, forest: Blend) -> Callable[[View], Output]:
+def bind(settings: TreesSettings, learnt: Stack) -> Callable[[View], Output]:
     """Return the trees as a pure function of what they see; a `MisfitError`, see `check_fit`."""
-    check_fit(forest, settings)
+    check_fit(learnt, settings)
     names = names_of(settings.features)
     known = [names.index(name) for name in FEATURES if name in names]
 
@@ -215,7 +215,7 @@ def bind(settings: TreesSettings, forest: Blend) -> Callable[[View], Output]:
         seen = features(scene, settings.features)
         over, around, light = seen[known] if len(known) == len(FEATURES) else inputs(scene)
         far = combined(over, around)
-        opinion = log_odds(seen, forest, settings)
+        opinion = log_odds(seen, learnt, settings)
         odds = opinion - np.float32(settings.reach_weight) * beyond(far, light)
         share = np.clip(guided(probability(odds), scene.image, view.image), 0, 1)
         codes = np.rint(share * np.float32(FULL)).astype(np.uint16)
@@ -243,7 +243,7 @@ STAGE: Final = Stage(
     layers=layers,
     fit=fit,
     adapt=adapt,
-    parameters=Blend,
+    parameters=Stack,
     oracle=perfect_mask,
     inference_only=("reach_weight", "threshold"),
 )

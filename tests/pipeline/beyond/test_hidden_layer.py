@@ -81,10 +81,10 @@ def test_a_blend_is_the_weighted_mean(network):
     forest = grow(values, road, None, SMALL, 0)
     seen = planes_of(values)
     trees, other = forest.sums(seen), network.sums(seen)
-    blend = Blend.of(forest, network)
+    blend = Blend(forest, network)
     for weight in (0, 0.25, 1, np.linspace(0, 1, len(other), dtype=np.float32)):
         expected = trees + np.float32(weight) * (other - trees)
-        np.testing.assert_allclose(blend.opinions(seen, weight), expected, rtol=1e-4, atol=1e-5)
+        np.testing.assert_allclose(blend.log_odds(seen, weight), expected, rtol=1e-4, atol=1e-5)
 
 
 def test_the_sum_is_that_of_scikit_learn():
@@ -127,29 +127,15 @@ def test_without_a_feature_that_tells_light_the_weight_is_that_in_the_light():
     assert network_weight(np.zeros((3, 1), np.float32), TreesSettings(features=("place",))) == 2 / 3
 
 
-def test_a_blend_on_top_sees_what_the_blend_below_gives():
-    values, road = features_and_road()
-    below = Blend.of(grow(values, road, None, SMALL, 0), train(values, road, None, SMALL, 0))
-    known = below.opinions(planes_of(values), 0.5)
-    more = np.column_stack([values, known])
-    above = Blend.of(grow(more, road, None, SMALL, 1), train(more, road, None, SMALL, 1))
-    both = above.on_top(below)
-    assert both.inputs == below.inputs
-    found, expected = both.opinions(planes_of(values), 0.5), above.opinions(planes_of(more), 0.5)
-    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5)
-
-
 @pytest.mark.parametrize(
     ("changed", "why"),
     [
-        ({"ranks": np.zeros((1, 4, CODES - 1), np.float32)}, "ranks has the shape"),
-        ({"planes": np.full((1, 32, 4), np.nan, np.float32)}, "not finite"),
-        ({"bias": np.zeros((1, 31), np.float32)}, "weights has the shape|bias has the shape"),
+        ({"ranks": np.zeros((4, CODES - 1), np.float32)}, "ranks has the shape"),
+        ({"planes": np.full((32, 4), np.nan, np.float32)}, "not finite"),
+        ({"bias": np.zeros(31, np.float32)}, "bias has the shape"),
         ({"shift": np.zeros(2, np.float32)}, "shift has the shape"),
     ],
 )
 def test_networks_that_no_training_gives_are_refused(network, changed, why):
-    values, road = features_and_road()
-    blend = Blend.of(grow(values, road, None, SMALL, 0), network)
     with pytest.raises(ValueError, match=why):
-        replace(blend, **changed)
+        replace(network, **changed)

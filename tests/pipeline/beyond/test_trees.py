@@ -1,13 +1,14 @@
 """Boosted trees: what they learn, and that their arrays say what scikit-learn's say."""
 
 from dataclasses import fields, replace
+from functools import partial
 
 import numpy as np
 import pytest
 from sklearn.ensemble import HistGradientBoostingClassifier
 
 from roadeval.pipeline.beyond import trees
-from roadeval.pipeline.beyond.blend import Blend
+from roadeval.pipeline.beyond.blend import Blend, Stack
 from roadeval.pipeline.beyond.forest import ALL, BINS, NODES, bin_edges, grow
 from roadeval.pipeline.beyond.ground.reach import reach
 from roadeval.pipeline.beyond.ground.scene import scene_of
@@ -40,8 +41,13 @@ def sample():
 
 
 @pytest.fixture(scope="module")
-def forest(sample):
+def learnt(sample):
     return trees.fit(sample, SMALL)
+
+
+@pytest.fixture(scope="module")
+def forest(learnt):
+    return learnt.top.forest
 
 
 def features_and_road(seed=0, count=600):
@@ -98,24 +104,24 @@ def test_bins_of_few_values_part_each_from_the_next(feature, edges):
 
 
 def test_the_same_seed_grows_the_same_trees(sample, forest):
-    again = trees.fit(sample, SMALL)
-    for field in fields(Blend):
+    again = trees.fit(sample, SMALL).top.forest
+    for field in fields(forest):
         np.testing.assert_array_equal(getattr(again, field.name), getattr(forest, field.name))
-    other = trees.fit(replace(sample, seed=1), SMALL)
+    other = trees.fit(replace(sample, seed=1), SMALL).top.forest
     assert (other.feature != forest.feature).any()
 
 
-def test_a_pavement_of_the_roads_grey_is_told_from_it_by_the_kerb(forest):
+def test_a_pavement_of_the_roads_grey_is_told_from_it_by_the_kerb(learnt):
     for kerb in (7, 11):
         image, truth = picture(kerb, seed=99)
-        mask = trees.bind(SMALL, forest)(View.of(image)).mask.pixels()
+        mask = trees.bind(SMALL, learnt)(View.of(image)).mask.pixels()
         assert (mask == truth).mean() > 0.95
 
 
-def test_the_mask_is_where_road_is_more_probable_than_the_threshold(forest):
+def test_the_mask_is_where_road_is_more_probable_than_the_threshold(learnt):
     view = View.of(picture(9, seed=99)[0])
     for threshold in (0.2, 0.5, 0.9):
-        output = trees.bind(replace(SMALL, threshold=threshold), forest)(view)
+        output = trees.bind(replace(SMALL, threshold=threshold), learnt)(view)
         expected = output.probability > round(threshold * 65535)
         np.testing.assert_array_equal(output.mask.pixels(), expected)
 
@@ -190,10 +196,10 @@ def test_trees_that_no_training_gives_are_refused(forest, changed, why):
         replace(forest, **changed)
 
 
-def test_trees_for_other_features_are_a_misfit(forest):
+def test_trees_for_other_features_are_a_misfit(learnt):
     known = len(names_of(SMALL.features))
     with pytest.raises(MisfitError, match=f"grown on {known} features .* computes 3;"):
-        trees.bind(replace(SMALL, features=("place",)), forest)
+        trees.bind(replace(SMALL, features=("place",)), learnt)
 
 
 def test_trees_for_fewer_features_are_a_misfit(sample):
@@ -207,8 +213,8 @@ def test_groups_must_be_known_and_named_once(names):
         TreesSettings(features=names)
 
 
-def test_the_layers_are_those_that_are_announced(forest):
-    found = trees.bind(SMALL, forest)(VIEW).layers
+def test_the_layers_are_those_that_are_announced(learnt):
+    found = trees.bind(SMALL, learnt)(VIEW).layers
     assert tuple(layer.spec for layer in found) == trees.layers(SMALL)
     far = reach(scene_of(VIEW.image, SMALL.width, SMALL.patch))
     np.testing.assert_allclose(found[0].array, stretched(far, VIEW.image.shape), rtol=1e-6)
@@ -223,9 +229,9 @@ VIEW = View.of(picture(9)[0])
 def test_lit_ground_beyond_reach_loses_log_odds_whatever_the_trees_see(sample, groups, monkeypatch):
     monkeypatch.setattr(trees, "guided", lambda values, *_images: values)
     without = replace(SMALL, features=groups, reach_weight=0.0)
-    forest = trees.fit(sample, without)
+    learnt = trees.fit(sample, without)
     plain, more = (
-        trees.bind(replace(without, reach_weight=weight), forest)(VIEW).probability / trees.FULL
+        trees.bind(replace(without, reach_weight=weight), learnt)(VIEW).probability / trees.FULL
         for weight in (0.0, 2.0)
     )
     scene = scene_of(VIEW.image, SMALL.width, SMALL.patch)
@@ -245,28 +251,21 @@ def test_lit_ground_beyond_reach_loses_log_odds_whatever_the_trees_see(sample, g
 # --- On top of what other drives have taught ------------------------------------------------------
 
 
-def test_trees_on_top_see_the_sum_of_those_below_and_nothing_else_of_it():
-    values, road = features_and_road()
-    base = grow(values, road, None, replace(SMALL, share=1.0), 0)
-    below = base.sums(np.ascontiguousarray(values.T))
-    above = grow(below[:, None], road, None, replace(SMALL, share=1.0), 0)
-    # The only feature of the trees above is the place after the features of those below.
-    known = values.shape[1]
-    moved = replace(above, feature=above.feature + np.int32(known), inputs=known + 1)
-    both = moved.on_top(base)
-    np.testing.assert_array_equal(
-        both.sums(np.ascontiguousarray(values.T)), above.sums(below[None])
-    )
-    assert both.inputs == known
+def test_what_stands_on_top_sees_the_base_as_its_last_feature(sample, learnt):
+    adapted = trees.adapt(learnt, sample, SMALL)
+    assert adapted.base is learnt.top
+    assert adapted.inputs == learnt.inputs
+    values = np.ascontiguousarray(np.concatenate(at_samples(sample, partial(trees.see, SMALL))).T)
+    known = learnt.log_odds(values, 0.5)
+    expected = adapted.top.log_odds(np.concatenate([values, known[None]]), 0.5)
+    np.testing.assert_array_equal(adapted.log_odds(values, 0.5), expected)
+    assert (adapted.top.forest.feature == learnt.inputs).any()
 
 
-def test_adapted_trees_know_what_other_drives_taught(forest):
+def test_adapted_trees_know_what_other_drives_taught():
     nothing_to_see = replace(SMALL, features=("place",), least=20)
     base = trees.fit(every_pixel((5, 9, 13)), nothing_to_see)
-    own = every_pixel((3,))
-    adapted = trees.adapt(base, own, nothing_to_see)
-    assert adapted.base == len(base.feature)
-    assert len(adapted.feature) == 2 * len(base.feature)
+    adapted = trees.adapt(base, every_pixel((3,)), nothing_to_see)
     image, truth = picture(3, seed=99)
     right = [
         (trees.bind(nothing_to_see, each)(View.of(image)).mask.pixels() == truth).mean()
@@ -275,13 +274,15 @@ def test_adapted_trees_know_what_other_drives_taught(forest):
     assert right[1] > right[0]
 
 
-def test_what_was_adapted_is_not_adapted_again(sample, forest):
-    adapted = trees.adapt(forest, sample, SMALL)
+def test_what_was_adapted_is_not_adapted_again(sample, learnt):
+    adapted = trees.adapt(learnt, sample, SMALL)
     with pytest.raises(MisfitError, match="adapted to a drive already"):
         trees.adapt(adapted, sample, SMALL)
 
 
-@pytest.mark.parametrize("base", [-1, 20, 1.5, 2.0])
-def test_a_base_that_cannot_be_is_refused(forest, base):
-    with pytest.raises(ValueError, match="base"):
-        replace(forest, base=base)
+def test_parts_that_see_other_features_are_refused(sample, learnt):
+    other = trees.fit(sample, replace(SMALL, features=("place",))).top
+    with pytest.raises(ValueError, match="the forest sees 3 features of a pixel, and the network"):
+        Blend(other.forest, learnt.top.network)
+    with pytest.raises(ValueError, match="on top sees 3 features of a pixel, and the base 3"):
+        Stack(other, other)
