@@ -2,7 +2,8 @@
 
 `simplejpeg` tells of damage that other decoders hide: they fill in what they cannot read. Its
 pixels are those of OpenCV, bit for bit. All other formats are read by Pillow, after the checksums
-of a PNG were verified. Damage that leaves a valid file cannot be known.
+of a PNG were verified; a usual PNG by `roadeval.images.png`, as Pillow would. Damage that leaves a
+valid file cannot be known.
 
 A rotation that EXIF data asks for is not applied: labels and calibrations belong to the sensor's
 own rows and columns.
@@ -24,6 +25,7 @@ from roadeval.data import Rgb
 from roadeval.images.errors import DamagedImageError, ImageError
 from roadeval.images.formats import ImageFormat, format_of
 from roadeval.images.limits import Limits
+from roadeval.images.png import Png, decode
 from roadeval.images.samples import eight_bits
 from roadeval.images.scans import check_scans
 
@@ -50,9 +52,12 @@ def to_rgb(data: File, limits: Limits) -> Rgb:
     format_ = _known_format(data)
     if format_.plugin is None:
         return _jpeg(data, limits)
+    if found := _usual_png(data, format_, limits):
+        pixels = found.pixels if found.palette is None else found.palette[found.pixels]
+        return pixels if pixels.ndim == 3 else _in_all_channels(pixels)
     image = _loaded(data, format_, limits)
     if image.mode in _SAMPLES:
-        return np.repeat(eight_bits(_samples(image))[..., None], 3, axis=2)
+        return _in_all_channels(_samples(image))
     return np.array(image.convert("RGB"))
 
 
@@ -70,9 +75,14 @@ def to_labels(data: File, limits: Limits) -> Array:
     format_ = _known_format(data)
     if format_.plugin is None:
         return without_colours(_jpeg(data, limits))
+    if found := _usual_png(data, format_, limits):
+        if found.palette is not None:
+            return _indices_or_greys(found.pixels, found.palette)
+        return found.pixels if found.pixels.ndim == 2 else without_colours(found.pixels)
     image = _loaded(data, format_, limits)
     if image.mode == "P":
-        return _indices_or_greys(image)
+        palette = np.array(image.getpalette("RGB"), np.uint8).reshape(-1, 3)
+        return _indices_or_greys(np.array(image), palette)
     if image.mode in _SAMPLES:
         samples = _samples(image)
         return samples if samples.dtype == np.uint16 else eight_bits(samples)
@@ -88,6 +98,9 @@ def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
         As `to_rgb`, and if it has no palette.
     """
     format_ = _known_format(data)
+    found = _usual_png(data, format_, limits)
+    if found is not None and found.palette is not None:
+        return found.pixels
     image = None if format_.plugin is None else _loaded(data, format_, limits)
     if image is None or image.mode != "P":
         raise ImageError("an image without a palette")
@@ -160,6 +173,10 @@ def _jpeg_size(data: File) -> tuple[int, int]:
     return width, height
 
 
+def _usual_png(data: File, format_: ImageFormat, limits: Limits) -> Png | None:
+    return decode(data, limits) if format_.name == "PNG" else None
+
+
 def _loaded(data: File, format_: ImageFormat, limits: Limits) -> Any:
     """Return a decoded image of Pillow's."""
     with _damage_in(format_):
@@ -217,9 +234,11 @@ def _samples(image: Any) -> Array:
     return samples.astype(samples.dtype.newbyteorder("="), copy=False)
 
 
-def _indices_or_greys(image: Any) -> Array:
-    indices = np.array(image)
-    palette = np.array(image.getpalette("RGB"), np.uint8).reshape(-1, 3)
+def _in_all_channels(samples: Array) -> Rgb:
+    return np.repeat(eight_bits(samples)[..., None], 3, axis=2)
+
+
+def _indices_or_greys(indices: Array, palette: npt.NDArray[np.uint8]) -> Array:
     used = palette[: int(indices.max()) + 1]
     greys = (used == used[:, :1]).all() and len(used) > 1
     return np.ascontiguousarray(used[indices, 0] if greys else indices)

@@ -52,6 +52,7 @@ __all__ = [
     "run_sums",
     "transfer",
     "tree_sum",
+    "unfilter",
 ]
 
 if lacking := [name for name in __all__ if not hasattr(_loops, name)]:
@@ -280,3 +281,15 @@ def tree_sum(
     sized = features, count, pixels
     _loops.tree_sum(*sized, feature, threshold, kept, values, trees, nodes, block, result)
     return result
+
+
+# --- Image files ----------------------------------------------------------------------------------
+
+
+def unfilter(lines: Plane, step: int) -> Plane:
+    """See `plain.unfilter`."""
+    height, width = lines.shape
+    rows = np.empty((height + 1, width - 1), np.uint8)
+    rows[0] = 0
+    _loops.unfilter(lines, height, width - 1, step, rows)
+    return rows[1:]

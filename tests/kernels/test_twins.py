@@ -81,6 +81,14 @@ def test_twins_agree_on_random_images(image, width):
     assert_twins(image, width)
 
 
+@given(st.integers(1, 9), st.integers(0, 40), st.integers(1, 4), st.integers(0, 2**32))
+@settings(max_examples=100)
+def test_twins_take_back_the_same_filters(height, size, step, seed):
+    lines = np.random.default_rng(seed).integers(0, 256, (height, 1 + size), np.uint8)
+    lines[:, 0] %= 5
+    assert_same(fast.unfilter(lines, step), plain.unfilter(lines, step))
+
+
 def test_arrays_may_be_read_only():
     for name, writeable in every_kernel(noise(12, 20), 1).items():
         arguments = [a.copy() if isinstance(a, np.ndarray) else a for a in writeable]
