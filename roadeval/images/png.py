@@ -83,7 +83,7 @@ def decode(data: bytes | memoryview, limits: Limits) -> Png | None:
     lines = _lines(_joined(chunks, b"IDAT"), height, -(-width * channels * bits // 8))
     if lines is None:
         return None
-    rows = KERNELS.unfilter(lines, max(1, channels * bits // 8))
+    rows = KERNELS.unfilter_rows(lines, max(1, channels * bits // 8))
     if kind == _PALETTE:
         return _indexed(_unpacked(rows, bits, width), _joined(chunks, b"PLTE"))
     if bits == 16:

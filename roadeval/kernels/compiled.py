@@ -39,6 +39,7 @@ __all__ = [
     "components",
     "count_bits",
     "fill_holes",
+    "filter_rows",
     "geodesics",
     "grow",
     "keep_region",
@@ -52,7 +53,7 @@ __all__ = [
     "run_sums",
     "transfer",
     "tree_sum",
-    "unfilter",
+    "unfilter_rows",
 ]
 
 if lacking := [name for name in __all__ if not hasattr(_loops, name)]:
@@ -286,10 +287,18 @@ def tree_sum(
 # --- Image files ----------------------------------------------------------------------------------
 
 
-def unfilter(lines: Plane, step: int) -> Plane:
-    """See `plain.unfilter`."""
+def filter_rows(rows: Plane, step: int, kind: int) -> Plane:
+    """See `plain.filter_rows`."""
+    height, width = rows.shape
+    lines = np.empty((height, 1 + width), np.uint8)
+    _loops.filter_rows(rows, height, width, step, kind, lines)
+    return lines
+
+
+def unfilter_rows(lines: Plane, step: int) -> Plane:
+    """See `plain.unfilter_rows`."""
     height, width = lines.shape
     rows = np.empty((height + 1, width - 1), np.uint8)
     rows[0] = 0
-    _loops.unfilter(lines, height, width - 1, step, rows)
+    _loops.unfilter_rows(lines, height, width - 1, step, rows)
     return rows[1:]

@@ -3,8 +3,8 @@
 A label image has 1, 2, 4 or 8 bits a pixel: the value of a pixel is its index, the palette only
 colours it. A binary mask of a real frame takes a quarter of what its raw bytes take after LZ4.
 
-Pillow, by which `roadeval.images` decodes these files, and OpenCV take several times as long to
-encode them. zlib-ng finds the same runs as zlib, in half the time.
+Pillow and OpenCV take several times as long to encode them. zlib-ng finds the same runs as zlib, in
+half the time.
 
 References
 ----------
@@ -25,6 +25,7 @@ from zlib_ng import zlib_ng as zlib
 
 from roadeval.data.colours import ColourWithOpacity
 from roadeval.data.packed import Packed
+from roadeval.kernels import KERNELS
 
 Bytes = npt.NDArray[np.uint8]
 
@@ -77,28 +78,12 @@ def encode_levels(levels: Bytes, row_filter: Filter) -> bytes:
     """Encode ``(H, W)`` uint8 grey levels, or ``(H, W, 3)`` uint8 RGB, as a PNG file."""
     height, width, *channels = levels.shape
     step = channels[0] if channels else 1
-    rows = _filtered(levels.reshape(height, -1), step, row_filter)
-    return _file((height, width), 8, _COLOUR if channels else _GREY, (), rows)
+    lines = _filtered(levels.reshape(height, -1), step, row_filter)
+    return _file((height, width), 8, _COLOUR if channels else _GREY, (), lines)
 
 
 def _filtered(rows: Bytes, step: int, row_filter: Filter) -> Bytes:
-    """Return ``(H, B)`` bytes less what the filter takes from them, ``(H, 1 + B)`` with its number.
-
-    The pixel to the left begins ``step`` bytes before; beyond the image all is 0.
-    """
-    lines = np.empty((rows.shape[0], rows.shape[1] + 1), np.uint8)
-    lines[:, 0], lines[:, 1:] = row_filter, rows
-    inner = lines[:, 1:]
-    match row_filter:
-        case Filter.LEFT:
-            inner[:, step:] -= rows[:, :-step]
-        case Filter.ABOVE:
-            inner[1:] -= rows[:-1]
-        case Filter.MEAN:
-            left, above = np.zeros_like(rows), np.zeros_like(rows)
-            left[:, step:], above[1:] = rows[:, :-step], rows[:-1]
-            # (left + above) // 2 without a ninth bit.
-            inner -= (left & above) + ((left ^ above) >> 1)
+    lines: Bytes = KERNELS.filter_rows(np.ascontiguousarray(rows), step, row_filter)
     return lines
 
 

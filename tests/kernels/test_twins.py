@@ -12,6 +12,7 @@ from roadeval import kernels
 from roadeval.data.packed import Packed, pack, unpack
 from roadeval.kernels import plain
 from roadeval.pipeline.paper import compensation, shadow_mask, similarity
+from roadeval.recording.png import Filter
 from tests.pipeline.images import IMAGES, images, noise
 
 fast = pytest.importorskip(
@@ -86,7 +87,16 @@ def test_twins_agree_on_random_images(image, width):
 def test_twins_take_back_the_same_filters(height, size, step, seed):
     lines = np.random.default_rng(seed).integers(0, 256, (height, 1 + size), np.uint8)
     lines[:, 0] %= 5
-    assert_same(fast.unfilter(lines, step), plain.unfilter(lines, step))
+    assert_same(fast.unfilter_rows(lines, step), plain.unfilter_rows(lines, step))
+
+
+@given(st.integers(1, 9), st.integers(0, 40), st.integers(1, 4), st.sampled_from(Filter))
+@settings(max_examples=100)
+def test_twins_filter_rows_alike_and_it_can_be_taken_back(height, size, step, kind):
+    rows = RNG.integers(0, 256, (height, size), np.uint8)
+    lines = fast.filter_rows(rows, step, kind)
+    assert_same(lines, plain.filter_rows(rows, step, kind))
+    np.testing.assert_array_equal(plain.unfilter_rows(lines, step), rows)
 
 
 def test_arrays_may_be_read_only():

@@ -83,7 +83,9 @@ void tree_sum(
     const float *features, int64_t count, int64_t pixels, const int32_t *feature,
     const float *threshold, const uint32_t *kept, const float *values, int64_t trees,
     int64_t nodes, float *block, float *result);
-void unfilter(
+void filter_rows(
+    const uint8_t *rows, int64_t height, int64_t size, int64_t step, int kind, uint8_t *lines);
+void unfilter_rows(
     const uint8_t *lines, int64_t height, int64_t size, int64_t step, uint8_t *rows);
 
 PART int64_t least(int64_t a, int64_t b) { return a < b ? a : b; }

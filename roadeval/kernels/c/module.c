@@ -177,15 +177,18 @@ FUNCTION(tree_sum, "f2 n n i2 f2 I2 f2 n n >f1 >f1",
     tree_sum(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3), ARRAY(4), ARRAY(5), ARRAY(6), SIZE(7), SIZE(8),
         ARRAY(9), ARRAY(10)))
 
-FUNCTION(unfilter, "B2 n n n >B2", unfilter(ARRAY(0), SIZE(1), SIZE(2), SIZE(3), ARRAY(4)))
+FUNCTION(filter_rows, "B2 n n n n >B2",
+    filter_rows(ARRAY(0), SIZE(1), SIZE(2), SIZE(3), (int)SIZE(4), ARRAY(5)))
+
+FUNCTION(unfilter_rows, "B2 n n n >B2", unfilter_rows(ARRAY(0), SIZE(1), SIZE(2), SIZE(3), ARRAY(4)))
 
 #define METHOD(name) {#name, (PyCFunction)(void (*)(void))call_##name, METH_FASTCALL, NULL}
 
 static PyMethodDef methods[] = {
     METHOD(look_up_sum_min), METHOD(mahalanobis), METHOD(look_up_colours), METHOD(run_sums),
     METHOD(ring_sums), METHOD(transfer), METHOD(paint), METHOD(label_runs), METHOD(components),
-    METHOD(keep_region), METHOD(fill_holes), METHOD(count_bits), METHOD(grow),
-    METHOD(outcomes), METHOD(add_outcomes), METHOD(geodesics), METHOD(tree_sum), METHOD(unfilter),
+    METHOD(keep_region), METHOD(fill_holes), METHOD(count_bits), METHOD(grow), METHOD(filter_rows),
+    METHOD(outcomes), METHOD(add_outcomes), METHOD(geodesics), METHOD(tree_sum), METHOD(unfilter_rows),
     {NULL, NULL, 0, NULL},
 };
 

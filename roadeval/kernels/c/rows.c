@@ -42,9 +42,39 @@ PART void paeth_of_channel(
     }
 }
 
+/* `rows`: height x size. `lines`: height x (1 + size). */
+LOOP void filter_rows(
+    const uint8_t *restrict rows, int64_t height, int64_t size, int64_t step, int kind,
+    uint8_t *restrict lines)
+{
+    for (int64_t y = 0; y < height; y++) {
+        const uint8_t *row = rows + y * size;
+        const uint8_t *above = y > 0 ? row - size : row;
+        uint8_t *restrict line = lines + y * (1 + size) + 1;
+        int64_t first = least(step, size);
+        bool from_above = y > 0 && kind != LEFT;
+        line[-1] = (uint8_t)kind;
+        if (kind == ABOVE) {
+            for (int64_t byte = 0; byte < size; byte++)
+                line[byte] = (uint8_t)(row[byte] - (from_above ? above[byte] : 0));
+            continue;
+        }
+        for (int64_t byte = 0; byte < first; byte++)
+            line[byte] = (uint8_t)(row[byte] - (from_above ? above[byte] / 2 : 0));
+        if (kind == LEFT) {
+            for (int64_t byte = first; byte < size; byte++)
+                line[byte] = (uint8_t)(row[byte] - row[byte - step]);
+            continue;
+        }
+        for (int64_t byte = first; byte < size; byte++)
+            line[byte] = (uint8_t)(
+                row[byte] - (row[byte - step] + (from_above ? above[byte] : 0)) / 2);
+    }
+}
+
 /* `lines`: height x (1 + size). `rows`: (1 + height) x size, the first row cleared: what is above
  * the image. */
-LOOP void unfilter(
+LOOP void unfilter_rows(
     const uint8_t *restrict lines, int64_t height, int64_t size, int64_t step, uint8_t *rows)
 {
     for (int64_t y = 0; y < height; y++) {

@@ -8,7 +8,7 @@ from roadeval.kernels.plain.colours import look_up_colours, look_up_sum_min, mah
 from roadeval.kernels.plain.compensation import ring_sums, run_sums, transfer
 from roadeval.kernels.plain.geodesics import ASLANT, FAR, STRAIGHT, geodesics
 from roadeval.kernels.plain.outcomes import add_outcomes, outcomes
-from roadeval.kernels.plain.rows import unfilter
+from roadeval.kernels.plain.rows import filter_rows, unfilter_rows
 from roadeval.kernels.plain.runs import components, fill_holes, keep_region, label_runs, paint
 from roadeval.kernels.plain.trees import LEAVES, tree_sum
 
@@ -21,6 +21,7 @@ __all__ = [
     "components",
     "count_bits",
     "fill_holes",
+    "filter_rows",
     "geodesics",
     "grow",
     "keep_region",
@@ -34,5 +35,5 @@ __all__ = [
     "run_sums",
     "transfer",
     "tree_sum",
-    "unfilter",
+    "unfilter_rows",
 ]

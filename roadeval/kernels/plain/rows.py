@@ -1,4 +1,9 @@
-"""Rows of a PNG file."""
+"""Rows of a PNG file.
+
+References
+----------
+"Portable Network Graphics (PNG) Specification (Third Edition)", W3C, 2025, section 9.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +12,34 @@ import numpy as np
 from roadeval.data.arrays import Plane
 
 
-def unfilter(lines: Plane, step: int) -> Plane:
-    """Add to each byte of a PNG file's rows what the filter of its row has taken from it [1]_.
+def filter_rows(rows: Plane, step: int, kind: int) -> Plane:
+    """Subtract from each byte of an image's rows what a filter takes from it.
+
+    Parameters
+    ----------
+    rows
+        ``(H, B)`` uint8.
+    step
+        Bytes from a pixel to the next.
+    kind
+        1 takes the byte to the left, 2 the byte above, 3 the mean of both, rounded down.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(H, 1 + B)`` uint8, each row after its filter's number. The differences are taken modulo
+        256; beyond the image all is 0.
+    """
+    left, above = np.zeros_like(rows), np.zeros_like(rows)
+    left[:, step:], above[1:] = rows[:, :-step], rows[:-1]
+    # (left + above) // 2 without a ninth bit.
+    mean = (left & above) + ((left ^ above) >> 1)
+    taken = (left, above, mean)[kind - 1]
+    return np.insert(rows - taken, 0, np.uint8(kind), axis=1)
+
+
+def unfilter_rows(lines: Plane, step: int) -> Plane:
+    """Add to each byte of a PNG file's rows what the filter of its row has taken from it.
 
     Parameters
     ----------
@@ -21,10 +52,6 @@ def unfilter(lines: Plane, step: int) -> Plane:
     -------
     numpy.ndarray
         ``(H, B)`` uint8. The sums are taken modulo 256; beyond the image all is 0.
-
-    References
-    ----------
-    .. [1] "Portable Network Graphics (PNG) Specification (Third Edition)", W3C, 2025, section 9.
     """
     height, size = lines.shape
     # With what is above the image, and to the left of it.
