@@ -82,6 +82,8 @@ class LabelMap:
         if labels.ndim != 2:
             raise BadMessage("it holds colours, not label values")
         truth = self.of_values(labels)
+        if self.others != FRINGE:
+            return truth, 0
         fringe = truth == FRINGE
         truth[fringe] = IGNORE
         return truth, int(np.count_nonzero(fringe))

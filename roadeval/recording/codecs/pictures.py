@@ -54,7 +54,7 @@ class ScalarCodec:
             array = np.clip(np.rint(scaled), 0, 255).astype(np.uint8)
         if self.spec.exact:
             return png.encode_levels(array, png.Filter.MEAN)
-        return png.encode_levels(_FIFTHS[array], png.Filter.LEFT)
+        return png.encode_levels(np.asarray(cv2.LUT(array, _FIFTHS), np.uint8), png.Filter.LEFT)
 
     def columns(self, payloads: list[bytes]) -> Any:
         """Return columns of encoded depth images."""
