@@ -1,4 +1,4 @@
-"""PNG files that are sound and plain, several times as fast as Pillow decodes them.
+"""Decoding of usual PNG files, several times as fast as by Pillow.
 
 Pillow holds Python's interpreter lock while it decodes a PNG, and the other worker threads wait.
 Whatever else there is in a file, damage above all, is left to Pillow, which says what it is.
@@ -37,6 +37,7 @@ _CHANNELS: Final = {
 """By kind of pixels and bits of a sample."""
 _INVALID: Final[type[Exception]] = zlib.error  # type: ignore[assignment]  # by zlib-ng's stub
 _FILTERS: Final = 5
+"""Kinds of them, by the first byte of a row."""
 _ORDER: Final = re.compile(
     rb"IHDR(?:[a-z].{3})*(?:PLTE(?:[a-z].{3})*)?(?:IDAT)+(?:[a-z].{3})*IEND", re.DOTALL
 )
@@ -92,6 +93,7 @@ def decode(data: bytes | memoryview, limits: Limits) -> Png | None:
 
 
 def _indexed(indices: npt.NDArray[np.uint8], colours: bytes) -> Png | None:
+    """Return ``(H, W)`` indices with their palette, if it has a colour for each."""
     if len(colours) % 3 or 3 * int(indices.max()) >= len(colours):
         return None
     return Png(indices, np.frombuffer(colours, np.uint8).reshape(-1, 3))

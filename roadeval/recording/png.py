@@ -83,6 +83,10 @@ def encode_levels(levels: Bytes, row_filter: Filter) -> bytes:
 
 
 def _filtered(rows: Bytes, step: int, row_filter: Filter) -> Bytes:
+    """Return ``(H, B)`` bytes less what the filter takes from them, ``(H, 1 + B)`` with its number.
+
+    A pixel has ``step`` bytes.
+    """
     lines: Bytes = KERNELS.filter_rows(np.ascontiguousarray(rows), step, row_filter)
     return lines
 

@@ -1,4 +1,4 @@
-"""What a stage has learnt as named arrays, for a file, and back."""
+"""Conversion of what a stage has learnt to named arrays, as model files hold them, and back."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 Arrays = Mapping[str, npt.NDArray[Any]]
+"""Those of a dataclass by name."""
 
 
 def arrays_of(learnt: Any) -> dict[str, npt.NDArray[Any]]:
@@ -29,14 +30,19 @@ def arrays_of(learnt: Any) -> dict[str, npt.NDArray[Any]]:
 
 
 def from_arrays(kind: type[Any], arrays: Arrays) -> Any:
-    """Return the dataclass of `arrays_of`; a ValueError if an array is missing, or is not known."""
+    """Return the dataclass whose arrays these are, see `arrays_of`.
+
+    Raises
+    ------
+    ValueError
+        If an array is missing, or is not known, or the dataclass refuses what it is given.
+    """
     parts = _parts(kind)
     names = {field.name for field in dataclasses.fields(kind)}
-    missing = names - parts.keys() - arrays.keys()
-    unknown = {name for name in arrays if name.partition("/")[0] not in parts} - names
-    if missing or unknown or parts.keys() & arrays.keys():
-        wrong = sorted(missing | unknown | (parts.keys() & arrays.keys()))
-        raise ValueError(f"missing or unknown arrays: {', '.join(wrong)}")
+    own = names - parts.keys()
+    whole = {name for name in arrays if name.partition("/")[0] not in parts or name in parts}
+    if wrong := own ^ whole:
+        raise ValueError(f"missing or unknown arrays: {', '.join(sorted(wrong))}")
     values: dict[str, Any] = {}
     for name in names:
         if name not in parts:
@@ -45,8 +51,8 @@ def from_arrays(kind: type[Any], arrays: Arrays) -> Any:
             continue
         of_part, optional = parts[name]
         start = f"{name}/"
-        own = {key.removeprefix(start): arrays[key] for key in arrays if key.startswith(start)}
-        values[name] = from_arrays(of_part, own) if own or not optional else None
+        inner = {key.removeprefix(start): arrays[key] for key in arrays if key.startswith(start)}
+        values[name] = from_arrays(of_part, inner) if inner or not optional else None
     return kind(**values)
 
 

@@ -188,8 +188,8 @@ static PyMethodDef methods[] = {
     METHOD(look_up_sum_min), METHOD(mahalanobis), METHOD(look_up_colours), METHOD(run_sums),
     METHOD(ring_sums), METHOD(transfer), METHOD(paint), METHOD(label_runs), METHOD(components),
     METHOD(keep_region), METHOD(fill_holes), METHOD(count_bits), METHOD(grow), METHOD(filter_rows),
-    METHOD(outcomes), METHOD(add_outcomes), METHOD(geodesics), METHOD(tree_sum), METHOD(unfilter_rows),
-    {NULL, NULL, 0, NULL},
+    METHOD(outcomes), METHOD(add_outcomes), METHOD(geodesics), METHOD(tree_sum),
+    METHOD(unfilter_rows), {NULL, NULL, 0, NULL},
 };
 
 static struct PyModuleDef module = {

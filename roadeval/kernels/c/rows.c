@@ -42,33 +42,28 @@ PART void paeth_of_channel(
     }
 }
 
+/* What a filter takes from a byte. */
+PART int taken(int kind, int left, int above)
+{
+    return kind == LEFT ? left : kind == ABOVE ? above : (left + above) / 2;
+}
+
 /* `rows`: height x size. `lines`: height x (1 + size). */
 LOOP void filter_rows(
     const uint8_t *restrict rows, int64_t height, int64_t size, int64_t step, int kind,
     uint8_t *restrict lines)
 {
+    int64_t first = least(step, size);
     for (int64_t y = 0; y < height; y++) {
-        const uint8_t *row = rows + y * size;
-        const uint8_t *above = y > 0 ? row - size : row;
+        const uint8_t *row = rows + y * size, *above = y > 0 ? row - size : row;
         uint8_t *restrict line = lines + y * (1 + size) + 1;
-        int64_t first = least(step, size);
-        bool from_above = y > 0 && kind != LEFT;
         line[-1] = (uint8_t)kind;
-        if (kind == ABOVE) {
-            for (int64_t byte = 0; byte < size; byte++)
-                line[byte] = (uint8_t)(row[byte] - (from_above ? above[byte] : 0));
-            continue;
-        }
         for (int64_t byte = 0; byte < first; byte++)
-            line[byte] = (uint8_t)(row[byte] - (from_above ? above[byte] / 2 : 0));
-        if (kind == LEFT) {
-            for (int64_t byte = first; byte < size; byte++)
-                line[byte] = (uint8_t)(row[byte] - row[byte - step]);
-            continue;
+            line[byte] = (uint8_t)(row[byte] - taken(kind, 0, y > 0 ? above[byte] : 0));
+        for (int64_t byte = first; byte < size; byte++) {
+            int left = row[byte - step], over = y > 0 ? above[byte] : 0;
+            line[byte] = (uint8_t)(row[byte] - taken(kind, left, over));
         }
-        for (int64_t byte = first; byte < size; byte++)
-            line[byte] = (uint8_t)(
-                row[byte] - (row[byte - step] + (from_above ? above[byte] : 0)) / 2);
     }
 }
 

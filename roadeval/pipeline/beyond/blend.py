@@ -1,4 +1,4 @@
-"""Trees and a network with one hidden layer, and the weighted mean of their log-odds."""
+"""The weighted mean of the log-odds by trees and by a network, and one such mean on another."""
 
 from __future__ import annotations
 
@@ -79,7 +79,10 @@ class Stack:
         return (self.base or self.top).inputs
 
     def log_odds(self, values: Values, weight: Values | float) -> Values:
-        """Return what the blend on top gives, see `Blend.log_odds`."""
+        """Return what the blend on top gives for each pixel, ``(n,)`` float32.
+
+        ``values`` and ``weight`` are as in `Blend.log_odds`; both blends take the same weight.
+        """
         if self.base is not None:
             known = self.base.log_odds(values, weight)
             values = np.concatenate([values, known[None]])
