@@ -139,3 +139,11 @@ def test_the_camera_is_drawn_below_every_layer():
     orders = {path: order(codec) for path, codec in codecs.items()}
     assert all(above > camera for above in orders.values() if above is not None)
     assert None not in (orders["/filtered/post"], orders["/truth"])
+
+
+def test_a_number_map_that_need_not_be_exact_has_each_fifth_level_alone():
+    spec = replace(NDI, exact=False)
+    codes = np.repeat(np.repeat(np.arange(256, dtype=np.uint8)[None], 2, axis=0), 2, axis=1)
+    with Image.open(BytesIO(codec(spec, 512, 2).encode(codes))) as picture:
+        levels = np.array(picture)
+    np.testing.assert_array_equal(levels[0], np.rint(np.arange(256) / 5) * 5)
