@@ -78,6 +78,16 @@ def test_pixels_are_those_of_pillow(kind, bits, size, monkeypatch):
         assert found.flags.c_contiguous
 
 
+def test_labels_of_a_grey_palette_are_its_greys_and_of_a_colourful_one_its_indices():
+    greys = np.repeat(np.array([0, 255, 128], np.uint8), 3)
+    for colours, expected in ((greys, [0, 255, 128]), (greys + np.arange(9, dtype=np.uint8), None)):
+        packed = zlib.compress(bytes([0, 0, 1, 2]))
+        parts = chunk(b"PLTE", colours.tobytes()), chunk(b"IDAT", packed), chunk(b"IEND")
+        data = file(head(3, 1, 8, 3), *parts)
+        assert decode(data, LIMITS) is not None
+        assert images.to_labels(data, LIMITS).tolist() == [expected or [0, 1, 2]]
+
+
 @pytest.mark.parametrize("filters", [(each,) for each in range(5)])
 def test_each_filter_is_taken_back(filters, monkeypatch):
     for kind in (0, 2):
