@@ -101,20 +101,24 @@ def _bytes(result: FrameResult) -> int:
 def library_codecs() -> Iterator[None]:
     """Have PNG files encoded by OpenCV and zlib alone meanwhile.
 
-    OpenCV with the settings that make its smallest file of a noisy map, zlib with the recording's
-    own. A floor of these stays what it is when the recording's encoder becomes faster.
+    Both with the settings that make their smallest files of masks and noisy maps. A floor of these
+    stays what it is when the recording's encoder becomes faster.
     """
-    own = png.zlib, png.encode_levels
+    own = png.crc32, png.compress, png.encode_levels
 
-    def by_opencv(levels: np.ndarray, _filter: png.Filter) -> bytes:
+    def by_zlib(lines: np.ndarray) -> bytes:
+        deflate = zlib.compressobj(1, zlib.DEFLATED, strategy=zlib.Z_RLE)
+        return deflate.compress(lines.data) + deflate.flush()
+
+    def by_opencv(levels: np.ndarray) -> bytes:
         channels = levels if levels.ndim == 2 else cv2.cvtColor(levels, cv2.COLOR_RGB2BGR)
         return cv2.imencode(".png", channels, NOISY)[1].tobytes()
 
-    png.zlib, png.encode_levels = zlib, by_opencv
+    png.crc32, png.compress, png.encode_levels = zlib.crc32, by_zlib, by_opencv
     try:
         yield
     finally:
-        png.zlib, png.encode_levels = own
+        png.crc32, png.compress, png.encode_levels = own
 
 
 def floor(held: Held, folder: Path, jobs: int, codecs: AbstractContextManager[None]) -> Cost:

@@ -15,7 +15,7 @@ from roadeval.kernels import KERNELS
 
 def grow(bits: Bits, reach: Reach, truth: TruthBits) -> Bits:
     """Dilate a mask of the truth's shape by an element."""
-    grown: Bits = KERNELS.grow(bits, reach, truth.shape[1], False)
+    grown: Bits = KERNELS.dilate(bits, reach, truth.shape[1])
     return grown
 
 

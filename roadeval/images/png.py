@@ -17,7 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from zlib_ng import zlib_ng as zlib
+from isal import isal_zlib as zlib
 
 from roadeval.images.limits import Limits
 from roadeval.kernels import KERNELS, are_compiled
@@ -35,7 +35,7 @@ _CHANNELS: Final = {
     (_COLOUR, 8): 3,
 }
 """By kind of pixels and bits of a sample."""
-_INVALID: Final[type[Exception]] = zlib.error  # type: ignore[assignment]  # by zlib-ng's stub
+_INVALID: Final[type[Exception]] = zlib.error  # type: ignore[assignment]  # by its stub
 _FILTERS: Final = 5
 """Kinds of them, by the first byte of a row."""
 _ORDER: Final = re.compile(

@@ -8,6 +8,7 @@ runs are trusted: they are those of `components` or `label_runs`, of an image of
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -38,15 +39,18 @@ __all__ = [
     "add_outcomes",
     "components",
     "count_bits",
+    "dilate",
+    "erode",
     "fill_holes",
     "filter_rows",
     "geodesics",
-    "grow",
     "keep_region",
+    "label_rows",
     "label_runs",
     "look_up_colours",
     "look_up_sum_min",
     "mahalanobis",
+    "mask_rows",
     "outcomes",
     "paint",
     "ring_sums",
@@ -229,14 +233,22 @@ def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
     return counts
 
 
-def grow(bits: Bits, reach: Reach, width: int, outside: bool) -> Bits:
-    """See `plain.grow`."""
+def dilate(bits: Bits, reach: Reach, width: int) -> Bits:
+    """See `plain.dilate`."""
+    return _by_element(_loops.dilate, bits, reach, width)
+
+
+def erode(bits: Bits, reach: Reach, width: int) -> Bits:
+    """See `plain.erode`."""
+    return _by_element(_loops.erode, bits, reach, width)
+
+
+def _by_element(loop: Callable[..., int], bits: Bits, reach: Reach, width: int) -> Bits:
     _require(bits, len(bits), -(-width // 64))
     height, words = bits.shape
-    size = 1 + height * (words + 1)
-    room = np.empty(size, np.uint64), np.empty(size, np.uint64), np.zeros(size, np.uint64)
+    room = np.empty(3 * (1 + height * (words + 1)), np.uint64)
     result = np.empty((height, words), np.uint64)
-    _loops.grow(bits, height, width, reach, len(reach), outside, *room, result)
+    loop(bits, height, width, reach, len(reach), room, result)
     return result
 
 
@@ -287,11 +299,27 @@ def tree_sum(
 # --- Image files ----------------------------------------------------------------------------------
 
 
-def filter_rows(rows: Plane, step: int, kind: int) -> Plane:
+def filter_rows(rows: Plane, step: int) -> Plane:
     """See `plain.filter_rows`."""
     height, width = rows.shape
     lines = np.empty((height, 1 + width), np.uint8)
-    _loops.filter_rows(rows, height, width, step, kind, lines)
+    _loops.filter_rows(rows, height, width, step, lines)
+    return lines
+
+
+def label_rows(labels: Plane, bits: int) -> Plane:
+    """See `plain.label_rows`."""
+    height, width = labels.shape
+    lines = np.empty((height, 1 + -(-width * bits // 8)), np.uint8)
+    _loops.label_rows(labels, height, width, bits, lines)
+    return lines
+
+
+def mask_rows(mask: Bits, width: int) -> Plane:
+    """See `plain.mask_rows`."""
+    _require(mask, len(mask), -(-width // 64))
+    lines = np.empty((len(mask), 1 + -(-width // 8)), np.uint8)
+    _loops.mask_rows(mask, len(mask), width, lines)
     return lines
 
 

@@ -12,7 +12,6 @@ from roadeval import kernels
 from roadeval.data.packed import Packed, pack, unpack
 from roadeval.kernels import plain
 from roadeval.pipeline.paper import compensation, shadow_mask, similarity
-from roadeval.recording.png import Filter
 from tests.pipeline.images import IMAGES, images, noise
 
 fast = pytest.importorskip(
@@ -90,13 +89,20 @@ def test_twins_take_back_the_same_filters(height, size, step, seed):
     assert_same(fast.unfilter_rows(lines, step), plain.unfilter_rows(lines, step))
 
 
-@given(st.integers(1, 9), st.integers(0, 40), st.integers(1, 4), st.sampled_from(Filter))
+@given(st.integers(1, 9), st.integers(0, 40), st.integers(1, 4), st.integers(1, 256))
 @settings(max_examples=100)
-def test_twins_filter_rows_alike_and_it_can_be_taken_back(height, size, step, kind):
-    rows = RNG.integers(0, 256, (height, size), np.uint8)
-    lines = fast.filter_rows(rows, step, kind)
-    assert_same(lines, plain.filter_rows(rows, step, kind))
+def test_twins_filter_rows_alike_and_it_can_be_taken_back(height, size, step, levels):
+    rows = RNG.integers(0, levels, (height, size), np.uint8)
+    lines = fast.filter_rows(rows, step)
+    assert_same(lines, plain.filter_rows(rows, step))
     np.testing.assert_array_equal(plain.unfilter_rows(lines, step), rows)
+
+
+@given(st.integers(1, 5), st.integers(1, 140), st.sampled_from([1, 2, 4, 8]))
+@settings(max_examples=100)
+def test_twins_pack_labels_alike(height, width, bits):
+    labels = RNG.integers(0, 1 << bits, (height, width), np.uint8)
+    assert_same(fast.label_rows(labels, bits), plain.label_rows(labels, bits))
 
 
 def test_arrays_may_be_read_only():
@@ -137,7 +143,9 @@ def test_arrays_that_do_not_fit_together_are_refused():
         lambda: fast.run_sums((plane, plane, more), runs, 1),
         lambda: fast.ring_sums((plane, plane, more), runs, bits, 1, 1),
         lambda: fast.fill_holes(bits, 70),
-        lambda: fast.grow(bits, np.array([1]), 70, False),
+        lambda: fast.dilate(bits, np.array([1]), 70),
+        lambda: fast.erode(bits, np.array([1]), 70),
+        lambda: fast.mask_rows(bits, 70),
         lambda: fast.keep_region(whole, 70, more),
         lambda: fast.count_bits(bits, whole, whole),
         lambda: fast.transfer(
@@ -244,10 +252,10 @@ def test_kernels_of_masks_agree_about_the_end_of_a_word(width, share):
         assert_same(fast.keep_region(*given), plain.keep_region(*given), "keep_region")
     assert_same(fast.fill_holes(packed, width), plain.fill_holes(packed, width), "fill_holes")
     for reach in map(np.array, ([0], [1], [3, 1], [64, 63], [65, 2, 0], [130])):
-        for outside in (False, True):
-            grown = fast.grow(packed, reach, width, outside)
-            assert_same(grown, plain.grow(packed, reach, width, outside), "grow")
-            np.testing.assert_array_equal(grown, pack(unpack(grown, width)))
+        for name in ("dilate", "erode"):
+            changed = getattr(fast, name)(packed, reach, width)
+            assert_same(changed, getattr(plain, name)(packed, reach, width), name)
+            np.testing.assert_array_equal(changed, pack(unpack(changed, width)))
 
 
 @pytest.mark.parametrize("width", [63, 64, 65, 128, 200])
@@ -284,14 +292,21 @@ def test_masks_may_have_any_layout(view):
     np.testing.assert_array_equal(unpack(pack(mask), mask.shape[1]), mask)
 
 
-@given(masks(), st.integers(0, 70), st.integers(0, 6), st.booleans())
+@given(masks())
+def test_twins_pack_masks_alike_as_labels_of_one_bit(mask):
+    rows = fast.mask_rows(pack(mask), mask.shape[1])
+    assert_same(rows, plain.mask_rows(pack(mask), mask.shape[1]))
+    assert_same(rows, fast.label_rows(mask, 1))
+
+
+@given(masks(), st.integers(0, 70), st.integers(0, 6), st.sampled_from(["dilate", "erode"]))
 @settings(max_examples=200)
-def test_bits_grow_alike_and_stay_in_the_image(mask, least, rows, outside):
+def test_masks_change_by_an_element_alike_and_stay_in_the_image(mask, least, rows, name):
     reach = np.array([least + rows - row for row in range(rows + 1)])
-    given = pack(mask), reach, mask.shape[1], outside
-    grown = fast.grow(*given)
-    np.testing.assert_array_equal(grown, plain.grow(*given))
-    np.testing.assert_array_equal(grown, pack(unpack(grown, mask.shape[1])))
+    given = pack(mask), reach, mask.shape[1]
+    changed = getattr(fast, name)(*given)
+    np.testing.assert_array_equal(changed, getattr(plain, name)(*given))
+    np.testing.assert_array_equal(changed, pack(unpack(changed, mask.shape[1])))
 
 
 @given(masks(most=30), st.sampled_from([1, 40, 65_535]), st.integers(0, 4), st.integers(0, 10**6))
@@ -301,15 +316,21 @@ def test_paths_are_measured_alike(seeds, greatest, rounds, seed):
     assert_same(fast.geodesics(*given), plain.geodesics(*given))
 
 
-def test_bits_grow_by_the_element():
+def test_a_pixel_is_dilated_to_the_element_and_its_complement_eroded_by_it():
     mask = np.zeros((9, 130), np.uint8)
     mask[4, 63] = 1
-    grown = unpack(fast.grow(pack(mask), np.array([3, 1]), 130, False), 130)
+    element = np.array([3, 1])
+    grown = unpack(fast.dilate(pack(mask), element, 130), 130)
     assert np.argwhere(grown).tolist() == [
         *([3, x] for x in range(62, 65)),
         *([4, x] for x in range(60, 67)),
         *([5, x] for x in range(62, 65)),
     ]
+    left = unpack(fast.erode(pack(1 - mask), element, 130), 130)
+    # Nothing lies around the image, so that its border goes, too.
+    np.testing.assert_array_equal(left[1:-1, 3:-3], 1 - grown[1:-1, 3:-3])
+    assert not left[[0, -1]].any()
+    assert not left[:, [0, 1, 2, -3, -2, -1]].any()
 
 
 @given(masks(), st.integers(0, 10**6))

@@ -47,27 +47,30 @@ def test_a_mask_takes_a_bit_a_pixel_before_compression():
     assert len(pngs.encode_labels(noise, ROAD)) < noise.size / 8 * 1.05
 
 
-@pytest.mark.parametrize("row_filter", pngs.Filter)
 @pytest.mark.parametrize("shape", [(1, 1), (1, 5), (7, 1), (9, 13), (9, 13, 3), (1, 1, 3)])
-def test_levels_come_back_with_every_filter_by_another_library(row_filter, shape):
+def test_levels_come_back_by_another_library(shape):
     levels = np.random.default_rng(0).integers(0, 256, shape).astype(np.uint8)
-    png = pngs.encode_levels(levels, row_filter)
+    png = pngs.encode_levels(levels)
     np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(png))), levels)
     read = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED)
     np.testing.assert_array_equal(read[..., ::-1] if levels.ndim == 3 else read, levels)
 
 
-def test_a_row_is_stored_as_what_its_filter_leaves():
-    levels = np.array([[10, 13], [20, 30]], np.uint8)
-    left = {
-        pngs.Filter.LEFT: [1, 10, 3, 1, 20, 10],
-        pngs.Filter.ABOVE: [2, 10, 13, 2, 10, 17],
-        pngs.Filter.MEAN: [3, 10, 8, 3, 15, 14],  # 13 - 10 // 2; 20 - 10 // 2; 30 - (20 + 13) // 2
-    }
-    for row_filter, expected in left.items():
-        png = pngs.encode_levels(levels, row_filter)
-        start = png.index(b"IDAT") + 4
-        assert list(zlib.decompress(png[start:-16])) == expected
+def test_a_row_of_levels_is_stored_as_what_the_nearest_of_three_neighbours_leaves():
+    png = pngs.encode_levels(np.array([[10, 13, 13], [20, 30, 9]], np.uint8))
+    # Above 30 is 13, left 20, the corner 10: 20 is nearest to 20 + 13 - 10. For 9 it is 30.
+    assert list(_rows(png)) == [4, 10, 3, 0, 4, 10, 10, (9 - 30) % 256]
+
+
+def test_a_row_of_labels_is_stored_without_a_filter():
+    labels = np.array([[0, 1, 2], [3, 0, 1]], np.uint8)
+    png = pngs.encode_labels(labels, [(i, 0, 0, 255) for i in range(4)])
+    assert list(_rows(png)) == [0, 0b00_01_10_00, 0, 0b11_00_01_00]
+
+
+def _rows(png):
+    start = png.index(b"IDAT") + 4
+    return zlib.decompress(png[start:-16])
 
 
 def test_a_noisy_map_takes_hardly_more_than_in_the_smallest_file_of_opencv():
@@ -79,12 +82,14 @@ def test_a_noisy_map_takes_hardly_more_than_in_the_smallest_file_of_opencv():
         *(cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE),
     )
     least = len(cv2.imencode(".png", levels, how)[1])
-    assert len(pngs.encode_levels(levels, pngs.Filter.MEAN)) < 1.05 * least
+    assert len(pngs.encode_levels(levels)) < 1.05 * least
 
 
-def test_rows_without_a_filter_are_read_as_earlier_recordings_have_them():
+def test_rows_with_another_filter_are_read_as_earlier_recordings_have_them():
     labels = np.random.default_rng(0).integers(0, 2, (5, 16)).astype(np.uint8)
-    rows = b"".join(b"\0" + np.packbits(row).tobytes() for row in labels)
+    packed = np.packbits(labels, axis=1)
+    above = np.vstack([packed[:1], np.diff(packed, axis=0)])
+    rows = b"".join(b"\2" + row.tobytes() for row in above)
     np.testing.assert_array_equal(decode(_with_rows(labels, rows)), labels)
 
 

@@ -31,7 +31,7 @@ LOOP void count_bits(
     }
 }
 
-/* --- Dilation --------------------------------------------------------------------------------- */
+/* --- Dilation and erosion --------------------------------------------------------------------- */
 
 /* The bits of a row's last word that lie within the width. */
 PART uint64_t within(int64_t width)
@@ -84,16 +84,21 @@ PART void unite(uint64_t *restrict grown, const uint64_t *restrict more, int64_t
  * pixels to either side; widened further until `done` is reach[away] it is united with `grown`,
  * moved up and down by `away` rows. So no widening is done twice.
  *
- * `wide`, `spare` and `grown`: 1 + height * (words + 1) each, the last one cleared. */
-LOOP void grow(
-    const uint64_t *bits, int64_t height, int64_t width, const int64_t *reach, int64_t reaches,
-    int outside, uint64_t *wide, uint64_t *spare, uint64_t *grown, uint64_t *result)
+ * Every pixel is changed as it is read and as it is written by `changed`, all ones or none: what is
+ * eroded is the complement, dilated among ones, and the complement again.
+ *
+ * `room`: 3 * (1 + height * (words + 1)). */
+PART void grow(
+    const uint64_t *restrict bits, int64_t height, int64_t width, const int64_t *reach,
+    int64_t reaches, uint64_t changed, uint64_t *room, uint64_t *restrict result)
 {
     int64_t words = (width + 63) / 64, across = words + 1, size = 1 + height * across, done = 0;
-    uint64_t beyond = outside ? ~(uint64_t)0 : 0;
+    uint64_t *wide = room, *spare = wide + size, *grown = spare + size;
     for (int64_t y = 0; y < height; y++)
-        memcpy(wide + 1 + y * across, bits + y * words, (size_t)words * sizeof *bits);
-    surround(wide, size, across, width, beyond);
+        for (int64_t word = 0; word < words; word++)
+            wide[1 + y * across + word] = bits[y * words + word] ^ changed;
+    surround(wide, size, across, width, changed);
+    memset(grown, 0, (size_t)size * sizeof *grown);
     for (int64_t away = reaches - 1; away >= 0; away--) {
         while (done < reach[away]) {
             /* A set pixel is by now a stretch of 2 done + 1, or of done + 1 where the image's side
@@ -103,7 +108,7 @@ LOOP void grow(
             widen(wide, spare, size, (int)step);
             uint64_t *other = wide;
             wide = spare, spare = other;
-            surround(wide, size, across, width, beyond);
+            surround(wide, size, across, width, changed);
             done += step;
         }
         if (away < height) {
@@ -113,12 +118,26 @@ LOOP void grow(
                 unite(grown, wide + away * across, rest);
         }
     }
-    /* Outside is set, too: it has reached the first and the last rows. */
-    int64_t edge = outside ? least(reaches - 1, height) : 0;
+    /* What is outside is set, too, where `changed` is: it has reached the first and the last rows. */
+    int64_t edge = least(reaches - 1, height);
     for (int64_t y = 0; y < height; y++) {
-        bool reached = y < edge || y >= height - edge;
+        uint64_t reached = y < edge || y >= height - edge ? changed : 0;
         for (int64_t word = 0; word < words; word++)
-            result[y * words + word] = reached ? ~(uint64_t)0 : grown[1 + y * across + word];
+            result[y * words + word] = (grown[1 + y * across + word] | reached) ^ changed;
         result[y * words + words - 1] &= within(width);
     }
+}
+
+LOOP void dilate(
+    const uint64_t *bits, int64_t height, int64_t width, const int64_t *reach, int64_t reaches,
+    uint64_t *room, uint64_t *result)
+{
+    grow(bits, height, width, reach, reaches, 0, room, result);
+}
+
+LOOP void erode(
+    const uint64_t *bits, int64_t height, int64_t width, const int64_t *reach, int64_t reaches,
+    uint64_t *room, uint64_t *result)
+{
+    grow(bits, height, width, reach, reaches, ~(uint64_t)0, room, result);
 }

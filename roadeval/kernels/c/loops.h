@@ -71,9 +71,12 @@ void count_bits(
     const uint64_t *masks, int64_t mask_count, const uint64_t *classes, int64_t class_count,
     const uint64_t *regions, int64_t region_count, int64_t words, int64_t *counts,
     uint64_t *both);
-void grow(
+void dilate(
     const uint64_t *bits, int64_t height, int64_t width, const int64_t *reach, int64_t reaches,
-    int outside, uint64_t *wide, uint64_t *spare, uint64_t *grown, uint64_t *result);
+    uint64_t *room, uint64_t *result);
+void erode(
+    const uint64_t *bits, int64_t height, int64_t width, const int64_t *reach, int64_t reaches,
+    uint64_t *room, uint64_t *result);
 void outcomes(const uint8_t *mask, const uint8_t *truth, int64_t size, uint8_t *errors);
 void add_outcomes(const uint8_t *errors, int64_t size, uint8_t *totals);
 void geodesics(
@@ -84,7 +87,10 @@ void tree_sum(
     const float *threshold, const uint32_t *kept, const float *values, int64_t trees,
     int64_t nodes, float *block, float *result);
 void filter_rows(
-    const uint8_t *rows, int64_t height, int64_t size, int64_t step, int kind, uint8_t *lines);
+    const uint8_t *rows, int64_t height, int64_t size, int64_t step, uint8_t *lines);
+void label_rows(
+    const uint8_t *labels, int64_t height, int64_t width, int bits, uint8_t *lines);
+void mask_rows(const uint64_t *mask, int64_t height, int64_t width, uint8_t *lines);
 void unfilter_rows(
     const uint8_t *lines, int64_t height, int64_t size, int64_t step, uint8_t *rows);
 

@@ -162,9 +162,11 @@ FUNCTION(count_bits, "Q2 n Q2 n Q2 n n >q3 >Q1",
     count_bits(ARRAY(0), SIZE(1), ARRAY(2), SIZE(3), ARRAY(4), SIZE(5), SIZE(6), ARRAY(7),
         ARRAY(8)))
 
-FUNCTION(grow, "Q2 n n q1 n n >Q1 >Q1 >Q1 >Q2",
-    grow(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3), SIZE(4), (int)SIZE(5), ARRAY(6), ARRAY(7),
-        ARRAY(8), ARRAY(9)))
+FUNCTION(dilate, "Q2 n n q1 n >Q1 >Q2",
+    dilate(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3), SIZE(4), ARRAY(5), ARRAY(6)))
+
+FUNCTION(erode, "Q2 n n q1 n >Q1 >Q2",
+    erode(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3), SIZE(4), ARRAY(5), ARRAY(6)))
 
 FUNCTION(outcomes, "B2 B2 n >B2", outcomes(ARRAY(0), ARRAY(1), SIZE(2), ARRAY(3)))
 
@@ -177,8 +179,12 @@ FUNCTION(tree_sum, "f2 n n i2 f2 I2 f2 n n >f1 >f1",
     tree_sum(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3), ARRAY(4), ARRAY(5), ARRAY(6), SIZE(7), SIZE(8),
         ARRAY(9), ARRAY(10)))
 
-FUNCTION(filter_rows, "B2 n n n n >B2",
-    filter_rows(ARRAY(0), SIZE(1), SIZE(2), SIZE(3), (int)SIZE(4), ARRAY(5)))
+FUNCTION(filter_rows, "B2 n n n >B2", filter_rows(ARRAY(0), SIZE(1), SIZE(2), SIZE(3), ARRAY(4)))
+
+FUNCTION(label_rows, "B2 n n n >B2",
+    label_rows(ARRAY(0), SIZE(1), SIZE(2), (int)SIZE(3), ARRAY(4)))
+
+FUNCTION(mask_rows, "Q2 n n >B2", mask_rows(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3)))
 
 FUNCTION(unfilter_rows, "B2 n n n >B2", unfilter_rows(ARRAY(0), SIZE(1), SIZE(2), SIZE(3), ARRAY(4)))
 
@@ -187,9 +193,10 @@ FUNCTION(unfilter_rows, "B2 n n n >B2", unfilter_rows(ARRAY(0), SIZE(1), SIZE(2)
 static PyMethodDef methods[] = {
     METHOD(look_up_sum_min), METHOD(mahalanobis), METHOD(look_up_colours), METHOD(run_sums),
     METHOD(ring_sums), METHOD(transfer), METHOD(paint), METHOD(label_runs), METHOD(components),
-    METHOD(keep_region), METHOD(fill_holes), METHOD(count_bits), METHOD(grow), METHOD(filter_rows),
+    METHOD(keep_region), METHOD(fill_holes), METHOD(count_bits), METHOD(dilate), METHOD(erode),
     METHOD(outcomes), METHOD(add_outcomes), METHOD(geodesics), METHOD(tree_sum),
-    METHOD(unfilter_rows), {NULL, NULL, 0, NULL},
+    METHOD(filter_rows), METHOD(label_rows), METHOD(mask_rows), METHOD(unfilter_rows),
+    {NULL, NULL, 0, NULL},
 };
 
 static struct PyModuleDef module = {

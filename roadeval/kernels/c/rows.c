@@ -42,27 +42,82 @@ PART void paeth_of_channel(
     }
 }
 
-/* What a filter takes from a byte. */
-PART int taken(int kind, int left, int above)
-{
-    return kind == LEFT ? left : kind == ABOVE ? above : (left + above) / 2;
-}
-
-/* `rows`: height x size. `lines`: height x (1 + size). */
+/* `rows`: height x size. `lines`: height x (1 + size), each row filtered by PAETH. */
 LOOP void filter_rows(
-    const uint8_t *restrict rows, int64_t height, int64_t size, int64_t step, int kind,
+    const uint8_t *restrict rows, int64_t height, int64_t size, int64_t step,
     uint8_t *restrict lines)
 {
     int64_t first = least(step, size);
     for (int64_t y = 0; y < height; y++) {
-        const uint8_t *row = rows + y * size, *above = y > 0 ? row - size : row;
+        const uint8_t *row = rows + y * size, *above = row - size;
         uint8_t *restrict line = lines + y * (1 + size) + 1;
-        line[-1] = (uint8_t)kind;
+        line[-1] = PAETH;
+        /* Left of the image all is 0, and what is above is nearest; above it, what is left. */
         for (int64_t byte = 0; byte < first; byte++)
-            line[byte] = (uint8_t)(row[byte] - taken(kind, 0, y > 0 ? above[byte] : 0));
-        for (int64_t byte = first; byte < size; byte++) {
-            int left = row[byte - step], over = y > 0 ? above[byte] : 0;
-            line[byte] = (uint8_t)(row[byte] - taken(kind, left, over));
+            line[byte] = (uint8_t)(row[byte] - (y > 0 ? above[byte] : 0));
+        if (y > 0)
+            for (int64_t byte = first; byte < size; byte++)
+                line[byte] = (uint8_t)(row[byte]
+                    - nearest(row[byte - step], above[byte], above[byte - step]));
+        else
+            for (int64_t byte = first; byte < size; byte++)
+                line[byte] = (uint8_t)(row[byte] - row[byte - step]);
+    }
+}
+
+/* `bits` is a constant wherever this is used. */
+PART void pack_row(
+    const uint8_t *restrict labels, int64_t width, int bits, uint8_t *restrict line)
+{
+    int64_t each = 8 / bits, whole = width / each;
+    for (int64_t byte = 0; byte < whole; byte++) {
+        unsigned packed = 0;
+        for (int64_t place = 0; place < each; place++)
+            packed = packed << bits | labels[byte * each + place];
+        line[byte] = (uint8_t)packed;
+    }
+    if (whole * each < width) {
+        unsigned packed = 0;
+        for (int64_t place = whole * each; place < (whole + 1) * each; place++)
+            packed = packed << bits | (place < width ? labels[place] : 0);
+        line[whole] = (uint8_t)packed;
+    }
+}
+
+/* `labels`: height x width, each below 2^bits. `lines`: height x (1 + bytes of a row). */
+LOOP void label_rows(
+    const uint8_t *restrict labels, int64_t height, int64_t width, int bits,
+    uint8_t *restrict lines)
+{
+    int64_t size = 1 + (width * bits + 7) / 8;
+    for (int64_t y = 0; y < height; y++) {
+        const uint8_t *row = labels + y * width;
+        uint8_t *line = lines + y * size + 1;
+        line[-1] = NONE;
+        if (bits == 1)
+            pack_row(row, width, 1, line);
+        else if (bits == 2)
+            pack_row(row, width, 2, line);
+        else if (bits == 4)
+            pack_row(row, width, 4, line);
+        else
+            pack_row(row, width, 8, line);
+    }
+}
+
+/* `mask`: height rows of whole words, whose bytes are in the order of pixels. `lines`: height x (1 + bytes of a row). */
+LOOP void mask_rows(
+    const uint64_t *restrict mask, int64_t height, int64_t width, uint8_t *restrict lines)
+{
+    int64_t words = (width + 63) / 64, size = (width + 7) / 8;
+    for (int64_t y = 0; y < height; y++) {
+        const uint8_t *restrict row = (const uint8_t *)(mask + y * words);
+        uint8_t *restrict line = lines + y * (1 + size) + 1;
+        line[-1] = NONE;
+        for (int64_t byte = 0; byte < size; byte++) {
+            uint8_t bits = (uint8_t)(row[byte] >> 4 | row[byte] << 4);
+            bits = (uint8_t)((bits >> 2 & 0x33) | (bits & 0x33) << 2);
+            line[byte] = (uint8_t)((bits >> 1 & 0x55) | (bits & 0x55) << 1);
         }
     }
 }

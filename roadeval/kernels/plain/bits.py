@@ -1,12 +1,17 @@
-"""Masks of a bit a pixel: counted and dilated."""
+"""Masks of a bit a pixel: counted, dilated and eroded."""
 
 from __future__ import annotations
+
+from typing import Any, Final
 
 import cv2
 import numpy as np
 
 from roadeval.data.arrays import Bits, Plane, Reach, Sums
 from roadeval.data.packed import pack, unpack
+
+_AROUND: Final[dict[str, Any]] = {"borderType": cv2.BORDER_CONSTANT, "borderValue": 0}
+"""Nothing is set around a mask."""
 
 
 def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
@@ -20,10 +25,22 @@ def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
     return np.array(counts, np.int64).reshape(len(masks), *both.shape[:2])
 
 
-def grow(bits: Bits, reach: Reach, width: int, outside: bool) -> Bits:
-    """Dilate a mask of ``width`` pixels a row by an element; all around it is ``outside``."""
-    border = {"borderType": cv2.BORDER_CONSTANT, "borderValue": int(outside)}
-    return pack(cv2.dilate(unpack(bits, width), _element(reach), **border))
+def dilate(bits: Bits, reach: Reach, width: int) -> Bits:
+    """Dilate a mask of ``width`` pixels a row by an element; nothing around it is set."""
+    return pack(
+        cv2.dilate(
+            unpack(bits, width), _element(reach), borderType=cv2.BORDER_CONSTANT, borderValue=0
+        )
+    )
+
+
+def erode(bits: Bits, reach: Reach, width: int) -> Bits:
+    """Erode a mask of ``width`` pixels a row by an element; nothing around it is set."""
+    return pack(
+        cv2.erode(
+            unpack(bits, width), _element(reach), borderType=cv2.BORDER_CONSTANT, borderValue=0
+        )
+    )
 
 
 def _element(reach: Reach) -> Plane:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from roadeval.data.arrays import Plane
+from roadeval.data.arrays import Bits, Plane
+from roadeval.data.packed import unpack
 
 
-def filter_rows(rows: Plane, step: int, kind: int) -> Plane:
-    """Subtract from each byte of an image's rows what a filter takes from it.
+def filter_rows(rows: Plane, step: int) -> Plane:
+    """Subtract from each byte the Paeth predictor: left, above or corner, the nearest to their sum.
 
     Parameters
     ----------
@@ -21,21 +22,47 @@ def filter_rows(rows: Plane, step: int, kind: int) -> Plane:
         ``(H, B)`` uint8.
     step
         Bytes from a pixel to the next.
-    kind
-        1 takes the byte to the left, 2 the byte above, 3 the mean of both, rounded down.
 
     Returns
     -------
     numpy.ndarray
-        ``(H, 1 + B)`` uint8, each row after its filter's number. The differences are taken modulo
-        256; beyond the image all is 0.
+        ``(H, 1 + B)`` uint8, each row after its filter's number, 4. The differences are taken
+        modulo 256; beyond the image all is 0.
     """
-    left, above = np.zeros_like(rows), np.zeros_like(rows)
-    left[:, step:], above[1:] = rows[:, :-step], rows[:-1]
-    # (left + above) // 2 without a ninth bit.
-    mean = (left & above) + ((left ^ above) >> 1)
-    taken = (left, above, mean)[kind - 1]
-    return np.insert(rows - taken, 0, np.uint8(kind), axis=1)
+    height, size = rows.shape
+    seen = np.zeros((1 + height, step + size), np.int16)
+    seen[1:, step:] = rows
+    left, above, corner = seen[1:, :size], seen[:-1, step:], seen[:-1, :size]
+    each = np.stack([left, above, corner])
+    # Of equals the first.
+    nearest = np.abs(left + above - corner - each).argmin(axis=0)
+    taken = np.take_along_axis(each, nearest[None], axis=0)[0].astype(np.uint8)
+    return np.insert(rows - taken, 0, np.uint8(4), axis=1)
+
+
+def label_rows(labels: Plane, bits: int) -> Plane:
+    """Pack labels, the leftmost into a byte's highest bits, without a filter.
+
+    Parameters
+    ----------
+    labels
+        ``(H, W)`` uint8, each below ``2 ** bits``.
+    bits
+        Of a label: 1, 2, 4 or 8.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(H, 1 + ceil(W * bits / 8))`` uint8, each row after its filter's number, 0.
+    """
+    single = np.unpackbits(labels[..., None], axis=2)[..., 8 - bits :]
+    packed = np.packbits(single.reshape(len(labels), -1), axis=1)
+    return np.insert(packed, 0, np.uint8(0), axis=1)
+
+
+def mask_rows(mask: Bits, width: int) -> Plane:
+    """Pack a mask of ``width`` pixels a row as `label_rows` packs its pixels, of one bit each."""
+    return label_rows(unpack(mask, width), 1)
 
 
 def unfilter_rows(lines: Plane, step: int) -> Plane:

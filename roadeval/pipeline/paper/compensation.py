@@ -42,7 +42,7 @@ def connected_components(shadow: Packed, connectivity: int) -> Components:
 
 def buffer_ring(shadow: Packed, width: int) -> Packed:
     """Return the union of all buffer rings (Eq. 10): within ``width`` dilations, and not shadow."""
-    reached = KERNELS.grow(shadow.bits, np.full(width + 1, width), shadow.width, False)
+    reached = KERNELS.dilate(shadow.bits, np.full(width + 1, width), shadow.width)
     return Packed(reached & ~shadow.bits, shadow.width)
 
 

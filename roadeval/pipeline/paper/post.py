@@ -6,6 +6,7 @@ Masks are packed here, 64 pixels a word: see `roadeval.data.packed`.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Annotated, Final, Literal
 
 import cv2
@@ -15,7 +16,7 @@ from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, colours, mask_spec
 from roadeval.data.arrays import Reach
-from roadeval.data.packed import Packed, everywhere
+from roadeval.data.packed import Packed
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View
@@ -85,6 +86,7 @@ def element_side(width: int) -> int:
     return max(3, 2 * (width // 200) + 1)
 
 
+@lru_cache(maxsize=8)
 def structuring_element(side: int, shape: str) -> Reach:
     """Return B of Eq. 17-22, of ``side`` pixels, odd; see `roadeval.data.arrays.Reach`."""
     kind = cv2.MORPH_RECT if shape == "square" else cv2.MORPH_ELLIPSE
@@ -95,14 +97,12 @@ def structuring_element(side: int, shape: str) -> Reach:
 
 def dilate(mask: Packed, element: Reach) -> Packed:
     """Dilate a mask (Eq. 17)."""
-    return Packed(KERNELS.grow(mask.bits, element, mask.width, False), mask.width)
+    return Packed(KERNELS.dilate(mask.bits, element, mask.width), mask.width)
 
 
 def erode(mask: Packed, element: Reach) -> Packed:
-    """Erode a mask (Eq. 18): the complement of non-road dilated, with non-road around the image."""
-    image = everywhere(mask.shape)
-    other = KERNELS.grow(image ^ mask.bits, element, mask.width, True)
-    return Packed(image ^ other, mask.width)
+    """Erode a mask (Eq. 18), with non-road around the image."""
+    return Packed(KERNELS.erode(mask.bits, element, mask.width), mask.width)
 
 
 def opening(mask: Packed, element: Reach) -> Packed:

@@ -53,8 +53,8 @@ class ScalarCodec:
             scaled = (array - np.float32(low)) * np.float32(255 / (high - low))
             array = np.clip(np.rint(scaled), 0, 255).astype(np.uint8)
         if self.spec.exact:
-            return png.encode_levels(array, png.Filter.MEAN)
-        return png.encode_levels(np.asarray(cv2.LUT(array, _FIFTHS), np.uint8), png.Filter.LEFT)
+            return png.encode_levels(array)
+        return png.encode_levels(np.asarray(cv2.LUT(array, _FIFTHS), np.uint8))
 
     def columns(self, payloads: list[bytes]) -> Any:
         """Return columns of encoded depth images."""
@@ -108,7 +108,7 @@ class ImageCodec(CameraCodec):
     def encode(self, array: Array) -> bytes:
         """Return ``(H, W, 3)`` uint8 RGB as a PNG file, or a small JPEG file."""
         if self.exact:
-            return png.encode_levels(array, png.Filter.MEAN)
+            return png.encode_levels(array)
         return _jpeg(_halve(array))
 
     def decode(self, payload: bytes) -> Array:
