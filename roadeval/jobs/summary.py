@@ -17,7 +17,7 @@ from roadeval.version import VERSION
 
 PACKAGES: Final = (
     *("mcap", "numpy", "opencv-python-headless", "pillow", "scikit-learn", "scipy"),
-    *("simplejpeg", "rerun-sdk", "pandas", "matplotlib"),
+    *("simplejpeg", "isal", "rerun-sdk", "pandas", "matplotlib"),
 )
 """The packages whose version can change a number or a file."""
 JOURNEY: Final = 3

@@ -118,7 +118,7 @@ PART void grow(
                 unite(grown, wide + away * across, rest);
         }
     }
-    /* What is outside is set, too, where `changed` is: it has reached the first and the last rows. */
+    /* What is outside is set where `changed` is, and has reached the first and the last rows. */
     int64_t edge = least(reaches - 1, height);
     for (int64_t y = 0; y < height; y++) {
         uint64_t reached = y < edge || y >= height - edge ? changed : 0;

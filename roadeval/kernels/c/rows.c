@@ -49,7 +49,7 @@ LOOP void filter_rows(
 {
     int64_t first = least(step, size);
     for (int64_t y = 0; y < height; y++) {
-        const uint8_t *row = rows + y * size, *above = row - size;
+        const uint8_t *row = rows + y * size, *above = y > 0 ? row - size : row;
         uint8_t *restrict line = lines + y * (1 + size) + 1;
         line[-1] = PAETH;
         /* Left of the image all is 0, and what is above is nearest; above it, what is left. */
@@ -105,7 +105,7 @@ LOOP void label_rows(
     }
 }
 
-/* `mask`: height rows of whole words, whose bytes are in the order of pixels. `lines`: height x (1 + bytes of a row). */
+/* `mask`: height rows of whole words, whose bytes are in the order of pixels. `lines`: as above. */
 LOOP void mask_rows(
     const uint64_t *restrict mask, int64_t height, int64_t width, uint8_t *restrict lines)
 {

@@ -27,20 +27,12 @@ def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
 
 def dilate(bits: Bits, reach: Reach, width: int) -> Bits:
     """Dilate a mask of ``width`` pixels a row by an element; nothing around it is set."""
-    return pack(
-        cv2.dilate(
-            unpack(bits, width), _element(reach), borderType=cv2.BORDER_CONSTANT, borderValue=0
-        )
-    )
+    return pack(cv2.dilate(unpack(bits, width), _element(reach), **_AROUND))
 
 
 def erode(bits: Bits, reach: Reach, width: int) -> Bits:
     """Erode a mask of ``width`` pixels a row by an element; nothing around it is set."""
-    return pack(
-        cv2.erode(
-            unpack(bits, width), _element(reach), borderType=cv2.BORDER_CONSTANT, borderValue=0
-        )
-    )
+    return pack(cv2.erode(unpack(bits, width), _element(reach), **_AROUND))
 
 
 def _element(reach: Reach) -> Plane:
