@@ -10,19 +10,9 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-PACKAGES: Final = (
-    "roadeval",
-    "python",
-    "mcap",
-    "numpy",
-    "opencv-python-headless",
-    "scikit-learn",
-    "scipy",
-    "rerun-sdk",
-    "pandas",
-    "matplotlib",
-)
-_NAMES: Final = "|".join(PACKAGES)
+from roadeval.jobs.summary import PACKAGES
+
+_NAMES: Final = "|".join(("roadeval", "python", *PACKAGES))
 
 RULES: Final[Mapping[str, tuple[str, str | Callable[[re.Match[str]], str]]]] = {
     # The log's own checksum: its writer's version stands in the file.
