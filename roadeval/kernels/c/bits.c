@@ -124,7 +124,6 @@ PART void grow(
         uint64_t reached = y < edge || y >= height - edge ? changed : 0;
         for (int64_t word = 0; word < words; word++)
             result[y * words + word] = (grown[1 + y * across + word] | reached) ^ changed;
-        result[y * words + words - 1] &= within(width);
     }
 }
 
