@@ -245,6 +245,8 @@ def erode(bits: Bits, reach: Reach, width: int) -> Bits:
 
 def _by_element(loop: Callable[..., int], bits: Bits, reach: Reach, width: int) -> Bits:
     _require(bits, len(bits), -(-width // 64))
+    if not len(reach):
+        raise ValueError("an element without rows")
     height, words = bits.shape
     room = np.empty(3 * (1 + height * (words + 1)), np.uint64)
     result = np.empty((height, words), np.uint64)
@@ -309,6 +311,8 @@ def filter_rows(rows: Plane, step: int) -> Plane:
 
 def label_rows(labels: Plane, bits: int) -> Plane:
     """See `plain.label_rows`."""
+    if bits not in plain.LABEL_BITS:
+        raise ValueError(f"labels of {bits} bits")
     height, width = labels.shape
     lines = np.empty((height, 1 + -(-width * bits // 8)), np.uint8)
     _loops.label_rows(labels, height, width, bits, lines)

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from roadeval.data import LayerSpec
+from roadeval.data import Layer, LayerKind, LayerSpec
 from roadeval.data.packed import Packed
 from roadeval.errors import RoadevalError
 from roadeval.pipeline.stage import Output, Stage, StageError, TrainingSet, View
@@ -73,5 +73,14 @@ def _check(
     for layer in output.layers:
         if layer.spec not in specs:
             raise ValueError(f"it handed out a layer {layer.spec.name!r} that it does not announce")
-        if layer.array.shape[:2] != size:
-            raise ValueError(f"its layer {layer.spec.name!r} is {layer.array.shape}, not {size}")
+        _check_layer(layer, size)
+
+
+def _check_layer(layer: Layer, size: tuple[int, int]) -> None:
+    name, kind, held = layer.spec.name, layer.spec.kind, layer.array.dtype
+    if layer.array.shape[:2] != size:
+        raise ValueError(f"its layer {name!r} is {layer.array.shape}, not {size}")
+    if kind is LayerKind.MASK and held.kind not in "biu":
+        raise TypeError(f"its layer {name!r} holds {held}, and no whole numbers")
+    if kind in (LayerKind.LABELS, LayerKind.RGB) and held != np.uint8:
+        raise TypeError(f"its layer {name!r} holds {held}, not uint8")

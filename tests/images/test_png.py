@@ -147,6 +147,7 @@ LEFT_TO_PILLOW = {
     "a stream that ends early": file(START, chunk(b"IDAT", SOUND[:-9]), END),
     "a stream without its checksum": file(START, chunk(b"IDAT", SOUND[:-4]), END),
     "bytes after the stream": file(START, chunk(b"IDAT", SOUND + b"x"), END),
+    "a window that there is not": file(START, chunk(b"IDAT", b"\x88\x1c" + SOUND[2:]), END),
     "no stream": file(START, chunk(b"IDAT", b"road"), END),
     "an unknown filter": file(
         START, chunk(b"IDAT", zlib.compress(lines(13, 11, 8, 0, (0, 5)))), END
@@ -162,6 +163,22 @@ LEFT_TO_PILLOW = {
 @pytest.mark.parametrize("data", LEFT_TO_PILLOW.values(), ids=LEFT_TO_PILLOW)
 def test_what_is_damaged_or_rare_is_left_to_pillow(data):
     assert decode(data, LIMITS) is None
+
+
+@pytest.mark.parametrize("more", [1, 2, 3, 4, 9])
+@pytest.mark.parametrize("levels", [2, 256])
+@pytest.mark.parametrize("effort", [0, 1, 6, 9])
+def test_no_bytes_after_a_stream_are_passed_over(effort, levels, more):
+    for size in range(1, 20):
+        rows = np.zeros((size, 14), np.uint8)
+        rows[:, 1:] = RNG.integers(0, levels, (size, 13), np.uint8)
+        packed = zlib.compress(rows.tobytes(), effort)
+        whole, longer = (
+            file(head(13, size, 8, 0), chunk(b"IDAT", stream), END)
+            for stream in (packed, packed + RNG.bytes(more))
+        )
+        assert decode(whole, LIMITS) is not None
+        assert decode(longer, LIMITS) is None
 
 
 def test_no_changed_byte_is_passed_over():

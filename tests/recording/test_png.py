@@ -36,6 +36,21 @@ def test_a_packed_mask_gives_the_same_file(classes, width):
     assert pngs.encode_labels(Packed.of(mask), palette) == png
 
 
+@pytest.mark.parametrize("values", [np.bool_, np.uint8, np.int64])
+def test_a_mask_may_be_of_any_type_and_is_set_where_it_is_not_0(values):
+    mask = np.random.default_rng(0).integers(0, 2, (5, 13)).astype(np.uint8)
+    for inside in (1, 255):
+        given = (mask * np.uint8(inside)).astype(values)
+        np.testing.assert_array_equal(decode(pngs.encode_labels(given, ROAD)), mask)
+
+
+@pytest.mark.parametrize("classes", [3, 5, 17])
+def test_labels_may_be_of_another_type(classes):
+    labels = np.random.default_rng(0).integers(0, classes, (5, 13))
+    png = pngs.encode_labels(labels, [(i, 0, 0, 255) for i in range(classes)])
+    np.testing.assert_array_equal(decode(png), labels)
+
+
 def test_another_library_sees_the_colours_and_how_opaque_they_are():
     png = pngs.encode_labels(np.array([[0, 1]], np.uint8), ROAD)
     rgba = np.asarray(Image.open(io.BytesIO(png)).convert("RGBA"))

@@ -84,8 +84,8 @@ PART void unite(uint64_t *restrict grown, const uint64_t *restrict more, int64_t
  * pixels to either side; widened further until `done` is reach[away] it is united with `grown`,
  * moved up and down by `away` rows. So no widening is done twice.
  *
- * Every pixel is changed as it is read and as it is written by `changed`, all ones or none: what is
- * eroded is the complement, dilated among ones, and the complement again.
+ * Each word is XORed with `changed`, 0 or all ones, as it is read and as it is written: to erode is
+ * to dilate the complement, with ones around the image, and to take the complement again.
  *
  * `room`: 3 * (1 + height * (words + 1)). */
 PART void grow(

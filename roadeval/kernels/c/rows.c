@@ -52,7 +52,8 @@ LOOP void filter_rows(
         const uint8_t *row = rows + y * size, *above = y > 0 ? row - size : row;
         uint8_t *restrict line = lines + y * (1 + size) + 1;
         line[-1] = PAETH;
-        /* Left of the image all is 0, and what is above is nearest; above it, what is left. */
+        /* In the first pixel left and corner are 0, and above is nearest; in the first row above and
+         * corner are 0, and left is. */
         for (int64_t byte = 0; byte < first; byte++)
             line[byte] = (uint8_t)(row[byte] - (y > 0 ? above[byte] : 0));
         if (y > 0)
@@ -70,21 +71,22 @@ PART void pack_row(
     const uint8_t *restrict labels, int64_t width, int bits, uint8_t *restrict line)
 {
     int64_t each = 8 / bits, whole = width / each;
+    unsigned most = (1u << bits) - 1;
     for (int64_t byte = 0; byte < whole; byte++) {
         unsigned packed = 0;
         for (int64_t place = 0; place < each; place++)
-            packed = packed << bits | labels[byte * each + place];
+            packed = packed << bits | (labels[byte * each + place] & most);
         line[byte] = (uint8_t)packed;
     }
     if (whole * each < width) {
         unsigned packed = 0;
         for (int64_t place = whole * each; place < (whole + 1) * each; place++)
-            packed = packed << bits | (place < width ? labels[place] : 0);
+            packed = packed << bits | (place < width ? labels[place] & most : 0);
         line[whole] = (uint8_t)packed;
     }
 }
 
-/* `labels`: height x width, each below 2^bits. `lines`: height x (1 + bytes of a row). */
+/* `labels`: height x width; `bits`: 2, 4 or 8. `lines`: height x (1 + bytes of a row). */
 LOOP void label_rows(
     const uint8_t *restrict labels, int64_t height, int64_t width, int bits,
     uint8_t *restrict lines)
@@ -94,9 +96,7 @@ LOOP void label_rows(
         const uint8_t *row = labels + y * width;
         uint8_t *line = lines + y * size + 1;
         line[-1] = NONE;
-        if (bits == 1)
-            pack_row(row, width, 1, line);
-        else if (bits == 2)
+        if (bits == 2)
             pack_row(row, width, 2, line);
         else if (bits == 4)
             pack_row(row, width, 4, line);
@@ -105,7 +105,9 @@ LOOP void label_rows(
     }
 }
 
-/* `mask`: height rows of whole words, whose bytes are in the order of pixels. `lines`: as above. */
+/* Turn each byte's bits round: a file has the leftmost pixel in the highest bit, a mask in the lowest.
+ *
+ * `mask`: height rows of whole words, the first pixels in a word's first byte. `lines`: as above. */
 LOOP void mask_rows(
     const uint64_t *restrict mask, int64_t height, int64_t width, uint8_t *restrict lines)
 {

@@ -8,13 +8,20 @@ from roadeval.kernels.plain.colours import look_up_colours, look_up_sum_min, mah
 from roadeval.kernels.plain.compensation import ring_sums, run_sums, transfer
 from roadeval.kernels.plain.geodesics import ASLANT, FAR, STRAIGHT, geodesics
 from roadeval.kernels.plain.outcomes import add_outcomes, outcomes
-from roadeval.kernels.plain.rows import filter_rows, label_rows, mask_rows, unfilter_rows
+from roadeval.kernels.plain.rows import (
+    LABEL_BITS,
+    filter_rows,
+    label_rows,
+    mask_rows,
+    unfilter_rows,
+)
 from roadeval.kernels.plain.runs import components, fill_holes, keep_region, label_runs, paint
 from roadeval.kernels.plain.trees import LEAVES, tree_sum
 
 __all__ = [
     "ASLANT",
     "FAR",
+    "LABEL_BITS",
     "LEAVES",
     "STRAIGHT",
     "add_outcomes",

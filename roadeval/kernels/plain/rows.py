@@ -7,14 +7,21 @@ References
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from roadeval.data.arrays import Bits, Plane
 from roadeval.data.packed import unpack
 
+LABEL_BITS: Final = (2, 4, 8)
+
 
 def filter_rows(rows: Plane, step: int) -> Plane:
-    """Subtract from each byte the Paeth predictor: left, above or corner, the nearest to their sum.
+    """Subtract from each byte its Paeth predictor.
+
+    That is the byte to the left, above, or above the left one (the corner), whichever is nearest to
+    ``left + above - corner``; of equals the first in this order.
 
     Parameters
     ----------
@@ -34,7 +41,6 @@ def filter_rows(rows: Plane, step: int) -> Plane:
     seen[1:, step:] = rows
     left, above, corner = seen[1:, :size], seen[:-1, step:], seen[:-1, :size]
     each = np.stack([left, above, corner])
-    # Of equals the first.
     nearest = np.abs(left + above - corner - each).argmin(axis=0)
     taken = np.take_along_axis(each, nearest[None], axis=0)[0].astype(np.uint8)
     return np.insert(rows - taken, 0, np.uint8(4), axis=1)
@@ -46,9 +52,9 @@ def label_rows(labels: Plane, bits: int) -> Plane:
     Parameters
     ----------
     labels
-        ``(H, W)`` uint8, each below ``2 ** bits``.
+        ``(H, W)`` uint8; of each the lowest bits are taken.
     bits
-        Of a label: 1, 2, 4 or 8.
+        Of a label, one of `LABEL_BITS`.
 
     Returns
     -------
@@ -56,13 +62,16 @@ def label_rows(labels: Plane, bits: int) -> Plane:
         ``(H, 1 + ceil(W * bits / 8))`` uint8, each row after its filter's number, 0.
     """
     single = np.unpackbits(labels[..., None], axis=2)[..., 8 - bits :]
-    packed = np.packbits(single.reshape(len(labels), -1), axis=1)
-    return np.insert(packed, 0, np.uint8(0), axis=1)
+    return _unfiltered(single.reshape(len(labels), -1))
 
 
 def mask_rows(mask: Bits, width: int) -> Plane:
-    """Pack a mask of ``width`` pixels a row as `label_rows` packs its pixels, of one bit each."""
-    return label_rows(unpack(mask, width), 1)
+    """Pack a mask of ``width`` pixels a row as `label_rows` packs labels, with a bit a pixel."""
+    return _unfiltered(unpack(mask, width))
+
+
+def _unfiltered(single: Plane) -> Plane:
+    return np.insert(np.packbits(single, axis=1), 0, np.uint8(0), axis=1)
 
 
 def unfilter_rows(lines: Plane, step: int) -> Plane:

@@ -88,7 +88,7 @@ def element_side(width: int) -> int:
 
 @lru_cache(maxsize=8)
 def structuring_element(side: int, shape: str) -> Reach:
-    """Return B of Eq. 17-22, of ``side`` pixels, odd: shared, read-only."""
+    """Return B of Eq. 17-22, ``side`` pixels wide (odd), as a `Reach`: shared, read-only."""
     kind = cv2.MORPH_RECT if shape == "square" else cv2.MORPH_ELLIPSE
     below = cv2.getStructuringElement(kind, (side, side))[side // 2 :]
     reach: Reach = (np.count_nonzero(below, axis=1) - 1) // 2

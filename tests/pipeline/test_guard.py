@@ -1,0 +1,49 @@
+"""What a stage of somebody else may hand out, and what costs its frame."""
+
+import numpy as np
+import pytest
+
+from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Output, Packed, mask_spec
+from roadeval.pipeline.guard import guarded
+from roadeval.pipeline.stage import Stage, StageError, View
+
+CLASSES = tuple(LabelClass(i, str(i), (i, 0, 0, 255)) for i in range(3))
+MASK = mask_spec("mask", "Mask")
+LABELS = LayerSpec("labels", LayerKind.LABELS, "Labels", CLASSES)
+RGB = LayerSpec("rgb", LayerKind.RGB, "Colours")
+SCALAR = LayerSpec("scalar", LayerKind.SCALAR, "Numbers", value_range=(0.0, 1.0))
+IMAGE = np.zeros((4, 6, 3), np.uint8)
+
+
+def run(spec, array):
+    def bind(_settings, _parameters):
+        road = Packed.of(IMAGE[..., 0])
+        return lambda view: Output((Layer(spec, array),), mask=road)
+
+    stage = Stage("own", "Own", int, bind, lambda _settings: (spec,))
+    return guarded(stage).bind(0, None)(View.of(IMAGE))
+
+
+@pytest.mark.parametrize("spec", [MASK, LABELS, SCALAR])
+def test_a_layer_of_bytes_passes(spec):
+    assert run(spec, IMAGE[..., 0]).layers[0].spec is spec
+
+
+@pytest.mark.parametrize("held", [bool, np.int64])
+def test_a_mask_may_hold_any_whole_numbers(held):
+    run(MASK, IMAGE[..., 0].astype(held))
+
+
+@pytest.mark.parametrize(
+    ("spec", "held"),
+    [(MASK, np.float32), (LABELS, np.int64), (LABELS, bool), (RGB, np.float32), (RGB, np.uint16)],
+)
+def test_a_layer_that_cannot_be_recorded_is_named(spec, held):
+    array = (IMAGE if spec is RGB else IMAGE[..., 0]).astype(held)
+    with pytest.raises(StageError, match=f"its layer '{spec.name}' holds {np.dtype(held)}"):
+        run(spec, array)
+
+
+def test_a_layer_of_another_size_is_named():
+    with pytest.raises(StageError, match=r"its layer 'mask' is \(3, 6\), not \(4, 6\)"):
+        run(MASK, IMAGE[:3, :, 0])
