@@ -77,10 +77,11 @@ def _check(
 
 
 def _check_layer(layer: Layer, size: tuple[int, int]) -> None:
-    name, kind, held = layer.spec.name, layer.spec.kind, layer.array.dtype
-    if layer.array.shape[:2] != size:
-        raise ValueError(f"its layer {name!r} is {layer.array.shape}, not {size}")
-    if kind is LayerKind.MASK and held.kind not in "biu":
-        raise TypeError(f"its layer {name!r} holds {held}, and no whole numbers")
-    if kind in (LayerKind.LABELS, LayerKind.RGB) and held != np.uint8:
-        raise TypeError(f"its layer {name!r} holds {held}, not uint8")
+    """Raise an error where a layer is not of the image's size, or of a type that no codec takes."""
+    name, kind, array = layer.spec.name, layer.spec.kind, layer.array
+    if array.shape[:2] != size:
+        raise ValueError(f"its layer {name!r} is {array.shape}, not {size}")
+    if kind is LayerKind.MASK and array.dtype.kind not in "biu":
+        raise TypeError(f"its layer {name!r} holds {array.dtype}, and no whole numbers")
+    if kind in (LayerKind.LABELS, LayerKind.RGB) and array.dtype != np.uint8:
+        raise TypeError(f"its layer {name!r} holds {array.dtype}, not uint8")

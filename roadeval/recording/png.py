@@ -64,7 +64,7 @@ def encode_levels(levels: Bytes) -> bytes:
 
 
 def compress(lines: Bytes) -> bytes:
-    """Pack a file's rows, each after its filter's number, in zlib's format."""
+    """Pack ``(H, 1 + B)`` uint8, rows each after its filter's number, in zlib's format."""
     return igzip_lib.compress(lines.data, 1, flag=igzip_lib.COMP_ZLIB, hist_bits=_WINDOW_BITS)
 
 

@@ -15,6 +15,7 @@ from roadeval.data.arrays import Bits, Plane
 from roadeval.data.packed import unpack
 
 LABEL_BITS: Final = (2, 4, 8)
+"""Those that a label of a PNG file may have; with one it is a mask."""
 
 
 def filter_rows(rows: Plane, step: int) -> Plane:
