@@ -39,7 +39,7 @@ def test_a_packed_mask_gives_the_same_file(classes, width):
 @pytest.mark.parametrize("values", [np.bool_, np.uint8, np.int64])
 def test_a_mask_may_be_of_any_type_and_is_set_where_it_is_not_0(values):
     mask = np.random.default_rng(0).integers(0, 2, (5, 13)).astype(np.uint8)
-    for inside in (1, 255):
+    for inside in (1, 2, 255):
         given = (mask * np.uint8(inside)).astype(values)
         np.testing.assert_array_equal(decode(pngs.encode_labels(given, ROAD)), mask)
 
