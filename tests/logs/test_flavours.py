@@ -66,6 +66,12 @@ def test_every_frame_of_a_video_is_decoded(log: Path) -> None:
     assert min(moved) > 0
 
 
+@cases("colour", "grey", "video")
+def test_the_cameras_own_name_is_read(log: Path) -> None:
+    with open_log(log) as opened:
+        assert all(topic.frame_id in {"camera", "cam"} for topic in opened.topics if topic.is_image)
+
+
 @cases("nothing")
 def test_what_is_no_image_is_called_by_its_name(log: Path) -> None:
     with pytest.raises((LogError, FrameError), match=REFUSED[log.stem]):

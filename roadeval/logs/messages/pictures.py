@@ -23,6 +23,8 @@ class RawPicture:
     step: int
     big_endian: bool
     data: Buffer
+    frame_id: str = ""
+    """The camera's name, as the header has it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,6 +34,7 @@ class CompressedPicture:
     stamp_ns: int
     format: str
     data: Buffer
+    frame_id: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,10 +89,11 @@ def picture_in(message: Any) -> Picture:
         If it has not the fields of an image.
     """
     try:
-        stamp_ns = _stamp_ns(message)
+        stamp_ns, frame_id = _stamp_ns(message), _frame_id(message)
         if not hasattr(message, "height") or hasattr(message, "pts"):
             name = message.format if hasattr(message, "format") else message.encoding
-            return CompressedPicture(stamp_ns, _as(str, name), _as(BUFFERS, message.data))
+            data = _as(BUFFERS, message.data)
+            return CompressedPicture(stamp_ns, _as(str, name), data, frame_id)
         return RawPicture(
             stamp_ns,
             int(message.width),
@@ -98,6 +102,7 @@ def picture_in(message: Any) -> Picture:
             int(getattr(message, "step", 0)),
             bool(getattr(message, "is_bigendian", False)),
             _as(BUFFERS, message.data),
+            frame_id,
         )
     except (AttributeError, StopIteration, TypeError, ValueError, LogError) as error:
         raise BadMessage("it has not the fields of an image") from error
@@ -119,6 +124,12 @@ def _stamp_ns(message: Any) -> int:
     else:
         return 0
     return nanoseconds(stamp)
+
+
+def _frame_id(message: Any) -> str:
+    """Return the name of the camera's coordinate frame; empty without one."""
+    name = getattr(getattr(message, "header", message), "frame_id", "")
+    return name if isinstance(name, str) else ""
 
 
 def nanoseconds(stamp: Any) -> int:

@@ -33,6 +33,17 @@ PLAIN_WORDS: Final = _set(
     "camera cam image images img raw compressed front left right rear png mono rect color"
 )
 DEPTH_FORMATS: Final = _set("16uc1 32fc1")
+TRANSPORT_WORDS: Final = _set("image img images raw compressed png mono rect color")
+SIDES: Final = _set("front rear left right side top bottom center")
+SAME_WORDS: Final = {
+    "cam": "camera",
+    "back": "rear",
+    "backward": "rear",
+    "forward": "front",
+    "centre": "center",
+    "middle": "center",
+}
+"""Words of cameras' names, by other words for the same."""
 NO_TOPIC: Final = ""
 """The name that means none, even if the log has one whose role is plain."""
 
@@ -92,11 +103,21 @@ def choose_truth(
         return _asked_for(topics, asked, "`topics.truth`")
     found = [t for t in _label_topics(topics, image) if not words(t.name) & SHADOW_WORDS]
     roads = [topic for topic in found if labels.tolerance or not topic.lossy]
+    elsewhere = {t.name: why for t in roads if (why := other_camera(t, image, topics))}
+    own = [topic for topic in roads if topic.name not in elsewhere]
     colors = bool(labels.road_colors)
-    plain = _only(_plain_truths(roads, image, colors=colors), image, "label", "`topics.truth`")
+    plain = _only(_plain_truths(own, image, colors=colors), image, "label", "`topics.truth`")
+    if plain is None and (others := _plain_truths(roads, image, colors=colors)):
+        raise LogError(
+            f"{others[0].name} belongs to another camera than {image.name}, by "
+            f"{elsewhere[others[0].name]}: name it with `topics.truth` to use it all the same, or "
+            "give an empty name there to go on without truth"
+        )
     if plain is not None:
         by = "colours" if plain.channels == 3 else "single channel"
-        return Choice(plain, f"the label image, by its name and its {by}")
+        rig = len(_other_cameras(topics, image)) > 0
+        no_others = ", and no other camera's by path and frame_id" if rig else ""
+        return Choice(plain, f"the label image, by its name and its {by}{no_others}")
     if roads:
         why = f"no topic is plainly road truth; `topics.truth` takes one of: {_names(roads)}"
         return Choice(None, why)
@@ -130,12 +151,60 @@ def choose_shadow(
     if asked is not None:
         return _asked_for(topics, asked, "`topics.shadow`")
     masks = [topic for topic in _label_topics(topics, image) if topic.channels == 1]
-    shadows = [topic for topic in masks if words(topic.name) & SHADOW_WORDS]
+    shadows = [
+        topic
+        for topic in masks
+        if words(topic.name) & SHADOW_WORDS and not other_camera(topic, image, topics)
+    ]
     exact = [topic for topic in shadows if labels.tolerance or not topic.lossy]
     shadow = _only(exact, image, "shadow", "`topics.shadow`")
     if shadow is None:
         return Choice(None, "no shadow topic")
     return Choice(shadow, "the shadow mask, by its name and its single channel")
+
+
+def other_camera(label: TopicInfo, image: TopicInfo, topics: Sequence[TopicInfo]) -> str:
+    """Return by what a label topic belongs to another camera than an image topic; else empty.
+
+    A topic's path and its header's ``frame_id`` name a camera by a side (front, rear, left ...), by
+    a number (``cam1``), or by any word that the cameras of the log are called by. Neither may name
+    another camera than the image's; that of a label may say less (``/front/labels`` of
+    ``/front/left/image``), unless another camera of the log fits better.
+    """
+    cameras = _other_cameras(topics, image)
+    for what, theirs, ours, others in (
+        ("its path", label.name, image.name, [each.name for each in cameras]),
+        ("its frame_id", label.frame_id, image.frame_id, [each.frame_id for each in cameras]),
+    ):
+        known = frozenset[str]().union(*map(_camera_words, (ours, *others)))
+        of_label, of_image, *of_others = (
+            {word for word in _camera_words(text) if word in known or _is_a_camera(word)}
+            for text in (theirs, ours, *others)
+        )
+        is_another = bool(of_image - {"camera"}) and not of_label <= of_image
+        nearer = any(len(of_label ^ each) < len(of_label ^ of_image) for each in of_others)
+        if of_label and ours and (is_another or nearer):
+            return what if theirs == label.name else f"{what} ({theirs}, not {ours})"
+    return ""
+
+
+def _other_cameras(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicInfo]:
+    found = [topic for topic in topics if topic.is_image and topic.count and topic != image]
+    return [topic for topic in found if not _looks_like_label(topic)]
+
+
+def _camera_words(name: str) -> frozenset[str]:
+    """Split a path or a ``frame_id`` into words and numbers that may tell cameras apart."""
+    spaced = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", name).lower()
+    numbered = re.sub(r"(?<![a-z])cam(?:era)?[ _]?(\d+)", r"camera\1", spaced)
+    found = re.findall(r"camera\d+|[a-z]+|\d+", numbered)
+    said = frozenset(SAME_WORDS.get(word, word) for word in found)
+    return said - TRANSPORT_WORDS - LABEL_WORDS - MASK_WORDS - ROAD_WORDS
+
+
+def _is_a_camera(word: str) -> bool:
+    """Whether a word names a camera in whatever log."""
+    return word in SIDES or bool(re.fullmatch(r"camera\d+", word))
 
 
 def _asked_for(topics: Sequence[TopicInfo], name: str, setting: str) -> Choice:
@@ -199,9 +268,13 @@ def _only(
 ) -> TopicInfo | None:
     """Return the topic that shares the most words with the image's name: its own camera's.
 
-    None if there is none, a `LogError` if several share as many.
+    Of several that share as many, the one of the same ``frame_id``. None if there is none, a
+    `LogError` if several are left.
     """
-    shared = [len(words(topic.name) & words(image.name)) for topic in topics]
+    shared = [
+        (len(words(topic.name) & words(image.name)), topic.frame_id == image.frame_id)
+        for topic in topics
+    ]
     best = [t for t, s in zip(topics, shared, strict=True) if s == max(shared)]
     if len(best) > 1:
         raise LogError(f"{len(best)} {what} topics: {_names(best)}; choose one with {setting}")

@@ -50,6 +50,8 @@ class TopicInfo:
     lossy
         For images: the format of the first readable one if its compression changes values, as
         JPEG; else empty.
+    frame_id
+        For images: the camera's name in the header of the first readable message, or empty.
     problem
         Why no message could be decoded, or empty.
     """
@@ -67,6 +69,7 @@ class TopicInfo:
     size: tuple[int, int] | None = None
     channels: int | None = None
     lossy: str = ""
+    frame_id: str = ""
     problem: str = ""
 
     @property
@@ -139,8 +142,11 @@ def _look(reader: TopicReader, position: int) -> dict[str, Any]:
             "format": picture.encoding,
             "size": (picture.width, picture.height),
             "channels": channels,
+            "frame_id": picture.frame_id,
         }
     found = {"kind": TopicKind.COMPRESSED, "lossy": lossy_format(picture)}
+    if isinstance(picture, CompressedPicture):
+        found["frame_id"] = picture.frame_id
     codec = codec_of(picture)
     if codec is not None:
         size = _video_size(reader)

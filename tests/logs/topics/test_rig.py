@@ -1,0 +1,127 @@
+"""A rig of several cameras: no camera is scored against another one's truth."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from roadeval.logs import LogError, TopicSettings, open_log
+from tests.logs.making import SECOND, compressed, grey, jpeg, raw, ros2_log
+
+FRONT = "/camera/front/image_raw/compressed"
+REAR = "/camera/rear_left/image_raw/compressed"
+
+
+def rig(folder: Path, cameras: Mapping[str, str], labels: Mapping[str, str]) -> Path:
+    """Write three images and masks of each topic, which is given with its ``frame_id``."""
+    messages = []
+    for stamp in range(SECOND, 4 * SECOND, SECOND):
+        for topic, frame_id in cameras.items():
+            image = compressed(stamp, jpeg(grey(90)))
+            messages.append((topic, stamp, named(image, frame_id)))
+        for topic, frame_id in labels.items():
+            messages.append((topic, stamp, named(raw(stamp, grey(255), "mono8"), frame_id)))
+    return ros2_log(folder / "rig.mcap", messages)
+
+
+def named(message: dict, frame_id: str) -> dict:
+    return message | {"header": message["header"] | {"frame_id": frame_id}}
+
+
+def truth(path: Path, image: str, asked: str | None = None) -> str | None:
+    with open_log(path) as log:
+        found = log.select(TopicSettings(image=image, truth=asked)).truth
+    return found.topic.name if found else None
+
+
+def test_another_cameras_truth_is_refused_by_its_path(tmp_path: Path) -> None:
+    path = rig(tmp_path, {FRONT: "", REAR: ""}, {"/camera/front/labels": ""})
+    assert truth(path, FRONT) == "/camera/front/labels"
+    with pytest.raises(LogError, match=rf"/camera/front/labels belongs to another.*{REAR}.* path"):
+        truth(path, REAR)
+
+
+def test_another_cameras_truth_is_refused_by_its_frame_id(tmp_path: Path) -> None:
+    path = rig(tmp_path, {"/a/image": "front", "/b/image": "rear"}, {"/labels/semantic": "front"})
+    assert truth(path, "/a/image") == "/labels/semantic"
+    with pytest.raises(LogError, match=r"frame_id \(front, not rear\)"):
+        truth(path, "/b/image")
+
+
+def test_another_cameras_truth_is_taken_where_it_is_named(tmp_path: Path) -> None:
+    path = rig(tmp_path, {FRONT: "front", REAR: "rear"}, {"/camera/front/labels": "front"})
+    assert truth(path, REAR, "/camera/front/labels") == "/camera/front/labels"
+    assert truth(path, REAR, "") is None
+
+
+def test_of_two_truths_the_cameras_own_is_taken(tmp_path: Path) -> None:
+    cameras = {"/one": "cam1", "/two": "cam2"}
+    path = rig(tmp_path, cameras, {"/labels/a": "cam1", "/labels/b": "cam2"})
+    assert truth(path, "/one") == "/labels/a"
+    assert truth(path, "/two") == "/labels/b"
+
+
+def test_a_rig_is_told_that_its_truth_names_no_other_camera(tmp_path: Path) -> None:
+    path = rig(tmp_path, {FRONT: "front", REAR: "rear"}, {"/camera/front/labels": "front"})
+    with open_log(path) as log:
+        reasons = " ".join(log.select(TopicSettings(image=FRONT)).reasons)
+    assert "no other camera's by path and frame_id" in reasons
+
+
+def test_a_truth_without_a_camera_of_its_own_belongs_to_each(tmp_path: Path) -> None:
+    path = rig(tmp_path, {FRONT: "front", REAR: "rear"}, {"/labels/semantic": ""})
+    assert truth(path, FRONT) == truth(path, REAR) == "/labels/semantic"
+
+
+@pytest.mark.parametrize(
+    ("image", "frame_id", "label", "its_frame_id"),
+    [
+        ("/camera/image_raw", "camera", "/labels/semantic", "labels"),
+        ("/camera/image", "camera_optical", "/front/road_mask", "base_link"),
+        ("/front/left/image", "", "/front/labels", ""),
+    ],
+)
+def test_the_only_camera_takes_a_truth_that_names_no_other(
+    tmp_path: Path, image: str, frame_id: str, label: str, its_frame_id: str
+) -> None:
+    assert truth(rig(tmp_path, {image: frame_id}, {label: its_frame_id}), image) == label
+
+
+@pytest.mark.parametrize(
+    ("image", "frame_id", "label", "its_frame_id"),
+    [
+        ("/rear/image", "", "/front/labels", ""),
+        ("/image", "camera_1", "/labels", "camera_2"),
+        ("/image", "CAM_BACK", "/labels", "CAM_FRONT"),
+        ("/cam0/image", "", "/cam1/labels", ""),
+    ],
+)
+def test_the_only_camera_takes_no_truth_of_one_that_is_not_there(
+    tmp_path: Path, image: str, frame_id: str, label: str, its_frame_id: str
+) -> None:
+    path = rig(tmp_path, {image: frame_id}, {label: its_frame_id})
+    with pytest.raises(LogError, match="belongs to another camera"):
+        truth(path, image)
+
+
+def test_a_camera_whose_name_is_part_of_anothers_has_its_own_truth(tmp_path: Path) -> None:
+    cameras = {"/CAM_FRONT/image_rect": "", "/CAM_FRONT_LEFT/image_rect": ""}
+    path = rig(tmp_path, cameras, {"/CAM_FRONT/annotations": "", "/CAM_FRONT_LEFT/annotations": ""})
+    assert truth(path, "/CAM_FRONT/image_rect") == "/CAM_FRONT/annotations"
+    assert truth(path, "/CAM_FRONT_LEFT/image_rect") == "/CAM_FRONT_LEFT/annotations"
+    path = rig(tmp_path, cameras, {"/CAM_FRONT/annotations": ""})
+    with pytest.raises(LogError, match="belongs to another camera"):
+        truth(path, "/CAM_FRONT_LEFT/image_rect")
+
+
+def test_a_coded_camera_and_its_raw_images_are_one(tmp_path: Path) -> None:
+    cameras = {"/front/image_raw": "front", "/front/image_raw/compressed": "front"}
+    path = rig(tmp_path, cameras, {"/front/labels/compressed": "front"})
+    assert {truth(path, camera) for camera in cameras} == {"/front/labels/compressed"}
+
+
+def test_another_cameras_shadow_is_left_out(tmp_path: Path) -> None:
+    path = rig(tmp_path, {FRONT: "", REAR: ""}, {"/camera/front/shadow_mask": ""})
+    with open_log(path) as log:
+        assert log.select(TopicSettings(image=FRONT)).shadow is not None
+        assert log.select(TopicSettings(image=REAR)).shadow is None
