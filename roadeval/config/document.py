@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
+import inspect
 import textwrap
 import types
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import pairwise
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin, get_type_hints
 
 from roadeval.config.run import RunConfig
@@ -49,16 +52,10 @@ def _stages(pipeline: Pipeline, prefix: str) -> list[str]:
 
 def _table(name: str, settings: Any) -> str:
     """Write the table of a settings dataclass; those within it follow as tables of their own."""
-    from docstring_parser import DocstringStyle, parse
-
-    parsed = parse(type(settings).__doc__ or "", DocstringStyle.NUMPYDOC)
-    meanings = {
-        each.strip(): parameter.description or ""
-        for parameter in parsed.params
-        for each in parameter.arg_name.split(",")
-    }
+    meanings = _meanings(type(settings))
     hints = get_type_hints(type(settings), include_extras=True)
-    lines, inner = [f"# {parsed.short_description}", f"[{name}]"], []
+    title = (inspect.getdoc(type(settings)) or "").partition("\n\n")[0]
+    lines, inner = [*_comment(title), f"[{name}]"], []
     for field in dataclasses.fields(settings):
         value = getattr(settings, field.name)
         if dataclasses.is_dataclass(value):
@@ -68,6 +65,25 @@ def _table(name: str, settings: Any) -> str:
         lines += ["", *_comment(" ".join(filter(None, (meanings.get(field.name), allowed))))]
         lines.append(_assignment(field.name, value))
     return "\n\n".join(["\n".join(lines), *inner])
+
+
+def _meanings(kind: type) -> dict[str, str]:
+    """Return the string that follows each field in the source of a settings class."""
+    try:
+        source = inspect.getsource(kind)
+    except (OSError, TypeError):  # a class that was made in no file
+        return {}
+    (described,) = ast.parse(textwrap.dedent(source)).body
+    assert isinstance(described, ast.ClassDef)
+    found = {}
+    for field, after in pairwise(described.body):
+        match field, after:
+            case (
+                ast.AnnAssign(target=ast.Name(name)),
+                ast.Expr(value=ast.Constant(value=str(text))),
+            ):
+                found[name] = text
+    return found
 
 
 def _assignment(name: str, value: Any) -> str:

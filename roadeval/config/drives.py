@@ -17,23 +17,16 @@ OF_A_LOG: Final = ("topics", "labels", "frames", "masks")
 
 @dataclass(frozen=True, slots=True)
 class DriveSettings:
-    """What is asked of some drives in place of what is asked of all.
-
-    Parameters
-    ----------
-    path
-        Of the drives: a path, or the end of one, as a file's name; ``*`` and ``?`` stand for any
-        text within a name.
-    tables
-        ``topics``, ``labels``, ``frames`` and ``masks`` in the shape of a TOML file. Labels take
-        the place of the run's as a whole, the others key by key.
-    where
-        Begins a message about them.
-    """
+    """What is asked of some drives in place of what is asked of all."""
 
     path: str
+    """Of the drives: a path, or the end of one, as a file's name; ``*`` and ``?`` stand for any
+    text within a name."""
     tables: Mapping[str, Mapping[str, Any]]
+    """``topics``, ``labels``, ``frames`` and ``masks`` in the shape of a TOML file. Labels take the
+    place of the run's as a whole, the others key by key."""
     where: str = field(default="", compare=False)
+    """Begins a message about them."""
 
     @classmethod
     def of(cls, tables: Mapping[str, Any], where: str) -> DriveSettings:

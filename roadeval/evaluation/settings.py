@@ -12,51 +12,36 @@ from roadeval.errors import RoadevalError
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
 class EvaluationSettings:
-    """How results are counted, summed up and judged. Rates are fractions.
-
-    Parameters
-    ----------
-    window
-        Evaluated frames in a row of ``windows.csv``; the paper's is 10 (section 5).
-    boundary_width
-        Pixels on either side of the truth's edge that make up the region ``boundary``. Annotators
-        place an edge with a few pixels of freedom, so errors there mean less.
-    bands
-        Equal stripes of image rows, ``band_0`` at the top: how far away an error lies.
-    failed_err
-        A frame with at least this ERR has failed: a quarter of its pixels are wrong.
-    failed_fnr
-        A frame with at least this FNR has failed, however little road there is: next to nothing
-        of the road was found.
-    degraded_err
-        A frame with at least this ERR is degraded. The ``blind`` baseline makes about half of it
-        on an ordinary street.
-    degraded_margin
-        A frame whose ERR exceeds that of ``blind`` by more than this is degraded too: there, not
-        looking at the image would have been better.
-    noteworthy
-        The least change of ERR by the filter, or excess over ``blind``, that is noted.
-    confidence
-        Of the interval around a difference.
-    least_frames
-        Frames that an interval needs. Fewer tell next to nothing of how alike neighbours are, so
-        none is given.
-    negligible
-        A change of a drive's mean rate by no more than this matters to nobody: an interval that
-        ends within it is the answer that there is no larger effect.
-    """
+    """How results are counted, summed up and judged. Rates are fractions."""
 
     window: Annotated[int, Field(ge=1, le=1_000_000_000)] = 10
+    """Evaluated frames in a row of ``windows.csv``; the paper's is 10 (section 5)."""
     boundary_width: Annotated[int, Field(ge=1, le=100)] = 5
+    """Pixels on either side of the truth's edge that make up the region ``boundary``. Annotators
+    place an edge with a few pixels of freedom, so errors there mean less."""
     bands: Annotated[int, Field(ge=1, le=50)] = 5
+    """Equal stripes of image rows, ``band_0`` at the top: how far away an error lies."""
     failed_err: Annotated[float, Field(gt=0, le=1)] = 0.25
+    """A frame with at least this ERR has failed: a quarter of its pixels are wrong."""
     failed_fnr: Annotated[float, Field(gt=0, le=1)] = 0.9
+    """A frame with at least this FNR has failed, however little road there is: next to nothing of
+    the road was found."""
     degraded_err: Annotated[float, Field(gt=0, le=1)] = 0.15
+    """A frame with at least this ERR is degraded. The ``blind`` baseline makes about half of it on
+    an ordinary street."""
     degraded_margin: Annotated[float, Field(ge=0, le=1)] = 0.02
+    """A frame whose ERR exceeds that of ``blind`` by more than this is degraded too: there, not
+    looking at the image would have been better."""
     noteworthy: Annotated[float, Field(ge=0, le=1)] = 0.05
+    """The least change of ERR by the filter, or excess over ``blind``, that is noted."""
     confidence: Annotated[float, Field(gt=0.5, lt=1)] = 0.95
+    """Of the interval around a difference."""
     least_frames: Annotated[int, Field(ge=4, le=1_000_000_000)] = 10
+    """Frames that an interval needs. Fewer tell next to nothing of how alike neighbours are, so
+    none is given."""
     negligible: Annotated[float, Field(gt=0, le=1)] = 0.01
+    """A change of a drive's mean rate by no more than this matters to nobody: an interval that ends
+    within it is the answer that there is no larger effect."""
 
 
 def settings_of(summary: Mapping[str, Any]) -> EvaluationSettings:

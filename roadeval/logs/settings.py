@@ -40,32 +40,22 @@ Color = tuple[Level, Level, Level]
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class TopicSettings:
-    """Topics, where the log leaves a choice, and how label images are paired with images.
-
-    Parameters
-    ----------
-    image
-        The camera's topic.
-    truth
-        The topic of label images that show where road is; an empty name takes none.
-    shadow
-        The topic of masks that show where shadow truly is; an empty name takes none.
-    masks
-        Topics of road masks that the log already carries, by the name of their variant: a
-        network's output, for example, which is then scored beside the pipeline.
-    sync_tolerance_ms
-        Milliseconds between the stamps of an image and its label image, at most; half the frame
-        period by default.
-    resize_truth
-        Whether label images of another size are scaled to the image's (nearest pixel).
-    """
+    """Topics, where the log leaves a choice, and how label images are paired with images."""
 
     image: str | None = None
+    """The camera's topic."""
     truth: str | None = None
+    """The topic of label images that show where road is; an empty name takes none."""
     shadow: str | None = None
+    """The topic of masks that show where shadow truly is; an empty name takes none."""
     masks: Mapping[str, str] = field(default_factory=dict)
+    """Topics of road masks that the log already carries, by the name of their variant: a network's
+    output, for example, which is then scored beside the pipeline."""
     sync_tolerance_ms: Annotated[float, Field(ge=0, le=86_400_000)] | None = None
+    """Milliseconds between the stamps of an image and its label image, at most; half the frame
+    period by default."""
     resize_truth: bool = False
+    """Whether label images of another size are scaled to the image's (nearest pixel)."""
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
@@ -74,29 +64,21 @@ class LabelSettings:
 
     All others are non-road. With none given, a mask is understood by itself if its values are among
     0 and 255 (road), with 128 for ignore; or among 0 and 1 (road), with 255 for ignore.
-
-    Parameters
-    ----------
-    road
-        Values that are road; of an image with a palette, its indices.
-    ignore
-        Values that are counted nowhere.
-    road_colors
-        Colours that are road, red, green and blue.
-    ignore_colors
-        Colours that are counted nowhere.
-    tolerance
-        For masks whose compression changes values, as JPEG does: a value at most so far from one
-        that means road (255 by default), from 0 or from one to ignore means the same; the others,
-        which lie at edges, are counted nowhere, and their share is told. Without it such masks are
-        refused.
     """
 
     road: tuple[Label, ...] = ()
+    """Values that are road; of an image with a palette, its indices."""
     ignore: tuple[Label, ...] = ()
+    """Values that are counted nowhere."""
     road_colors: tuple[Color, ...] = ()
+    """Colours that are road, red, green and blue."""
     ignore_colors: tuple[Color, ...] = ()
+    """Colours that are counted nowhere."""
     tolerance: Annotated[int, Field(ge=1, le=127)] | None = None
+    """For masks whose compression changes values, as JPEG does: a value at most so far from one
+    that means road (255 by default), from 0 or from one to ignore means the same; the others,
+    which lie at edges, are counted nowhere, and their share is told. Without it such masks are
+    refused."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -117,36 +99,26 @@ class LabelSettings:
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class MaskSettings:
-    """Another method's road masks that do not lie in the log.
-
-    Parameters
-    ----------
-    path
-        A folder of images or NPY files, one a frame; or ``LOG.mcap:/topic``, a topic of another
-        log. ``{drive}`` stands for the name of the drive's file, without its ending.
-    pair
-        How masks and frames belong together: by ``number``, for a folder the last number in a
-        file's name; or by ``stamp``, for a folder the time that the name is (seconds, or milli-,
-        micro- or nanoseconds since 1970). By default stamps of a log, and of a folder in which
-        every name is a time of more than ten digits.
-    first
-        The number of the first frame's mask.
-    images
-        The folder of images that the log was made of, in their order: masks belong to the image of
-        the same name, endings such as ``_mask`` aside. ``{drive}`` stands for the same here.
-    threshold
-        For confidence maps: road is what has at least this confidence. A value of 8 or 16 bits is
-        a share of the greatest such value; one with a fraction is from 0 to 1.
-    labels
-        For masks of other values than 0 and 255 (road), or 0 and 1 (road): what they mean.
-    """
+    """Another method's road masks that do not lie in the log."""
 
     path: str = ""
+    """A folder of images or NPY files, one a frame; or ``LOG.mcap:/topic``, a topic of another log.
+    ``{drive}`` stands for the name of the drive's file, without its ending."""
     pair: Literal["number", "stamp"] | None = None
+    """How masks and frames belong together: by ``number``, for a folder the last number in a file's
+    name; or by ``stamp``, for a folder the time that the name is (seconds, or milli-, micro- or
+    nanoseconds since 1970). By default stamps of a log, and of a folder in which every name is a
+    time of more than ten digits."""
     first: Annotated[int, Field(ge=0, le=1_000_000_000)] = 0
+    """The number of the first frame's mask."""
     images: str | None = None
+    """The folder of images that the log was made of, in their order: masks belong to the image of
+    the same name, endings such as ``_mask`` aside. ``{drive}`` stands for the same here."""
     threshold: Annotated[float, Field(gt=0, le=1)] | None = None
+    """For confidence maps: road is what has at least this confidence. A value of 8 or 16 bits is a
+    share of the greatest such value; one with a fraction is from 0 to 1."""
     labels: LabelSettings = LabelSettings()
+    """For masks of other values than 0 and 255 (road), or 0 and 1 (road): what they mean."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -159,32 +131,21 @@ class MaskSettings:
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class FrameSettings:
-    """Which frames of the log are read, and how.
-
-    Parameters
-    ----------
-    start
-        First log time: seconds from the log's start, nanoseconds, or RFC 3339.
-    end
-        Likewise; a frame at that very time is not read.
-    every
-        Read every so many frames.
-    max_frames
-        Stop after so many frames read.
-    scale
-        Reduce frames and truth to this share of their width and height first: a cheaper look at a
-        long log, with other results.
-    keep_corrupt
-        Use damaged data: messages whose checksum is wrong, and images of which a part is lost.
-    max_pixels
-        Most pixels of an image. One whose head claims more is not decoded: a damaged head may
-        claim any size.
-    """
+    """Which frames of the log are read, and how."""
 
     start: Time | None = None
+    """First log time: seconds from the log's start, nanoseconds, or RFC 3339."""
     end: Time | None = None
+    """Likewise; a frame at that very time is not read."""
     every: Annotated[int, Field(ge=1, le=1_000_000_000)] = 1
+    """Read every so many frames."""
     max_frames: Annotated[int, Field(ge=1, le=1_000_000_000)] | None = None
+    """Stop after so many frames read."""
     scale: Annotated[float, Field(gt=0, le=1)] = 1.0
+    """Reduce frames and truth to this share of their width and height first: a cheaper look at a
+    long log, with other results."""
     keep_corrupt: bool = False
+    """Use damaged data: messages whose checksum is wrong, and images of which a part is lost."""
     max_pixels: Annotated[int, Field(ge=1, le=1 << 30)] = MAX_PIXELS
+    """Most pixels of an image. One whose head claims more is not decoded: a damaged head may claim
+    any size."""

@@ -15,64 +15,48 @@ Class = Annotated[int, Field(ge=0, le=65535)] | str
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class NetSettings:
-    """Settings of a network. What has no value is read from the file, and stated in ``run.toml``.
-
-    Parameters
-    ----------
-    file
-        The network, an ONNX file.
-    sha256
-        Of that file, in hexadecimal: another one is refused. Of a network whose weights lie in
-        files beside it, that of all of them, one after the other.
-    backend
-        Who runs it: ``onnxruntime``, by default where it is installed, or ``opencv``.
-    size
-        Width and height of its input, in pixels; by default those that the file names.
-    resize
-        How an image gets that size, interpolated linearly. ``stretch``: each side by itself.
-        ``letterbox``: reduced as a whole until it fits, in the middle of a grey area. ``crop``:
-        reduced until it covers the input, what juts out is cut off, and no road there.
-    layout
-        The order of its input's sizes, from N images, C channels, H rows, W columns.
-    channels
-        In which order it takes the channels; by default as the file's metadata name them, or
-        ``rgb``. ``grey``: one alone.
-    scale
-        A grey level of 0..255 is multiplied by this first; by default by 1/255, and by 1 where the
-        network takes whole numbers.
-    mean, deviation
-        Then ``mean`` is subtracted and the rest divided by ``deviation``, one for each channel in
-        the order of ``channels``, or one for all; by default 0 and 1.
-    outputs
-        The names of the outputs that tell of road; where there are several, road is what one of
-        them calls road.
-    road
-        The classes that are road: numbers from 0, or names that the file's metadata list.
-    activation
-        What makes probabilities of an output: ``softmax`` over its classes, ``sigmoid`` of each,
-        or ``none`` where the network has applied one.
-    decide
-        Road is where a class of ``road`` beats all others (``argmax``), or where the probability
-        of road is above ``threshold``.
-    threshold
-        Between 0 and 1; means nothing to ``argmax``.
-    """
+    """Settings of a network. Missing values are read from the file, and stated in ``run.toml``."""
 
     file: str = ""
+    """The network, an ONNX file."""
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
+    """Of that file, in hexadecimal: another one is refused. Of a network whose weights lie in files
+    beside it, that of all of them, one after the other."""
     backend: Literal["onnxruntime", "opencv"] | None = None
+    """Who runs it: ``onnxruntime``, by default where it is installed, or ``opencv``."""
     size: tuple[Side, Side] | None = None
+    """Width and height of its input, in pixels; by default those that the file names."""
     resize: Literal["stretch", "letterbox", "crop"] = "stretch"
+    """How an image gets that size, interpolated linearly. ``stretch``: each side by itself.
+    ``letterbox``: reduced as a whole until it fits, in the middle of a grey area. ``crop``:
+    reduced until it covers the input, what juts out is cut off, and no road there."""
     layout: Literal["NCHW", "NHWC"] | None = None
+    """The order of its input's sizes, from N images, C channels, H rows, W columns."""
     channels: Literal["rgb", "bgr", "grey"] | None = None
+    """In which order it takes the channels; by default as the file's metadata name them, or
+    ``rgb``. ``grey``: one alone."""
     scale: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+    """A grey level of 0..255 is multiplied by this first; by default by 1/255, and by 1 where the
+    network takes whole numbers."""
     mean: Channels | None = None
+    """Subtracted from that: one number for each channel in the order of ``channels``, or one for
+    all; by default 0."""
     deviation: Channels | None = None
+    """The difference is divided by this: one number for each channel in the order of ``channels``,
+    or one for all; by default 1."""
     outputs: tuple[str, ...] | None = None
+    """The names of the outputs that tell of road; where there are several, road is what one of them
+    calls road."""
     road: tuple[Class, ...] | None = None
+    """The classes that are road: numbers from 0, or names that the file's metadata list."""
     activation: Literal["softmax", "sigmoid", "none"] | None = None
+    """What makes probabilities of an output: ``softmax`` over its classes, ``sigmoid`` of each, or
+    ``none`` where the network has applied one."""
     decide: Literal["argmax", "threshold"] | None = None
+    """Road is where a class of ``road`` beats all others (``argmax``), or where the probability of
+    road is above ``threshold``."""
     threshold: Annotated[float, Field(ge=0, le=1)] = 0.5
+    """Between 0 and 1; means nothing to ``argmax``."""
 
     @field_validator("deviation")
     @classmethod

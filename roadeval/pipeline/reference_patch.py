@@ -16,20 +16,16 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class ReferencePatch:
-    """A trapezoid, symmetric about the image's middle; all as shares of height and width.
-
-    Parameters
-    ----------
-    top, bottom
-        Rows from the image's upper edge. The bottom stays clear of the vehicle's own bonnet.
-    top_width, bottom_width
-        Widths of the upper and of the lower edge.
-    """
+    """A trapezoid, symmetric about the image's middle; all as shares of height and width."""
 
     top: Share = 0.75
+    """First row, from the image's upper edge."""
     bottom: Share = 0.95
+    """Last row; it stays clear of the vehicle's own bonnet."""
     top_width: Share = 0.2
+    """Width of the upper edge."""
     bottom_width: Share = 0.4
+    """Width of the lower edge."""
 
     @model_validator(mode="after")
     def _upright(self) -> ReferencePatch:

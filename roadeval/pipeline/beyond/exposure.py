@@ -29,26 +29,19 @@ Gain = Annotated[float, Field(gt=0, le=255)]
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class ExposureSettings:
-    """Settings of the exposure.
-
-    Parameters
-    ----------
-    level
-        Grey level, 0..255, that the patch's median gets.
-    channels
-        ``each`` channel gets a gain of its own, so that the road turns grey under any light and
-        camera; ``alike``: all get the one of the brightness.
-    least, greatest
-        Bounds of a gain. A patch that is black, or white, says nothing about the light.
-    patch
-        The reference patch.
-    """
+    """Settings of the exposure."""
 
     level: Annotated[float, Field(gt=0, lt=255)] = 96.0
+    """Grey level, 0..255, that the patch's median gets."""
     channels: Literal["each", "alike"] = "each"
+    """``each`` channel gets a gain of its own, so that the road turns grey under any light and
+    camera; ``alike``: all get the one of the brightness."""
     least: Gain = 0.25
+    """Lowest gain: a white patch says nothing about the light."""
     greatest: Gain = 6.0
+    """Highest gain: a black patch says nothing about the light."""
     patch: ReferencePatch = ReferencePatch()
+    """The reference patch."""
 
     @model_validator(mode="after")
     def _ordered(self) -> ExposureSettings:

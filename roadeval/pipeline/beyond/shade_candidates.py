@@ -47,73 +47,52 @@ OFFSET: Final = np.float32(8)
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class GatedSettings:
-    """Settings of the gated filter. Lengths are in pixels of the working image.
-
-    Parameters
-    ----------
-    width
-        Of the working image: wider ones are reduced to it for all that is decided. Texture then
-        means the same for every camera, and the time is the same too.
-    darkness
-        Candidates are darker than this share of the sunlit level.
-    place
-        Candidates lie where at least this share of the training pixels is road: sky, trees and
-        houses are elsewhere.
-    planes
-        Planes of the feature map on which the odds are learnt. What a frame costs grows with them.
-    penalty
-        Of the squared weights, a training pixel.
-    odds
-        Factor of the odds that a candidate is shaded road. The more, the more dark road comes back,
-        and the more is brightened that is none. A classifier on colours takes all of that for
-        road, and wants caution; one that sees place and surroundings as well takes 1.
-    least
-        Below this probability nothing is brightened.
-    window
-        Side of the square over which a candidate's own colour is averaged: texture finer than it
-        stays.
-    greatest
-        Greatest gain of a channel.
-    softness
-        Side of the square that the gains are averaged over, so that edges stay soft.
-    """
+    """Settings of the gated filter. Lengths are in pixels of the working image."""
 
     width: Annotated[int, Field(ge=32, le=4096)] = 160
+    """Of the working image: wider ones are reduced to it for all that is decided. Texture then
+    means the same for every camera, and the time is the same too."""
     darkness: Share = 0.6
+    """Candidates are darker than this share of the sunlit level."""
     place: Share = 0.05
+    """Candidates lie where at least this share of the training pixels is road: sky, trees and
+    houses are elsewhere."""
     planes: Annotated[int, Field(ge=1, le=4096)] = 128
+    """Planes of the feature map on which the odds are learnt. What a frame costs grows with them.
+    """
     penalty: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.01
+    """Of the squared weights, a training pixel."""
     odds: Annotated[float, Field(gt=0, le=1e6)] = 0.1
+    """Factor of the odds that a candidate is shaded road. The more, the more dark road comes back,
+    and the more is brightened that is none. A classifier on colours takes all of that for road,
+    and wants caution; one that sees place and surroundings as well takes 1."""
     least: Annotated[float, Field(ge=0, lt=1)] = 0.1
+    """Below this probability nothing is brightened."""
     window: Annotated[int, Field(ge=1, le=99)] = 1
+    """Side of the square over which a candidate's own colour is averaged: texture finer than it
+    stays."""
     greatest: Annotated[float, Field(ge=1, le=255)] = 8.0
+    """Greatest gain of a channel."""
     softness: Annotated[int, Field(ge=1, le=99)] = 3
+    """Side of the square that the gains are averaged over, so that edges stay soft."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """A working image as the filter sees it.
-
-    Parameters
-    ----------
-    image
-        ``(h, w, 3)`` uint8 RGB.
-    level
-        Sunlit level of ``R + G + B``.
-    lit
-        ``(3,)``: mean colour of lit road.
-    place, likely
-        ``(h, w)``: the road's share by place, float32, and whether it is more than half.
-    candidates
-        ``(h, w)`` bool.
-    """
+    """A working image as the filter sees it."""
 
     image: Rgb
+    """``(h, w, 3)`` uint8 RGB."""
     level: float
+    """Sunlit level of ``R + G + B``."""
     lit: Floats
+    """``(3,)``: mean colour of lit road."""
     place: Values
+    """``(h, w)`` float32: the road's share by place."""
     likely: npt.NDArray[np.bool_]
+    """``(h, w)``: whether that is more than half."""
     candidates: npt.NDArray[np.bool_]
+    """``(h, w)`` bool."""
 
 
 def look(image: Rgb, place: Floats, settings: GatedSettings) -> Look:

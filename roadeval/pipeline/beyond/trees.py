@@ -68,54 +68,37 @@ GEODESIC: Final = LayerSpec(
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class TreesSettings:
-    """Settings of the boosted trees.
-
-    Parameters
-    ----------
-    width
-        Columns of the working image.
-    features
-        Groups of features, each a file of `roadeval.pipeline.beyond.ground`.
-    patch
-        The reference patch, from which distances of colour and paths are measured.
-    trees
-        How many. What a decision costs grows with them.
-    leaves
-        Of a tree, at most.
-    rate
-        Share of what is left to mend that a tree mends.
-    least
-        Training pixels of a leaf, mirrored ones included, at least.
-    share
-        Of the features, drawn anew for each node, among which it chooses.
-    hidden
-        Planes of the network. What a decision costs grows with them, too.
-    passes
-        Of the network's training through as many pixels as were sampled.
-    noise
-        Deviation of what is added in training to each input of the network, -1 to 1.
-    reach_weight
-        ``reach_weight`` times ``s max(d - 1, 0)`` is taken from the log-odds. The distance d from
-        the patch is 1 where roads end, after the stage ``exposure``; s is 1 in the light and 0 in
-        the shade. It changes little where the camera itself taught the trees; where others did,
-        up to 4 may mend much.
-    threshold
-        A pixel is road where it is more probable than this.
-    """
+    """Settings of the boosted trees."""
 
     width: Annotated[int, Field(ge=32, le=1024)] = 160
+    """Columns of the working image."""
     features: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(GROUPS)
+    """Groups of features, each a file of `roadeval.pipeline.beyond.ground`."""
     patch: ReferencePatch = ReferencePatch()
+    """The reference patch, from which distances of colour and paths are measured."""
     trees: Annotated[int, Field(ge=1, le=1000)] = 150
+    """How many. What a decision costs grows with them."""
     leaves: Annotated[int, Field(ge=2, le=LEAVES)] = 31
+    """Of a tree, at most."""
     rate: Annotated[float, Field(gt=0, le=1)] = 0.1
+    """Share of what is left to mend that a tree mends."""
     least: Annotated[int, Field(ge=1, le=10_000)] = 50
+    """Training pixels of a leaf, mirrored ones included, at least."""
     share: Annotated[float, Field(gt=0, le=1)] = 0.33
+    """Of the features, drawn anew for each node, among which it chooses."""
     hidden: Annotated[int, Field(ge=1, le=1024)] = 64
+    """Planes of the network. What a decision costs grows with them, too."""
     passes: Annotated[int, Field(ge=1, le=1000)] = 12
+    """Of the network's training through as many pixels as were sampled."""
     noise: Annotated[float, Field(ge=0, le=10)] = 0.1
+    """Deviation of what is added in training to each input of the network, -1 to 1."""
     reach_weight: Annotated[float, Field(ge=0, le=100)] = 1.0
+    """``reach_weight`` times ``s max(d - 1, 0)`` is taken from the log-odds. The distance d from
+    the patch is 1 where roads end, after the stage ``exposure``; s is 1 in the light and 0 in
+    the shade. It changes little where the camera itself taught the trees; where others did, up
+    to 4 may mend much."""
     threshold: Annotated[float, Field(ge=0, le=1)] = 0.5
+    """A pixel is road where it is more probable than this."""
 
     @field_validator("features")
     @classmethod

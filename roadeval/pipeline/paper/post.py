@@ -37,41 +37,29 @@ Odd = Annotated[int, Field(ge=1, le=999)]
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class PostSettings:
-    """Settings of phase 4.
-
-    Parameters
-    ----------
-    element
-        Side of the structuring element B in pixels, odd; none: the odd number nearest to 1 %
-        of the image's width, at least 3.
-    shape
-        ``square`` or ``ellipse``.
-    operations
-        ``open`` (Eq. 20) and ``close`` (Eq. 21) in the order they are applied. Section 4.4
-        begins with dilation and erosion, a closing. On a noisy mask that joins the road to
-        whatever lies beside it, for good: without the filter it costs 4 and 10 points of ERR on
-        two real drives (on three synthetic ones it gains 8 and 6 and costs 1). So the opening
-        comes first here; the presets ``printed_order`` and ``printed`` close first.
-    region
-        What is kept: the ``largest`` component, the component with most pixels in the
-        reference patch before the vehicle (``patch``; the largest where none has any), or
-        ``all`` of them.
-    fill
-        Whether the holes of what is kept are filled (Eq. 23).
-    boundary_element
-        Side of the square that erodes the result for its boundary (Eq. 22); 3 gives a line one
-        pixel wide.
-    patch
-        The reference patch.
-    """
+    """Settings of phase 4."""
 
     element: Odd | None = None
+    """Side of the structuring element B in pixels, odd; none: the odd number nearest to 1 % of the
+    image's width, at least 3."""
     shape: Literal["square", "ellipse"] = "square"
+    """``square`` or ``ellipse``."""
     operations: tuple[Literal["open", "close"], ...] = ("open", "close")
+    """``open`` (Eq. 20) and ``close`` (Eq. 21) in the order they are applied. Section 4.4 begins
+    with dilation and erosion, a closing. On a noisy mask that joins the road to whatever lies
+    beside it, for good: without the filter it costs 4 and 10 points of ERR on two real drives
+    (on three synthetic ones it gains 8 and 6 and costs 1). So the opening comes first here; the
+    presets ``printed_order`` and ``printed`` close first."""
     region: Literal["largest", "patch", "all"] = "largest"
+    """What is kept: the ``largest`` component, the component with most pixels in the reference
+    patch before the vehicle (``patch``; the largest where none has any), or ``all`` of them."""
     fill: bool = True
+    """Whether the holes of what is kept are filled (Eq. 23)."""
     boundary_element: Odd = 3
+    """Side of the square that erodes the result for its boundary (Eq. 22); 3 gives a line one pixel
+    wide."""
     patch: ReferencePatch = ReferencePatch()
+    """The reference patch."""
 
     @field_validator("element", "boundary_element")
     @classmethod

@@ -23,21 +23,15 @@ SIMILARITY: Final = mask_spec("similarity", "Similar to road (Eq. 2)")
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class SimilaritySettings:
-    """Settings of phase 1.
-
-    Parameters
-    ----------
-    quantile
-        A pixel is road where ``d^2`` is at most this quantile of the chi-squared distribution
-        with 3 degrees of freedom: the share of normally distributed road colours kept.
-    ridge
-        Added to the covariance's diagonal, in squared grey levels: a grey camera's covariance
-        is singular. 1 is about the variance that 8-bit JPEG coding alone adds; much below 0.001
-        a singular covariance's inverse is lost in rounding.
-    """
+    """Settings of phase 1."""
 
     quantile: Annotated[float, Field(gt=0, lt=1)] = 0.95
+    """A pixel is road where ``d^2`` is at most this quantile of the chi-squared distribution with 3
+    degrees of freedom: the share of normally distributed road colours kept."""
     ridge: Annotated[float, Field(ge=1e-3, allow_inf_nan=False)] = 1.0
+    """Added to the covariance's diagonal, in squared grey levels: a grey camera's covariance is
+    singular. 1 is about the variance that 8-bit JPEG coding alone adds; much below 0.001 a
+    singular covariance's inverse is lost in rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -32,29 +32,20 @@ _BLOCK: Final = 1 << 17
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class SvmSettings:
-    """Settings of phase 3.
-
-    Parameters
-    ----------
-    kernel
-        ``rbf``, an adaptation of the printed machine: road is a mid grey between dark verges
-        and bright sky, which no plane in RGB cuts out; or ``linear``, as printed (Eq. 12).
-    c
-        Penalty of a training pixel on the wrong side. The printed Eq. 13 allows none, which
-        has no solution for classes that overlap.
-    gamma
-        Width of the RBF kernel ``exp(-gamma |x - y|^2)``, in standardised colours.
-    standardise
-        Whether colours are brought to mean 0 and deviation 1 over the training set.
-    threshold
-        A pixel is road where the decision function is above this.
-    """
+    """Settings of phase 3."""
 
     kernel: Literal["rbf", "linear"] = "rbf"
+    """``rbf``, an adaptation of the printed machine: road is a mid grey between dark verges and
+    bright sky, which no plane in RGB cuts out; or ``linear``, as printed (Eq. 12)."""
     c: Penalty = 1.0
+    """Penalty of a training pixel on the wrong side. The printed Eq. 13 allows none, which has no
+    solution for classes that overlap."""
     gamma: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.5
+    """Width of the RBF kernel ``exp(-gamma |x - y|^2)``, in standardised colours."""
     standardise: bool = True
+    """Whether colours are brought to mean 0 and deviation 1 over the training set."""
     threshold: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+    """A pixel is road where the decision function is above this."""
 
 
 # Of scipy.linalg's BLAS, which libsvm and liblinear call, the compiled part is enough.
@@ -64,25 +55,18 @@ NOT_RUN: Final = ("sklearn", "sklearn.svm", "sklearn.utils", "scipy.linalg")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SupportVectors:
-    """A fitted machine (Eq. 15-16).
-
-    Parameters
-    ----------
-    mean, scale
-        ``(3,)``: features are ``(colour - mean) / scale``, colours in 0..255.
-    vectors
-        ``(m, 3)``: the support vectors x_i, as features.
-    weights
-        ``(m,)``: their ``lambda_i y_i``, y = 1 for road and -1 otherwise.
-    offset
-        b.
-    """
+    """A fitted machine (Eq. 15-16)."""
 
     mean: Floats
+    """``(3,)``, of colours in 0..255."""
     scale: Floats
+    """``(3,)``: features are ``(colour - mean) / scale``."""
     vectors: Floats
+    """``(m, 3)``: the support vectors x_i, as features."""
     weights: Floats
+    """``(m,)``: their ``lambda_i y_i``, y = 1 for road and -1 otherwise."""
     offset: float
+    """B."""
 
     def __post_init__(self) -> None:
         check_arrays(self, np.float64, mean=(3,), scale=(3,))
