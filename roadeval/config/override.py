@@ -39,8 +39,6 @@ NOT_UTF8: Final = (
 NUL: Final = "holds a zero byte, which no name and no path can"
 QUOTED: Final = 60
 """Letters of a wrong value that a message quotes."""
-FORMER: Final = {"effective_frames": "least_frames"}
-"""Settings that an earlier version wrote under another name."""
 
 _JSON: Final = TypeAdapter(dict[str, Any], config=ConfigDict(ser_json_inf_nan="constants"))
 
@@ -70,7 +68,6 @@ def override(settings: Any, tables: Mapping[str, Any], table: str, where: str = 
         raise ConfigError(f"{begin}[{table}] must be a table")
     if not values:
         return settings
-    values = {FORMER.get(key, key): value for key, value in values.items()}
     merged = _merged(dataclasses.asdict(settings), values)
     known = [entry.name for entry in dataclasses.fields(settings)]
     for key in merged.keys() - {*known}:

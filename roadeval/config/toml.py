@@ -79,8 +79,8 @@ def _text(path: Path) -> str:
     text = Recording(path).result("run")
     if text is None:
         raise ConfigError(
-            f"{path}: holds no configuration: an earlier version made it, or the run was cut; "
-            "replay the drive once with its options, and that recording holds them"
+            f"{path}: holds no configuration, for the run was cut: replay the drive once with its "
+            "options, and that recording holds them"
         )
     return text
 

@@ -124,12 +124,7 @@ def without_pictures(result: Result, frame: int) -> str:
         return ""
     if frame not in result.rows["frame"]:
         return ""
-    cleared = result.recording.format > 1
-    return f"the recording has no pictures of frame {frame}, " + (
-        "so the views of them are empty"
-        if cleared
-        else "and its views may show an earlier frame's: an earlier version made it"
-    )
+    return f"the recording has no pictures of frame {frame}, so the views of them are empty"
 
 
 def _scored(result: Result) -> list[str]:

@@ -13,7 +13,7 @@ from roadeval.data import Rows
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import scored
 from roadeval.evaluation.differences import drive_differences
-from roadeval.evaluation.settings import EvaluationSettings, settings_of
+from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.recording.layout import DamagedError, RecordingError
 from roadeval.results.folder import RUN, ResultsFolder
 from roadeval.results.verdict import verdict_of
@@ -90,11 +90,7 @@ class Result:
         """As ``summary.json``; of an incomplete run, what its tables give."""
         if not self.complete:
             return self._summary_of_part()
-        summary = self._tables.summary
-        if "difference" in summary:
-            return summary
-        # An earlier version found the differences in another way.
-        return summary | _found(self.rows, settings_of(summary))
+        return self._tables.summary
 
     @cached_property
     def rows(self) -> Rows:
@@ -187,7 +183,8 @@ class Result:
     def _summary_of_part(self) -> dict[str, Any]:
         """Make the summary that a killed run did not get to write, of what it had scored."""
         assert self.recording is not None
-        layout = self.recording.layout
+        layout, settings = self.recording.layout, EvaluationSettings()
+        differences = drive_differences(list(scored.mask_counts(self.rows)), settings)
         return {
             "drive": {"name": layout.drive, "width": layout.width, "height": layout.height},
             "frames": {
@@ -202,7 +199,10 @@ class Result:
             "versions": {},
             "seconds": {},
             "training": {"source": layout.properties.get("trained_on")},
-        } | _found(self.rows, EvaluationSettings())
+            "totals": (totals := scored.totals(self.rows)),
+            "verdict": verdict_of(totals, differences, settings),
+            **differences.as_dict(),
+        }
 
 
 def _recording(path: Path) -> Recording:
@@ -210,11 +210,3 @@ def _recording(path: Path) -> Recording:
     from roadeval.recording import Recording
 
     return Recording(path)
-
-
-def _found(rows: Rows, settings: EvaluationSettings) -> dict[str, Any]:
-    """Compute what a summary states of the frames that were scored."""
-    totals = scored.totals(rows)
-    differences = drive_differences(list(scored.mask_counts(rows)), settings)
-    verdict = verdict_of(totals, differences, settings)
-    return {"verdict": verdict, "totals": totals, **differences.as_dict()}

@@ -11,7 +11,6 @@ from typing import Any, Final
 from roadeval.config import RunConfig
 from roadeval.data import BASELINE, Role
 from roadeval.jobs.run import Run
-from roadeval.results.summary import RESULTS, digest_of
 from roadeval.results.verdict import verdict_of
 from roadeval.version import VERSION
 
@@ -30,7 +29,7 @@ def of(run: Run) -> dict[str, Any]:
     found, differences = run.board.summary(), run.board.differences()
     repeats = run.board.repeats()
     seeds = {"seeds": [run.config.training.seed, *run.repeats], **repeats} if repeats else None
-    facts = found | {
+    return found | {
         "verdict": verdict_of(found["totals"], differences, run.config.evaluation),
         **differences.as_dict(),
         **({"seeds": seeds} if seeds else {}),
@@ -46,7 +45,6 @@ def of(run: Run) -> dict[str, Any]:
         "log": {"path": str(run.log.path), "sha256": run.log.sha256},
         **({"masks": masks} if (masks := _masks(run)) else {}),
     }
-    return facts | {"digest": digest_of(facts, RESULTS)}
 
 
 def versions() -> dict[str, str]:

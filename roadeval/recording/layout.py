@@ -27,11 +27,8 @@ from roadeval.errors import RoadevalError
 APPLICATION: Final = "roadeval"
 """Name under which the viewer knows the files, and by which ours are recognised."""
 FORMAT: Final = 3
-"""Version of the arrangement inside the file; raised when an older reader would go wrong.
-
-In 2 rows without a value end what is shown, and the rows of masks are filtered; in 3 truths and
-errors are masks, where they were labels before. All can be read.
-"""
+"""Version of the arrangement inside the file, which alone is read; raised with every change of it
+that a reader must know of."""
 
 FRAME: Final = "frame"
 STAMP: Final = "stamp"

@@ -1,4 +1,4 @@
-"""The results folder: tables and summary as plain files that any later version reads.
+"""The results folder: tables and summary as plain files.
 
 It is built beside the one of its name, and replaces it as one: see `roadeval.runtime.folders`.
 """
@@ -6,6 +6,7 @@ It is built beside the one of its name, and replaces it as one: see `roadeval.ru
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -24,27 +25,21 @@ if TYPE_CHECKING:
 
 RUN: Final = "run.toml"
 """The file that makes the run again."""
-_UNLISTED: Final = frozenset(
-    f"{figure}.{kind}"
-    for figure in ("fig2_masks", "fig3a_error_rate", "fig3b_fp_fn_rate")
-    for kind in ("png", "pdf")
-)
-"""The figures of version 0.1, whose summaries do not list the folder's files."""
-
-
 NAME_BYTES: Final = 255
 """Of a file's name, at most, on the file systems that there are."""
 
 
 def belonging(folder: Path) -> frozenset[str]:
-    """Return the names of the files in a folder that are results, there or not."""
-    try:
-        listed = read_summary(folder / SUMMARY).get("files")
-    except ResultsError:
-        listed = None
+    """Return the names of the files in a folder that are results, there or not.
+
+    A summary lists them in all formats.
+    """
+    listed = None
+    with suppress(OSError, ValueError, RecursionError, AttributeError):
+        listed = json.loads((folder / SUMMARY).read_bytes()).get("files")
     names = [str(name) for name in listed] if isinstance(listed, list) else []
     plain = {name for name in names if _is_name(name)}
-    return _UNLISTED | {SUMMARY, RUN, *(f"{table}.csv" for table in TABLES)} | plain
+    return frozenset(plain) | {SUMMARY, RUN, *(f"{table}.csv" for table in TABLES)}
 
 
 def _is_name(text: str) -> bool:

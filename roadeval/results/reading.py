@@ -56,13 +56,12 @@ def read_table(
         empty text.
     summary
         The summary that belongs to it. Where it states the table's rows and SHA-256 (its part
-        ``tables``, which earlier versions do not write) they must be those of the text.
+        ``tables``, which that of a recording lacks) they must be those of the text.
 
     Returns
     -------
     DataFrame
-        Names are text, whatever they look like; rates are float64, all else int64. A rate that the
-        table lacks, as it was written before that metric was known, is NaN.
+        Names are text, whatever they look like; rates are float64, all else int64.
 
     Raises
     ------
@@ -219,7 +218,6 @@ def _chunk(numbers: pa.Array) -> Cells:
 
 def _parsed(content: bytes, table: TableSchema) -> pa.Table:
     """Parse CSV; a ValueError says what is wrong with it."""
-    import pyarrow as pa
     from pyarrow import csv
 
     options = csv.ConvertOptions(column_types=_coded(table))
@@ -228,14 +226,11 @@ def _parsed(content: bytes, table: TableSchema) -> pa.Table:
         raise ValueError("its last line is cut off")
     if len({*parsed.column_names}) < len(parsed.column_names):
         raise ValueError("a column stands there twice")
-    lacking = [column for column in table.columns if column.name not in parsed.column_names]
-    if missing := [column.name for column in lacking if column.kind is not Kind.RATE]:
+    if missing := [name for name in table.names if name not in parsed.column_names]:
         raise ValueError(f"no column {', '.join(missing)}")
     for column in table.columns:
         if column.kind is not Kind.RATE:
             _check_cells(column, parsed[column.name])
-    for column in lacking:
-        parsed = parsed.append_column(column.name, pa.nulls(len(parsed), pa.float64()))
     return parsed
 
 

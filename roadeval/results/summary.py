@@ -11,9 +11,9 @@ from typing import Any, Final
 
 from roadeval.results.reading import ResultsError
 from roadeval.runtime.files import check_input
-from roadeval.runtime.text import visible_lines
+from roadeval.runtime.text import visible, visible_lines
 
-FORMAT: Final = {"name": "roadeval-summary", "version": 3}
+FORMAT: Final[Mapping[str, Any]] = {"name": "roadeval-summary", "version": 3}
 SUMMARY: Final = "summary.json"
 PARTS: Final = (
     *("format", "verdict", "drive", "frames", "totals", "beyond", "curves", "difference"),
@@ -22,12 +22,9 @@ PARTS: Final = (
     *("files", "digest"),
 )
 """The parts of the summary, in the file's order."""
-LATER: Final = frozenset(
-    {"curves", "seeds", "claims", "methods", "masks", "tables", "files", "digest"}
-)
-"""Parts that not every summary has, so that readers must do without them: earlier versions did not
-write them, a recording has no files, and most runs train with one seed, have no network, and all
-masks in the log."""
+OPTIONAL: Final = frozenset({"curves", "seeds", "methods", "masks", "tables", "files"})
+"""Parts that not every summary has: a recording has no files, and most runs train with one seed,
+have no network, and all masks in the log."""
 RESULTS: Final = (
     *("verdict", "frames", "totals", "beyond", "curves", "difference", "against_blind", "seeds"),
     *("oracles", "windows", "claims", "health", "warnings", "losses", "settings", "methods"),
@@ -36,32 +33,11 @@ RESULTS: Final = (
 moves or renames files may mend what the others say of them."""
 ALTERED: Final = "its content is not what was written"
 _LEVELS: Final = {
-    **dict.fromkeys(("drive", "frames", "training", "run", "versions", "log", "selection"), 1),
+    **dict.fromkeys(("drive", "frames", "training", "run", "versions", "log"), 1),
     **dict.fromkeys(("beyond", "claims", "health", "seconds", "settings", "tables"), 2),
     **dict.fromkeys(("totals", "difference", "against_blind", "seeds", "oracles"), 3),
 }
 """Parts that are mappings, and how many levels of mappings they are at least."""
-_SELECTION: Final[Mapping[str, Mapping[str, str]]] = {
-    "topics": {
-        "image": "image_topic",
-        "truth": "truth_topic",
-        "shadow": "shadow_topic",
-        "masks": "mask_topics",
-        "sync_tolerance_ms": "sync_tolerance_ms",
-        "resize_truth": "resize_truth",
-    },
-    "labels": {
-        "road": "road_labels",
-        "ignore": "ignore_labels",
-        "road_colors": "road_colors",
-        "ignore_colors": "ignore_colors",
-    },
-    "frames": {
-        name: name for name in ("start", "end", "every", "max_frames", "scale", "keep_corrupt")
-    },
-    "output": {"record": "record"},
-}
-"""What version 1 called the settings of a run, by their tables."""
 
 
 def digest_of(content: Mapping[str, Any], parts: Iterable[str]) -> dict[str, Any]:
@@ -74,11 +50,9 @@ def digest_of(content: Mapping[str, Any], parts: Iterable[str]) -> dict[str, Any
 
 
 def is_as_written(content: Mapping[str, Any]) -> bool:
-    """Return whether a document agrees with its ``digest``, which earlier versions do not have."""
-    stated = content.get("digest")
-    if stated is None:
-        return True
+    """Return whether a document agrees with its ``digest``."""
     try:
+        stated = content["digest"]
         return bool(stated == digest_of(content, stated["parts"]))
     except (TypeError, KeyError, RecursionError):  # the digest is damaged, or a part is endless
         return False
@@ -90,10 +64,10 @@ def summary_text(parts: Mapping[str, Any]) -> str:
     Raises
     ------
     ValueError
-        If a part is unknown or missing (see `PARTS`; ``format`` is added here).
+        If a part is unknown or missing (see `PARTS`; ``format`` and ``digest`` are added here).
     """
-    document = {"format": FORMAT} | dict(parts)
-    if wrong := (document.keys() ^ set(PARTS)) - (LATER - document.keys()):
+    document = {"format": FORMAT} | dict(parts) | {"digest": digest_of(parts, RESULTS)}
+    if wrong := (document.keys() ^ set(PARTS)) - (OPTIONAL - document.keys()):
         raise ValueError(f"summary: unknown or missing {sorted(wrong)}")
     ordered = {name: plain(document[name]) for name in PARTS if name in document}
     return json_text(ordered)
@@ -124,7 +98,7 @@ def read_summary(path: Path) -> dict[str, Any]:
 
 
 def parse_summary(text: str, where: object) -> dict[str, Any]:
-    """Read the text of a summary; one of an earlier version takes the shape of today's.
+    """Read the text of a summary.
 
     Raises
     ------
@@ -135,23 +109,32 @@ def parse_summary(text: str, where: object) -> dict[str, Any]:
         summary = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise ResultsError(f"{where}: not a summary ({error}); make it anew") from error
-    if isinstance(summary, dict):
-        for part in summary.keys() & _LEVELS.keys():
-            if not _is_mapping(summary[part], _LEVELS[part]):
-                raise ResultsError(f"{where}: damaged (`{part}` is not what it must be)")
     form = summary.get("format") if isinstance(summary, dict) else None
-    if form == {**FORMAT, "version": 1}:
-        summary, form = _of_version_1(summary), {**FORMAT, "version": 2}
-    if form == {**FORMAT, "version": 2}:
-        summary, form = _of_version_2(summary), FORMAT
-    if form != FORMAT:
-        raise ResultsError(
-            f"{where}: not a summary of format {FORMAT['name']} {FORMAT['version']}; "
-            "make it anew with this version of roadeval replay"
-        )
+    number = form.get("version") if isinstance(form, dict) else None
+    if not isinstance(number, int) or form != {**FORMAT, "version": number}:
+        raise ResultsError(f"{where}: not a summary of roadeval; make it anew with roadeval replay")
+    if number != FORMAT["version"] or "digest" not in summary:
+        versions = summary.get("versions")
+        made_by = versions.get("roadeval") if isinstance(versions, dict) else None
+        sentence = another_format(made_by, later=number > FORMAT["version"])
+        raise ResultsError(f"{where}: {sentence}")
+    for part in summary.keys() & _LEVELS.keys():
+        if not _is_mapping(summary[part], _LEVELS[part]):
+            raise ResultsError(f"{where}: damaged (`{part}` is not what it must be)")
     if not is_as_written(summary):
         raise ResultsError(f"{where}: damaged ({ALTERED}); make it anew with roadeval replay")
     return dict(summary)
+
+
+def another_format(version: object, *, later: bool) -> str:
+    """Return a sentence on results of another format, with the version that wrote them if known."""
+    if later:
+        made = (
+            f"roadeval {visible(str(version))}, a later version" if version else "a later version"
+        )
+        return f"made by {made}: update roadeval"
+    made = f"roadeval {visible(str(version))}" if version else "an earlier version of roadeval"
+    return f"made by {made}, whose format is read no more: replay the log again"
 
 
 def _is_mapping(value: Any, levels: int) -> bool:
@@ -159,37 +142,6 @@ def _is_mapping(value: Any, levels: int) -> bool:
     return isinstance(value, dict) and (
         levels == 1 or all(_is_mapping(each, levels - 1) for each in value.values())
     )
-
-
-def _of_version_1(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Bring a summary of version 1 to the shape of version 2.
-
-    There every variant carried the run's training and evaluation among its settings, and what was
-    asked of the log stood under ``selection``; summaries made before that have no such part.
-    """
-    asked = summary.get("selection") or {}
-    run: dict[str, Any] = {
-        table: {key: asked[old] for key, old in keys.items() if old in asked}
-        for table, keys in _SELECTION.items()
-    }
-    settings = {}
-    for variant, own in summary.get("settings", {}).items():
-        run |= {table: own[table] for table in ("training", "evaluation") if table in own}
-        shared = ("preset", "training", "evaluation")
-        settings[variant] = {key: value for key, value in own.items() if key not in shared}
-        run.setdefault("preset", own.get("preset"))
-    rest = {key: value for key, value in summary.items() if key != "selection"}
-    return {**rest, "run": run, "settings": settings}
-
-
-def _of_version_2(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Bring a summary of version 2 to today's shape.
-
-    Its differences had other intervals, or none, and a reason; they and the verdict on them are
-    left out, for the tables have all that it takes to compute them.
-    """
-    kept = {key: value for key, value in summary.items() if key not in ("difference", "verdict")}
-    return {**kept, "format": FORMAT}
 
 
 def json_text(value: Any) -> str:

@@ -81,13 +81,11 @@ def own_name(path: Path, *, hidden: bool = True) -> Path:
 def own_names(path: Path, *, hidden: bool = True) -> list[Path]:
     """List what lies there under an `own_name` of an output, the newest last.
 
-    Names that go on with a hyphen are among them, for what a run keeps beside such a file; and one
-    without the run's part, as earlier versions gave it, where they are not hidden.
+    Names that go on with a hyphen are among them, for what a run keeps beside such a file.
     """
     stem, suffix = re.escape(path.stem), re.escape(path.suffix)
-    token = rf"\.[0-9a-f]{{{2 * _TOKEN}}}"
-    begin = rf"\.{stem}{token}" if hidden else rf"{stem}({token})?"
-    pattern = re.compile(rf"{begin}\.partial{suffix}(-\w+)?")
+    dot, token = r"\." if hidden else "", rf"\.[0-9a-f]{{{2 * _TOKEN}}}"
+    pattern = re.compile(rf"{dot}{stem}{token}\.partial{suffix}(-\w+)?")
     found = [each for each in path.parent.iterdir() if pattern.fullmatch(each.name)]
     return sorted(found, key=lambda each: each.lstat().st_mtime_ns)
 

@@ -149,16 +149,6 @@ def test_a_frame_without_pictures_is_drawn_with_a_warning(
     assert said.err == f"roadeval: warning: {sentence}\n"
 
 
-def test_of_a_recording_by_an_earlier_version_the_viewer_may_show_another_frame(sparse):
-    opened, bad = Result(sparse.recording), worst(sparse)
-    opened.recording.format = 1
-    assert inspecting.without_pictures(opened, bad) == (
-        f"the recording has no pictures of frame {bad}, and its views may show an earlier "
-        "frame's: an earlier version made it"
-    )
-    assert inspecting.without_pictures(opened, opened.pictured[-1]) == ""
-
-
 def test_the_worst_of_nothing_is_none_unless_a_variant_is_asked_for(unlabelled):
     opened = Result(unlabelled.recording)
     assert inspecting.worst(opened) is None

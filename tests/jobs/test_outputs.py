@@ -102,13 +102,6 @@ def test_what_killed_runs_left_goes_but_for_the_newest_partial_recording(to, tmp
     assert names(tmp_path) == [left.name]
 
 
-def test_an_empty_partial_recording_of_an_earlier_version_goes(to, tmp_path):
-    (tmp_path / "out.partial.rrd").touch()
-    with to.holding(()) as left:
-        assert left is None
-    assert names(tmp_path) == []
-
-
 def test_without_locks_nothing_that_may_be_another_run_s_is_removed(to, tmp_path, monkeypatch):
     usual = builtins.__import__
 

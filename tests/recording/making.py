@@ -33,7 +33,7 @@ from roadeval.recording import Layout, Recorder, Recording
 from roadeval.recording.read.rrd_file import RrdFile
 from roadeval.results.lines import lines
 from roadeval.results.schema import TABLES
-from roadeval.results.summary import FORMAT
+from roadeval.results.summary import FORMAT, digest_of
 
 HEIGHT, WIDTH = 6, 8
 
@@ -50,7 +50,9 @@ RINGS = LayerSpec(
 )
 POST = mask_spec("post", "Road")
 VARIANT = VariantLayout("filtered", "with the filter", ("post",), (NDI, RINGS, POST))
-SUMMARY = {"format": FORMAT, "totals": {}, "seconds": {"filtered": {"post": 0.5}}}
+SUMMARY = {"format": FORMAT, "totals": {}, "digest": digest_of({}, ())} | {
+    "seconds": {"filtered": {"post": 0.5}}
+}
 """Of which the viewer and the reader use a few parts only."""
 WINDOW = {"window": 0, "first_frame": 2, "last_frame": 18, "frames": 17} | {
     **dict.fromkeys(TABLES["windows"].names[6:], 0.25),

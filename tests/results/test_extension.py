@@ -60,7 +60,7 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.folder import ResultsFolder, ResultsWriter
 from roadeval.results.lines import lines, sum_lines
 from roadeval.results.schema import documentation
-from roadeval.results.summary import LATER, PARTS
+from roadeval.results.summary import OPTIONAL, PARTS
 from tests.evaluation.making import a_frame, a_variant, pixels
 
 board = Scoreboard(EvaluationSettings(bands=1), ["net"], None)
@@ -71,7 +71,7 @@ summary = board.summary()
 with ResultsWriter(folder / "out") as writer:
     writer.append(lines(result))
     writer.append(sum_lines(board.sums()))
-    unknown = set(PARTS) - summary.keys() - {"format"} - LATER
+    unknown = set(PARTS) - summary.keys() - {"format", "digest"} - OPTIONAL
     writer.finish(summary | {part: {} for part in unknown}, "")
 read = ResultsFolder(folder / "out")
 assert read.frames["FDR"].tolist() == [0.25]

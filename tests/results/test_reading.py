@@ -67,13 +67,6 @@ def test_a_file_that_is_not_there_has_no_rows(tmp_path):
     assert read_table("oracles", tmp_path / "oracles.csv").empty
 
 
-def test_a_metric_that_was_not_known_then_is_undefined():
-    old = HEADER.replace(",FPR", "") + line().replace(",0.25\n", "\n")
-    table = read_table("oracles", old)
-    assert math.isnan(table["FPR"][0])
-    assert kinds(table) == KINDS
-
-
 def test_rows_make_the_table_that_their_text_would():
     row = (1, "net", "svm", "post", 2, 4, 0, 0, 6, 0.5, math.nan, 0.1, 0.2, 0.3, 0.25)
     made = table_of("oracles", [row])
@@ -102,7 +95,6 @@ MANY = "".join(
     "text",
     [
         HEADER + MANY + line(40_000, "late", 1, ""),
-        HEADER.replace(",FPR", "") + line().replace(",0.25\n", "\n"),
         HEADER,
         "",
     ],

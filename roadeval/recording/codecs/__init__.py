@@ -17,30 +17,18 @@ adds only its payload. Both need Rerun, which is imported there: who decodes doe
 
 from __future__ import annotations
 
-from roadeval.data import ERRORS, TRUTH, LayerKind, LayerSpec
+from roadeval.data import LayerKind, LayerSpec
 from roadeval.recording.codecs.codec import Codec
 from roadeval.recording.codecs.masks import LabelCodec, MaskCodec
 from roadeval.recording.codecs.pictures import CameraCodec, ImageCodec, ScalarCodec
-from roadeval.recording.layout import CAMERA, FORMAT, SHADOW_TRUTH, Layout
+from roadeval.recording.layout import CAMERA, Layout
 
 
-def codecs_of(layout: Layout, version: int = FORMAT) -> dict[str, Codec]:
-    """Return the codec of every image, by its entity path.
-
-    Parameters
-    ----------
-    layout
-        Of the recording.
-    version
-        Of its format.
-    """
-    codecs: dict[str, Codec] = {CAMERA: CameraCodec(layout.width, layout.height)}
-    for path, spec in layout.images():
-        if version < 3 and spec in (TRUTH, SHADOW_TRUTH, ERRORS):
-            codecs[path] = LabelCodec(spec, layout.width, layout.height)
-        else:
-            codecs[path] = codec(spec, layout.width, layout.height)
-    return codecs
+def codecs_of(layout: Layout) -> dict[str, Codec]:
+    """Return the codec of every image, by its entity path."""
+    width, height = layout.width, layout.height
+    codecs: dict[str, Codec] = {CAMERA: CameraCodec(width, height)}
+    return codecs | {path: codec(spec, width, height) for path, spec in layout.images()}
 
 
 def codec(spec: LayerSpec, width: int, height: int) -> Codec:

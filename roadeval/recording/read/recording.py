@@ -17,7 +17,7 @@ from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.read.payloads import PayloadCache
 from roadeval.recording.read.rrd_file import RrdFile, whole
 from roadeval.results.reading import read_rows, read_table
-from roadeval.results.summary import parse_summary
+from roadeval.results.summary import another_format, parse_summary
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,12 +41,7 @@ class Recording:
     Raises
     ------
     RecordingError
-        If it is none, or one by a later version.
-
-    Attributes
-    ----------
-    format
-        Version of the arrangement inside the file, see `roadeval.recording.layout.FORMAT`.
+        If it is none, or of another format.
 
     Examples
     --------
@@ -61,14 +56,15 @@ class Recording:
         self.path = Path(path)
         self._file = RrdFile(self.path)
         with whole(self.path, at.PROPERTIES):
-            # The first format did not state its version.
-            self.format = int(self._file.static(at.PROPERTIES, "format") or 1)
-        if self.format > at.FORMAT:
-            raise RecordingError(f"{self.path}: made by a later version of roadeval: update it")
+            form = int(self._file.static(at.PROPERTIES, "format") or 0)
         text = self._file.document(at.LAYOUT)
         if text is None:
             raise RecordingError(f"{self.path}: the recording ends before its first frame")
         with whole(self.path, at.LAYOUT):
+            if form != at.FORMAT:
+                version = json.loads(text).get("properties", {}).get("version")
+                sentence = another_format(version, later=form > at.FORMAT)
+                raise RecordingError(f"{self.path}: {sentence}")
             self.layout = Layout.from_json(text)
         self._payloads = PayloadCache(self._file)
 
@@ -216,7 +212,7 @@ class Recording:
         # Only here: what decodes pictures takes time to import, and tables are read without it.
         from roadeval.recording.codecs import codecs_of
 
-        return codecs_of(self.layout, self.format)
+        return codecs_of(self.layout)
 
     @cached_property
     def _notes(self) -> dict[int, tuple[str, ...]]:

@@ -48,7 +48,7 @@ def section(findings: Findings) -> Iterator[Block]:
 
 
 def _claims(findings: Findings) -> Iterator[Block]:
-    """Tabulate in how many windows the paper's claims are borne out; earlier runs counted none."""
+    """Tabulate in how many windows the paper's claims are borne out."""
     found = findings.summary.get("claims", {})
     rows = list(claim_rows(found))
     if not rows:

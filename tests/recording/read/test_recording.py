@@ -1,4 +1,4 @@
-"""What was recorded is read back: images, numbers and texts, of this format and of earlier ones."""
+"""What was recorded is read back: images, numbers and texts."""
 
 from dataclasses import replace
 
@@ -9,7 +9,6 @@ import rerun as rr
 
 from roadeval.data import Health, Role
 from roadeval.recording import Recorder, Recording, RecordingError
-from roadeval.recording.codecs import codecs_of
 from roadeval.recording.read.rrd_file import RrdFile
 from roadeval.recording.write.encoding import Images
 from roadeval.results.lines import lines
@@ -154,50 +153,28 @@ def test_a_lane_holds_changes_only_and_ends_where_nothing_is_known(tmp_path):
     assert lane == {0: "ok", 2: "failed", 3: "", 4: "ok"}
 
 
-def recorded_in(version, folder, monkeypatch):
-    """A recording whose arrangement is said to be of this version."""
-    with monkeypatch.context() as patched:
-        patched.setattr("roadeval.recording.layout.FORMAT", version)
-        record(folder / "out.rrd", [unscored(0)])
-    return folder / "out.rrd"
-
-
-def test_the_arrangement_of_a_recording_has_a_version(recording, tmp_path, monkeypatch):
-    assert recording.format == 3
-    earlier = Recording(recorded_in(1, tmp_path, monkeypatch))
-    assert (earlier.format, earlier.frame_numbers) == (1, (0,))
-
-
-def test_truths_and_errors_of_the_second_version_were_labels(drive, tmp_path, monkeypatch):
-    with monkeypatch.context() as patched:
-        patched.setattr("roadeval.recording.layout.FORMAT", 2)
-        patched.setattr("roadeval.recording.write.encoding.codecs_of", lambda it: codecs_of(it, 2))
-        shadow = drive[3].frame.truth
-        shown = replace(drive[3], frame=replace(drive[3].frame, shadow_truth=shadow))
-        record(tmp_path / "out.rrd", [*drive[:3], shown], layout(has_shadow_truth=True))
-    earlier = Recording(tmp_path / "out.rrd")
-    np.testing.assert_array_equal(earlier.true_shadow(3), shadow)
-    assert rows_of(earlier, "/truth", "SegmentationImage:buffer") == dict.fromkeys(range(4), 1)
-    np.testing.assert_array_equal(earlier.truth(3), drive[3].frame.truth)
-    errors = earlier.layer("filtered", "errors", 3)
-    np.testing.assert_array_equal(errors, drive[3].errors["filtered"].array)
-    np.testing.assert_array_equal(
-        earlier.layer("filtered", "post", 3), next(drive[3].variants[0].masks())[1].pixels()
-    )
-
-
-def test_a_recording_that_tells_no_version_is_of_the_first(recording, tmp_path):
-    words = ["--drop-entity", "/__properties/roadeval", recording.path, "-o", tmp_path / "out.rrd"]
-    assert rerun("filter", *words) == 0
-    first = Recording(tmp_path / "out.rrd")
-    assert (first.format, len(first.frame_numbers)) == (1, 19)
-
-
-def test_a_recording_of_a_later_version_is_one_line(tmp_path, monkeypatch):
-    path = recorded_in(4, tmp_path, monkeypatch)
+@pytest.mark.parametrize(
+    ("version", "told"),
+    [
+        (2, "made by roadeval 0.1.9, whose format is read no more: replay the log again"),
+        (4, "made by roadeval 0.1.9, a later version: update roadeval"),
+    ],
+)
+def test_a_recording_of_another_format_is_one_line(version, told, tmp_path, monkeypatch):
+    path = tmp_path / "out.rrd"
+    monkeypatch.setattr("roadeval.recording.layout.FORMAT", version)
+    record(path, [unscored(0)], layout(properties={"version": "0.1.9"}))
+    monkeypatch.undo()
     with pytest.raises(RecordingError) as caught:
         Recording(path)
-    assert str(caught.value) == f"{path}: made by a later version of roadeval: update it"
+    assert str(caught.value) == f"{path}: {told}"
+
+
+def test_a_recording_that_tells_no_format_is_of_an_earlier_version(recording, tmp_path):
+    words = ["--drop-entity", "/__properties/roadeval", recording.path, "-o", tmp_path / "out.rrd"]
+    assert rerun("filter", *words) == 0
+    with pytest.raises(RecordingError, match=r"made by an earlier version of roadeval, whose"):
+        Recording(tmp_path / "out.rrd")
 
 
 def test_an_unknown_layer_is_answered_with_those_that_exist(recording):
