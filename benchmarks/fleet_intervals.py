@@ -17,23 +17,19 @@ import numpy.typing as npt
 from scipy import special
 
 from roadeval.evaluation.drives import AcrossSettings, DriveEffect, across_drives
-from roadeval.evaluation.drives.bootstrap import pooled_counts, pooled_difference, resampled
 from roadeval.evaluation.drives.effect import Clusters
-from roadeval.evaluation.drives.spread import tau_squared
 
 Values = npt.NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Values]
 """Draws so many effects of mean 0 and variance 1."""
 
-SETTINGS: Final = AcrossSettings(resamples=1000)
+SETTINGS: Final = AcrossSettings()
 TAIL: Final = (1 - SETTINGS.confidence) / 2
 CLUSTERS: Final = (6, 10, 30, 200)
 POWER: Final = (0.5, 1)
 """True means that are to be found, in standard deviations of a drive's effect."""
 SCALE: Final = 0.02
 """That standard deviation, as a rate."""
-NEW: Final = 1000
-"""New drives, of which a share is held."""
 
 
 # --- Made-up fleets -------------------------------------------------------------------------------
@@ -49,9 +45,9 @@ EFFECTS: Final[dict[str, Draw]] = {
 class Layout:
     """What drives are like, their effects aside.
 
-    ``least`` and ``most`` are the drives' own standard errors, in standard deviations of an effect;
-    a drive has as many pixels as make its error. Groups have 1 to ``drives`` drives, which share
-    half of the variance where that is more than one.
+    ``least`` and ``most`` are the drives' own standard errors, in standard deviations of an effect.
+    Groups have 1 to ``drives`` drives, which share half of the variance where that is more than
+    one.
     """
 
     name: str
@@ -73,16 +69,8 @@ def fleet(rng: np.random.Generator, draw: Draw, layout: Layout, groups: int) -> 
     group = np.repeat(np.arange(groups), sizes)
     errors = np.exp(rng.uniform(math.log(layout.least), math.log(layout.most), len(group)))
     measured = _effects(rng, draw, layout, group) + errors * rng.standard_normal(len(group))
-    # The base is wrong in half of all pixels, so that no rate leaves 0 to 1.
-    labelled = np.round(1e6 / errors**2).astype(int)
-    wrong = np.round((0.5 + SCALE * measured) * labelled).astype(int)
     return [
-        DriveEffect(
-            *(f"{place:05}", f"{group[place]:05}", SCALE * measured[place]),
-            *(SCALE * errors[place], 100),
-            (labelled[place] // 2, labelled[place]),
-            (wrong[place], labelled[place]),
-        )
+        DriveEffect(f"{place:05}", f"{group[place]:05}", SCALE * measured[place], 100)
         for place in range(len(group))
     ]
 
@@ -96,7 +84,7 @@ def _effects(
     return (shared + draw(rng, len(group))) / math.sqrt(2)
 
 
-# --- Other intervals, for comparison --------------------------------------------------------------
+# --- Another interval, for comparison -------------------------------------------------------------
 
 
 def student(clusters: Clusters) -> tuple[float, float]:
@@ -106,63 +94,25 @@ def student(clusters: Clusters) -> tuple[float, float]:
     return means.mean() - half, means.mean() + half
 
 
-def bootstraps(clusters: Clusters) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the plain percentile interval of the pooled difference, and the BCa interval."""
-    counts = pooled_counts(clusters)
-    drawn, whole = resampled(counts, SETTINGS), pooled_difference(counts.sum(axis=0))
-    without = pooled_difference(counts.sum(axis=0) - counts)
-    away = without.mean() - without
-    acceleration = (away**3).sum() / (6 * (away**2).sum() ** 1.5)
-    bias = special.ndtri(((drawn < whole).mean() + (drawn <= whole).mean()) / 2)
-    shifted = bias + special.ndtri([TAIL, 1 - TAIL])
-    levels = special.ndtr(bias + shifted / (1 - acceleration * shifted))
-    plain, bca = np.quantile(drawn, [TAIL, 1 - TAIL]), np.quantile(drawn, levels)
-    return (plain[0], plain[1]), (bca[0], bca[1])
-
-
-def q_profile(effects: list[DriveEffect]) -> tuple[float, float]:
-    """Return the interval of tau that takes drives for normal, and groups for nothing."""
-    measured = np.array([[each.mean for each in effects]])
-    variances = np.array([[each.standard_error for each in effects]]) ** 2
-    targets = special.chdtri(len(effects) - 1, [[TAIL, 1 - TAIL]])
-    low, high = np.sqrt(tau_squared(measured, variances, targets)[0])
-    return low, high
-
-
 # --- Tables ---------------------------------------------------------------------------------------
 
-COLUMNS: Final[tuple[tuple[str, dict[str, int]], ...]] = (
-    ("mean", {"t": 3, "ours": 4, "at .5": 5, "at 1": 4, "width": 5}),
-    ("pooled", {"plain": 5, "BCa": 3, "ours": 4}),
-    ("tau", {"plain": 5, "ours": 4, "found": 5}),
-    ("new", {"ours": 4}),
-)
-"""What is judged, and in which columns of how many characters. "at" is how often a true mean is
-found; the rest, but for the mean's width and the tau that is found, how often an interval holds,
-all in percent."""
-WIDTHS: Final = tuple(width for _, own in COLUMNS for width in own.values())
-WITH_FRACTION: Final = ("width", "found")
+WIDTHS: Final = {"t": 3, "ours": 4, "at .5": 5, "at 1": 4, "width": 5}
+"""The columns, and how many characters they have. "at" is how often a true mean is found; the rest,
+but for the width, how often an interval holds, all in percent."""
 
 
 def judged(rng: np.random.Generator, draw: Draw, layout: Layout, groups: int) -> list[float]:
     """Make a fleet, and return what the columns are the averages of."""
     effects = fleet(rng, draw, layout, groups)
     clusters, found = Clusters.of(effects), across_drives(effects, SETTINGS)
-    low, high, spread = found.low / SCALE, found.high / SCALE, found.spread
-    plain, bca = bootstraps(clusters)
-    new = SCALE * _effects(rng, draw, layout, np.arange(NEW))
-    pooled = (found.pooled_low, found.pooled_high)
+    low, high = found.low / SCALE, found.high / SCALE
     shares = [
         _holds(student(clusters), 0),
         _holds((low, high), 0),
         # An effect that is there moves the fleet; here 0 moves instead.
         *(1 - _holds((low, high), -effect) for effect in POWER),
-        *(_holds(ends, 0) for ends in (plain, bca, pooled)),
-        *(_holds(ends, SCALE) for ends in (q_profile(effects), (spread.tau_low, spread.tau_high))),
-        np.mean((spread.new_low <= new) & (new <= spread.new_high)),
     ]
-    percent = [100 * float(share) for share in shares]
-    return [*percent[:4], high - low, *percent[4:9], spread.tau / SCALE, percent[9]]
+    return [*(100 * share for share in shares), high - low]
 
 
 def _holds(ends: tuple[float, float], value: float) -> float:
@@ -171,13 +121,10 @@ def _holds(ends: tuple[float, float], value: float) -> float:
 
 def rows(repetitions: int) -> Iterator[str]:
     """Yield the lines of the table."""
-    spans = [(name, sum(own.values()) + len(own) - 1) for name, own in COLUMNS]
-    rule = f"{'=' * 6}  {'=' * 16}  ===" + "".join(f" {'=' * width}" for width in WIDTHS)
+    rule = f"{'=' * 6}  {'=' * 16}  ===" + "".join(f" {'=' * width}" for width in WIDTHS.values())
+    names = "".join(f" {name:>{width}}" for name, width in WIDTHS.items())
     yield rule
-    yield f"{'':29}" + "".join(f" {name:{width}}" for name, width in spans).rstrip()
-    yield "-" * 29 + "".join(f" {'-' * width}" for _, width in spans)
-    names = [f" {name:>{width}}" for _, own in COLUMNS for name, width in own.items()]
-    yield f"{'effect':6}  {'drives':16}  {'n':>3}" + "".join(names)
+    yield f"{'effect':6}  {'drives':16}  {'n':>3}{names}"
     yield rule
     for kind, (name, draw) in enumerate(EFFECTS.items()):
         for place, layout in enumerate(LAYOUTS):
@@ -191,10 +138,9 @@ def rows(repetitions: int) -> Iterator[str]:
 def _cells(results: Values) -> str:
     """Return the columns' averages, and the width's median."""
     shown = []
-    names = [name for _, own in COLUMNS for name in own]
-    for name, width, values in zip(names, WIDTHS, results.T, strict=True):
+    for (name, width), values in zip(WIDTHS.items(), results.T, strict=True):
         value = np.median(values) if name == "width" else values.mean()
-        shown.append(f" {value:{width}.{2 if name in WITH_FRACTION else 0}f}")
+        shown.append(f" {value:{width}.{2 if name == 'width' else 0}f}")
     return "".join(shown)
 
 

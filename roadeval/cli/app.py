@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 import traceback
 from collections.abc import Callable, Sequence
-from functools import wraps
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import typer
 
@@ -33,9 +32,6 @@ FIRST = (
     ),
 )
 """The order of the commands in the help; others follow by their names."""
-LIGHT: Final = frozenset({"info", "config", "pack"})
-"""Commands that load neither Rerun nor Arrow, and live with half a gigabyte of addresses."""
-
 THREADS: Final = {"OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS"}
 """The variables that OpenBLAS obeys, the first one before the others."""
 
@@ -53,20 +49,8 @@ def _place(command: Callable[..., int]) -> int:
     return FIRST.index(name) if name in FIRST else len(FIRST)
 
 
-def _with_room(command: Callable[..., int]) -> Callable[..., int]:
-    """Return a command that first asks for the addresses that its libraries reserve."""
-
-    @wraps(command)
-    def run(*args: Any, **values: Any) -> int:
-        if problem := memory.too_few_addresses():
-            raise RoadevalError(problem)
-        return command(*args, **values)
-
-    return run
-
-
 for _command in sorted(found_in(commands, "COMMAND"), key=_place):
-    app.command()(_command if _command.__name__ in LIGHT else _with_room(_command))
+    app.command()(_command)
 
 
 def _show_version(wanted: bool) -> None:

@@ -145,59 +145,6 @@ def mean_distribution(series: Series) -> MeanDistribution:
     )
 
 
-def frames_for(series: Series, half_width: float, confidence: float, most: int) -> int | None:
-    """Compute how long a series like this must be for an interval of a half-width.
-
-    A longer series is taken to favour the models that this one favours, the more so the longer it
-    is. Skewness is left aside.
-
-    Returns
-    -------
-    int or None
-        Longer than the series, within a hundredth; None above ``most``.
-    """
-    models, n = _models(len(series)), len(series)
-    spreads, weights, degrees = _explained(series, models)
-
-    def enough(length: int) -> bool:
-        errors = np.sqrt(_variance_of_mean(models.coefficients, models.shares, length)) * spreads
-        sharper = (weights / weights.max()) ** (length / n)
-        beyond = _beyond(half_width, errors, sharper / sharper.sum(), degrees)
-        return beyond <= 1 - confidence
-
-    low, high = n, 2 * n
-    while not enough(high):
-        if high > most:
-            return None
-        low, high = high, 2 * high
-    while high - low > max(high // 100, 1):
-        middle = (low + high) // 2
-        low, high = (low, middle) if enough(middle) else (middle, high)
-    return high if high <= most else None
-
-
-def series_for(
-    found: MeanDistribution, half_width: float, confidence: float, most: int
-) -> int | None:
-    """Compute how many series are needed for an interval of a half-width around their common mean.
-
-    Student's interval of the series' own means, which are taken to spread by the error that one has
-    under the model in the middle, by weight.
-
-    Returns
-    -------
-    int or None
-        At least 2, the one at hand included; None above ``most``.
-    """
-    order = np.argsort(found.errors)
-    middle = int(np.searchsorted(np.cumsum(found.weights[order]), 0.5))
-    error = float(found.errors[order[middle]])
-    counts = np.arange(2, most + 1)
-    halves = special("stdtrit")(counts - 1, (1 + confidence) / 2) * error / np.sqrt(counts)
-    enough = halves <= half_width
-    return int(counts[np.argmax(enough)]) if enough.any() else None
-
-
 def _explained(series: Series, models: _Models) -> tuple[Series, Series, int]:
     """Return each model's estimate of the standard deviation, its weight, and their degrees."""
     n, degrees = len(series), models.precisions.shape[1]

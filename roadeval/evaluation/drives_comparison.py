@@ -68,8 +68,6 @@ def pair_drive(
     settings
         The confidence, and the least number of frames.
     """
-    # What would tell on a single drive takes as long again to find, and nobody asks for it here.
-    settings = replace(settings, negligible=1.0)
     masks, truths = {}, 0
     left = 0, 0
     for mask in (each for each in new if each in base):
@@ -219,13 +217,12 @@ def _effect(pair: DrivePair, mask: Mask, rate: str, *, counted: bool = False) ->
     """Return a drive's difference of a rate; with ``counted`` that of ERR has its pixels."""
     own = pair.masks.get(mask)
     if own is None:
-        return DriveEffect(pair.drive, pair.group, math.nan, None, 0)
+        return DriveEffect(pair.drive, pair.group, math.nan, 0)
     mean = float(own.difference[list(METRICS).index(rate)])
     if rate != TESTED:
-        return DriveEffect(pair.drive, pair.group, mean, None, own.frames)
-    error = own.tested.standard_error if own.tested else None
+        return DriveEffect(pair.drive, pair.group, mean, own.frames)
     counts = map(_wrong, (own.base_counts, own.new_counts)) if counted else (None, None)
-    return DriveEffect(pair.drive, pair.group, mean, error, own.frames, *counts)
+    return DriveEffect(pair.drive, pair.group, mean, own.frames, *counts)
 
 
 def _wrong(counts: Integers) -> tuple[int, int]:
@@ -249,7 +246,7 @@ def _rates(
 def _mean_of_groups(pairs: Sequence[DrivePair], values: Sequence[float]) -> float:
     """Average drives as their differences are, so that these are what lies between two rates."""
     own = zip(pairs, values, strict=True)
-    clusters = Clusters.of(DriveEffect(pair.drive, pair.group, v, None, 0) for pair, v in own)
+    clusters = Clusters.of(DriveEffect(pair.drive, pair.group, v, 0) for pair, v in own)
     return float(clusters.group_means().mean()) if len(clusters) else math.nan
 
 

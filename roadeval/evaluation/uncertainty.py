@@ -65,23 +65,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 
-from roadeval.evaluation.autocorrelation import (
-    MeanDistribution,
-    Series,
-    frames_for,
-    mean_distribution,
-    series_for,
-)
+from roadeval.evaluation.autocorrelation import Series, mean_distribution
 from roadeval.evaluation.corrections import holm_p_values
 from roadeval.evaluation.settings import EvaluationSettings
-
-MOST_FRAMES: Final = 1_000_000
-MOST_DRIVES: Final = 1_000
-"""More than this is told as too many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,11 +98,6 @@ class Difference:
         Frames with a difference.
     effective_frames
         Independent frames that would determine the mean as well; None without an interval.
-    frames_needed, drives_needed
-        Where the interval neither leaves out 0 nor ends within `EvaluationSettings.negligible`:
-        about how many frames like these, and how many drives like this one, this one included,
-        would make it do one or the other, the mean being what it is. None elsewhere, or above
-        `MOST_FRAMES` and `MOST_DRIVES`.
     """
 
     mean: float
@@ -123,8 +107,6 @@ class Difference:
     p: float | None
     frames: int
     effective_frames: float | None
-    frames_needed: int | None = None
-    drives_needed: int | None = None
     p_holm: float | None = None
     comparisons: int | None = None
     standard_error: float | None = None
@@ -139,7 +121,7 @@ def mean_difference(rates: Series, base: Series, settings: EvaluationSettings) -
         ``(n,)`` float64, one a frame in the drive's order; NaN where a rate is undefined, which
         leaves the frame out.
     settings
-        The confidence, the least number of frames, and what is negligible.
+        The confidence, and the least number of frames.
     """
     differences = rates - base
     known = ~np.isnan(differences)
@@ -154,25 +136,8 @@ def mean_difference(rates: Series, base: Series, settings: EvaluationSettings) -
     low, high = found.interval(confidence)
     level = float(base[known].mean())
     low, high = max(low, -level), min(high, 1 - level)
-    told = low > 0 or high < 0 or max(-low, high) <= settings.negligible
-    frames, drives = (None, None) if told else _needed(series, found, settings)
-    return Difference(
-        *(mean, low, high, confidence, found.p_value(), n, found.frames),
-        frames_needed=frames,
-        drives_needed=drives,
-        standard_error=found.scale,
-    )
-
-
-def _needed(
-    series: Series, found: MeanDistribution, settings: EvaluationSettings
-) -> tuple[int | None, int | None]:
-    """Return about how many frames, and how many drives, would tell."""
-    half_width = max(abs(found.mean), settings.negligible)
-    return (
-        frames_for(series, half_width, settings.confidence, MOST_FRAMES),
-        series_for(found, half_width, settings.confidence, MOST_DRIVES),
-    )
+    told = found.p_value(), n, found.frames
+    return Difference(mean, low, high, confidence, *told, standard_error=found.scale)
 
 
 def holm(family: Sequence[Difference]) -> list[Difference]:

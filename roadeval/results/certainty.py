@@ -1,4 +1,4 @@
-"""How sure a difference is: its degree, and words on what would make it surer."""
+"""How sure a difference is, by degrees."""
 
 from __future__ import annotations
 
@@ -105,23 +105,3 @@ def correction(changes: Iterable[Mapping[str, Any]]) -> str:
 def too_few(frames: int) -> str:
     """Return why a difference has no interval."""
     return f"{frames} frame{' is' if frames == 1 else 's are'} too few for an interval"
-
-
-def what_would_tell(difference: Difference) -> str:
-    """Return how many frames or drives would narrow an interval; empty where that is not known.
-
-    >>> what_would_tell(Difference(0.1, -0.1, 0.3, 0.95, 0.3, 91, 4.0, 414, 7))
-    'about 410 frames like these, or 6 more drives like this one'
-    """
-    ways = []
-    if difference.frames_needed is not None:
-        ways.append(f"about {_rounded(difference.frames_needed)} frames like these")
-    if difference.drives_needed is not None:
-        more = _rounded(difference.drives_needed - 1)
-        ways.append(f"{more} more drive{'' if more == '1' else 's'} like this one")
-    return ", or ".join(ways)
-
-
-def _rounded(count: int) -> str:
-    """Return a count in two digits that matter."""
-    return f"{float(f'{count:.2g}'):,.0f}"

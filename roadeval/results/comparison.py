@@ -22,7 +22,7 @@ from roadeval.evaluation.comparison_result import (
 )
 from roadeval.evaluation.conditions import Judgement
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.certainty import Degree, degree_of, stands, too_few, what_would_tell
+from roadeval.results.certainty import Degree, degree_of, stands, too_few
 
 FORMAT: Final = {"name": "roadeval-comparison", "version": 1}
 
@@ -122,7 +122,6 @@ def _change(row: MaskComparison, settings: EvaluationSettings) -> str:
     mean = f"ERR {plain_points(change.mean)} pp"
     sure = f"{mean} [{plain_points(change.low)}, {plain_points(change.high)}]"
     most = percent(max(-(change.low or 0), change.high or 0))
-    ways = what_would_tell(change)
     clauses = {
         Degree.UNDEFINED: f"{name}: ERR is undefined on every frame",
         Degree.FEW: f"{name}: {too_few(change.frames)}, {mean}",
@@ -130,7 +129,7 @@ def _change(row: MaskComparison, settings: EvaluationSettings) -> str:
         Degree.SURE: f"{name} is {better}, {sure}",
         Degree.LITTLE: f"{name} is neither better nor worse by more than {most} pp, {sure}",
         Degree.PROBABLE: f"{name} is probably {better}, {sure}",
-        Degree.UNKNOWN: f"{name}: cannot tell, {sure}{f'; to tell takes {ways}' if ways else ''}",
+        Degree.UNKNOWN: f"{name}: cannot tell, {sure}",
     }
     return clauses[degree_of(change, settings)]
 

@@ -11,7 +11,7 @@ from roadeval.data.words import in_percent, plain_points
 from roadeval.evaluation.differences import DriveDifferences, final_stages
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.uncertainty import Difference
-from roadeval.results.certainty import Degree, degree_of, what_would_tell
+from roadeval.results.certainty import Degree, degree_of
 
 RATE: Final = "ERR"
 NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
@@ -94,9 +94,7 @@ class _Told:
         self.sizes = f"[{', '.join(map(self._number, ends))}]"
         self.ends = f"between {self._signed(low)} and {self._signed(high)} pp"
         here = f"{self._signed(found.mean)} on these {found.frames} frames"
-        ways = what_would_tell(found)
-        end = f". To tell takes {ways}" if ways else ""
-        self.unknown = f"changes by {self.ends} ({here}){end}"
+        self.unknown = f"changes by {self.ends} ({here})"
         self.few = f"changes by {self._signed(found.mean)} pp on these {found.frames}"
 
     def _number(self, fraction: float) -> str:

@@ -10,9 +10,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
-ADDRESS_SPACE: Final = 4_800_000_000
-"""Bytes of addresses that a run needs. Libraries reserve them, most of them never to use them: of
-this much a run of small frames takes up half a gigabyte."""
 LACKING: Final = (
     "not enough memory: give it more, or let it take less, by fewer `run.jobs` or a smaller "
     "`frames.scale`"
@@ -57,25 +54,6 @@ def trim() -> None:
         malloc_trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
         if malloc_trim is not None:
             malloc_trim(0)
-
-
-def too_few_addresses() -> str:
-    """Return a sentence on a limit of the address space that is too low for any run; else nothing.
-
-    Where a library does not get what it wants to reserve it ends the process, in words of its own.
-    """
-    try:
-        from resource import RLIM_INFINITY, RLIMIT_AS, getrlimit
-    except ImportError:  # not POSIX
-        return ""
-    limit, _ = getrlimit(RLIMIT_AS)
-    if limit == RLIM_INFINITY or limit >= ADDRESS_SPACE:
-        return ""
-    return (
-        f"the address space is limited to {limit / 1e9:.1f} GB, as by 'ulimit -v', and libraries "
-        f"reserve {ADDRESS_SPACE / 1e9:.1f} GB of it: raise that limit, or limit the memory in "
-        "another way"
-    )
 
 
 def is_lacking(error: BaseException) -> bool:

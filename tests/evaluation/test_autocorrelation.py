@@ -7,7 +7,7 @@ from scipy.fft import dct
 from scipy.linalg import toeplitz
 
 from roadeval.evaluation import autocorrelation
-from roadeval.evaluation.autocorrelation import frames_for, mean_distribution, series_for
+from roadeval.evaluation.autocorrelation import mean_distribution
 from tests.evaluation.making import autoregression
 
 INDEPENDENT = np.random.default_rng(1).standard_normal(400)
@@ -86,21 +86,3 @@ def test_the_unit_does_not_matter() -> None:
     low, high = mean_distribution(INDEPENDENT).interval(CONFIDENCE)
     found = mean_distribution(3 + 1e-3 * INDEPENDENT).interval(CONFIDENCE)
     assert found == pytest.approx((3 + 1e-3 * low, 3 + 1e-3 * high), rel=1e-9)
-
-
-def test_a_narrower_interval_takes_more_frames_by_the_square() -> None:
-    half = width(INDEPENDENT) / 2
-    once, twice = (
-        frames_for(INDEPENDENT, half / ratio, CONFIDENCE, 10**6) for ratio in (1.01, 2.02)
-    )
-    assert 400 < once < 440
-    assert twice == pytest.approx(4 * once, rel=0.2)
-    assert frames_for(INDEPENDENT, half / 1000, CONFIDENCE, 10**6) is None
-
-
-def test_series_needed_are_those_of_students_interval_of_their_means() -> None:
-    found = mean_distribution(INDEPENDENT)
-    # t(0.975, n - 1) / sqrt(n) is 1.24 for 5 and 0.92 for 7.
-    assert series_for(found, 1.1 * found.scale, CONFIDENCE, 1000) in (5, 6, 7)
-    assert series_for(found, 100.0, CONFIDENCE, 1000) == 2
-    assert series_for(found, 1e-6, CONFIDENCE, 1000) is None

@@ -13,7 +13,7 @@ MASK = ("filtered", "post")
 
 
 def a_change(means, base=0.10):
-    effects = [DriveEffect(str(i), str(i), mean, None, 20) for i, mean in enumerate(means)]
+    effects = [DriveEffect(str(i), str(i), mean, 20) for i, mean in enumerate(means)]
     over = across_drives(effects, AcrossSettings())
     new = base + over.mean
     rates = {"ERR": base, "pooled_ERR": 0.2}, {"ERR": new, "pooled_ERR": 0.26}

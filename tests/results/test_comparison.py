@@ -54,11 +54,6 @@ def a_comparison(*changes, notes=(), same_drive=True):
             "filtered of new: cannot tell, ERR +1.20 pp [-0.50, +3.00]",
         ),
         (
-            a_change(1.2, -0.5, 3, p=0.4, frames_needed=414),
-            "filtered of new: cannot tell, ERR +1.20 pp [-0.50, +3.00]; to tell takes about 410 "
-            "frames like these",
-        ),
-        (
             a_change(0.1, -0.5, 0.6, p=0.4),
             "filtered of new is neither better nor worse by more than 0.60 pp, ERR +0.10 pp "
             "[-0.50, +0.60]",

@@ -1,6 +1,5 @@
 """Memory: freed where the C library has a call for it, and told where there is not enough."""
 
-import sys
 from types import SimpleNamespace
 
 import pytest
@@ -22,20 +21,6 @@ def test_without_such_a_call_nothing_happens(platform, monkeypatch):
     monkeypatch.setattr("ctypes.CDLL", lambda name: SimpleNamespace())
     monkeypatch.setattr("sys.platform", platform)
     memory.trim()
-
-
-@pytest.mark.parametrize(
-    ("limit", "said"), [(-1, ""), (8 << 30, ""), (2_000_000_000, "limited to 2.0 GB")]
-)
-def test_a_limit_of_addresses_that_stops_every_run_is_told_beforehand(limit, said, monkeypatch):
-    monkeypatch.setattr("resource.getrlimit", lambda what: (limit, -1))
-    sentence = memory.too_few_addresses()
-    assert (said in sentence) if said else not sentence
-
-
-def test_where_there_are_no_such_limits_nothing_is_told(monkeypatch):
-    monkeypatch.setitem(sys.modules, "resource", None)
-    assert memory.too_few_addresses() == ""
 
 
 @pytest.mark.parametrize(

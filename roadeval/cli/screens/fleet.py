@@ -66,7 +66,7 @@ def show_effects(effects: Sequence[Mapping[str, Any]], out: Console) -> None:
     tested = [each for each in effects if each["metric"] == TESTED]
     (confidence,) = {each["confidence"] for each in tested}
     out.print(f"Change of ERR in percentage points, over drives ({confidence:.0%} interval)")
-    titles = ("mean", "interval", "worse", "better", "pooled", "spread")
+    titles = ("mean", "interval", "worse", "better", "pooled")
     rows = [
         Row(
             [
@@ -76,7 +76,6 @@ def show_effects(effects: Sequence[Mapping[str, Any]], out: Console) -> None:
                 str(each["worse"]),
                 str(each["better"]),
                 points(each["pooled"]),
-                percent(each["spread"]["tau"]) if each["spread"] else "-",
             ]
         )
         for each in tested

@@ -4,7 +4,6 @@ from roadeval.evaluation.corrections import benjamini_hochberg
 from roadeval.evaluation.drives.across import AcrossDrives, Method, NoInterval, across_drives
 from roadeval.evaluation.drives.effect import DriveEffect
 from roadeval.evaluation.drives.settings import AcrossSettings
-from roadeval.evaluation.drives.spread import Spread
 from roadeval.evaluation.drives.strata import Stratum, Third, strata
 
 __all__ = [
@@ -13,7 +12,6 @@ __all__ = [
     "DriveEffect",
     "Method",
     "NoInterval",
-    "Spread",
     "Stratum",
     "Third",
     "across_drives",

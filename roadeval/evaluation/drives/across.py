@@ -1,69 +1,60 @@
-"""The mean of a fleet's differences, how sure it is, and how far drives lie from each other.
+"""The mean of a fleet's differences, and how sure it is.
 
 The unit is the cluster: a group's drives are averaged first, and every group counts alike. Below 30
 clusters p-value and interval are those of the exact sign-flip test, from there on Student's.
 
 How often each 95 % interval holds, in percent of 1000 made-up fleets
 (``benchmarks/fleet_intervals.py``, which prints this). Drives' effects have a standard deviation of
-1, and errors of their own, in that unit, one for all or from 0.1 to 3; a drive has as many pixels
-as make its error. "n" is the number of clusters. In groups, two drives share half of the variance,
-and errors are 0.1 to 1. "t" is Student's interval; "at .5" and "at 1" are how often ours finds a
-true mean of that size; "width" is its median. "plain" is the percentile bootstrap, and the
-Q-profile that takes all drives for independent and normal; "found" is the average estimate of tau,
-whose truth is 1; "new" is the share of new drives that lie between the ends given for them.
+1, and errors of their own, in that unit, one for all or from 0.1 to 3. "n" is the number of
+clusters. In groups, two drives share half of the variance, and errors are 0.1 to 1. "t" is
+Student's interval; "at .5" and "at 1" are how often ours finds a true mean of that size; "width" is
+its median.
 
-======  ================  === === ==== ===== ==== ===== ===== === ==== ===== ==== ===== ====
-                              mean                      pooled         tau              new
------------------------------ ------------------------- -------------- ---------------- ----
-effect  drives              n   t ours at .5 at 1 width plain BCa ours plain ours found ours
-======  ================  === === ==== ===== ==== ===== ===== === ==== ===== ==== ===== ====
-normal  errors 0.3          6  94   96     9   31  2.58    85  84   92    96   96  0.93   97
-normal  errors 0.3         10  95   95    28   76  1.44    88  88   94    95   96  0.97   97
-normal  errors 0.3         30  94   94    72  100  0.76    94  94   95    95   96  0.98   96
-normal  errors 0.3        200  96   96   100  100  0.29    96  96   96    95   96  1.00   95
-normal  errors 0.1 to 3     6  96   97     7   21  3.48    82  79   92    95   97  0.92   97
-normal  errors 0.1 to 3    10  95   95    18   50  2.00    86  82   91    95   96  0.96   97
-normal  errors 0.1 to 3    30  96   96    44   93  1.09    90  87   92    94   96  0.99   96
-normal  errors 0.1 to 3   200  94   94   100  100  0.42    93  92   93    96   96  1.00   95
-normal  groups of 1 to 7    6  96   98    15   48  2.12    84  82   92    90  100  0.93  100
-normal  groups of 1 to 7   10  95   95    38   89  1.20    88  87   94    89  100  0.97   99
-normal  groups of 1 to 7   30  96   96    86  100  0.65    93  93   94    86  100  0.99   97
-normal  groups of 1 to 7  200  95   95   100  100  0.24    95  95   95    87   99  1.00   95
-t3      errors 0.3          6  96   97    16   51  2.09    87  86   94    86   90  0.81   96
-t3      errors 0.3         10  96   95    43   86  1.18    90  88   94    80   85  0.86   95
-t3      errors 0.3         30  96   96    80   99  0.68    93  90   95    67   80  0.94   95
-t3      errors 0.3        200  95   95   100  100  0.27    94  93   94    48   78  0.98   95
-t3      errors 0.1 to 3     6  97   97    12   29  3.28    82  80   93    90   94  0.81   96
-t3      errors 0.1 to 3    10  97   95    21   54  1.87    86  82   92    89   92  0.87   96
-t3      errors 0.1 to 3    30  96   96    46   92  1.05    89  84   90    79   87  0.91   95
-t3      errors 0.1 to 3   200  96   96    99  100  0.42    94  90   94    65   83  0.98   95
-t3      groups of 1 to 7    6  96   97    21   58  1.82    82  81   92    65   98  0.82   98
-t3      groups of 1 to 7   10  96   96    46   90  1.06    88  86   93    62   98  0.88   97
-t3      groups of 1 to 7   30  96   96    86   99  0.59    91  88   92    52   94  0.94   96
-t3      groups of 1 to 7  200  95   95   100  100  0.23    94  93   94    40   89  0.96   95
-skewed  errors 0.3          6  92   95     7   55  2.27    82  82   90    84   90  0.87   95
-skewed  errors 0.3         10  92   92    23   97  1.30    88  88   92    82   88  0.92   95
-skewed  errors 0.3         30  94   94    78  100  0.73    93  94   94    76   88  0.96   95
-skewed  errors 0.3        200  94   94   100  100  0.29    94  94   94    71   91  1.00   95
-skewed  errors 0.1 to 3     6  94   95     6   31  3.29    77  75   86    90   94  0.82   96
-skewed  errors 0.1 to 3    10  96   95    15   56  1.94    83  80   90    88   92  0.93   96
-skewed  errors 0.1 to 3    30  95   95    42   94  1.10    86  86   89    82   88  0.96   95
-skewed  errors 0.1 to 3   200  94   94   100  100  0.42    93  93   93    79   92  0.99   95
-skewed  groups of 1 to 7    6  95   97    10   66  1.95    83  82   91    78   98  0.88   98
-skewed  groups of 1 to 7   10  93   93    37   98  1.12    86  85   92    70   98  0.91   97
-skewed  groups of 1 to 7   30  93   93    91  100  0.62    90  91   92    66   98  0.97   96
-skewed  groups of 1 to 7  200  94   94   100  100  0.24    93  94   94    60   98  0.99   95
-======  ================  === === ==== ===== ==== ===== ===== === ==== ===== ==== ===== ====
+======  ================  === === ==== ===== ==== =====
+effect  drives              n   t ours at .5 at 1 width
+======  ================  === === ==== ===== ==== =====
+normal  errors 0.3          6  96   97    11   35  2.57
+normal  errors 0.3         10  95   96    28   77  1.47
+normal  errors 0.3         30  96   96    71  100  0.78
+normal  errors 0.3        200  95   95   100  100  0.29
+normal  errors 0.1 to 3     6  96   97     9   23  3.48
+normal  errors 0.1 to 3    10  96   96    17   52  1.96
+normal  errors 0.1 to 3    30  95   95    44   93  1.10
+normal  errors 0.1 to 3   200  96   96   100  100  0.42
+normal  groups of 1 to 7    6  96   97    14   45  2.13
+normal  groups of 1 to 7   10  95   95    36   91  1.18
+normal  groups of 1 to 7   30  95   95    86  100  0.65
+normal  groups of 1 to 7  200  94   94   100  100  0.24
+t3      errors 0.3          6  96   97    18   53  2.12
+t3      errors 0.3         10  96   96    43   86  1.19
+t3      errors 0.3         30  95   95    79   98  0.69
+t3      errors 0.3        200  96   96   100  100  0.27
+t3      errors 0.1 to 3     6  97   97    12   33  3.33
+t3      errors 0.1 to 3    10  96   94    22   59  1.86
+t3      errors 0.1 to 3    30  97   97    49   94  1.06
+t3      errors 0.1 to 3   200  95   95    99  100  0.41
+t3      groups of 1 to 7    6  97   98    20   58  1.88
+t3      groups of 1 to 7   10  96   95    48   91  1.05
+t3      groups of 1 to 7   30  95   95    89   99  0.58
+t3      groups of 1 to 7  200  96   96   100  100  0.23
+skewed  errors 0.3          6  91   95     7   52  2.20
+skewed  errors 0.3         10  92   92    23   97  1.28
+skewed  errors 0.3         30  93   93    78  100  0.74
+skewed  errors 0.3        200  95   95   100  100  0.29
+skewed  errors 0.1 to 3     6  95   95     6   31  3.44
+skewed  errors 0.1 to 3    10  95   94    15   57  1.92
+skewed  errors 0.1 to 3    30  95   95    43   93  1.09
+skewed  errors 0.1 to 3   200  96   96   100  100  0.42
+skewed  groups of 1 to 7    6  94   96    11   65  1.91
+skewed  groups of 1 to 7   10  93   93    37   97  1.11
+skewed  groups of 1 to 7   30  94   94    90  100  0.62
+skewed  groups of 1 to 7  200  96   96   100  100  0.24
+======  ================  === === ==== ===== ==== =====
 
 From ten clusters on, the sign-flip test and Student's hold equally often. With six, sign flip's
 interval reaches from the least to the greatest mean, which is wider, finds less, and holds more
 often where drives are skewed. It is used because it needs no normal distribution, nor drives that
-vary alike.
-
-What does not hold: the pooled rate's interval, in nine of ten fleets rather than nineteen of twenty
-where six or ten clusters decide, or a few that have most of the pixels; and that of tau, in eight
-or nine of ten where drives are heavy-tailed or skewed, however many there are. With few groups
-tau's interval and a new drive's are too wide. Effects more skewed than these are held less often.
+vary alike. Effects more skewed than these are held less often.
 """
 
 from __future__ import annotations
@@ -75,7 +66,6 @@ from enum import StrEnum
 
 import numpy as np
 
-from roadeval.evaluation.drives.bootstrap import pooled_counts, pooled_difference, pooled_interval
 from roadeval.evaluation.drives.effect import Clusters, DriveEffect, Values
 from roadeval.evaluation.drives.settings import AcrossSettings
 from roadeval.evaluation.drives.sign_flip import (
@@ -83,7 +73,6 @@ from roadeval.evaluation.drives.sign_flip import (
     sign_flip_interval,
     sign_flip_p,
 )
-from roadeval.evaluation.drives.spread import Spread, spread_of
 from roadeval.runtime.extensions import special
 
 
@@ -124,12 +113,9 @@ class AcrossDrives:
         That an interval of this confidence needs.
     worse, better, equal
         Drives whose own mean is worse, better, and exactly the same.
-    pooled, pooled_low, pooled_high
-        The difference of the rates of all pixels together, in which long drives count for more, and
-        its interval. None where a drive's counts are unknown; the interval also where the mean has
-        none.
-    spread
-        Between drives; None where too few clusters have standard errors.
+    pooled
+        The difference of the rates of all pixels together, in which long drives count for more.
+        None where a drive's counts are unknown, for the rest would be another fleet.
     """
 
     mean: float
@@ -146,9 +132,6 @@ class AcrossDrives:
     better: int
     equal: int
     pooled: float | None
-    pooled_low: float | None
-    pooled_high: float | None
-    spread: Spread | None
 
 
 def across_drives(
@@ -170,7 +153,7 @@ def across_drives(
 
     Examples
     --------
-    >>> drives = [DriveEffect(name, name, mean, None, 100)
+    >>> drives = [DriveEffect(name, name, mean, 100)
     ...           for name, mean in zip("abcdef", [0.01, 0.02, 0.02, 0.03, 0.05, -0.01])]
     >>> found = across_drives(drives, AcrossSettings())
     >>> round(found.mean, 3), found.low, found.high, found.p, found.method.value, found.worse
@@ -179,7 +162,6 @@ def across_drives(
     clusters = Clusters.of(effects)
     rises, falls = (int(np.sum(sign * clusters.means > 0)) for sign in (1, -1))
     needed = _needed(settings)
-    pooled, pooled_low, pooled_high = _pooled(clusters, settings, needed)
     mean, low, high, p, method = _mean(clusters, settings, needed)
     reason = NoInterval.TOO_FEW_CLUSTERS if len(clusters) else NoInterval.NO_DRIVES
     return AcrossDrives(
@@ -192,10 +174,7 @@ def across_drives(
         worse=falls if higher_is_better else rises,
         better=rises if higher_is_better else falls,
         equal=len(clusters.effects) - rises - falls,
-        pooled=pooled,
-        pooled_low=pooled_low,
-        pooled_high=pooled_high,
-        spread=spread_of(clusters, settings),
+        pooled=_pooled(clusters.effects),
     )
 
 
@@ -233,14 +212,14 @@ def _student(means: Values, confidence: float) -> tuple[float, float, float]:
     return mean - half, mean + half, float(2 * special("stdtr")(degrees, -abs(mean) / error))
 
 
-def _pooled(
-    clusters: Clusters, settings: AcrossSettings, needed: int
-) -> tuple[float | None, float | None, float | None]:
-    """Return the difference of pooled rates with its interval."""
-    counts = pooled_counts(clusters)
-    if counts is None:
-        return None, None, None
-    difference = float(pooled_difference(counts.sum(axis=0)))
-    if math.isnan(difference) or len(clusters) < needed:
-        return (None if math.isnan(difference) else difference), None, None
-    return difference, *pooled_interval(counts, settings)
+def _pooled(effects: Sequence[DriveEffect]) -> float | None:
+    """Return the difference of the rates of all pixels together; None where it is unknown."""
+    counts = [
+        (*each.base_counts, *each.new_counts)
+        for each in effects
+        if each.base_counts is not None and each.new_counts is not None
+    ]
+    if not counts or len(counts) < len(effects):
+        return None
+    base_wrong, base, wrong, new = (sum(column) for column in zip(*counts, strict=True))
+    return wrong / new - base_wrong / base if new and base else None

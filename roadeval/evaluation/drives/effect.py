@@ -23,8 +23,6 @@ class DriveEffect:
         What it shares with other drives, as a day or a route; its own identity where it has none.
     mean
         Of the frames' differences; NaN if no frame has one, and the drive is left out.
-    standard_error
-        Of that mean, for the frames' likeness; None where too few frames tell.
     frames
         With a difference.
     base_counts, new_counts
@@ -35,7 +33,6 @@ class DriveEffect:
     drive: str
     group: str
     mean: float
-    standard_error: float | None
     frames: int
     base_counts: tuple[int, int] | None = None
     new_counts: tuple[int, int] | None = None

@@ -22,14 +22,8 @@ class AcrossSettings:
     exact_below
         With fewer clusters than this the mean's interval is that of the exact sign-flip test,
         from it on Student's, which takes the mean for normal.
-    resamples
-        Fleets that the bootstrap of the pooled rates draws.
-    seed
-        Of what is drawn: the bootstrap, and the drives that stand for their groups.
     """
 
     confidence: Annotated[float, Field(gt=0.5, lt=1)] = 0.95
     least_clusters: Annotated[int, Field(ge=4, le=1_000_000)] = 6
     exact_below: Annotated[int, Field(ge=0, le=MOST + 1)] = 30
-    resamples: Annotated[int, Field(ge=1000, le=1_000_000)] = 10_000
-    seed: Annotated[int, Field(ge=0)] = 0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from roadeval.data import colours
-from roadeval.data.words import DASH, points
+from roadeval.data.words import points
 from roadeval.report.figures.charts import LEAST, WIDTH
 from roadeval.report.figures.layout import short
 from roadeval.report.figures.style import FAINT, INK, PALE
@@ -28,8 +28,8 @@ ROW: Final = 0.17
 """Inches that a named drive takes; in long plots a little less."""
 CATERPILLAR: Final = 3.3
 """Inches that drives without names take together."""
-BELOW: Final = 2.2
-"""Rows below the last drive, for the mean and a new drive."""
+BELOW: Final = 1.2
+"""Rows below the last drive, for the mean."""
 WIDEST: Final = 0.9
 """The share of the drives' intervals that are seen whole; an axis for all would hide the rest."""
 WORSE: Final = colours.hex_of(colours.VERMILLION)
@@ -49,20 +49,15 @@ class ForestRow:
 
 @dataclass(frozen=True, slots=True)
 class ForestMean:
-    """The mean over drives with its interval, and where a new drive is expected; None if unknown.
-
-    Fractions, as those of the drives.
-    """
+    """The mean over drives with its interval, None if unknown. Fractions, as the drives' own."""
 
     mean: float
     low: float | None
     high: float | None
-    new_low: float | None
-    new_high: float | None
 
 
 def forest(rows: Sequence[ForestRow], mean: ForestMean, label: str) -> Figure:
-    """Draw a row a drive, the worst above, and below them the mean and a new drive's interval.
+    """Draw a row a drive, the worst above, and below them the mean over drives.
 
     Parameters
     ----------
@@ -111,7 +106,7 @@ def cut(rows: Sequence[ForestRow], mean: ForestMean) -> int:
 def limits(rows: Sequence[ForestRow], mean: ForestMean) -> tuple[float, float]:
     """Return the ends of the axis in percentage points: every mean is seen, and most intervals."""
     wanted = [row.mean for row in rows] + [0.0, LEAST / 100, -LEAST / 100]
-    wanted += [end for end in (mean.low, mean.high, mean.new_low, mean.new_high) if end is not None]
+    wanted += [end for end in (mean.low, mean.high) if end is not None]
     for ends, share in (
         ([row.low for row in rows if row.low is not None], 1 - WIDEST),
         ([row.high for row in rows if row.high is not None], WIDEST),
@@ -201,26 +196,19 @@ def _told(row: ForestRow) -> str:
 
 
 def _summary(ax: Axes, mean: ForestMean, top: float, scale: float) -> None:
-    """Draw the mean as a diamond as wide as its interval, and a new drive's interval below it."""
+    """Draw the mean as a diamond as wide as its interval."""
     ax.axhspan(top, top + BELOW * scale, color=PALE, alpha=0.45, linewidth=0, zorder=0)
-    places = [top + 0.6 * scale, top + 1.6 * scale]
+    place = top + 0.6 * scale
     middle = 100 * mean.mean
     if mean.low is not None and mean.high is not None:
         ends = 100 * mean.low, 100 * mean.high
         half = 0.38 * scale
         x = [ends[0], middle, ends[1], middle]
-        y = [places[0], places[0] - half, places[0], places[0] + half]
+        y = [place, place - half, place, place + half]
         ax.fill(x, y, color=INK, zorder=4, linewidth=0.8)
     else:
-        ax.plot([middle], [places[0]], "D", color=INK, markersize=5, zorder=4)
-    words = ["mean over drives", f"a new drive {DASH}"]
-    if mean.new_low is not None and mean.new_high is not None:
-        words[1] = "a new drive"
-        ends = 100 * mean.new_low, 100 * mean.new_high
-        ax.plot(ends, [places[1]] * 2, color=INK, linewidth=1.3, linestyle=(0, (3, 1.5)), zorder=4)
-        ax.plot(ends, [places[1]] * 2, "|", color=INK, markersize=6, zorder=4)
+        ax.plot([middle], [place], "D", color=INK, markersize=5, zorder=4)
     ticks = list(ax.get_yticks()), [label.get_text() for label in ax.get_yticklabels()]
     size = ax.get_yticklabels()[0].get_fontsize() if ticks[0] else 7
-    ax.set_yticks([*ticks[0], *places], [*ticks[1], *words], size=size)
-    for label in ax.get_yticklabels()[-2:]:
-        label.set_fontweight("bold")
+    ax.set_yticks([*ticks[0], place], [*ticks[1], "mean over drives"], size=size)
+    ax.get_yticklabels()[-1].set_fontweight("bold")

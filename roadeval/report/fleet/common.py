@@ -132,8 +132,6 @@ def caption(rows: Sequence[ForestRow], mean: ForestMean) -> str:
         told.append("The mean has no interval: too few drives or groups of drives.")
     else:
         told.append("Diamond: the mean over drives and its interval.")
-    if mean.new_low is not None:
-        told.append("Dashed: where a new drive's difference is expected.")
     return " ".join(told)
 
 

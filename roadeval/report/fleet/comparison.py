@@ -135,9 +135,7 @@ def _plot(comparison: FleetComparison, change: FleetChange) -> Iterator[Block]:
     if not rows:
         return
     over = change.difference[TESTED]
-    spread = over.spread
-    ends = (spread.new_low, spread.new_high) if spread else (None, None)
-    mean = ForestMean(over.mean, over.low, over.high, *ends)
+    mean = ForestMean(over.mean, over.low, over.high)
     label = f"change of {TESTED} of {change.variant}, pp"
     yield Figure(
         svg(lambda: forest(rows, mean, label)),

@@ -60,9 +60,7 @@ def _plot(findings: FleetFindings, told: Mapping[str, Any]) -> Iterator[Block]:
     ]
     if not rows:
         return
-    spread = told["spread"]
-    ends = (spread["new_low"], spread["new_high"]) if spread else (None, None)
-    mean = ForestMean(told["mean"], told["low"], told["high"], *ends)
+    mean = ForestMean(told["mean"], told["low"], told["high"])
     label = f"ERR of {told['variant']} minus that of {told['base']}, pp"
     yield Figure(
         svg(lambda: forest(rows, mean, label)),

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from roadeval.data import BASELINE
-from roadeval.data.words import DASH, defined, interval, listing, number, percent, points
+from roadeval.data.words import defined, interval, listing, number, percent, points
 from roadeval.evaluation.metrics import FULL, SHORT
 from roadeval.report.blocks import (
     Block,
@@ -96,17 +96,16 @@ def effects_table(findings: FleetFindings) -> Table:
         there = [name for name in SHORT if name in own]
         rows += [_effect_cells(own[name], first=name == there[0]) for name in there]
     return Table(
-        ["difference", "rate", "mean", "interval", "worse", "better", "pooled", "spread"],
+        ["difference", "rate", "mean", "interval", "worse", "better", "pooled"],
         rows,
         text_columns=(0, 1),
         breaks=breaks[1:],
-        groups=[("", 2), ("over drives", 2), ("drives", 2), ("", 2)],
+        groups=[("", 2), ("over drives", 2), ("drives", 2), ("", 1)],
         small=True,
     )
 
 
 def _effect_cells(each: Mapping[str, Any], *, first: bool) -> list[Cell | str]:
-    spread = each["spread"]
     return [
         f"{each['variant']} \N{MINUS SIGN} {each['base']}" if first else "",
         each["metric"],
@@ -115,15 +114,13 @@ def _effect_cells(each: Mapping[str, Any], *, first: bool) -> list[Cell | str]:
         number(each["worse"]),
         number(each["better"]),
         points(each["pooled"]),
-        percent(spread["tau"]) if spread else DASH,
     ]
 
 
 def _effects_note() -> str:
     return (
         "Percentage points. A drive is as good as any other, long or short; drives of one group "
-        "count as one. Pooled: of all pixels together. Spread: how far the drives' true "
-        "differences lie apart (standard deviation), their own errors set aside."
+        "count as one. Pooled: of all pixels together."
     )
 
 

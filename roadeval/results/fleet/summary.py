@@ -104,12 +104,10 @@ def drive_effect(row: Mapping[str, Any], group: str | None, *, counted: bool) ->
     With ``counted`` the pixels are given, for the difference of pooled rates: of ERR alone.
     """
     counts = counted and row["metric"] == TESTED and row["N"] and row["base_N"]
-    error = row["standard_error"]
     return DriveEffect(
         row["drive"],
         group or row["drive"],
         math.nan if row["mean"] is None else row["mean"],
-        error,
         row["frames"],
         (row["base_wrong"], row["base_N"]) if counts else None,
         (row["wrong"], row["N"]) if counts else None,

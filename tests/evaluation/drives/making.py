@@ -9,7 +9,6 @@ from roadeval.evaluation.drives import DriveEffect
 
 def drives(
     means: Sequence[float],
-    errors: Sequence[float | None] | float | None = None,
     groups: Sequence[str] | None = None,
     counts: Sequence[tuple[int, int, int, int] | None] | None = None,
 ) -> list[DriveEffect]:
@@ -18,10 +17,9 @@ def drives(
     for place, mean in enumerate(means):
         name = f"{place:03}"
         own = None if counts is None else counts[place]
-        error = errors[place] if isinstance(errors, Sequence) else errors
         made.append(
             DriveEffect(
-                *(name, name if groups is None else groups[place], mean, error, 100),
+                *(name, name if groups is None else groups[place], mean, 100),
                 *((None, None) if own is None else (own[:2], own[2:])),
             )
         )

@@ -9,7 +9,7 @@ from statsmodels.stats.multitest import multipletests
 from roadeval.evaluation.drives import AcrossSettings, across_drives, strata
 from tests.evaluation.drives.making import drives
 
-SETTINGS = AcrossSettings(resamples=1000)
+SETTINGS = AcrossSettings()
 FLEET = drives(np.random.default_rng(3).normal(0.01, 0.02, 24).tolist())
 LIGHT = ["dusk", "day", "night"] * 8
 LUMINANCE = [float(place) for place in range(24)]

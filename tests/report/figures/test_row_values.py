@@ -4,7 +4,7 @@ from roadeval.report.chart import ChartKind
 from roadeval.report.figures.forest import NAMED, ForestMean, ForestRow
 from roadeval.report.figures.row_values import MEAN, forest
 
-OVER = ForestMean(0.01, -0.01, 0.03, None, None)
+OVER = ForestMean(0.01, -0.01, 0.03)
 
 
 def drives(count):
