@@ -143,23 +143,6 @@ def test_what_is_no_exception_to_python_is_explained_too(capsys, monkeypatch):
     assert lines(capsys)[0].startswith("roadeval: error: PanicException: index out of bounds (a")
 
 
-@pytest.fixture
-def few_addresses(monkeypatch):
-    monkeypatch.setattr("resource.getrlimit", lambda what: (1_000_000_000, -1))
-
-
-@pytest.mark.parametrize("words", ["replay drive.mcap", "inspect out.rrd --list"])
-def test_a_limit_of_addresses_that_stops_a_command_is_a_known_problem(words, capsys, few_addresses):
-    assert main(words.split()) == 1
-    assert "address space is limited to 1.0 GB" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("words", ["info no.mcap", "replay --help", "config", "pack no -o a.mcap"])
-def test_such_a_limit_stops_no_command_that_needs_little(words, capsys, few_addresses):
-    main(words.split())
-    assert "address space" not in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(("call", "ours"), [("main()", True), ("main(['--version'])", False)])
 def test_cycles_are_searched_rarely_in_a_process_of_its_own_alone(call, ours):
     code = (

@@ -19,6 +19,7 @@ SUMMARY = {
     "totals": {},
     "difference": {},
     "against_blind": {},
+    "claims": {},
     "windows": 0,
     "health": {},
     "beyond": {},
@@ -195,6 +196,7 @@ def test_json_is_the_summary_and_nothing_else(asked, capsys):
     main(["replay", "drive.mcap", "--json"])
     printed = json.loads(capsys.readouterr().out)
     assert printed.pop("format") == {"name": "roadeval-summary", "version": 3}
+    assert printed.pop("digest")["parts"]
     assert printed == SUMMARY
 
 

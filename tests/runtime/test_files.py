@@ -143,8 +143,14 @@ def test_a_folder_is_none_where_a_file_or_a_device_bears_the_name(tmp_path):
         (
             "out.rrd",
             False,
-            ["out.0123abcd.partial.rrd", "out.0123abcd.partial.rrd-images", "out.partial.rrd"],
-            ["out.rrd", "out.0123abcd.partial.mcap", "out.b.0123abcd.partial.rrd", "out.partial"],
+            ["out.0123abcd.partial.rrd", "out.0123abcd.partial.rrd-images"],
+            [
+                "out.rrd",
+                "out.partial.rrd",
+                "out.0123abcd.partial.mcap",
+                "out.b.0123abcd.partial.rrd",
+                "out.partial",
+            ],
         ),
         (
             "drive",

@@ -66,7 +66,8 @@ def test_groups_stand_at_the_edge():
 
 
 DRAWN = """\
-x from -1.1 to 1.6: \N{MINUS SIGN}1.5 | \N{MINUS SIGN}1.0 | \N{MINUS SIGN}0.5 | 0.0 | 0.5 | 1.0 | 1.5 | 2.0
+x from -1.1 to 1.6: \N{MINUS SIGN}1.5 | \N{MINUS SIGN}1.0 | \N{MINUS SIGN}0.5 | 0.0 | 0.5 | \
+1.0 | 1.5 | 2.0
 x grid: color #b0b0b0, linestyle -, linewidth 0.8, markerfacecolor #b0b0b0
 y from 2.7 to -0.7: drive_0001 | drive_0000 | mean over drives
 box 0 1.5 1 1.2: facecolor #e3e3e373, linestyle solid, linewidth 0.0
