@@ -19,7 +19,16 @@ from typing import Any
 from benchmarks import drives, processes
 from benchmarks.drives import Source
 from benchmarks.plainly import PlainWay
-from benchmarks.replaying import Held, Whole, floor, hold, library_codecs, loop, whole
+from benchmarks.replaying import (
+    Held,
+    Whole,
+    floor,
+    hold,
+    library_codecs,
+    lines_of,
+    loop,
+    whole,
+)
 from benchmarks.timing import Spread, ratios, table, timed
 from roadeval import logs
 from roadeval.config import configure
@@ -30,7 +39,6 @@ from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import prepare
 from roadeval.pipeline.stage import View
 from roadeval.recording import RecordRule, recorder_for
-from roadeval.results.lines import lines
 from roadeval.runtime.threads import one_thread_each
 
 Rows = list[dict[str, Any]]
@@ -144,7 +152,9 @@ def _stages(drive: Path, folder: Path) -> dict[str, list[float]]:
                 score = partial(run.board.score, frame, Role.EVALUATED, variants)
                 result, seconds = timed(score)
                 lap("score", seconds)
-                encoded, seconds = timed(partial(recorder.encode, result, position, lines(result)))
+                encoded, seconds = timed(
+                    partial(recorder.encode, result, position, lines_of(result))
+                )
                 lap("encode", seconds)
                 lap("write", timed(partial(recorder.write, encoded))[1])
             recorder.finish({})

@@ -25,7 +25,7 @@ from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import prepare
 from roadeval.recording import RecordRule, png, recorder_for
 from roadeval.results.folder import ResultsWriter
-from roadeval.results.lines import lines, sum_lines
+from roadeval.results.rows import Key, csv_lines, frame_rows, sum_rows
 from roadeval.runtime.threads import ordered
 
 ALL: Final = RecordRule.parse("all")
@@ -63,6 +63,11 @@ class Whole:
         return result
 
 
+def lines_of(result: FrameResult) -> dict[str, str]:
+    """Return a frame's lines of the tables."""
+    return csv_lines(Key("drive", "/camera/image"), frame_rows(result))
+
+
 def hold(drive: Path, config: RunConfig) -> Held:
     """Run the pipeline once, before any clock runs, and keep what the floor needs."""
     with logs.open_log(drive) as log:
@@ -73,7 +78,7 @@ def hold(drive: Path, config: RunConfig) -> Held:
             result = done.encoded
             if position % max(1, -(-len(run.frames) * _bytes(result) // HELD_BYTES)) == 0:
                 results.append(result)
-                encoded = recorder.encode(result, position, lines(result))
+                encoded = recorder.encode(result, position, lines_of(result))
                 sizes.append(_layer_bytes(encoded.payloads))
         frames = log.frames(run.selection, logs.Span.of(config.frames))
         files = [_files(logged) for logged in frames]
@@ -131,7 +136,7 @@ def floor(held: Held, folder: Path, jobs: int, codecs: AbstractContextManager[No
         number, files, result = item
         for flags, data in zip((cv2.IMREAD_COLOR_RGB, *[-1] * 9), files, strict=False):
             cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-        return recorder.encode(result, number, lines(result))
+        return recorder.encode(result, number, lines_of(result))
 
     recorder = recorder_for(folder / "floor.rrd", held.layout, ALL)
     meter = Meter()
@@ -154,7 +159,7 @@ def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
                 results.append(done.lines)
             recorder.finish({})
             cost = meter.read()
-            results.append(sum_lines(run.board.sums()))
+            results.append(csv_lines(run.key, sum_rows(run.board.sums())))
             results.finish(summary.of(run), "")
         return cost
 

@@ -20,7 +20,6 @@ from pdoc import docstrings
 
 import roadeval
 from roadeval.results import schema
-from roadeval.results.fleet import schema as of_a_fleet
 
 UNRESOLVED: Final = (
     r".*(array\[int\]|Series\[float\]|DataclassInstance|PydanticDataclass|ForwardRef)"
@@ -53,9 +52,11 @@ def in_markdown(convert: Callable[[str], str]) -> Callable[[str], str]:
 def main(folder: str = "build/api") -> None:
     """Write the pages into a folder."""
     prepare(roadeval)
-    schema.__doc__ = f"{schema.__doc__}\n{schema.documentation()}"
-    tables = schema.documentation(of_a_fleet.TABLES.values(), "parquet")
-    of_a_fleet.__doc__ = f"{of_a_fleet.__doc__}\n{tables}"
+    tables = (
+        schema.documentation(schema.OF_A_DRIVE, "csv"),
+        schema.documentation((*schema.OF_DRIVES, "frames"), "parquet"),
+    )
+    schema.__doc__ = "\n".join((schema.__doc__ or "", *tables))
     docstrings.numpy = in_markdown(docstrings.numpy)
     warnings.simplefilter("error")
     warnings.filterwarnings("ignore", UNRESOLVED, UserWarning)

@@ -59,6 +59,8 @@ class Frame:
         Another system's road masks, from the log itself or from elsewhere, by variant name.
     probabilities
         How probable road is to such a system, where its masks are thresholds on that.
+    camera
+        The image topic.
     """
 
     number: int
@@ -71,6 +73,7 @@ class Frame:
     shadow_truth: Truth | None = None
     external: Mapping[str, Mask] = field(default_factory=dict)
     probabilities: Mapping[str, Probability] = field(default_factory=dict)
+    camera: str = ""
 
     @property
     def moment(self) -> Moment:

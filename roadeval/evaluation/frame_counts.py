@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import FILTERED, UNFILTERED, Counts
+from roadeval.data import FILTERED, UNFILTERED, Counts, Tally
+from roadeval.data.counts import OUTCOMES
 from roadeval.evaluation import metrics
 
 FourCounts = npt.NDArray[np.int64]
@@ -61,6 +62,66 @@ class GrowingCounts:
         return FrameCounts(variant, stage, np.array(self._positions, np.int64), counts)
 
 
+class RegionSums:
+    """Counts of each mask and region, summed up over frames, and the means of the frames' rates."""
+
+    def __init__(self) -> None:
+        self._places: dict[tuple[str, str, str], int] = {}
+        self._frames = np.zeros(0, np.int64)
+        self._counts = np.zeros((0, 4), np.int64)
+        self._rates = np.zeros((0, len(metrics.METRICS)))
+        self._defined = np.zeros((0, len(metrics.METRICS)), np.int64)
+
+    def add(self, tallies: Sequence[Tally]) -> None:
+        """Add a frame; a region without a labelled pixel does not count."""
+        found = {
+            (tally.variant, tally.stage, region): (own.tp, own.tn, own.fp, own.fn)
+            for tally in tallies
+            for region, own in tally.regions.items()
+        }
+        places = [self._places.setdefault(name, len(self._places)) for name in found]
+        if len(self._places) > len(self._frames):
+            more = len(self._places) - len(self._frames)
+            for name in ("_frames", "_counts", "_rates", "_defined"):
+                sums = getattr(self, name)
+                grown = np.concatenate([sums, np.zeros((more, *sums.shape[1:]), sums.dtype)])
+                setattr(self, name, grown)
+        counts = np.array([*found.values()], np.int64).reshape(-1, 4)
+        rates = metrics.table(counts)
+        known = ~np.isnan(rates)
+        self._frames[places] += counts.any(axis=1)
+        self._counts[places] += counts
+        self._rates[places] += np.where(known, rates, 0.0)
+        self._defined[places] += known
+
+    def totals(self) -> dict[tuple[str, str, str], dict[str, Any]]:
+        """Return frames, counts, means and pooled rates by variant, stage and region."""
+        means = np.divide(
+            self._rates,
+            self._defined,
+            out=np.full(self._rates.shape, np.nan),
+            where=self._defined > 0,
+        )
+        return {
+            name: {
+                "frames": int(self._frames[place]),
+                **_summed(Counts(*self._counts[place].tolist())),
+                **dict(zip(metrics.METRICS, means[place].tolist(), strict=True)),
+                **_pooled(Counts(*self._counts[place].tolist())),
+            }
+            for name, place in self._places.items()
+        }
+
+
+def _summed(counts: Counts) -> dict[str, int]:
+    own = (counts.tp, counts.tn, counts.fp, counts.fn, counts.n)
+    return dict(zip((*OUTCOMES, "N"), own, strict=True))
+
+
+def _pooled(counts: Counts) -> dict[str, float]:
+    return {f"pooled_{name}": value for name, value in metrics.of(counts).items()}
+
+
 def paired(masks: Sequence[FrameCounts]) -> Iterator[tuple[str, npt.NDArray[np.float64]]]:
     """Yield each stage of both default variants with the ``(n, m)`` differences of its rates.
 
@@ -85,13 +146,9 @@ def sum_up(counts: FourCounts) -> dict[str, Any]:
     undefined = np.isnan(rates).sum(axis=0).tolist()
     return {
         "frames": len(counts),
-        "TP": pooled.tp,
-        "TN": pooled.tn,
-        "FP": pooled.fp,
-        "FN": pooled.fn,
-        "N": pooled.n,
+        **_summed(pooled),
         **means(rates),
-        **{f"pooled_{name}": value for name, value in metrics.of(pooled).items()},
+        **_pooled(pooled),
         "undefined": dict(zip(metrics.METRICS, undefined, strict=True)),
     }
 

@@ -24,7 +24,7 @@ from roadeval.evaluation.claims import evidence
 from roadeval.evaluation.curves import Curves
 from roadeval.evaluation.differences import DriveDifferences, drive_differences
 from roadeval.evaluation.edges_and_flicker import EdgesAndFlicker
-from roadeval.evaluation.frame_counts import FrameCounts, GrowingCounts, sum_up
+from roadeval.evaluation.frame_counts import FrameCounts, GrowingCounts, RegionSums, sum_up
 from roadeval.evaluation.maps import HeatMap, Maps, Name
 from roadeval.evaluation.repeats import Repeats
 from roadeval.evaluation.score import score_frame
@@ -73,6 +73,7 @@ class Scoreboard:
         self._oracles: Final[defaultdict[tuple[str, str, str], GrowingCounts]] = defaultdict(
             GrowingCounts
         )
+        self._regions: Final = RegionSums()
         self._repeats: Final = Repeats()
         self._maps: Final = Maps()
         self._curves: Final = Curves()
@@ -102,6 +103,7 @@ class Scoreboard:
         for oracle, tallies in result.oracles.items():
             for tally in tallies:
                 self._oracles[tally.variant, oracle, tally.stage].append(position, tally.counts)
+        self._regions.add(result.tallies)
         self._repeats.add(position, result)
         self._maps.add(result.errors, result.changes)
         self._curves.add(result.histograms)
@@ -134,6 +136,10 @@ class Scoreboard:
             counts = growing.so_far(variant, stage).counts
             sums.setdefault(variant, {}).setdefault(oracle, {})[stage] = sum_up(counts)
         return sums
+
+    def regions(self) -> dict[tuple[str, str, str], dict[str, Any]]:
+        """Sum up by variant, stage and region, as in `totals`."""
+        return self._regions.totals()
 
     def windows(self) -> Iterator[windows.Window]:
         """Cut the drive into windows: by window, then variant and stage."""

@@ -22,8 +22,7 @@ from roadeval.evaluation.windows import Window
 from roadeval.jobs.result import Result
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.comparison import as_dict, judged
-from roadeval.results.lines import window_rows
-from roadeval.results.reading import rows_of
+from roadeval.results.rows import as_arrays, window_rows
 from roadeval.results.summary import json_text, plain
 from roadeval.runtime.paths import Paths, listed
 from roadeval.runtime.text import visible
@@ -75,7 +74,7 @@ class Compared:
         """
         size = self.comparison.settings.window
         found = _windows(self.sides, size) if self.comparison.same_drive else ()
-        return rows_of("windows", window_rows(found))
+        return as_arrays("windows", window_rows(found))
 
     @property
     def content(self) -> dict[str, Any]:

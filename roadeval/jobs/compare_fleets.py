@@ -41,7 +41,7 @@ from roadeval.results.fleet.comparison import FleetComparison, FleetSide, as_dic
 from roadeval.results.fleet.folder import Fleet
 from roadeval.results.fleet.masks import read_masks
 from roadeval.results.fleet.record import DAMAGED, SCORED
-from roadeval.results.fleet.schema import ALL
+from roadeval.results.schema import ALL
 from roadeval.results.summary import json_text, plain
 
 TESTS: Final = 6_000

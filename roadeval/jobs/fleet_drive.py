@@ -17,19 +17,18 @@ from roadeval.fleet.entry import DriveEntry
 from roadeval.fleet.errors import FleetError
 from roadeval.fleet.remote import staged, stamp
 from roadeval.jobs.fleet_frames import FrameGatherer
-from roadeval.jobs.fleet_rows import drive_row, effect_rows, failed_row, score_rows
+from roadeval.jobs.fleet_rows import drive_row, failed_row
 from roadeval.jobs.identity import asked
 from roadeval.jobs.replay import replay
 from roadeval.results.fleet.record import (
     RESULTS,
     Record,
-    cells,
     read_record,
     record_path,
     recording_path,
 )
-from roadeval.results.fleet.schema import ALL, TABLES
-from roadeval.results.fleet.tables import write_frames
+from roadeval.results.rows import Key, cells
+from roadeval.results.schema import ALL, TABLES
 from roadeval.runtime import memory
 from roadeval.runtime.claims import claimed
 from roadeval.version import VERSION
@@ -174,7 +173,8 @@ def failed(task: DriveTask, reason: str, exit_code: int = 1) -> Record:
         "fold": task.fold,
         "model": task.model or None,
     }
-    rows = {"drives": cells("drives", [row]), "scores": [], "effects": [], "worst": []}
+    drives = cells("drives", Key(task.entry.id, ""), [row])
+    rows = {"drives": drives, "scores": [], "effects": [], "worst": []}
     return Record(task.entry.id, task.asked, _stamp(task.entry), rows)
 
 
@@ -252,14 +252,11 @@ def _replayed(task: DriveTask) -> Record:
     started, before = time.perf_counter(), _stamp(task.entry)
     drive, folder, wanted = task.entry.id, task.folder, task.asked
     results = folder / RESULTS / drive
-    gatherer = FrameGatherer(folder, drive)
-    with staged(task.entry.source) as path:
+    with staged(task.entry.source) as path, FrameGatherer(folder, drive) as gatherer:
         outcome = replay(path, _config(task, results), on_frame=gatherer.add)
         size = sum(each.stat().st_size for each in ([path] if path.is_file() else path.iterdir()))
-    if gatherer.lights:
-        write_frames(folder, drive, results, gatherer.lights)
-    gatherer.write_pictures()
-    scores = list(score_rows(drive, outcome.summary, results))
+        gatherer.finish()
+    key = Key(drive, outcome.summary["drive"]["camera"])
     row = (
         drive_row(outcome, task.entry)
         | gatherer.facts()
@@ -273,12 +270,8 @@ def _replayed(task: DriveTask) -> Record:
             "peak_memory_mib": memory.peak_mib(),
         }
     )
-    rows = {
-        "drives": cells("drives", [row]),
-        "scores": cells("scores", scores),
-        "effects": cells("effects", effect_rows(drive, outcome.summary)),
-        "worst": cells("worst", gatherer.worst_rows()),
-    }
+    own = {"drives": [row], **outcome.rows, "worst": [*gatherer.worst_rows()]}
+    rows = {table: cells(table, key, each) for table, each in own.items()}
     return Record(drive, wanted, before, rows)
 
 

@@ -1,4 +1,4 @@
-"""The light of a drive's frames and the worst of them, collected while it is replayed."""
+"""What a fleet keeps of a drive's frames while it is replayed: rows, light, and the worst ones."""
 
 from __future__ import annotations
 
@@ -12,9 +12,12 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.data import BASELINE, ERRORS, FrameResult, Role, Tally
+from roadeval.evaluation.differences import final_stages
 from roadeval.evaluation.light import Light, light_of
 from roadeval.report.images import LayerImage, jpeg, shrink
-from roadeval.results.fleet.record import PICTURES
+from roadeval.results.fleet.record import PICTURES, frames_path
+from roadeval.results.rows import frame_rows
+from roadeval.results.tables import TableFile
 from roadeval.runtime.files import put
 
 WORST: Final = 3
@@ -39,7 +42,9 @@ class _WorstFrame:
 
 
 class FrameGatherer:
-    """Takes a drive's frames in order.
+    """Takes a drive's frames in order, and writes their rows; to be used as a context.
+
+    Without `finish` the rows of an earlier replay stay.
 
     Parameters
     ----------
@@ -52,17 +57,31 @@ class FrameGatherer:
     def __init__(self, folder: Path, drive: str) -> None:
         self._folder: Final = folder
         self._drive: Final = drive
-        self.lights: Final[dict[int, tuple[float, ...]]] = {}
+        self._rows: Final = TableFile(frames_path(folder, drive), "frames")
+        self._lights: Final[list[tuple[float, ...]]] = []
         self._stamps: list[int] = []
         self._worst: list[_WorstFrame] = []
 
+    def __enter__(self) -> FrameGatherer:
+        self._rows.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._rows.__exit__(*error)
+
     def add(self, result: FrameResult) -> None:
-        """Add a frame; one that was not evaluated is passed by."""
+        """Add a frame; one that was not evaluated is ignored."""
         if result.role is not Role.EVALUATED:
             return
         light = light_of(result.frame.image)
-        self.lights[result.frame.number] = astuple(light)
+        self._lights.append(astuple(light))
         self._stamps = [*self._stamps[:1], result.frame.stamp_ns]
+        key = self._drive, result.frame.camera
+        stages = final_stages((tally.variant, tally.stage) for tally in result.tallies)
+        self._rows.add(
+            (*key, *row, stages[tally.variant] == tally.stage, *astuple(light))
+            for tally, row in zip(result.tallies, frame_rows(result)["frames"], strict=True)
+        )
         first = next((t.variant for t in result.tallies if t.variant != BASELINE), None)
         if first is not None:
             *_, final = (tally for tally in result.tallies if tally.variant == first)
@@ -88,9 +107,9 @@ class FrameGatherer:
 
     def facts(self) -> dict[str, Any]:
         """Return what a drive's row says of its evaluated frames: their times and mean light."""
-        if not self.lights:
+        if not self._lights:
             return {}
-        values = np.array([*self.lights.values()])
+        values = np.array(self._lights)
         known = ~np.isnan(values)
         sums = np.where(known, values, 0).sum(axis=0)
         means = sums / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
@@ -98,14 +117,16 @@ class FrameGatherer:
         times = {"start_ns": self._stamps[0], "end_ns": self._stamps[-1]}
         return times | dict(zip(names, means.tolist(), strict=True))
 
-    def write_pictures(self) -> None:
-        """Write the worst frames' pictures in place of those of an earlier replay.
+    def finish(self) -> None:
+        """Write the rows and the worst frames' pictures in place of those of an earlier replay.
 
         Raises
         ------
         OSError
             If they cannot be written.
         """
+        if self._lights:
+            self._rows.finish()
         shutil.rmtree(self._folder / PICTURES / self._drive, ignore_errors=True)
         for each in self._worst:
             put(self._folder / self._picture(each), each.picture)
@@ -115,7 +136,6 @@ class FrameGatherer:
         for rank, each in enumerate(self._worst, 1):
             yield {
                 "rank": rank,
-                "drive": self._drive,
                 "frame": each.number,
                 "stamp_ns": each.stamp_ns,
                 "variant": each.tally.variant,

@@ -19,8 +19,8 @@ from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.replay import Outcome, replay
 from roadeval.results.fleet.folder import Fleet
 from roadeval.results.fleet.record import RECORDINGS, RESULTS, recording_path
-from roadeval.results.fleet.schema import ALL, TAG
 from roadeval.results.folder import RUN
+from roadeval.results.schema import ALL, TAG
 
 if TYPE_CHECKING:
     from roadeval.recording.screen.catalogue import Catalogue

@@ -15,7 +15,7 @@ from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.jobs.run import Run
 from roadeval.pipeline.stage import StageError, View
 from roadeval.results import notes
-from roadeval.results.lines import lines
+from roadeval.results.rows import csv_lines, frame_rows
 from roadeval.runtime.memory import TRIM_EVERY, trim
 from roadeval.runtime.threads import ordered
 
@@ -66,7 +66,7 @@ def _process(
 ) -> ProcessedFrame | None:
     position, logged = item
     try:
-        frame = logged.decode()
+        frame = replace(logged.decode(), camera=run.key.camera)
     except logs.FrameError:
         return None  # it stands in the log's accounting, with the reason
     use = run.schedule.use(frame)
@@ -95,7 +95,7 @@ def _process(
     ]
     result = run.board.score(frame, use.role, tuple(variants))
     result = replace(result, notes=notes.of_tallies(result.tallies, run.config.evaluation))
-    own = lines(result)
+    own = csv_lines(run.key, frame_rows(result))
     encoded = encoder.encode(result, position - 1, own)
     # Results wait for their turn, and would wait with some 15 bytes a pixel.
     return ProcessedFrame(position, result.without_layers(), own, encoded, use.beside)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from roadeval.recording import NullRecorder, RecordRule, SelectiveRecorder, reco
 from roadeval.report.figures.figure import ExampleFrame, FigureData, ThresholdData
 from roadeval.report.figures.files import write_figures
 from roadeval.results.folder import ResultsWriter
-from roadeval.results.lines import sum_lines
+from roadeval.results.rows import as_arrays, csv_lines, effect_rows, score_rows, sum_rows
 from roadeval.results.schema import TABLES
 from roadeval.results.summary import summary_text
 from roadeval.runtime.memory import trim
@@ -41,7 +41,8 @@ def pass_by(_result: FrameResult) -> None:
 class Outcome:
     """The result of a replay: where it lies, and the content of ``summary.json``.
 
-    ``tracebacks`` tell where in their code stages failed that are among the ``losses``.
+    ``tracebacks`` tell where in their code stages failed that are among the ``losses``. ``rows``
+    are those of the tables ``scores`` and ``effects``.
     """
 
     recording: Path | None
@@ -51,6 +52,7 @@ class Outcome:
     losses: tuple[str, ...]
     files: tuple[Path, ...]
     tracebacks: tuple[str, ...] = ()
+    rows: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
 
 
 def replay(
@@ -116,10 +118,15 @@ def _written(
         examples = _record(
             run, recorder, results, sidecar, on_progress=on_progress, on_frame=on_frame
         )
-        sums = sum_lines(run.board.sums())
+        rows = sum_rows(run.board.sums())
+        sums = csv_lines(run.key, rows)
         results.append(sums)
         facts = summary.of(run) | {"tables": results.tables}
         warnings, losses = summary.warnings(run), summary.losses(run)
+        of_drive = {
+            "scores": list(score_rows(facts, run.board.regions())),
+            "effects": list(effect_rows(facts)),
+        }
         tracebacks = tuple(run.failures.tracebacks.values())
         recorder.finish(_texts(run, facts, sums))
         sidecar.finish()
@@ -127,14 +134,17 @@ def _written(
         trim()
         if config.output.figures:
             with results.explained():
-                curves = ThresholdData(
-                    results.rows("probabilities"), facts.get("curves", {}), facts["totals"]
-                )
-                data = FigureData(log.name, results.rows("windows"), examples, curves)
+                windows, levels = (as_arrays(n, rows[n]) for n in ("windows", "probabilities"))
+                curves = ThresholdData(levels, facts.get("curves", {}), facts["totals"])
+                data = FigureData(log.name, windows, examples, curves)
                 write_figures(results.folder, data)
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
     files = [to.reports / name for name in facts["files"]] + ([to.mcap] if to.mcap else [])
-    return Outcome(to.recording, to.reports, facts, warnings, losses, tuple(files), tracebacks)
+    return Outcome(
+        *(to.recording, to.reports, facts, warnings, losses, tuple(files)),
+        tracebacks=tracebacks,
+        rows=of_drive,
+    )
 
 
 def _record(

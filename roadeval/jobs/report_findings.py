@@ -14,8 +14,7 @@ from roadeval.evaluation.settings import settings_of
 from roadeval.jobs.report_frames import FramePicker, evenly, variants_but_baseline
 from roadeval.jobs.result import Result
 from roadeval.report.findings import Commands, ErrorHeatmap, Findings, PairedComparison
-from roadeval.results.lines import change_rows, heat_rows, window_rows
-from roadeval.results.reading import rows_of, table_of
+from roadeval.results.rows import as_arrays, change_rows, heat_rows, window_rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -90,7 +89,7 @@ def _windows(result: Result) -> tuple[Rows, int]:
     if not count or (count <= WINDOWS and len(result.windows)):
         return result.windows, size
     size *= -(-count // WINDOWS)
-    return rows_of("windows", window_rows(scored.windows(result.rows, size))), size
+    return as_arrays("windows", window_rows(scored.windows(result.rows, size))), size
 
 
 def _paired(result: Result, changes: pd.DataFrame) -> Iterator[PairedComparison]:
@@ -150,12 +149,15 @@ def _mask_sums(result: Result, numbers: Sequence[int]) -> tuple[pd.DataFrame, pd
     A run that was killed did not get to write them: they are made of the masks of evenly spread
     frames then.
     """
+    import pandas as pd
+
     changes, heat = result.extra("changes"), result.extra("heat")
     if len(changes) or len(heat):
         return changes, heat, result.frames["frame"].nunique()
     sample = _sample(result, numbers)
-    changes = table_of("changes", change_rows(sample.changes))
-    return changes, table_of("heat", heat_rows(sample.heat)), sample.frames
+    made = {"changes": change_rows(sample.changes), "heat": heat_rows(sample.heat)}
+    changes, heat = (pd.DataFrame(as_arrays(name, own).columns) for name, own in made.items())
+    return changes, heat, sample.frames
 
 
 def _sample(result: Result, numbers: Sequence[int]) -> maps.Maps:

@@ -10,7 +10,7 @@ from typing import Any, Final
 from roadeval.report.blocks import ImageFile
 from roadeval.report.fleet.findings import FleetFindings, Row, WorstFrame
 from roadeval.results.fleet.folder import Fleet
-from roadeval.results.fleet.schema import ALL
+from roadeval.results.schema import ALL
 
 TESTED: Final = "ERR"
 WORST: Final = 12

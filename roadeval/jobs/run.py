@@ -21,7 +21,8 @@ from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import MisfitError
 from roadeval.recording import Layout
-from roadeval.results.schema import streamed
+from roadeval.results.rows import Key
+from roadeval.results.schema import STREAMED, TABLES
 from roadeval.runtime.memory import trim
 from roadeval.training import Model, TrainingSettings, learning
 from roadeval.training.model import ModelError
@@ -79,6 +80,11 @@ class Run:
     beside: set[int] = field(default_factory=set)
     failures: Failures = field(default_factory=Failures)
 
+    @property
+    def key(self) -> Key:
+        """What every row of its tables begins with."""
+        return Key(self.log.name, self.selection.image.name)
+
     def layout(self) -> Layout:
         """Describe the recording before its first frame."""
         width, height = self.selection.size or (0, 0)
@@ -93,7 +99,7 @@ class Run:
             has_shadow_truth=self.selection.shadow is not None,
             first_frame=self.schedule.first,
             rate_hz=self.selection.image.rate_hz,
-            tables={name: table.header for name, table in streamed().items()},
+            tables={name: TABLES[name].header for name in STREAMED},
             properties=self._properties(),
         )
 

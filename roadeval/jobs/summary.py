@@ -178,6 +178,7 @@ def _drive(run: Run) -> dict[str, Any]:
     width, height = run.selection.size or (0, 0)
     return {
         "name": run.log.name,
+        "camera": run.key.camera,
         "width": width,
         "height": height,
         "rate_hz": run.selection.image.rate_hz,

@@ -14,9 +14,9 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Final, Self
 
 from roadeval.data import Rows
-from roadeval.results.reading import ResultsError, read_rows, read_table
-from roadeval.results.schema import TABLES, TableSchema
+from roadeval.results.schema import OF_A_DRIVE, TABLES, TableSchema
 from roadeval.results.summary import SUMMARY, read_summary, summary_text
+from roadeval.results.tables import ResultsError, read_rows, read_table
 from roadeval.runtime.folders import Content, NewFolder
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def belonging(folder: Path) -> frozenset[str]:
         listed = json.loads((folder / SUMMARY).read_bytes()).get("files")
     names = [str(name) for name in listed] if isinstance(listed, list) else []
     plain = {name for name in names if _is_name(name)}
-    return frozenset(plain) | {SUMMARY, RUN, *(f"{table}.csv" for table in TABLES)}
+    return frozenset(plain) | {SUMMARY, RUN, *(f"{table}.csv" for table in OF_A_DRIVE)}
 
 
 def _is_name(text: str) -> bool:
@@ -82,8 +82,8 @@ class ResultsWriter:
     def __enter__(self) -> Self:
         with self.explained():
             self._new.begin()
-            for name, table in TABLES.items():
-                self._open[name] = _Growing(self.folder, table)
+            for name in OF_A_DRIVE:
+                self._open[name] = _Growing(self.folder, TABLES[name])
         return self
 
     def __exit__(
@@ -103,7 +103,7 @@ class ResultsWriter:
             self._new.discard()
 
     def append(self, lines: Mapping[str, str]) -> None:
-        """Add lines to tables, by their names."""
+        """Add lines of CSV to tables, by their names."""
         with self.explained():
             for name, text in lines.items():
                 self._open[name].append(text)
@@ -112,12 +112,6 @@ class ResultsWriter:
     def tables(self) -> dict[str, dict[str, Any]]:
         """Rows and SHA-256 of each table that has rows so far, as the summary states them."""
         return {name: table.stated for name, table in self._open.items() if table.rows}
-
-    def rows(self, name: str) -> Rows:
-        """Read back a table, to which nothing is added any more."""
-        with self.explained():
-            self._open[name].close()
-        return read_rows(name, self._open[name].path, {"tables": self.tables})
 
     def finish(self, summary: Mapping[str, Any], run_toml: str) -> dict[str, Any]:
         """Write the last files, and return the content of the summary.
@@ -166,7 +160,7 @@ class _Growing:
 
     @property
     def stated(self) -> dict[str, Any]:
-        """As `roadeval.results.reading.fingerprint` of the whole file."""
+        """As `roadeval.results.tables.fingerprint` of the whole file."""
         return {"rows": self.rows, "sha256": self._digest.hexdigest()}
 
     def append(self, lines: str) -> None:
@@ -231,8 +225,8 @@ class ResultsFolder:
         ResultsError
             If it is damaged, or not the one of which the summary tells.
         """
-        return read_table(name, self._folder / f"{name}.csv", self.summary)
+        return read_table(name, self._folder / f"{name}.csv", self.summary.get("tables"))
 
     def rows(self, name: str) -> Rows:
         """Read a table as `table` does, without pandas."""
-        return read_rows(name, self._folder / f"{name}.csv", self.summary)
+        return read_rows(name, self._folder / f"{name}.csv", self.summary.get("tables"))

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from roadeval.results.reading import ResultsError
+from roadeval.results.tables import ResultsError
 from roadeval.runtime.files import check_input
 from roadeval.runtime.text import visible, visible_lines
 

@@ -90,7 +90,7 @@ def a_table(errors: Mapping[tuple[str, str], Sequence[int]], hertz: float = 10) 
 
 
 def rows_of(table: pd.DataFrame) -> Rows:
-    """The rows of a table as `roadeval.results.reading.read_rows` gives them."""
+    """The rows of a table as `roadeval.results.tables.read_rows` gives them."""
     texts = {"variant", "stage", "region"}
     return Rows({n: np.array(table[n].tolist(), str if n in texts else None) for n in table})
 

@@ -25,7 +25,7 @@ def test_a_region_tells_its_share_of_the_pixels_and_of_the_errors():
             (0, "filtered", "post", "interior", 40, 45, 5, 0, 90),
             (0, "filtered", "post", "shadow", 0, 0, 0, 0, 0),
         ],
-        columns=list(TABLES["regions"].names),
+        columns=list(TABLES["regions"].names[2:]),
     )
     found = analysis.by_region(regions).set_index("region")
     assert found.loc["boundary", "ERR"] == 0.5

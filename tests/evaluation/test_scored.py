@@ -11,10 +11,10 @@ from roadeval.evaluation import scored
 from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.lines import lines as lines_of
-from roadeval.results.reading import read_rows
 from roadeval.results.schema import TABLES
+from roadeval.results.tables import read_rows
 from tests.evaluation.making import a_frame, a_table, a_variant, pixels, rows_of
+from tests.results.making import lines as lines_of
 
 POST, SVM = ("filtered", "post"), ("filtered", "svm")
 CONTROL_POST, CONTROL_SVM = ("unfiltered", "post"), ("unfiltered", "svm")

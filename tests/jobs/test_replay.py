@@ -27,7 +27,7 @@ from roadeval.training import learning
 from tests.fixtures.make import make
 from tests.jobs.making import FRAMES, NS, settings, write_log
 
-TABLES = tuple(name for name in schema.TABLES if name != "probabilities")
+TABLES = tuple(name for name in schema.OF_A_DRIVE if name != "probabilities")
 """Those of runs in which nothing says how probable road is."""
 
 

@@ -9,8 +9,7 @@ import pytest
 
 import roadeval
 from roadeval.fleet.manifest import read_manifest
-from roadeval.results.fleet.schema import TABLES
-from roadeval.results.schema import documentation
+from roadeval.results.schema import OF_DRIVES, documentation
 from tests.results.fleet.making import fleet_of
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "fleet.md"
@@ -48,7 +47,7 @@ def asked(fleets, monkeypatch):
 
 def test_the_columns_are_the_schemas():
     written = TEXT.partition(BEGIN)[2].partition(END)[0]
-    assert written == f"{documentation(TABLES.values(), 'parquet')}\n"
+    assert written == documentation((*OF_DRIVES, "frames"), "parquet") + "\n"
 
 
 def test_which_drives_got_worse_at_dusk(asked, fleets):

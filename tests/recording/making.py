@@ -31,9 +31,9 @@ from roadeval.data.packed import Packed
 from roadeval.evaluation.metrics import METRICS
 from roadeval.recording import Layout, Recorder, Recording
 from roadeval.recording.read.rrd_file import RrdFile
-from roadeval.results.lines import lines
 from roadeval.results.schema import TABLES
 from roadeval.results.summary import FORMAT, digest_of
+from tests.results.making import lines
 
 HEIGHT, WIDTH = 6, 8
 
@@ -54,8 +54,15 @@ SUMMARY = {"format": FORMAT, "totals": {}, "digest": digest_of({}, ())} | {
     "seconds": {"filtered": {"post": 0.5}}
 }
 """Of which the viewer and the reader use a few parts only."""
-WINDOW = {"window": 0, "first_frame": 2, "last_frame": 18, "frames": 17} | {
-    **dict.fromkeys(TABLES["windows"].names[6:], 0.25),
+WINDOW = {
+    "drive": "street",
+    "camera": "/camera/image",
+    "window": 0,
+    "first_frame": 2,
+    "last_frame": 18,
+    "frames": 17,
+} | {
+    **dict.fromkeys(TABLES["windows"].names[8:], 0.25),
     "variant": "filtered",
     "stage": "post",
 }

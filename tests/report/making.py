@@ -9,7 +9,7 @@ from pypdf import PdfReader
 from roadeval.report.blocks import Cell, Document
 from roadeval.report.figures.figure import FigureData
 from roadeval.report.findings import Commands, Findings, PairedComparison
-from roadeval.results import reading
+from roadeval.results.rows import as_arrays
 from tests.evaluation.making import rows_of
 
 
@@ -29,8 +29,8 @@ def text(content):
     return re.sub(r"\s+", " ", " ".join(pages))
 
 
-NO_WINDOWS = reading.rows_of("windows", [])
-NO_LEVELS = reading.rows_of("probabilities", [])
+NO_WINDOWS = as_arrays("windows", [])
+NO_LEVELS = as_arrays("probabilities", [])
 
 
 def figure_data(drive, windows, *more):

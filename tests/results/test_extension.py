@@ -58,9 +58,9 @@ from roadeval.evaluation import regions, scored
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.folder import ResultsFolder, ResultsWriter
-from roadeval.results.lines import lines, sum_lines
-from roadeval.results.schema import documentation
+from roadeval.results.schema import TABLES, documentation
 from roadeval.results.summary import OPTIONAL, PARTS
+from tests.results.making import lines, sum_lines
 from tests.evaluation.making import a_frame, a_variant, pixels
 
 board = Scoreboard(EvaluationSettings(bands=1), ["net"], None)
@@ -78,7 +78,7 @@ assert read.frames["FDR"].tolist() == [0.25]
 assert read.windows["FDR"].tolist() == read.windows["pooled_FDR"].tolist() == [0.25]
 assert read.summary["totals"]["net"]["post"]["pooled_FDR"] == 0.25
 assert scored.totals(read.rows("frames"))["net"]["post"]["FDR"] == 0.25
-assert "FP / (TP + FP)" in documentation()
+assert "FP / (TP + FP)" in documentation(TABLES, "csv")
 left = read.regions.set_index("region").loc["left"]
 assert left[["TP", "TN", "FP", "FN"]].tolist() == [3, 0, 0, 1]
 assert regions.titles([*read.regions["region"]])["left"] == "on the left"

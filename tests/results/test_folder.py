@@ -18,11 +18,11 @@ from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.folder import ResultsFolder, ResultsWriter, belonging
-from roadeval.results.lines import lines, sum_lines
-from roadeval.results.reading import ResultsError
-from roadeval.results.schema import TABLES
+from roadeval.results.schema import OF_A_DRIVE
 from roadeval.results.summary import FORMAT, OPTIONAL, PARTS, digest_of, summary_text
+from roadeval.results.tables import ResultsError
 from tests.evaluation.making import a_frame, a_variant, pixels
+from tests.results.making import lines, sum_lines
 
 TRUTHS = [pixels("##..", "##.?"), pixels("....", "...."), pixels("###.", "....")]
 MASK = pixels("#.#.", "##..")
@@ -71,35 +71,40 @@ def test_the_columns_are_those_of_the_design(tmp_path: Path) -> None:
     write(tmp_path)
     first = {path.stem: path.read_text().splitlines()[0] for path in tmp_path.glob("*.csv")}
     assert first == {
-        "frames": "frame,stamp_ns,log_time_ns,variant,stage,TP,TN,FP,FN,N,ACC,ERR,TPR,FNR,TNR,FPR",
-        "windows": "window,first_frame,last_frame,frames,variant,stage,ACC,ERR,TPR,FNR,TNR,FPR,"
+        "frames": "drive,camera,frame,stamp_ns,log_time_ns,variant,stage,TP,TN,FP,FN,N,"
+        "ACC,ERR,TPR,FNR,TNR,FPR",
+        "windows": "drive,camera,window,first_frame,last_frame,frames,variant,stage,"
+        "ACC,ERR,TPR,FNR,TNR,FPR,"
         "pooled_ACC,pooled_ERR,pooled_TPR,pooled_FNR,pooled_TNR,pooled_FPR",
-        "regions": "frame,variant,stage,region,TP,TN,FP,FN,N",
-        "oracles": "frame,variant,oracle,stage,TP,TN,FP,FN,N,ACC,ERR,TPR,FNR,TNR,FPR",
-        "disagreements": "frame,from_variant,to_variant,repaired,spoiled,N",
-        "changes": "from_variant,from_stage,to_variant,to_stage,repaired,spoiled,N",
-        "heat": "variant,top,left,side,labelled,FP,FN",
-        "probabilities": "variant,stage,level,road,other",
+        "regions": "drive,camera,frame,variant,stage,region,TP,TN,FP,FN,N",
+        "oracles": "drive,camera,frame,variant,oracle,stage,TP,TN,FP,FN,N,ACC,ERR,TPR,FNR,TNR,FPR",
+        "disagreements": "drive,camera,frame,from_variant,to_variant,repaired,spoiled,N",
+        "changes": "drive,camera,from_variant,from_stage,to_variant,to_stage,repaired,spoiled,N",
+        "heat": "drive,camera,variant,top,left,side,labelled,FP,FN",
+        "probabilities": "drive,camera,variant,stage,level,road,other",
     }
+
+
+OF = "street,/camera/image,"
 
 
 def test_lines_by_hand(tmp_path: Path) -> None:
     write(tmp_path)
     line = (tmp_path / "frames.csv").read_text().splitlines()[1]
     rates = "0.7142857142857143,0.2857142857142857,0.75,0.25,0.6666666666666666,0.3333333333333333"
-    assert line == f"5,500000000,500000007,filtered,post,3,2,1,1,7,{rates}"
+    assert line == f"{OF}5,500000000,500000007,filtered,post,3,2,1,1,7,{rates}"
     line = (tmp_path / "oracles.csv").read_text().splitlines()[1]
-    assert line == f"5,filtered,svm,post,3,2,1,1,7,{rates}"
+    assert line == f"{OF}5,filtered,svm,post,3,2,1,1,7,{rates}"
     line = (tmp_path / "regions.csv").read_text().splitlines()[1]
-    assert line == "5,filtered,post,shadow,3,0,1,0,4"
+    assert line == f"{OF}5,filtered,post,shadow,3,0,1,0,4"
     lines = (tmp_path / "probabilities.csv").read_text().splitlines()[1:]
-    assert lines == ["filtered,post,0,2,9", "filtered,post,156,5,7"]
+    assert lines == [f"{OF}filtered,post,0,2,9", f"{OF}filtered,post,156,5,7"]
 
 
 def test_an_undefined_rate_is_an_empty_cell_and_reads_back_as_undefined(tmp_path: Path) -> None:
     write(tmp_path)
     line = (tmp_path / "frames.csv").read_text().splitlines()[3]
-    assert line == "6,600000000,600000007,filtered,post,0,4,4,0,8,0.5,0.5,,,0.5,0.5"
+    assert line == f"{OF}6,600000000,600000007,filtered,post,0,4,4,0,8,0.5,0.5,,,0.5,0.5"
     assert math.isnan(ResultsFolder(tmp_path).frames.loc[2, "TPR"])
 
 
@@ -199,7 +204,7 @@ def test_nothing_bears_its_name_before_all_is_complete(tmp_path: Path) -> None:
         assert names(tmp_path) == {writer.folder.name}
         assert writer.folder.name.startswith(".new.")
     assert names(tmp_path) == {"new"}
-    written = {*(f"{table}.csv" for table in TABLES), "run.toml", "summary.json"}
+    written = {*(f"{table}.csv" for table in OF_A_DRIVE), "run.toml", "summary.json"}
     assert names(tmp_path / "new") == written
 
 
@@ -263,7 +268,7 @@ def test_a_folder_that_was_there_stays(tmp_path: Path) -> None:
     assert names(tmp_path) == {"old"}
 
 
-@pytest.mark.parametrize("table", TABLES)
+@pytest.mark.parametrize("table", OF_A_DRIVE)
 def test_a_table_that_was_cut_at_the_end_of_a_line_is_refused(tmp_path: Path, table: str) -> None:
     write(tmp_path)
     path = tmp_path / f"{table}.csv"
@@ -281,11 +286,11 @@ def test_a_table_with_one_number_changed_is_refused(tmp_path: Path) -> None:
     write(tmp_path)
     path = tmp_path / "heat.csv"
     path.write_text(path.read_text().replace("filtered,0,0,1,3", "filtered,0,0,1,4"))
-    with pytest.raises(ResultsError, match=r"summary \(its content is another\)"):
+    with pytest.raises(ResultsError, match=r"summary \(its content differs\)"):
         ResultsFolder(tmp_path).table("heat")
 
 
-@pytest.mark.parametrize("table", TABLES)
+@pytest.mark.parametrize("table", OF_A_DRIVE)
 def test_a_table_that_was_taken_away_is_missed(tmp_path: Path, table: str) -> None:
     write(tmp_path)
     (tmp_path / f"{table}.csv").unlink()
@@ -305,7 +310,7 @@ def test_a_table_of_which_the_summary_knows_nothing_is_refused(tmp_path: Path) -
 def test_the_summary_states_what_sha256sum_says(tmp_path: Path) -> None:
     write(tmp_path)
     stated = ResultsFolder(tmp_path).summary["tables"]
-    assert list(stated) == list(TABLES)
+    assert list(stated) == list(OF_A_DRIVE)
     for name, told in stated.items():
         content = (tmp_path / f"{name}.csv").read_bytes()
         assert told["sha256"] == hashlib.sha256(content).hexdigest()
@@ -324,7 +329,7 @@ def test_masks_that_are_missing_on_some_frames_agree_with_the_summary(tmp_path: 
             writer.append(lines(result))
         writer.append(sum_lines(board.sums()))
         writer.finish(the_rest(board), RUN_TOML)
-    tables = {name: ResultsFolder(tmp_path).table(name) for name in TABLES}
+    tables = {name: ResultsFolder(tmp_path).table(name) for name in OF_A_DRIVE}
     assert len(tables["frames"]) == 3 * 2 + 1 + 1
     assert not {("net", "late"), ("late", "net")} & set(
         zip(tables["changes"]["from_variant"], tables["changes"]["to_variant"], strict=True)

@@ -5,25 +5,18 @@ import subprocess
 import sys
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from roadeval.results.reading import (
-    ResultsError,
-    fingerprint,
-    read_rows,
-    read_table,
-    rows_of,
-    table_of,
-)
+from roadeval.results.rows import Key, as_arrays, csv_lines
 from roadeval.results.schema import TABLES
+from roadeval.results.tables import ResultsError, fingerprint, read_rows, read_table
 
 HEADER = TABLES["oracles"].header
 KINDS = {"frame": "int64", "TP": "int64", "ERR": "float64", "FPR": "float64"}
 
 
 def line(frame=1, variant="net", tp=2, err="0.5"):
-    return f"{frame},{variant},svm,post,{tp},4,0,0,6,0.5,{err},0.1,0.2,0.3,0.25\n"
+    return f"drive,/camera,{frame},{variant},svm,post,{tp},4,0,0,6,0.5,{err},0.1,0.2,0.3,0.25\n"
 
 
 def kinds(table):
@@ -67,22 +60,27 @@ def test_a_file_that_is_not_there_has_no_rows(tmp_path):
     assert read_table("oracles", tmp_path / "oracles.csv").empty
 
 
-def test_rows_make_the_table_that_their_text_would():
-    row = (1, "net", "svm", "post", 2, 4, 0, 0, 6, 0.5, math.nan, 0.1, 0.2, 0.3, 0.25)
-    made = table_of("oracles", [row])
-    pd.testing.assert_frame_equal(made, read_table("oracles", HEADER + line(err="")))
-    pd.testing.assert_frame_equal(table_of("oracles", []), read_table("oracles", ""))
-
-
 @pytest.mark.parametrize("errs", [[], [math.nan], [0.5, math.nan]])
 def test_rows_of_arrays_are_those_that_their_text_would_make(errs):
     rows = [(1, "net", "svm", "post", 2, 4, 0, 0, 6, 0.5, e, 0.1, 0.2, 0.3, 0.25) for e in errs]
     lines = [line(err="" if math.isnan(err) else str(err)) for err in errs]
-    made, read = rows_of("oracles", rows), read_rows("oracles", HEADER + "".join(lines))
+    text = csv_lines(Key("drive", "/camera"), {"oracles": rows}).get("oracles", "")
+    assert text == "".join(lines)
+    made, read = as_arrays("oracles", rows), read_rows("oracles", HEADER + text)
     assert len(made) == len(errs)
-    for name in TABLES["oracles"].names:
+    assert [*made.columns] == [*read.columns] == [*TABLES["oracles"].names[2:]]
+    for name in made.columns:
         assert made[name].dtype.kind == read[name].dtype.kind
         np.testing.assert_array_equal(made[name], read[name])
+
+
+def test_a_drive_s_and_a_camera_s_name_may_hold_anything(tmp_path):
+    key = Key('a, "b"\n', "/front/image")
+    rows = {"disagreements": [(1, "filtered", "unfiltered", 2, 3, 9)]}
+    text = csv_lines(key, rows)["disagreements"]
+    assert text.count("\n") == 1
+    (row,) = read_table("disagreements", TABLES["disagreements"].header + text).to_dict("records")
+    assert (row["drive"], row["camera"]) == ('a, "b"\\n', "/front/image")
 
 
 MANY = "".join(
@@ -102,7 +100,7 @@ MANY = "".join(
 def test_rows_are_those_of_the_table(text):
     table, rows = read_table("oracles", text), read_rows("oracles", text)
     assert len(rows) == len(table)
-    for name in TABLES["oracles"].names:
+    for name in TABLES["oracles"].names[2:]:
         np.testing.assert_array_equal(rows[name].tolist(), table[name].tolist())
 
 
@@ -110,13 +108,13 @@ def test_rows_are_those_of_the_table(text):
     ("text", "why"),
     [
         (HEADER[:-10], "Empty CSV file"),
-        (f"{HEADER}{line()}2,net", "Expected 15 columns, got 2"),
+        (f"{HEADER}{line()}2,net", "Expected 17 columns, got 2"),
         (f"{HEADER}{line()}"[:-2], "its last line is cut off"),
         (f"{HEADER}{line(tp='two')}", "two"),
         (f"{HEADER}{line(tp='')}", "column TP lacks a value"),
-        ("frame,variant\n1,net\n", "no column oracle, stage, TP"),
-        ("frame,frame\n1,1\n", "a column stands there twice"),
-        (HEADER + line(1) + line(2) + line(1), "a row stands there twice"),
+        ("drive,camera,frame,variant\na,b,1,net\n", "no column oracle, stage, TP"),
+        ("frame,frame\n1,1\n", "a column is there twice"),
+        (HEADER + line(1) + line(2) + line(1), "a row is there twice"),
     ],
 )
 def test_a_damaged_file_is_named_in_one_line(text, why, tmp_path):
@@ -129,7 +127,7 @@ def test_a_damaged_file_is_named_in_one_line(text, why, tmp_path):
 
 def test_text_that_is_not_the_summarys_is_refused_and_named():
     text = HEADER + line(1) + line(2)
-    summary = {"tables": {"oracles": fingerprint(text.encode())}}
+    summary = {"oracles": fingerprint(text.encode())}
     assert len(read_table("oracles", text, summary)) == 2
     with pytest.raises(ResultsError, match=r"^the recording's table oracles: .* \(1 of 2 rows\)"):
         read_table("oracles", HEADER + line(1), summary)
@@ -149,7 +147,7 @@ def test_a_long_one_is_quoted_in_part():
 @pytest.mark.parametrize("text", ["", HEADER, HEADER + line()])
 def test_rows_are_read_without_pandas(text):
     code = (
-        "import sys; from roadeval.results.reading import read_rows; "
+        "import sys; from roadeval.results.tables import read_rows; "
         f"read_rows('oracles', {text!r}); print('pandas' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.results.reading import ResultsError
 from roadeval.results.summary import (
     FORMAT,
     RESULTS,
@@ -15,6 +14,7 @@ from roadeval.results.summary import (
     parse_summary,
     plain,
 )
+from roadeval.results.tables import ResultsError
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.read.payloads import PayloadCache
 from roadeval.recording.read.rrd_file import RrdFile, whole
-from roadeval.results.reading import read_rows, read_table
 from roadeval.results.summary import another_format, parse_summary
+from roadeval.results.tables import read_rows, read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -145,11 +145,11 @@ class Recording:
 
     def table(self, name: str) -> pd.DataFrame:
         """Return the rows of a table by its name, as ``oracles``; none if the run counted none."""
-        return read_table(name, self._text(name), self.summary)
+        return read_table(name, self._text(name), self.summary.get("tables"))
 
     def rows(self, name: str) -> Rows:
         """Return the rows of a table as `table` does, without pandas."""
-        return read_rows(name, self._text(name), self.summary)
+        return read_rows(name, self._text(name), self.summary.get("tables"))
 
     def _text(self, name: str) -> str:
         """Return the text of a table; empty if the run counted none."""

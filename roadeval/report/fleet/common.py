@@ -11,7 +11,7 @@ from roadeval.evaluation.drives import Stratum
 from roadeval.report.blocks import Block, Cell, Table, Text
 from roadeval.report.figures.forest import EXTREMES, NAMED, ForestMean, ForestRow, cut
 from roadeval.results.certainty import MARK, stands
-from roadeval.results.fleet.schema import LIGHT, TAG
+from roadeval.results.schema import LIGHT, TAG
 
 STRATA: Final = 30
 """Parts of a fleet that a table has, at most."""

@@ -21,8 +21,8 @@ from roadeval.evaluation.drives_conditions import FleetJudgement
 from roadeval.evaluation.drives_matching import LeftOut, LeftOutBecause
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.comparison import note
-from roadeval.results.fleet.schema import TAG
 from roadeval.results.fleet.verdict import sentence
+from roadeval.results.schema import TAG
 
 FORMAT: Final = {"name": "roadeval-fleet-comparison", "version": 1}
 NAMED: Final = 5

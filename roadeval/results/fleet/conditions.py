@@ -15,8 +15,8 @@ from roadeval.evaluation.comparison_result import MaskComparison
 from roadeval.evaluation.conditions import Condition, ConditionError
 from roadeval.evaluation.metrics import METRICS
 from roadeval.results.comparison import judged
-from roadeval.results.fleet.schema import ALL
-from roadeval.results.fleet.tables import read_parquet
+from roadeval.results.schema import ALL
+from roadeval.results.tables import read_parquet
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ def judge_drives(
     columns += [f"pooled_{name}" for name in METRICS]
     rows = [
         row
-        for row in read_parquet(folder / "scores.parquet", columns).to_pylist()
+        for row in read_parquet(folder / "scores.parquet", "scores", columns).to_pylist()
         if row["region"] == ALL
     ]
     for condition in conditions:

@@ -16,18 +16,11 @@ from roadeval.results.fleet.conditions import DriveJudgement, judge_drives
 from roadeval.results.fleet.kind import FLEET, JUNIT, METRICS, RUN, is_fleet
 from roadeval.results.fleet.metrics import flat_metrics, junit_xml
 from roadeval.results.fleet.record import RECORDS, Record, read_record
-from roadeval.results.fleet.schema import FORMAT, TABLES
 from roadeval.results.fleet.summary import summarise
-from roadeval.results.fleet.tables import (
-    AGAIN,
-    Member,
-    read_frames,
-    read_parquet,
-    read_whole,
-    write_tables,
-)
-from roadeval.results.reading import ResultsError, arrow_schema
+from roadeval.results.fleet.tables import Member, read_frames, write_tables
+from roadeval.results.schema import TABLES
 from roadeval.results.summary import ALTERED, digest_of, is_as_written, json_text, plain
+from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, read_parquet
 from roadeval.runtime.claims import claimed
 from roadeval.runtime.files import check_folder, put
 from roadeval.runtime.text import is_utf8
@@ -107,7 +100,7 @@ class FleetWriter:
             write_tables(self.folder, members, _Records(self.folder, asked))
             judgements = [*judge_drives(self.folder, conditions, settings.least_frames)]
             summary = {
-                "format": FORMAT,
+                "format": FLEET_FORMAT,
                 **summarise(self.folder, members, settings),
                 "conditions": [_condition(each, judgements) for each in conditions],
                 "run": run,
@@ -122,7 +115,7 @@ class FleetWriter:
 
     def _drives(self) -> Iterator[Mapping[str, Any]]:
         columns = ["drive", "name", "status", "reason", "losses", "seconds", "verdict"]
-        yield from read_parquet(self.folder / "drives.parquet", columns).to_pylist()
+        yield from read_parquet(self.folder / "drives.parquet", "drives", columns).to_pylist()
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
@@ -245,7 +238,7 @@ class Fleet:
         try:
             table = read_frames(self.path, drive)
         except FileNotFoundError:
-            table = arrow_schema(TABLES["frames"]).empty_table()
+            table = TABLES["frames"].arrow().empty_table()
         frame: pd.DataFrame = table.to_pandas()
         return frame
 
@@ -253,7 +246,7 @@ class Fleet:
         """Read a table, or some columns of it, as Arrow has them."""
         path = self.path / f"{name}.parquet"
         try:
-            return read_whole(path, name, columns)
+            return read_parquet(path, name, columns)
         except FileNotFoundError:
             raise ResultsError(f"{path}: is not there; {AGAIN}") from None
 
@@ -281,10 +274,10 @@ def _read(folder: Path) -> dict[str, Any]:
 
 def _check_format(path: Path, content: Any) -> None:
     form = content.get("format") if isinstance(content, dict) else None
-    if form != FORMAT:
+    if form != FLEET_FORMAT:
         raise ResultsError(
-            f"{path}: not of format {FORMAT['name']} {FORMAT['version']}; another version of "
-            "roadeval made it: use that one, or another folder"
+            f"{path}: not of format {FLEET_FORMAT['name']} {FLEET_FORMAT['version']}: another "
+            "version of roadeval made it; use that one, or another folder"
         )
 
 

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Final
 
 from roadeval.errors import RoadevalError
-from roadeval.results.fleet.schema import TABLES
+from roadeval.results.schema import OF_DRIVES
 
 FLEET: Final = "fleet.json"
 """The file that makes a folder a fleet's; written last."""
 RUN: Final = "run.toml"
 METRICS: Final = "metrics.json"
 JUNIT: Final = "junit.xml"
-FILES: Final = (FLEET, RUN, METRICS, JUNIT, *(f"{table}.parquet" for table in TABLES))
+FILES: Final = (FLEET, RUN, METRICS, JUNIT, *(f"{table}.parquet" for table in OF_DRIVES))
 """The files of a fleet's folder."""
 
 

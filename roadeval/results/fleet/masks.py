@@ -10,8 +10,8 @@ import numpy as np
 from roadeval.data.counts import OUTCOMES
 from roadeval.evaluation.drives_comparison_result import Mask, MaskFrames
 from roadeval.results.fleet.record import frames_path
-from roadeval.results.fleet.tables import AGAIN, read_frames
-from roadeval.results.reading import ResultsError
+from roadeval.results.fleet.tables import read_frames
+from roadeval.results.tables import AGAIN, ResultsError
 
 _COLUMNS: Final = ["stamp_ns", "variant", "stage", *OUTCOMES]
 

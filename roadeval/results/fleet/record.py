@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from roadeval.results.fleet.schema import FORMAT, RECORDED, TABLES
-from roadeval.results.reading import ResultsError
+from roadeval.results.schema import OF_DRIVES, TABLES
 from roadeval.results.summary import SUMMARY, digest_of, is_as_written
+from roadeval.results.tables import FLEET_FORMAT, ResultsError
 from roadeval.runtime.files import put
 
 RECORDS: Final = "records"
@@ -50,7 +50,7 @@ class Record:
         What tells cheaply whether its log has changed, as sizes and times of files; None where it
         could not be looked at.
     rows
-        Its rows of each table in `roadeval.results.fleet.schema.RECORDED`.
+        Its rows of each table in `roadeval.results.schema.OF_DRIVES`.
     """
 
     drive: str
@@ -86,7 +86,7 @@ class Record:
             If it cannot be written.
         """
         content = {
-            "format": FORMAT,
+            "format": FLEET_FORMAT,
             "drive": self.drive,
             "asked": self.asked,
             "stamp": self.stamp,
@@ -121,7 +121,7 @@ def _of(content: Any, drive: str) -> Record | None:
             "rows": dict(rows),
             "digest": {"parts": list(parts)},
         } if (
-            form == FORMAT
+            form == FLEET_FORMAT
             and name == drive
             and parts == [*_KEPT]
             and is_as_written(content)
@@ -137,7 +137,7 @@ def _fits(rows: Mapping[str, Any]) -> bool:
     widths = all(
         isinstance(rows.get(name), list)
         and all(isinstance(row, list) and len(row) == len(TABLES[name].names) for row in rows[name])
-        for name in RECORDED
+        for name in OF_DRIVES
     )
     return widths and len(rows["drives"]) == 1
 
@@ -155,12 +155,6 @@ def frames_path(folder: Path, drive: str) -> Path:
 def recording_path(folder: Path, drive: str) -> Path:
     """Return where the recording of a drive stands, if it was kept."""
     return folder / RECORDINGS / f"{drive}.rrd"
-
-
-def cells(table: str, rows: Iterable[Mapping[str, Any]]) -> list[list[Any]]:
-    """Put rows into the order of a table's columns; what a row lacks is None."""
-    names = TABLES[table].names
-    return [[row.get(name) for name in names] for row in rows]
 
 
 def _plain(row: Cells) -> list[Any]:

@@ -23,9 +23,10 @@ from roadeval.evaluation.drives import (
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.fleet.record import FAILED
-from roadeval.results.fleet.schema import ALL, LIGHT, TAG
-from roadeval.results.fleet.tables import Member, read_parquet
+from roadeval.results.fleet.tables import Member
 from roadeval.results.fleet.verdict import verdict_of
+from roadeval.results.schema import ALL, LIGHT, TAG
+from roadeval.results.tables import read_parquet
 from roadeval.version import VERSION
 
 TESTED: Final = "ERR"
@@ -41,7 +42,7 @@ def summarise(
     """Return the content of ``fleet.json``, but for its format and settings, from the tables."""
     columns = ["drive", "status", "reason", "evaluated", "sha256", "warnings"]
     columns += [column.name for column in LIGHT]
-    drives: Rows = read_parquet(folder / "drives.parquet", columns).to_pylist()
+    drives: Rows = read_parquet(folder / "drives.parquet", "drives", columns).to_pylist()
     known = {member.drive: member for member in members}
     across = AcrossSettings(confidence=settings.confidence)
     effects = _final_effects(folder)
@@ -189,7 +190,7 @@ def final_rows(path: Path, columns: Sequence[str] | None = None) -> Rows:
     """Return the rows of the final masks, on all pixels where the table has regions."""
     from pyarrow import compute
 
-    table = read_parquet(path, None if columns is None else [*columns])
+    table = read_parquet(path, path.stem, None if columns is None else [*columns])
     table = table.filter(table["final"])
     if "region" in table.column_names:
         table = table.filter(compute.equal(table["region"], ALL))

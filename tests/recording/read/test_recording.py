@@ -11,7 +11,6 @@ from roadeval.data import Health, Role
 from roadeval.recording import Recorder, Recording, RecordingError
 from roadeval.recording.read.rrd_file import RrdFile
 from roadeval.recording.write.encoding import Images
-from roadeval.results.lines import lines
 from tests.recording.making import (
     HEIGHT,
     RESULTS,
@@ -25,6 +24,7 @@ from tests.recording.making import (
     rows_of,
     unscored,
 )
+from tests.results.making import lines
 
 
 def test_masks_and_labels_of_every_frame_come_back_equal(drive, recording):

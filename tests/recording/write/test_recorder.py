@@ -18,7 +18,6 @@ from roadeval.recording.read.rrd_file import RrdFile
 from roadeval.recording.screen import blueprint, static
 from roadeval.recording.write.batching import CHUNK_BYTES, PendingRows
 from roadeval.recording.write.recorder import LEAST_FREE, UNWRITTEN
-from roadeval.results.lines import lines
 from tests.recording.making import (
     RESULTS,
     SUMMARY,
@@ -29,6 +28,7 @@ from tests.recording.making import (
     result,
     rows_of,
 )
+from tests.results.making import lines
 
 
 def test_nothing_stands_under_the_final_name_before_the_end(drive, tmp_path):
@@ -153,7 +153,7 @@ KILLED = """
     import os, pathlib, signal, sys
     from roadeval.recording import Recorder
     from tests.recording.making import layout, result
-    from roadeval.results.lines import lines
+    from tests.results.making import lines
     with Recorder(pathlib.Path(sys.argv[1]), layout()) as recorder:
         for number in range(int(sys.argv[2])):
             recorder.write(recorder.encode(result(number), lines(result(number))))

@@ -8,8 +8,8 @@ import pytest
 
 from roadeval.recording import Recorder, Recording, RecordingError, RecordRule, SelectiveRecorder
 from roadeval.recording.write.picture_store import PictureStore
-from roadeval.results.lines import lines
 from tests.recording.making import RESULTS, layout, result, rows_of
+from tests.results.making import lines
 
 ERRORS = [0.1, 0.5, 0.3, 0.5, 0.2, 0.4, 0.0]
 

@@ -13,10 +13,10 @@ from roadeval.evaluation import metrics
 from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.fleet.folder import FleetWriter
-from roadeval.results.fleet.record import Record, cells, frames_path
-from roadeval.results.fleet.schema import LIGHT, TABLES
+from roadeval.results.fleet.record import Record, frames_path
 from roadeval.results.fleet.tables import Member
-from roadeval.results.reading import arrow_schema
+from roadeval.results.rows import Key, cells
+from roadeval.results.schema import LIGHT, TABLES
 from roadeval.runtime.files import put
 
 STAGES = ("similarity", "svm", "post")
@@ -59,7 +59,8 @@ def fleet_of(
                 _write_frames(folder, member.drive, masks, lights)
             if i < pictures:
                 _write_pictures(folder, member.drive)
-        tables = {name: cells(name, own) for name, own in rows.items()}
+        key = Key(member.drive, "/camera/image")
+        tables = {name: cells(name, key, own) for name, own in rows.items()}
         Record(member.drive, "asked", None, tables).write(folder)
     writer.finish(members, EvaluationSettings(), RUN if run is None else run, "")
     return folder
@@ -205,6 +206,8 @@ def _write_frames(folder, drive, masks, lights):
     n = len(masks["blind", "post"])
     counts = np.concatenate([*masks.values()])
     columns = {
+        "drive": [drive] * len(counts),
+        "camera": ["/camera/image"] * len(counts),
         "frame": np.tile(np.arange(n), len(masks)),
         "stamp_ns": _stamp(np.tile(np.arange(n), len(masks))),
         "log_time_ns": _stamp(np.tile(np.arange(n), len(masks))),
@@ -213,11 +216,12 @@ def _write_frames(folder, drive, masks, lights):
         "final": [s == "post" for _, s in masks for _ in range(n)],
         **dict(zip(("TP", "TN", "FP", "FN"), counts.T, strict=True)),
         "N": counts.sum(axis=1),
+        **dict(zip(METRICS, metrics.table(counts).T, strict=True)),
         **{name: np.full(len(counts), value) for name, value in lights.items()},
     }
     path = frames_path(folder, drive)
     path.parent.mkdir(parents=True, exist_ok=True)
-    table = pa.table(columns, schema=arrow_schema(TABLES["frames"]))
+    table = pa.table(columns, schema=TABLES["frames"].arrow())
     parquet.write_table(table, path, compression="zstd")
 
 

@@ -8,9 +8,8 @@ import pytest
 from pyarrow import parquet
 
 from roadeval import Fleet
-from roadeval.results.fleet import tables
 from roadeval.results.fleet.masks import read_masks
-from roadeval.results.reading import ResultsError
+from roadeval.results.tables import ResultsError
 from tests.results.fleet.making import fleet_of
 
 
@@ -88,10 +87,10 @@ def test_a_damaged_table_of_frames_says_what_makes_it_anew(folder):
 
 
 def test_a_footer_that_arrow_does_not_understand_is_damage(folder, monkeypatch):
-    def fail(*_):
+    def fail(*_, **__):
         raise pa.ArrowNotImplementedError("unknown encoding")
 
-    monkeypatch.setattr(tables, "read_parquet", fail)
+    monkeypatch.setattr(parquet.ParquetFile, "read", fail)
     with pytest.raises(ResultsError, match=r"damaged \(unknown encoding\); run the fleet"):
         Fleet(folder).table("scores")
 

@@ -4,14 +4,15 @@ import json
 
 import pytest
 
-from roadeval.results.fleet.record import Record, cells, read_record, record_path
-from roadeval.results.fleet.schema import RECORDED
+from roadeval.results.fleet.record import Record, read_record, record_path
+from roadeval.results.rows import Key, cells
+from roadeval.results.schema import OF_DRIVES
 
 
 def write(folder):
     """Write a record whose drive has frames, and a file with a name that is no text."""
     row = {"drive": "a", "evaluated": 100}
-    rows = {name: [] for name in RECORDED} | {"drives": cells("drives", [row])}
+    rows = {name: [] for name in OF_DRIVES} | {"drives": cells("drives", Key("a", ""), [row])}
     made = Record("a", "asked", {"caf\udce9.mcap": [1, 2]}, rows)
     (folder / "records").mkdir()
     made.write(folder)

@@ -1,0 +1,266 @@
+"""Rows of the tables, typed as they are counted, and their text in CSV.
+
+Numbers are written so that they read back the same. An undefined rate is an empty cell.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from roadeval.data import (
+    BASELINE,
+    FILTERED,
+    UNFILTERED,
+    Change,
+    Counts,
+    FrameResult,
+    Rows,
+    Transition,
+)
+from roadeval.evaluation.differences import final_stages
+from roadeval.evaluation.maps import HeatMap, Name
+from roadeval.evaluation.scoreboard import DriveSums
+from roadeval.evaluation.thresholds import Sums, at_levels
+from roadeval.evaluation.windows import Window
+from roadeval.results.schema import ALL, KEY, TABLES, Kind
+from roadeval.runtime.text import visible
+
+Row = tuple[str | int | float, ...]
+"""A row's cells in the order of its table's columns, without the key."""
+ARRAYS: Final = {
+    **dict.fromkeys((Kind.NAME, Kind.TEXT), "str"),
+    **dict.fromkeys((Kind.COUNT, Kind.TIME), "int64"),
+    **dict.fromkeys((Kind.RATE, Kind.NUMBER), "float64"),
+    Kind.FLAG: "bool",
+}
+"""The NumPy type of each kind of column."""
+
+
+class Key(NamedTuple):
+    """What every row begins with."""
+
+    drive: str
+    camera: str
+
+    def cells(self) -> str:
+        """Return both as cells of CSV, with the comma behind them."""
+        return "".join(f"{_quoted(visible(each))}," for each in self)
+
+
+def _quoted(text: str) -> str:
+    return f'"{text.replace(chr(34), chr(34) * 2)}"' if set(text) & {",", '"'} else text
+
+
+def frame_rows(result: FrameResult) -> dict[str, list[Row]]:
+    """Return a frame's rows of each streamed table; empty unless the frame is evaluated."""
+    frame = result.frame
+    return {
+        "frames": [
+            (
+                *(frame.number, frame.stamp_ns, frame.log_time_ns, tally.variant, tally.stage),
+                *(*_counts(tally.counts), *tally.rates.values()),
+            )
+            for tally in result.tallies
+        ],
+        "regions": [
+            (frame.number, tally.variant, tally.stage, region, *_counts(counts))
+            for tally in result.tallies
+            for region, counts in tally.regions.items()
+        ],
+        "oracles": [
+            (
+                *(frame.number, tally.variant, oracle, tally.stage),
+                *(*_counts(tally.counts), *tally.rates.values()),
+            )
+            for oracle, tallies in result.oracles.items()
+            for tally in tallies
+        ],
+        "disagreements": [
+            (frame.number, one, other, change.repaired, change.spoiled, change.labelled)
+            for one, other, change in _pairs(result.changes)
+        ],
+    }
+
+
+def _pairs(changes: Mapping[Transition, Change]) -> Iterator[tuple[str, str, Change]]:
+    """Yield each pair of variants once, with how their final masks differ."""
+    seen: set[str] = set()
+    for (one, _, other, _), change in changes.items():
+        if one == other:
+            continue
+        seen.add(one)
+        if other not in seen:
+            yield one, other, change
+
+
+def sum_rows(sums: DriveSums) -> dict[str, list[Row]]:
+    """Return the rows of each table of sums over the drive."""
+    return {
+        "windows": window_rows(sums.windows),
+        "changes": change_rows(sums.changes),
+        "heat": heat_rows(sums.heat),
+        "probabilities": probability_rows(sums.probabilities),
+    }
+
+
+def window_rows(windows: Iterable[Window]) -> list[Row]:
+    """Return the rows of ``windows``."""
+    return [
+        (
+            *(each.number, each.first_frame, each.last_frame, each.frames),
+            *(each.variant, each.stage),
+            *each.rates.values(),
+            *each.pooled.values(),
+        )
+        for each in windows
+    ]
+
+
+def change_rows(changes: Mapping[Transition, Change]) -> list[Row]:
+    """Return the rows of ``changes``."""
+    return [
+        (*step, change.repaired, change.spoiled, change.labelled)
+        for step, change in changes.items()
+    ]
+
+
+def heat_rows(heat: Mapping[str, HeatMap]) -> list[Row]:
+    """Return the rows of ``heat``, without cells that are never labelled."""
+    rows: list[Row] = []
+    for variant, each in heat.items():
+        side, sums = each.cells()
+        tops, lefts = sums[0].nonzero()
+        cells = np.column_stack(
+            (tops * side, lefts * side, np.full_like(tops, side), *sums[:, tops, lefts])
+        )
+        rows += [(variant, *cell) for cell in cells.tolist()]
+    return rows
+
+
+def probability_rows(found: Mapping[Name, Sums]) -> list[Row]:
+    """Return the rows of ``probabilities``, without levels that do not occur."""
+    rows: list[Row] = []
+    for name, counts in found.items():
+        other, road = at_levels(counts)
+        rows += [
+            (*name, level, int(road[level]), int(other[level]))
+            for level in (other + road).nonzero()[0].tolist()
+        ]
+    return rows
+
+
+def _counts(counts: Counts) -> tuple[int, ...]:
+    return counts.tp, counts.tn, counts.fp, counts.fn, counts.n
+
+
+def csv_lines(key: Key, rows: Mapping[str, Iterable[Row]]) -> dict[str, str]:
+    """Return the lines of CSV of tables that have rows."""
+    start = key.cells()
+    texts = {
+        name: "".join(f"{start}{','.join(map(_cell, row))}\n" for row in own)
+        for name, own in rows.items()
+    }
+    return {name: text for name, text in texts.items() if text}
+
+
+def _cell(value: str | int | float) -> str:
+    """Return the shortest decimal that reads back as the same number."""
+    return "" if isinstance(value, float) and math.isnan(value) else str(value)
+
+
+def as_arrays(name: str, rows: Iterable[Row]) -> Rows:
+    """Return rows of a table as arrays, without the key."""
+    columns = TABLES[name].columns[len(KEY) :]
+    cells = [*zip(*rows, strict=True)] or [()] * len(columns)
+    return Rows(
+        {
+            column.name: np.array(each, ARRAYS[column.kind])
+            for column, each in zip(columns, cells, strict=True)
+        }
+    )
+
+
+# --- Rows of the tables of drives -----------------------------------------------------------------
+
+
+def score_rows(
+    facts: Mapping[str, Any], regions: Mapping[tuple[str, str, str], Mapping[str, Any]]
+) -> Iterator[dict[str, Any]]:
+    """Yield the rows of ``scores``: each mask on every labelled pixel, then region by region.
+
+    Parameters
+    ----------
+    facts
+        Of the drive, as in ``summary.json``.
+    regions
+        Frames, counts and rates by variant, stage and region.
+    """
+    stages = _final_stages(facts)
+    for variant, own in facts["totals"].items():
+        beyond = facts["beyond"].get(variant, {})
+        for stage, total in own.items():
+            final = stages[variant] == stage
+            mask = {"variant": variant, "stage": stage, "final": final}
+            further = {
+                "boundary_f": beyond.get("boundary_F"),
+                "flicker": beyond.get("flicker"),
+                "truth_flicker": beyond.get("truth_flicker"),
+            }
+            yield {**mask, "region": ALL, **total, **(further if final else {})}
+            for (name, after, region), sums in regions.items():
+                if (name, after) == (variant, stage):
+                    yield {**mask, "region": region, **sums}
+
+
+def effect_rows(facts: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield the rows of ``effects``: the filter's by stage, and each variant's against blind."""
+    stages = _final_stages(facts)
+    for stage, rates in facts["difference"].items():
+        pair = (FILTERED, stage), (UNFILTERED, stage)
+        yield from _effects(facts, "filter", *pair, rates, final=stages[FILTERED] == stage)
+    for variant, rates in facts["against_blind"].items():
+        pair = (variant, stages[variant]), (BASELINE, stages[BASELINE])
+        yield from _effects(facts, "blind", *pair, rates, final=True)
+
+
+def _effects(
+    facts: Mapping[str, Any],
+    kind: str,
+    mask: tuple[str, str],
+    base: tuple[str, str],
+    rates: Mapping[str, Mapping[str, Any]],
+    *,
+    final: bool,
+) -> Iterator[dict[str, Any]]:
+    mine, theirs = (facts["totals"][variant][stage] for variant, stage in (mask, base))
+    copied = ("mean", "standard_error", "low", "high", "p", "frames", "effective_frames")
+    for metric, found in rates.items():
+        yield {
+            "kind": kind,
+            "variant": mask[0],
+            "stage": mask[1],
+            "final": final,
+            "base": base[0],
+            "metric": metric,
+            **{name: found[name] for name in copied},
+            "base_wrong": theirs["FP"] + theirs["FN"],
+            "base_N": theirs["N"],
+            "wrong": mine["FP"] + mine["FN"],
+            "N": mine["N"],
+        }
+
+
+def _final_stages(facts: Mapping[str, Any]) -> dict[str, str]:
+    masks = ((variant, stage) for variant, own in facts["totals"].items() for stage in own)
+    return final_stages(masks)
+
+
+def cells(table: str, key: Key, rows: Iterable[Mapping[str, Any]]) -> list[list[Any]]:
+    """Put rows into the order of a table's columns, with their key; what a row lacks is None."""
+    names = TABLES[table].names
+    own = key._asdict()
+    return [[own.get(name, row.get(name)) for name in names] for row in rows]

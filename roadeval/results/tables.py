@@ -1,0 +1,352 @@
+"""Tables read from CSV and Parquet, checked, and written to Parquet."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from roadeval.data import Rows, is_plain
+from roadeval.data.rows import Cells
+from roadeval.errors import RoadevalError
+from roadeval.results.schema import ARROW, KEY, TABLES, TAG, Column, Kind, TableSchema
+from roadeval.runtime.files import NewFile, check_input
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
+    from pyarrow import parquet
+
+NAMED: Final = 40
+"""Letters of a wrong name that a message quotes."""
+BATCH: Final = 50_000
+"""Rows of a table that wait in memory before they are written."""
+FLEET_FORMAT: Final = {"name": "roadeval-fleet", "version": 2}
+"""Of a fleet's folder and its tables; the version rises where a column changes its meaning."""
+AGAIN: Final = "run the fleet's command again"
+_ANEW: Final = "make the results anew with roadeval replay"
+_WORDS: Final = (Kind.NAME, Kind.TEXT)
+
+
+class ResultsError(RoadevalError):
+    """Results that cannot be written or read."""
+
+
+# --- CSV ------------------------------------------------------------------------------------------
+
+
+def read_table(
+    name: str, source: Path | str, stated: Mapping[str, Any] | None = None
+) -> pd.DataFrame:
+    """Read a table of a drive bit-exactly, and check that it is whole.
+
+    Parameters
+    ----------
+    name
+        Of the table, in `roadeval.results.schema.TABLES`.
+    source
+        A CSV file, or its text with the header line. A file that does not exist has no rows, like
+        an empty text.
+    stated
+        The number of rows and the SHA-256 that the summary states of each table, by name. One that
+        it does not state must be empty. None where there is no summary.
+
+    Returns
+    -------
+    DataFrame
+        Words are text, whatever they look like; rates are float64, all other numbers int64.
+
+    Raises
+    ------
+    ResultsError
+        If the table is damaged, or is not the one that the summary states.
+    """
+    import pyarrow as pa
+
+    table = _read(name, source, stated)
+    fields = (
+        each.with_type(pa.string()) if pa.types.is_dictionary(each.type) else each
+        for each in table.schema
+    )
+    return _pandas(table.cast(pa.schema(fields)))
+
+
+def read_rows(name: str, source: Path | str, stated: Mapping[str, Any] | None = None) -> Rows:
+    """Read a table as `read_table` does, as arrays without the key, and without pandas.
+
+    pandas takes a third of a second to import.
+    """
+    table = _read(name, source, stated)
+    return _arrays(table, TABLES[name].columns[len(KEY) :])
+
+
+def fingerprint(content: bytes) -> dict[str, Any]:
+    """Return what a summary states of a table: ``rows`` and ``sha256`` of its text."""
+    rows = max(content.count(b"\n") - 1, 0)
+    return {"rows": rows, "sha256": hashlib.sha256(content).hexdigest()}
+
+
+def _read(name: str, source: Path | str, stated: Mapping[str, Any] | None) -> pa.Table:
+    import pyarrow as pa
+
+    table = TABLES[name]
+    where = source if isinstance(source, Path) else f"the recording's table {name}"
+    try:
+        content = source.encode() if isinstance(source, str) else _content(source)
+    except FileNotFoundError:
+        content = b""
+    except OSError as error:
+        raise ResultsError(f"{where}: {error.strerror}") from error
+    if stated is not None:
+        _check(where, content, stated.get(name))
+    if not content:
+        # Arrow's own `empty_table` imports pandas.
+        return pa.Table.from_batches([], _coded(table))
+    try:
+        if stated is None:
+            _check_lines(content)
+        return _parsed(content, table)
+    except ValueError as error:  # Arrow's too
+        reason = str(error).partition("\n")[0]
+        raise ResultsError(f"{where}: damaged ({reason}); {_ANEW}") from error
+
+
+def _content(path: Path) -> bytes:
+    check_input(path)
+    return path.read_bytes()
+
+
+def _check(where: Path | str, content: bytes, stated: Mapping[str, Any] | None) -> None:
+    found = fingerprint(content)
+    if found == stated or (stated is None and not found["rows"]):
+        return
+    wanted = stated["rows"] if stated else 0
+    difference = (
+        "its content differs" if found["rows"] == wanted else f"{found['rows']} of {wanted} rows"
+    )
+    raise ResultsError(f"{where}: does not agree with its summary ({difference}); {_ANEW}")
+
+
+def _coded(table: TableSchema) -> pa.Schema:
+    """Return the types of a table as it is parsed: each distinct word is held once."""
+    import pyarrow as pa
+
+    words = pa.dictionary(pa.int32(), pa.string())
+    types = ((c.name, words if c.kind in _WORDS else ARROW[c.kind]) for c in table.columns)
+    return pa.schema([*types])
+
+
+def _parsed(content: bytes, table: TableSchema) -> pa.Table:
+    """Parse CSV; a ValueError says what is wrong with it."""
+    from pyarrow import csv
+
+    options = csv.ConvertOptions(column_types=_coded(table))
+    parsed = csv.read_csv(BytesIO(content), convert_options=options)
+    if not content.endswith(b"\n"):
+        raise ValueError("its last line is cut off")
+    if len({*parsed.column_names}) < len(parsed.column_names):
+        raise ValueError("a column is there twice")
+    if missing := [name for name in table.names if name not in parsed.column_names]:
+        raise ValueError(f"no column {', '.join(missing)}")
+    for column in table.columns:
+        if column.kind is not Kind.RATE:
+            _check_cells(column, parsed[column.name])
+    return parsed
+
+
+def _check_lines(content: bytes) -> None:
+    """Refuse, as a ValueError, a table with a line twice: each begins with what it is of."""
+    lines = content.splitlines()
+    if len({*lines}) < len(lines):
+        raise ValueError("a row is there twice")
+
+
+def _check_cells(column: Column, cells: pa.ChunkedArray) -> None:
+    """Refuse, as a ValueError, a column that lacks a value, or a name that is none."""
+    if cells.null_count:
+        raise ValueError(f"column {column.name} lacks a value")
+    chunks = cells.chunks if column.kind is Kind.NAME else ()
+    for name in (name for chunk in chunks for name in chunk.dictionary.to_pylist()):
+        if not is_plain(name):
+            raise ValueError(f"column {column.name} holds {name[:NAMED]!r}, which is no name")
+
+
+# --- Arrays ---------------------------------------------------------------------------------------
+
+
+def _arrays(table: pa.Table, columns: Iterable[Column]) -> Rows:
+    return Rows(
+        {
+            column.name: (_words if column.kind in _WORDS else _numbers)(table[column.name])
+            for column in columns
+        }
+    )
+
+
+def _words(column: pa.ChunkedArray) -> Cells:
+    """Return a column of words as an array of text; a missing one is empty."""
+    import pyarrow as pa
+
+    if not pa.types.is_dictionary(column.type):
+        column = column.dictionary_encode()
+    chunks = column.unify_dictionaries().chunks
+    if not chunks:
+        return np.zeros(0, str)
+    words = np.array([*chunks[0].dictionary.to_pylist(), ""], str)
+    # Arrow's own way to NumPy imports pandas.
+    places: Cells = np.concatenate([_filled(each.indices, -1) for each in chunks])
+    return np.asarray(words[places])
+
+
+def _numbers(column: pa.ChunkedArray) -> Cells:
+    """Return a column of numbers as an array; NaN for an undefined one, -1 for a missing count."""
+    import pyarrow as pa
+
+    if not column.chunks:
+        return np.zeros(0, column.type.to_pandas_dtype())
+    if pa.types.is_boolean(column.type):
+        return np.array(column.to_pylist(), bool)
+    blank = np.nan if pa.types.is_floating(column.type) else -1
+    return np.concatenate([_filled(each, blank) for each in column.chunks])
+
+
+def _filled(cells: pa.Array, blank: float) -> Cells:
+    # Filling imports pandas.
+    return np.from_dlpack(cells.fill_null(blank) if cells.null_count else cells)
+
+
+def _pandas(table: pa.Table) -> pd.DataFrame:
+    frame: pd.DataFrame = table.to_pandas()
+    return frame
+
+
+# --- Parquet --------------------------------------------------------------------------------------
+
+
+class TableFile:
+    """Writes a table of a fleet in pieces; to be used as a context.
+
+    Without `finish` no file takes the table's name.
+    """
+
+    def __init__(self, path: Path, name: str, tags: Iterable[str] = ()) -> None:
+        self._schema: Final = _of_a_fleet(name, tags)
+        self._file: Final = NewFile(path)
+        self._rows: list[Any] = []
+        self._writer: parquet.ParquetWriter | None = None
+        self._finished = False
+
+    def __enter__(self) -> TableFile:
+        from pyarrow import parquet
+
+        self._file.begin()
+        # Pages have checksums, for Arrow's ZSTD has none.
+        self._writer = parquet.ParquetWriter(
+            self._file.partial, self._schema, compression="zstd", write_page_checksum=True
+        )
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        assert self._writer is not None
+        try:
+            self._writer.close()
+            if kind is None and self._finished:
+                self._file.publish()
+        finally:
+            self._file.discard()
+
+    def add(self, rows: Iterable[Any]) -> None:
+        """Add rows, each in the order of the columns; NaN is no value."""
+        self._rows.extend(rows)
+        if len(self._rows) >= BATCH:
+            self._flush()
+
+    def finish(self) -> None:
+        """Write what waits: the table is whole."""
+        self._flush()
+        self._finished = True
+
+    def _flush(self) -> None:
+        import pyarrow as pa
+
+        assert self._writer is not None
+        columns = zip(*self._rows, strict=True) if self._rows else [()] * len(self._schema)
+        arrays = [
+            pa.array(column, kind, from_pandas=True)
+            for column, kind in zip(columns, self._schema.types, strict=True)
+        ]
+        self._writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
+        self._rows = []
+
+
+def _of_a_fleet(name: str, tags: Iterable[str]) -> pa.Schema:
+    import pyarrow as pa
+
+    schema = TABLES[name].arrow()
+    for tag in tags:
+        schema = schema.append(pa.field(f"{TAG}{tag}", pa.string()))
+    return schema.with_metadata({"roadeval": json.dumps(FLEET_FORMAT), "about": TABLES[name].doc})
+
+
+def read_parquet(
+    path: Path, name: str, columns: list[str] | None = None, remedy: str = AGAIN
+) -> pa.Table:
+    """Read a table of a fleet's folder, which others may have damaged.
+
+    Parameters
+    ----------
+    path
+        The file.
+    name
+        The table's, in `roadeval.results.schema.TABLES`.
+    columns
+        Which are needed; all by default.
+    remedy
+        What the user can do where it is damaged.
+
+    Raises
+    ------
+    FileNotFoundError
+        If it is not there.
+    ResultsError
+        If it cannot be read, or lacks a column, or one is of another type.
+    """
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    try:
+        # As one file: of a path with "drive=" in it a column would be made.
+        with parquet.ParquetFile(path, page_checksum_verification=True) as file:
+            table = file.read(columns=columns)
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError, pa.ArrowException) as error:
+        reason = str(error).partition("\n")[0]
+        raise ResultsError(f"{path}: damaged ({reason}); {remedy}") from error
+    for column in TABLES[name].arrow():
+        if column.name not in table.column_names:
+            if columns is None or column.name in columns:
+                raise ResultsError(f"{path}: has no column {column.name}; {remedy}")
+        elif table.schema.field(column.name).type != column.type:
+            raise ResultsError(
+                f"{path}: damaged (column {column.name} is not of type {column.type}); {remedy}"
+            )
+    return table
+
+
+def parquet_rows(table: pa.Table, name: str) -> Rows:
+    """Return a table that was read as arrays, with those of its columns that are there."""
+    schema = TABLES[name]
+    there = set(table.column_names)
+    return _arrays(table, [c for c in (*schema.columns, *schema.of_a_fleet) if c.name in there])
+
+
+def rows_as_dicts(table: pa.Table) -> Iterator[dict[str, Any]]:
+    """Yield the rows of a table; what is undefined is None."""
+    for batch in table.to_batches(max_chunksize=BATCH):
+        yield from batch.to_pylist()

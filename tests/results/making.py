@@ -1,0 +1,13 @@
+"""Lines of tables, as a replay writes them."""
+
+from roadeval.results.rows import Key, csv_lines, frame_rows, sum_rows
+
+KEY = Key("street", "/camera/image")
+
+
+def lines(result):
+    return csv_lines(KEY, frame_rows(result))
+
+
+def sum_lines(sums):
+    return csv_lines(KEY, sum_rows(sums))
