@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from roadeval.data import FILTERED, FINAL_STAGE, UNFILTERED
-from roadeval.evaluation.windows import Window
+from roadeval.evaluation.frame_counts import Window
 
 
 @dataclass(frozen=True, slots=True)

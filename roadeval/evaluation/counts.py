@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
+from math import isqrt
 
 import numpy as np
 
 from roadeval.data import ERRORS, Layer, Mask, Truth, TruthBits
-from roadeval.data.arrays import Bits, Sums
+from roadeval.data.arrays import Bits, Reach, Sums
 from roadeval.data.packed import everywhere
-from roadeval.evaluation.bits import flat
 from roadeval.kernels import KERNELS
 
 
@@ -48,3 +49,27 @@ def error_map(mask: Mask, truth: Truth) -> Layer:
         ``(H, W)`` uint8: 0, 1, or 255 for ignored.
     """
     return Layer(ERRORS, KERNELS.outcomes(mask, truth))
+
+
+def grow(bits: Bits, reach: Reach, truth: TruthBits) -> Bits:
+    """Dilate a mask of the truth's shape by an element."""
+    grown: Bits = KERNELS.dilate(bits, reach, truth.shape[1])
+    return grown
+
+
+@lru_cache(maxsize=8)
+def square(radius: int) -> Reach:
+    """Return the element of ``radius`` pixels in chessboard distance, ``(radius + 1,)`` int64."""
+    return np.full(radius + 1, radius)
+
+
+@lru_cache(maxsize=8)
+def disk(radius: int) -> Reach:
+    """Return the element of ``radius`` pixels in Euclidean distance, ``(radius + 1,)`` int64."""
+    return np.array([isqrt(radius**2 - row**2) for row in range(radius + 1)])
+
+
+def flat(masks: Bits | Sequence[Bits]) -> Bits:
+    """Lay each mask's rows one after the other: ``(K, H * words)``."""
+    stacked = np.asarray(masks, np.uint64)
+    return stacked.reshape(len(stacked), stacked.shape[1] * stacked.shape[2])

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from roadeval.data import Change, Layer, Transition, TruthBits
 from roadeval.data.arrays import Bits
 from roadeval.data.packed import everywhere, ones
-from roadeval.evaluation.bits import flat
+from roadeval.evaluation.counts import flat
 from roadeval.kernels import KERNELS
 
 Sums = npt.NDArray[np.int64]

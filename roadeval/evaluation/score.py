@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TypeVar
+from dataclasses import dataclass, field
+from typing import Any, Final, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from roadeval.data import (
     BASELINE,
     FINAL_STAGE,
+    IGNORE,
+    ROAD,
     Counts,
     Frame,
     FrameResult,
+    Health,
     Role,
     Tally,
+    Truth,
     TruthBits,
     VariantResult,
 )
 from roadeval.data.arrays import Bits, Sums
 from roadeval.data.packed import Packed, ones
-from roadeval.evaluation import contours, counts, health, maps, metrics, regions
-from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation import counts, maps, metrics, regions
+from roadeval.evaluation.edges_and_flicker import boundary_f
 from roadeval.evaluation.maps import Name
 from roadeval.evaluation.region import LabelledFrame
 from roadeval.evaluation.settings import EvaluationSettings
@@ -75,10 +81,10 @@ def score_frame(
         variants,
         errors={v.variant: counts.error_map(v.final(), frame.truth) for v in variants},
         tallies=tallies,
-        health={name: health.judge(own, blind, settings) for name, own in finals.items()},
+        health={name: judge(own, blind, settings) for name, own in finals.items()},
         truth_bits=truth,
         changes=maps.changes(list(masks), bits, truth),
-        contours=contours.boundary_f(final_bits, truth, settings.boundary_width),
+        contours=boundary_f(final_bits, truth, settings.boundary_width),
         histograms={
             (variant.variant, each.stage): histogram(each.output.probability, frame.truth)
             for variant in variants
@@ -156,3 +162,81 @@ def _masks(
     if prior is not None:
         named[BASELINE, FINAL_STAGE] = prior.mask(shape)
     return named
+
+
+Rates = Mapping[str, float]
+
+
+def judge(rates: Rates, blind: Rates | None, settings: EvaluationSettings) -> Health:
+    """Return a variant's health by its final mask's rates and the baseline's, if there is one.
+
+    An undefined rate counts neither for nor against it. The thresholds and their reasons stand in
+    `EvaluationSettings`.
+    """
+    if rates["ERR"] >= settings.failed_err or rates["FNR"] >= settings.failed_fnr:
+        return Health.FAILED
+    worse = blind is not None and rates["ERR"] - blind["ERR"] > settings.degraded_margin
+    if worse or rates["ERR"] >= settings.degraded_err:
+        return Health.DEGRADED
+    return Health.OK
+
+
+_NEAREST: Final = 0
+_LINEAR: Final = 1
+"""OpenCV's numbers for the two, so that importing this module does not import OpenCV."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BlindPrior:
+    """Where the road was in the training frames.
+
+    Parameters
+    ----------
+    road
+        ``(H, W)`` float32: the share of the training frames in which a pixel was road, among
+        those that label it; 0 where none does.
+    """
+
+    road: npt.NDArray[np.float32]
+    _masks: dict[tuple[int, int], Packed] = field(default_factory=dict, init=False, repr=False)
+
+    @classmethod
+    def of_truths(cls, truths: Sequence[Truth]) -> BlindPrior:
+        """Average the truths, each ``(H, W)`` uint8 with 255 for ignored.
+
+        Truths of another size than the first are brought to it, nearest pixel.
+
+        Raises
+        ------
+        ValueError
+            If there is none.
+        """
+        if not truths:
+            raise ValueError("a prior needs at least one truth")
+        road = np.zeros(truths[0].shape, np.float32)
+        labelled = np.zeros_like(road)
+        for truth in truths:
+            resized = _resized(truth, road.shape, _NEAREST)
+            road += resized == ROAD
+            labelled += resized != IGNORE
+        return cls(np.divide(road, labelled, out=np.zeros_like(road), where=labelled > 0))
+
+    def mask(self, shape: tuple[int, int]) -> Packed:
+        """Return the baseline's mask for a frame of ``shape`` (height, width): road from one half.
+
+        It is computed once for a shape, and read-only.
+        """
+        if shape not in self._masks:
+            mask = Packed.of(_resized(self.road, shape, _LINEAR) >= 0.5)
+            mask.bits.flags.writeable = False
+            self._masks[shape] = mask
+        return self._masks[shape]
+
+
+def _resized(image: npt.NDArray[Any], shape: tuple[int, ...], how: int) -> npt.NDArray[Any]:
+    if image.shape == shape:
+        return image
+    import cv2
+
+    resized: npt.NDArray[Any] = cv2.resize(image, (shape[1], shape[0]), interpolation=how)
+    return resized

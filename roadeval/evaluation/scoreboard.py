@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import heapq
+import math
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from operator import attrgetter
 from typing import Any, Final
+
+import numpy as np
 
 from roadeval.data import (
     BASELINE,
@@ -18,18 +21,23 @@ from roadeval.data import (
     Transition,
     VariantResult,
 )
-from roadeval.evaluation import windows
-from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.claims import evidence
-from roadeval.evaluation.curves import Curves
 from roadeval.evaluation.differences import DriveDifferences, drive_differences
 from roadeval.evaluation.edges_and_flicker import EdgesAndFlicker
-from roadeval.evaluation.frame_counts import FrameCounts, GrowingCounts, RegionSums, sum_up
+from roadeval.evaluation.frame_counts import (
+    FrameCounts,
+    GrowingCounts,
+    RegionSums,
+    Window,
+    cut,
+    paired,
+    sum_up,
+)
 from roadeval.evaluation.maps import HeatMap, Maps, Name
-from roadeval.evaluation.repeats import Repeats
-from roadeval.evaluation.score import score_frame
+from roadeval.evaluation.metrics import COMPARED, METRICS
+from roadeval.evaluation.score import BlindPrior, score_frame
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.thresholds import Sums
+from roadeval.evaluation.thresholds import Curves, Sums
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +47,7 @@ class DriveSums:
     Windows, changes of masks, heat maps, and pixels by how probable road is.
     """
 
-    windows: Sequence[windows.Window]
+    windows: Sequence[Window]
     changes: Mapping[Transition, Change]
     heat: Mapping[str, HeatMap]
     probabilities: Mapping[Name, Sums]
@@ -141,9 +149,9 @@ class Scoreboard:
         """Sum up by variant, stage and region, as in `totals`."""
         return self._regions.totals()
 
-    def windows(self) -> Iterator[windows.Window]:
+    def windows(self) -> Iterator[Window]:
         """Cut the drive into windows: by window, then variant and stage."""
-        rows = (windows.cut(mask, self._frames, self._settings.window) for mask in self._masks())
+        rows = (cut(mask, self._frames, self._settings.window) for mask in self._masks())
         return heapq.merge(*rows, key=attrgetter("number"))
 
     def differences(self) -> DriveDifferences:
@@ -151,7 +159,7 @@ class Scoreboard:
         return drive_differences(self._masks(), self._settings)
 
     def repeats(self) -> dict[str, Any]:
-        """Return the rates with each seed: see `roadeval.evaluation.repeats.Repeats.rates`."""
+        """Return the rates with each seed: see `roadeval.evaluation.scoreboard.Repeats.rates`."""
         return self._repeats.rates(self._masks())
 
     def summary(self) -> dict[str, Any]:
@@ -186,3 +194,68 @@ class Scoreboard:
         for (variant, stage), total in self._seconds.items():
             mean.setdefault(variant, {})[stage] = total / self._runs[variant, stage]
         return mean
+
+
+RateLists = dict[str, list[float]]
+"""By rate: its value with each seed, in the order of the seeds."""
+
+
+class Repeats:
+    """The counts of every mask of a drive, with each further seed."""
+
+    def __init__(self) -> None:
+        self._counts: defaultdict[int, defaultdict[Name, GrowingCounts]] = defaultdict(
+            lambda: defaultdict(GrowingCounts)
+        )
+
+    def add(self, position: int, result: FrameResult) -> None:
+        """Add the evaluated frame at ``position``, counted from 0."""
+        for seed, tallies in result.repeats.items():
+            for tally in tallies:
+                self._counts[seed][tally.variant, tally.stage].append(position, tally.counts)
+
+    def rates(self, masks: Sequence[FrameCounts]) -> dict[str, Any]:
+        """Return the rates with each seed, in their order: first those of ``masks``, the run's own.
+
+        Returns
+        -------
+        dict
+            ``totals``, by variant and stage the mean and the pooled rates; ``difference``, by stage
+            the mean paired differences, filtered minus unfiltered. Empty without a further seed.
+            A mask that no training has to do with is not in it.
+        """
+        if not self._counts:
+            return {}
+        trainings = [_by_name(masks)]
+        for _, counts in sorted(self._counts.items()):
+            trainings.append({name: own.so_far(*name) for name, own in counts.items()})
+        names = [name for name in trainings[0] if name in trainings[-1]]
+        totals: dict[str, dict[str, RateLists]] = {}
+        for variant, stage in names:
+            sums = [sum_up(training[variant, stage].counts) for training in trainings]
+            totals.setdefault(variant, {})[stage] = {
+                rate: [each[rate] for each in sums] for rate in (*METRICS, *_POOLED)
+            }
+        return {"totals": totals, "difference": _differences(trainings, names)}
+
+
+_POOLED = tuple(f"pooled_{name}" for name in METRICS)
+
+
+def _by_name(masks: Sequence[FrameCounts]) -> dict[Name, FrameCounts]:
+    return {(mask.variant, mask.stage): mask for mask in masks}
+
+
+def _differences(
+    trainings: Sequence[Mapping[Name, FrameCounts]], names: Sequence[Name]
+) -> dict[str, RateLists]:
+    """Return the mean paired differences by stage and rate, one a training."""
+    found: dict[str, RateLists] = {}
+    for training in trainings:
+        for stage, table in paired([training[name] for name in names]):
+            for rate, values in zip(METRICS, table.T, strict=True):
+                if rate in COMPARED:
+                    known = values[~np.isnan(values)]
+                    mean = float(known.mean()) if len(known) else math.nan
+                    found.setdefault(stage, {}).setdefault(rate, []).append(mean)
+    return found

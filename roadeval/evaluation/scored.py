@@ -16,8 +16,7 @@ import numpy.typing as npt
 from roadeval.data import FILTERED, UNFILTERED, Counts, Rows
 from roadeval.data.counts import OUTCOMES
 from roadeval.evaluation import differences, metrics
-from roadeval.evaluation.frame_counts import FourCounts, FrameCounts, sum_up
-from roadeval.evaluation.windows import Window, cut
+from roadeval.evaluation.frame_counts import FourCounts, FrameCounts, Window, cut, sum_up
 
 FILTER: Final = "filter"
 """The part of an error rate that the filter caused, beside the stages'."""

@@ -17,8 +17,8 @@ from roadeval.evaluation import comparison, scored
 from roadeval.evaluation.comparison import Side
 from roadeval.evaluation.comparison_result import Comparison, EndMissing
 from roadeval.evaluation.conditions import Condition, Judgement, judge
+from roadeval.evaluation.frame_counts import Window
 from roadeval.evaluation.settings import settings_of
-from roadeval.evaluation.windows import Window
 from roadeval.jobs.result import Result
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.comparison import as_dict, judged

@@ -9,8 +9,8 @@ import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Health
 from roadeval.evaluation import analysis, scored
-from roadeval.evaluation.health import judge
 from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.score import judge
 from roadeval.evaluation.settings import EvaluationSettings, settings_of
 from roadeval.jobs.report_frames import LAYERS, FramePicker, evenly, rates_by_frame
 from roadeval.jobs.result import Result

@@ -11,8 +11,8 @@ from typing import Any
 from roadeval import logs
 from roadeval.config import RunConfig, Variant
 from roadeval.data import VariantLayout
-from roadeval.evaluation.baselines import BlindPrior
 from roadeval.evaluation.metrics import METRICS
+from roadeval.evaluation.score import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.jobs import frame
 from roadeval.jobs.failures import Failures

@@ -22,10 +22,10 @@ from roadeval.data import (
     Transition,
 )
 from roadeval.evaluation.differences import final_stages
+from roadeval.evaluation.frame_counts import Window
 from roadeval.evaluation.maps import HeatMap, Name
 from roadeval.evaluation.scoreboard import DriveSums
 from roadeval.evaluation.thresholds import Sums, at_levels
-from roadeval.evaluation.windows import Window
 from roadeval.results.schema import ALL, KEY, TABLES, Kind
 from roadeval.runtime.text import visible
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from roadeval.data import Frame
-from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.score import BlindPrior
 from roadeval.pipeline.chain import Pipeline
 from roadeval.training.choice import (
     Readable,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.score import BlindPrior
 from tests.evaluation.making import pixels
 
 

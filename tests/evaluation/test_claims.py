@@ -1,7 +1,7 @@
 """The paper's claims, on windows written by hand."""
 
 from roadeval.evaluation.claims import CLAIMS, Evidence, evidence
-from roadeval.evaluation.windows import Window
+from roadeval.evaluation.frame_counts import Window
 from roadeval.results.claims import WORDS
 
 NAN = float("nan")

@@ -8,8 +8,8 @@ from scipy.ndimage import distance_transform_edt
 
 from roadeval.data import IGNORE, TruthBits
 from roadeval.data.packed import pack
-from roadeval.evaluation import contours
-from roadeval.evaluation.bits import disk
+from roadeval.evaluation import edges_and_flicker as contours
+from roadeval.evaluation.counts import disk
 from tests.evaluation.making import pixels, unpacked
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from roadeval.data import Counts, Health
 from roadeval.evaluation import metrics
-from roadeval.evaluation.health import Rates, judge
+from roadeval.evaluation.score import Rates, judge
 from roadeval.evaluation.settings import EvaluationSettings
 
 SETTINGS = EvaluationSettings(

@@ -5,8 +5,7 @@ import numpy as np
 from roadeval.data import TruthBits
 from roadeval.evaluation import regions
 from roadeval.evaluation.region import LabelledFrame
-from roadeval.evaluation.regions.bands import row_bands
-from roadeval.evaluation.regions.boundary import boundary
+from roadeval.evaluation.regions.standard import boundary, row_bands
 from roadeval.evaluation.settings import EvaluationSettings
 from tests.evaluation.making import a_frame, a_variant, pixels, unpacked
 

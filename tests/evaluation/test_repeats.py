@@ -6,7 +6,7 @@ import pytest
 
 from roadeval.data import Role
 from roadeval.data.packed import Packed
-from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.score import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from tests.evaluation.making import a_frame, a_variant, pixels

@@ -9,8 +9,7 @@ import pytest
 
 from roadeval.data import Change, Counts, Health, Role
 from roadeval.data.packed import Packed
-from roadeval.evaluation.baselines import BlindPrior
-from roadeval.evaluation.score import CountsNotConservedError, check_conserved
+from roadeval.evaluation.score import BlindPrior, CountsNotConservedError, check_conserved
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from tests.evaluation.making import a_frame, a_variant, pixels

@@ -8,7 +8,7 @@ import pytest
 
 from roadeval.data import Role, Rows
 from roadeval.evaluation import scored
-from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.score import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.schema import TABLES

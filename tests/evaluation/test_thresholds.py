@@ -13,9 +13,9 @@ from sklearn.metrics import (
     roc_curve,
 )
 
-from roadeval.evaluation.curves import Curves
 from roadeval.evaluation.thresholds import (
     CODES,
+    Curves,
     Thresholds,
     at_levels,
     average_precision,

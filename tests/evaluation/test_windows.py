@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 
 from roadeval.data import Counts
-from roadeval.evaluation import metrics, windows
+from roadeval.evaluation import frame_counts as windows
+from roadeval.evaluation import metrics
 from roadeval.evaluation.frame_counts import FrameCounts, GrowingCounts, sum_up
 
 

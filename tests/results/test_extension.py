@@ -10,7 +10,7 @@ METRIC = '''
 
 from roadeval.evaluation.metric import Metric, ratio
 
-METRIC = Metric(
+FDR = Metric(
     name="FDR",
     title="false discovery rate",
     formula="FP / (TP + FP)",
@@ -18,6 +18,7 @@ METRIC = Metric(
     higher_is_better=False,
     order=30,
 )
+METRICS = (FDR,)
 '''
 REGION = '''
 """The leftmost columns."""
@@ -33,7 +34,7 @@ def left(labelled):
     return pack(np.arange(width)[None].repeat(height, 0) < 2)
 
 
-REGION = Region("left", "on the left", order=25, find=left)
+REGIONS = (Region("left", "on the left", order=25, find=left),)
 '''
 PROGRAM = """
 import importlib.util

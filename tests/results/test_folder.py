@@ -14,7 +14,7 @@ import pytest
 
 from roadeval.data import FrameResult, Role
 from roadeval.data.packed import Packed
-from roadeval.evaluation.baselines import BlindPrior
+from roadeval.evaluation.score import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.folder import ResultsFolder, ResultsWriter, belonging

@@ -1,6 +1,6 @@
-"""The metrics, one file each: the paper's six (Eq. 24-29) and those a reader of today expects.
+"""The metrics.
 
-To add one, add a file with a ``METRIC``: it becomes a column of the tables, a series of the
+To add one, add a file with ``METRICS``: each becomes a column of the tables, a series of the
 recording, and a rate of every screen, graph and report, as its attributes say.
 """
 
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from itertools import chain
 from typing import Final
 
 import numpy as np
@@ -19,7 +20,8 @@ from roadeval.runtime.discovery import by_name, found_in
 
 ALL: Final[Mapping[str, Metric]] = by_name(
     sorted(
-        found_in(sys.modules[__name__], "METRIC"), key=lambda metric: (metric.order, metric.name)
+        chain(*found_in(sys.modules[__name__], "METRICS")),
+        key=lambda metric: (metric.order, metric.name),
     )
 )
 METRICS: Final = {name: metric for name, metric in ALL.items() if metric.tabled}

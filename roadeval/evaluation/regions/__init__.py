@@ -1,12 +1,13 @@
-"""The regions, one file each: sets of pixels that are counted apart, to tell where the errors are.
+"""The regions: sets of pixels that are counted apart, to show where the errors are.
 
-To add one, add a file with a ``REGION``: it becomes rows of ``regions.csv`` and of the report.
+To add one, add a file with ``REGIONS``: each becomes rows of ``regions.csv`` and of the report.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Collection
+from itertools import chain
 from typing import Final
 
 from roadeval.data.arrays import Bits
@@ -14,7 +15,7 @@ from roadeval.evaluation.region import LabelledFrame, Region, RegionFamily
 from roadeval.runtime.discovery import found_in
 
 REGIONS: Final[tuple[Region | RegionFamily, ...]] = tuple(
-    sorted(found_in(sys.modules[__name__], "REGION"), key=lambda region: region.order)
+    sorted(chain(*found_in(sys.modules[__name__], "REGIONS")), key=lambda region: region.order)
 )
 
 

@@ -1,0 +1,105 @@
+"""The regions that every run counts: detected and true shadow, the road's edge, image rows."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from roadeval.data import TruthBits
+from roadeval.data.arrays import Bits
+from roadeval.data.packed import Packed, everywhere
+from roadeval.evaluation.counts import grow, square
+from roadeval.evaluation.region import LabelledFrame, Region, RegionFamily, fixed
+
+SHADOW_TITLES: Final = {
+    "shadow": "inside detected shadow",
+    "shadow_edge": "at the edge of detected shadow",
+    "lit": "in light",
+}
+
+
+def detected(labelled: LabelledFrame) -> dict[str, Bits]:
+    """Collect the regions that stages handed out.
+
+    The first variant that has a region of a name gives it to all: variants are compared on the
+    same pixels.
+    """
+    masks: dict[str, Packed] = {}
+    for variant in labelled.variants:
+        for result in variant.stages:
+            for name, mask in result.output.regions.items():
+                masks.setdefault(name, mask)
+    return dict(zip(masks, labelled.truth.bits_of(masks.values()), strict=True))
+
+
+def true_shadow(labelled: LabelledFrame) -> Bits | None:
+    """Return the truly shadowed pixels, ``(H, words)``; None without a truth of shadow."""
+    if labelled.frame.shadow_truth is None:
+        return None
+    bits: Bits = labelled.truth.bits_of([Packed.of(labelled.frame.shadow_truth == 1)])[0]
+    return bits
+
+
+EDGE_TITLES: Final = {"boundary": "near the road's edge", "interior": "away from the road's edge"}
+
+
+def boundary(truth: TruthBits, width: int) -> Bits:
+    """Mark the pixels within ``width`` of the edge between road and non-road, ``(H, words)``.
+
+    A pixel belongs to it if the square of side ``2 * width + 1`` around it holds both road and
+    non-road of the truth. An ignored pixel is neither, so where road meets ignored pixels there
+    is no edge. ``width`` is in pixels on either side, in chessboard distance.
+    """
+    element = square(width)
+    return grow(truth.road, element, truth) & grow(truth.other, element, truth)
+
+
+def _halves(labelled: LabelledFrame) -> dict[str, Bits]:
+    near = boundary(labelled.truth, labelled.settings.boundary_width)
+    return {"boundary": near, "interior": near ^ everywhere(labelled.truth.shape)}
+
+
+@lru_cache(maxsize=8)
+def row_bands(shape: tuple[int, int], bands: int) -> Mapping[str, Bits]:
+    """Cut an image's rows into stripes of equal height to within a row, ``(H, words)`` each.
+
+    Parameters
+    ----------
+    shape
+        Height and width in pixels.
+    bands
+        Number of stripes; ``band_0`` is the topmost.
+    """
+    stripe = np.arange(shape[0]) * bands // shape[0]
+    whole = everywhere(shape)
+    return {
+        f"band_{index}": np.where((stripe == index)[:, None], whole, np.uint64(0))
+        for index in range(bands)
+    }
+
+
+def _bands(labelled: LabelledFrame) -> Mapping[str, Bits]:
+    return row_bands(labelled.truth.shape, labelled.settings.bands)
+
+
+def _titles(names: Collection[str], height: int) -> dict[str, str]:
+    bands = [name for name in names if name.startswith("band_")]
+    titles = {}
+    for place, name in enumerate(bands):
+        first, after = (-(-height * edge // len(bands)) for edge in (place, place + 1))
+        rows = (
+            f"image rows {first}\N{EN DASH}{after - 1}" if height else f"image rows, band {place}"
+        )
+        titles[name] = rows + {0: ", the top", len(bands) - 1: ", the bottom"}.get(place, "")
+    return titles
+
+
+REGIONS: Final = (
+    RegionFamily(order=10, found=detected, titles=fixed(SHADOW_TITLES)),
+    Region("true_shadow", "inside true shadow", order=20, find=true_shadow),
+    RegionFamily(order=30, found=_halves, titles=fixed(EDGE_TITLES), whole=True),
+    RegionFamily(order=40, found=_bands, titles=_titles, whole=True),
+)
