@@ -81,9 +81,11 @@ def started(
     Raises
     ------
     FleetError
-        If Dask is not installed, or the scheduler does not answer.
+        If the scheduler does not answer.
     """
-    dask, distributed = _dask()
+    import dask
+    import distributed
+
     with ExitStack() as stack:
         if scheduler is None:
             stack.enter_context(_safe_path())
@@ -166,17 +168,6 @@ def _connected(distributed: Any, scheduler: str) -> Iterator[Any]:
             yield client
     finally:
         log.setLevel(before)
-
-
-def _dask() -> tuple[Any, Any]:
-    try:
-        import dask
-        import distributed
-    except ImportError as error:
-        raise FleetError(
-            "a fleet needs Dask's scheduler, which is not installed: pip install 'roadeval[fleet]'"
-        ) from error
-    return dask, distributed
 
 
 def _processors() -> int:

@@ -1,1 +1,6 @@
-"""Networks in ONNX files: what a file tells of itself, who runs it, and what its output means."""
+"""Networks in ONNX files: what a file says of itself, its inputs and outputs, and its road mask."""
+
+from roadeval.networks.network import FULL, Network, Road
+from roadeval.networks.settings import NetSettings, NetworkError
+
+__all__ = ["FULL", "NetSettings", "Network", "NetworkError", "Road"]

@@ -4,43 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Final, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Mask, Probability, Rgb
 from roadeval.data.arrays import Values
-from roadeval.networks import metadata
-from roadeval.networks.loaded import Loaded, load
-from roadeval.networks.placement import Placement, placement
-from roadeval.networks.scores import as_scores, road_numbers, road_probability
+from roadeval.networks.onnx_file import OnnxFile, load
+from roadeval.networks.placement import Placement, input_values, placement
 from roadeval.networks.settings import NetSettings
-from roadeval.networks.stating import is_labels, stated
-from roadeval.networks.values import input_values
+from roadeval.networks.stating import as_scores, class_names, is_labels, licence, stated
 
-FULL = 65535
+FULL: Final = 65535
 """The code of a probability of 1."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Road:
-    """The road mask of a frame by a network, and its probability.
-
-    Parameters
-    ----------
-    mask
-        ``(H, W)`` uint8, 1 road.
-    codes
-        How probable road is, ``(H, W)`` uint16 codes 0..65535 that span 0..1.
-    graded
-        Whether the mask is a threshold on them; otherwise the network gives classes alone, and
-        they are 0 and 65535.
-    """
+    """The road of a frame by a network."""
 
     mask: Mask
+    """``(H, W)`` uint8, 1 road."""
     codes: Probability
+    """How probable road is, ``(H, W)`` uint16 codes 0..65535 that span 0..1."""
     graded: bool
+    """Whether the mask is a threshold on them; otherwise the network gives classes alone, and they
+    are 0 and 65535."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +38,7 @@ class Network:
     """A network with settings that leave nothing open; any thread may call its methods."""
 
     settings: NetSettings
-    loaded: Loaded
+    file: OnnxFile
 
     @classmethod
     def of(cls, settings: NetSettings) -> Self:
@@ -59,8 +49,8 @@ class Network:
         NetworkError
             If it cannot be used, or settings are missing that its file does not tell.
         """
-        loaded = load(settings)
-        return cls(stated(settings, loaded), loaded)
+        file = load(settings)
+        return cls(stated(settings, file), file)
 
     def road(self, image: Rgb) -> Road:
         """Find the road in an ``(H, W, 3)`` uint8 RGB image.
@@ -72,14 +62,14 @@ class Network:
         Raises
         ------
         NetworkError
-            If the network fails on it, or gives numbers that are none.
+            If the network fails on it, or gives NaN.
         """
         settings = self.settings
         assert settings.size is not None
         height, width = image.shape[:2]
         place = placement((width, height), settings.size, settings.resize)
-        values = input_values(place.image(image), settings, self.loaded.file.inputs[0].dtype)
-        outputs = self.loaded.backend.run(values, settings.outputs or ())
+        values = input_values(place.image(image), settings, self.file.inputs[0].dtype)
+        outputs = self.file.run(values, settings.outputs or ())
         codes = np.maximum.reduce([self._codes(output, place) for output in outputs])
         limit = round((0.5 if settings.decide == "argmax" else settings.threshold) * FULL)
         mask = (codes > limit).astype(np.uint8)
@@ -87,29 +77,60 @@ class Network:
 
     def facts(self) -> Mapping[str, Any]:
         """Return what results tell of the network beside its settings."""
-        file = self.loaded.file
-        names = metadata.class_names(file.metadata)
-        road = [names.get(each, str(each)) for each in road_numbers(self.settings)]
+        from onnxruntime import __version__
+
+        names = class_names(self.file.metadata)
         return {
-            "backend": self.loaded.backend_name,
-            "version": self.loaded.backend.version,
-            "file": file.path.name,
-            "sha256": file.sha256,
-            "licence": metadata.licence(file.metadata),
-            "inputs": [str(each) for each in file.inputs],
-            "outputs": [str(each) for each in file.outputs],
-            "road": road,
+            "onnxruntime": __version__,
+            "file": self.file.path.name,
+            "sha256": self.file.sha256,
+            "licence": licence(self.file.metadata),
+            "inputs": [str(each) for each in self.file.inputs],
+            "outputs": [str(each) for each in self.file.outputs],
+            "road": [names.get(each, str(each)) for each in self.settings.road_numbers],
         }
 
     def _codes(self, output: npt.NDArray[Any], place: Placement) -> Probability:
-        assert self.settings.layout is not None
         scores = as_scores(output, self.settings.layout)
         assert scores is not None
         if is_labels(output):
-            road = np.isin(scores[0], road_numbers(self.settings)).astype(np.uint16)
+            road = np.isin(scores[0], self.settings.road_numbers).astype(np.uint16)
             return place.back(FULL * road, exact=True)
-        shares: Values = road_probability(scores.astype(np.float32), self.settings)
+        shares = road_probability(scores.astype(np.float32), self.settings)
         if not np.isfinite(shares).all():
-            raise self.loaded.file.error("gives numbers that are none (NaN)")
+            raise self.file.error("gives numbers that are none (NaN)")
         framed = np.clip(place.back(shares, exact=False), 0, 1)
         return np.rint(framed * np.float32(FULL)).astype(np.uint16)
+
+
+def road_probability(scores: Values, settings: NetSettings) -> Values:
+    """Compute how probable road is, ``(h, w)`` float32 in 0..1, from ``(C, h, w)`` float32 scores.
+
+    For ``argmax`` it is road against the rest: the best class of road against the best other one,
+    so that the mask is where it is above one half. For ``threshold`` it is the sum over the classes
+    of road, and of a ``sigmoid`` the greatest of them.
+    """
+    chosen = np.zeros(len(scores), np.bool_)
+    chosen[settings.road_numbers] = True
+    best: Values = scores[chosen].max(axis=0)
+    if settings.decide == "argmax":
+        other = scores[~chosen].max(axis=0)
+        if settings.activation != "none":
+            return _sigmoid(best - other)
+        with np.errstate(invalid="ignore"):
+            share: Values = best / (best + other)
+        return np.where(best + other > 0, share, 0.0).astype(np.float32)
+    if settings.activation == "sigmoid":
+        return _sigmoid(best)
+    if settings.activation == "softmax":
+        powers = np.exp(scores - scores.max(axis=0))
+        share = powers[chosen].sum(axis=0) / powers.sum(axis=0)
+    else:
+        share = np.clip(scores[chosen].sum(axis=0), 0, 1)
+    return share
+
+
+def _sigmoid(values: Values) -> Values:
+    """Compute ``1 / (1 + exp(-x))``, in a form that cannot overflow."""
+    result: Values = 0.5 + 0.5 * np.tanh(0.5 * values)
+    return result

@@ -1,36 +1,61 @@
-"""What an ONNX file tells of itself: inputs, outputs, metadata, and the digest of its bytes."""
+"""An ONNX file: what it takes and gives, its digest, and its outputs, by onnxruntime."""
 
 from __future__ import annotations
 
 import hashlib
+import re
+import subprocess
+import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
-from roadeval.networks.errors import NetworkError
-from roadeval.networks.onnx_schema import TYPES, model_class
-from roadeval.networks.wholeness import is_whole, weights_of
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.networks.protobuf import maker, weight_files
+from roadeval.networks.settings import NetSettings, NetworkError
 from roadeval.runtime.files import check_input
 from roadeval.runtime.text import visible
 
+Array = npt.NDArray[Any]
+
 LARGEST: Final = (1 << 31) - 1
 """Bytes that a protobuf file can have; larger weights lie in files beside it."""
-PASSING: Final = frozenset(
-    {"Cast", "Identity", "Reshape", "Resize", "Slice", "Squeeze", "Transpose", "Unsqueeze"}
-)
-"""Operators that leave a probability one."""
+QUOTED: Final = 240
+"""Letters of onnxruntime's complaint that a message quotes."""
 _SHOWN: Final = 12
 """Inputs and outputs that a message lists."""
+_DAMAGED: Final = "not an ONNX file, or a damaged one; export the network as ONNX"
+_PREAMBLE: Final = re.compile(r"^\[ONNXRuntimeError\] : \d+ : \w+ : (Load model from .*? failed:)?")
+_PROBE: Final = """
+import onnxruntime, sys
+options = onnxruntime.SessionOptions()
+options.log_severity_level = 4
+options.intra_op_num_threads = 1
+onnxruntime.InferenceSession(sys.argv[1], options, providers=["CPUExecutionProvider"])
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Tensor:
-    """An input or an output: its name, its type, and its shape, None where that is left open."""
+    """An input or an output."""
 
     name: str
     dtype: str
+    """As NumPy calls it, where it has one."""
     shape: tuple[int | None, ...]
+    """None where a length is left open."""
+
+    @classmethod
+    def of(cls, told: Any) -> Tensor:
+        """Return what onnxruntime tells of it."""
+        kind = re.sub(r"^tensor\((.*)\)$", r"\1", told.type)
+        sizes = (each if isinstance(each, int) and each > 0 else None for each in told.shape)
+        return cls(told.name, {"float": "float32", "double": "float64"}.get(kind, kind), (*sizes,))
 
     def __str__(self) -> str:
         sizes = ", ".join("?" if size is None else str(size) for size in self.shape)
@@ -39,32 +64,36 @@ class Tensor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OnnxFile:
-    """An ONNX file that was read.
-
-    Parameters
-    ----------
-    path
-        Where it lies.
-    sha256
-        Of its bytes; where weights lie in files beside it, of its bytes and theirs, in the order
-        of those files' names.
-    content
-        The bytes; None where weights lie beside it.
-    inputs, outputs
-        What it takes, without its weights, and what it gives.
-    metadata
-        Texts by name.
-    makers
-        By output: the operator that makes its numbers, those passed over that only move them.
-    """
+    """A network that onnxruntime has opened; any thread may run it, each call on one thread."""
 
     path: Path
+    session: Any
     sha256: str
-    content: bytes | None
+    """Of its bytes; where weights lie in files beside it, of its bytes and theirs, in the order of
+    those files' names."""
     inputs: tuple[Tensor, ...]
+    """What it takes, without its weights."""
     outputs: tuple[Tensor, ...]
     metadata: Mapping[str, str]
     makers: Mapping[str, str]
+    """By output: the operator that makes its numbers, see `roadeval.networks.protobuf.maker`."""
+    _tried: dict[Any, list[Array]] = field(default_factory=dict)
+
+    def run(self, values: Array, outputs: tuple[str, ...]) -> list[Array]:
+        """Return outputs by their names for the values of the one input.
+
+        A `NetworkError` if onnxruntime cannot compute them.
+        """
+        with _explained(self.path):
+            found = self.session.run(outputs, {self.inputs[0].name: values})
+        return [np.asarray(each) for each in found]
+
+    def tried(self, shape: tuple[int, ...], outputs: tuple[str, ...]) -> list[Array]:
+        """Return some outputs for an input of zeros: any input's have their shapes and types."""
+        key = (shape, outputs)
+        if key not in self._tried:
+            self._tried[key] = self.run(np.zeros(shape, self.inputs[0].dtype), outputs)
+        return self._tried[key]
 
     def error(self, problem: str) -> NetworkError:
         """Return an error about the file."""
@@ -79,60 +108,63 @@ class OnnxFile:
         return f"inputs: {_listed(self.inputs)}; outputs: {_listed(self.outputs)}"
 
 
-def read_onnx(path: Path) -> OnnxFile:
-    """Read an ONNX file, without its weights.
+def load(settings: NetSettings) -> OnnxFile:
+    """Open the network of some settings, or return it as long as its file stays the same.
 
     Raises
     ------
     NetworkError
-        If it is missing, no ONNX file, or lacks a file with weights.
+        If the file cannot be used, or is another one than the settings state.
     """
-    content = _bytes(path)
-    model = model_class()()
+    if not settings.file:
+        raise NetworkError("`net.file` names no network: give the path of an ONNX file")
+    path = Path(settings.file)
     try:
-        model.ParseFromString(content)
-    except Exception as error:  # the parser's own, which is of another class in each version
-        raise _no_onnx(path) from error
-    if not model.ir_version or not is_whole(model.graph):
-        raise _no_onnx(path)
-    beside = sorted({_text(name) for name in _external(model.graph)})
+        check_input(path)
+        there = path.stat()
+    except FileNotFoundError as error:
+        raise NetworkError(f"{path}: there is no such network") from error
+    except (OSError, ValueError) as error:
+        raise _unreadable(path, error) from error
+    if there.st_size > LARGEST:
+        raise NetworkError(f"{path}: larger than 2 GiB, which no ONNX file is")
+    file = _opened(path, (there.st_dev, there.st_ino, there.st_size, there.st_mtime_ns))
+    if settings.sha256 not in (None, file.sha256):
+        raise file.error(
+            f"is another network than was asked for: its SHA-256 is {file.sha256}, and "
+            f"`net.sha256` {settings.sha256}"
+        )
+    return file
+
+
+@lru_cache(maxsize=4)
+def _opened(path: Path, _state: tuple[int, ...]) -> OnnxFile:
+    import onnxruntime
+
+    try:
+        content = path.read_bytes()
+        beside = sorted(set(weight_files(memoryview(content))))
+    except OSError as error:
+        raise _unreadable(path, error) from error
+    except ValueError as error:
+        raise NetworkError(f"{path}: {_DAMAGED}") from error
     digest = hashlib.sha256(content)
     for name in beside:
         _add(digest, path, name)
-    weights = set(weights_of(model.graph))
-    return OnnxFile(
-        path,
-        digest.hexdigest(),
-        None if beside else content,
-        tuple(_tensor(each) for each in model.graph.input if each.name not in weights),
-        tuple(_tensor(each) for each in model.graph.output),
-        {_text(each.key): _text(each.value) for each in model.metadata_props},
-        {_text(each.name): _maker(model.graph, each.name) for each in model.graph.output},
-    )
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        check_input(path)
-        if path.stat().st_size > LARGEST:
-            raise NetworkError(f"{path}: larger than 2 GiB, which no ONNX file is")
-        return path.read_bytes()
-    except FileNotFoundError as error:
-        raise NetworkError(f"{path}: there is no such network") from error
-    except OSError as error:
-        raise NetworkError(f"{path}: cannot read the network: {error.strerror}") from error
-
-
-def _no_onnx(path: Path) -> NetworkError:
-    return NetworkError(f"{path}: not an ONNX file, or a damaged one; export the network as ONNX")
-
-
-def _external(graph: Any) -> Iterator[bytes]:
-    """Yield the names of the files that hold weights."""
-    for tensor in graph.initializer:
-        for entry in tensor.external_data:
-            if entry.key == b"location":
-                yield entry.value
+    _survived(path)
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 4  # it throws what it logs
+    with _explained(path):
+        session = onnxruntime.InferenceSession(
+            str(path), options, providers=["CPUExecutionProvider"], enable_fallback=0
+        )
+        inputs, outputs = (
+            tuple(map(Tensor.of, told)) for told in (session.get_inputs(), session.get_outputs())
+        )
+        metadata = session.get_modelmeta().custom_metadata_map
+        makers = {each.name: maker(memoryview(content), each.name) for each in outputs}
+    return OnnxFile(path, session, digest.hexdigest(), inputs, outputs, metadata, makers)
 
 
 def _add(digest: Any, path: Path, name: str) -> None:
@@ -140,10 +172,9 @@ def _add(digest: Any, path: Path, name: str) -> None:
     inner = PurePosixPath(name)
     if inner.is_absolute() or ".." in inner.parts or "\\" in name or ":" in name:
         raise NetworkError(f"{path}: asks for weights outside its folder: {visible(name)}")
-    beside = path.parent / inner
     try:
-        check_input(beside)
-        with beside.open("rb") as file:
+        check_input(path.parent / inner)
+        with (path.parent / inner).open("rb") as file:
             while block := file.read(1 << 20):
                 digest.update(block)
     except (OSError, ValueError) as error:
@@ -153,25 +184,38 @@ def _add(digest: Any, path: Path, name: str) -> None:
         ) from error
 
 
-def _tensor(value: Any) -> Tensor:
-    tensor = value.type.tensor_type
-    shape = tuple(each.dim_value if each.dim_value > 0 else None for each in tensor.shape.dim)
-    return Tensor(_text(value.name), TYPES.get(tensor.elem_type, "unknown"), shape)
+def _survived(path: Path) -> None:
+    """Open a network in another process first: some damaged files end the one that opens them."""
+    # -P: an onnxruntime.py that lies beside the network must not be what is imported.
+    probe = [sys.executable, "-P", "-c", _PROBE, str(path)]
+    code = subprocess.run(probe, check=False, capture_output=True).returncode
+    if code not in (0, 1):  # 1: an exception, which is met again
+        raise NetworkError(f"{path}: damaged: onnxruntime ends its process as it opens it")
 
 
-def _maker(graph: Any, name: bytes) -> str:
-    """Return the operator that makes the numbers of a tensor."""
-    made_by = {output: node for node in graph.node for output in node.output}
-    for _ in range(len(graph.node)):
-        node = made_by.get(name)
-        if node is None or _text(node.op_type) not in PASSING or not node.input:
-            break
-        name = node.input[0]
-    return _text(made_by[name].op_type) if name in made_by else ""
+def _unreadable(path: Path, error: OSError | ValueError) -> NetworkError:
+    reason = getattr(error, "strerror", None) or error
+    return NetworkError(f"{path}: cannot read the network: {reason}")
 
 
-def _text(value: bytes) -> str:
-    return value.decode(errors="replace")
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    """Turn an error of onnxruntime into one line that quotes it."""
+    import onnxruntime
+
+    try:
+        yield
+    except MemoryError:
+        raise
+    except UnicodeDecodeError as error:  # of a name
+        raise NetworkError(f"{path}: {_DAMAGED}") from error
+    except Exception as error:  # onnxruntime's have no class of their own in common
+        if type(error).__name__ == "InvalidProtobuf":
+            raise NetworkError(f"{path}: {_DAMAGED}") from error
+        said = visible(" ".join(_PREAMBLE.sub("", str(error)).split()))
+        quoted = said if len(said) <= QUOTED else f"{said[:QUOTED]}..."
+        library = f"onnxruntime {onnxruntime.__version__}"
+        raise NetworkError(f"{path}: {library} cannot run the network: {quoted}") from error
 
 
 def _listed(tensors: tuple[Tensor, ...]) -> str:

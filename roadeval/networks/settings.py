@@ -7,10 +7,16 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field, field_validator
 from pydantic.dataclasses import dataclass as validated
 
+from roadeval.errors import RoadevalError
+
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Channels = Annotated[tuple[Number, ...], Field(min_length=1, max_length=3)]
 Side = Annotated[int, Field(ge=1, le=16384)]
 Class = Annotated[int, Field(ge=0, le=65535)] | str
+
+
+class NetworkError(RoadevalError):
+    """A network that cannot be used: which file, why, and what to do."""
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
@@ -20,21 +26,19 @@ class NetSettings:
     file: str = ""
     """The network, an ONNX file."""
     sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
-    """Of that file, in hexadecimal: another one is refused. Of a network whose weights lie in files
-    beside it, that of all of them, one after the other."""
-    backend: Literal["onnxruntime", "opencv"] | None = None
-    """Who runs it: ``onnxruntime``, by default where it is installed, or ``opencv``."""
+    """SHA-256 of that file, in hexadecimal: any other file is refused. Where weights lie in files
+    beside it, of all of them, one after the other."""
     size: tuple[Side, Side] | None = None
     """Width and height of its input, in pixels; by default those that the file names."""
     resize: Literal["stretch", "letterbox", "crop"] = "stretch"
     """How an image gets that size, interpolated linearly. ``stretch``: each side by itself.
     ``letterbox``: reduced as a whole until it fits, in the middle of a grey area. ``crop``:
-    reduced until it covers the input, what juts out is cut off, and no road there."""
+    reduced until it covers the input; what is cut off counts as no road."""
     layout: Literal["NCHW", "NHWC"] | None = None
-    """The order of its input's sizes, from N images, C channels, H rows, W columns."""
+    """The order of its input's dimensions: N images, C channels, H rows, W columns."""
     channels: Literal["rgb", "bgr", "grey"] | None = None
-    """In which order it takes the channels; by default as the file's metadata name them, or
-    ``rgb``. ``grey``: one alone."""
+    """The order of its channels; by default as the file's metadata name them, or ``rgb``.
+    ``grey``: a single channel."""
     scale: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     """A grey level of 0..255 is multiplied by this first; by default by 1/255, and by 1 where the
     network takes whole numbers."""
@@ -45,18 +49,37 @@ class NetSettings:
     """The difference is divided by this: one number for each channel in the order of ``channels``,
     or one for all; by default 1."""
     outputs: tuple[str, ...] | None = None
-    """The names of the outputs that tell of road; where there are several, road is what one of them
-    calls road."""
+    """Names of the outputs that show road; where there are several, road is what one of them calls
+    road."""
     road: tuple[Class, ...] | None = None
     """The classes that are road: numbers from 0, or names that the file's metadata list."""
     activation: Literal["softmax", "sigmoid", "none"] | None = None
-    """What makes probabilities of an output: ``softmax`` over its classes, ``sigmoid`` of each, or
-    ``none`` where the network has applied one."""
+    """How probabilities are made of an output: ``softmax`` over its classes, ``sigmoid`` of each,
+    or ``none`` where the network has applied one."""
     decide: Literal["argmax", "threshold"] | None = None
     """Road is where a class of ``road`` beats all others (``argmax``), or where the probability of
     road is above ``threshold``."""
     threshold: Annotated[float, Field(ge=0, le=1)] = 0.5
-    """Between 0 and 1; means nothing to ``argmax``."""
+    """Between 0 and 1; ``argmax`` does not use it."""
+
+    @property
+    def channel_count(self) -> int:
+        """Channels of the input."""
+        return 1 if self.channels == "grey" else 3
+
+    @property
+    def input_shape(self) -> tuple[int, int, int, int]:
+        """Shape of the input, of stated settings."""
+        assert self.size is not None
+        width, height = self.size
+        if self.layout == "NCHW":
+            return 1, self.channel_count, height, width
+        return 1, height, width, self.channel_count
+
+    @property
+    def road_numbers(self) -> list[int]:
+        """The classes that are road, of stated settings: those are numbers."""
+        return [int(each) for each in self.road or ()]
 
     @field_validator("deviation")
     @classmethod

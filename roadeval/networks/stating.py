@@ -1,27 +1,48 @@
-"""Settings of a network with nothing left open: read from its file, or asked for in one line."""
+"""Settings of a network with nothing left open: read from its file, or asked for in one line.
+
+A file's metadata can tell of class names, the channels' order, their range, and a licence. The keys
+are those that exporters write: ``names`` (a dictionary in Python's or JSON's form, or a list) and
+ONNX's own ``Image.BitmapPixelFormat`` and ``Image.NominalPixelRange``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import ast
+import json
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final, Literal
 
 import numpy.typing as npt
 
-from roadeval.networks import metadata
-from roadeval.networks.loaded import Loaded
 from roadeval.networks.onnx_file import OnnxFile, Tensor
-from roadeval.networks.scores import as_scores
 from roadeval.networks.settings import NetSettings
-from roadeval.networks.values import channel_count, input_shape
+from roadeval.runtime.text import visible
 
 FED: Final = frozenset({"float32", "float16", "float64", "uint8"})
 """Types of an input that takes an image."""
-_COUNTS: Final = (1, 3)
-"""Channels that an image can have."""
+NAMES: Final = ("names", "class_names", "classes", "labels")
+LICENCES: Final = ("license", "licence")
+ROAD_NAMES: Final = frozenset({"road", "drivable", "drivable area", "driveable area", "roadway"})
+"""Names of classes that are road."""
+LONGEST: Final = 100_000
+"""Letters of a list of class names."""
+QUOTED: Final = 1000
+"""Letters of a licence that results quote."""
+_ORDERS: Final[Mapping[str, Literal["rgb", "bgr", "grey"]]] = {
+    "rgb8": "rgb",
+    "bgr8": "bgr",
+    "gray8": "grey",
+}
+_RANGES: Final[Mapping[str, tuple[float, float]]] = {
+    "nominalrange_0_255": (1.0, 0.0),
+    "normalized_0_1": (1 / 255, 0.0),
+    "normalized_1_1": (2 / 255, 1.0),
+}
+"""Scale and mean that bring 0..255 to the range."""
 
 
-def stated(settings: NetSettings, loaded: Loaded) -> NetSettings:
+def stated(settings: NetSettings, file: OnnxFile) -> NetSettings:
     """Return settings in which every choice is stated.
 
     Raises
@@ -30,20 +51,57 @@ def stated(settings: NetSettings, loaded: Loaded) -> NetSettings:
         If the network cannot be used, or a choice cannot be read from its file: one line that asks
         for it and lists the network's inputs and outputs.
     """
-    file = loaded.file
-    settings = replace(settings, sha256=file.sha256, backend=loaded.backend_name)
+    settings = replace(settings, sha256=file.sha256)
     settings = _numbers(_input(settings, file), file)
-    settings = replace(settings, outputs=_outputs(settings, file))
-    assert settings.outputs is not None
-    found = loaded.tried(input_shape(settings), settings.outputs)
-    for name, array in zip(settings.outputs, found, strict=True):
+    known = tuple(output.name for output in file.outputs)
+    if settings.outputs is None and len(known) > 1:
+        raise file.question("gives several outputs: say which tell of road by `net.outputs`")
+    outputs = settings.outputs or known
+    for name in outputs:
+        if name not in known:
+            raise file.question(f"has no output {name!r}: see `net.outputs`")
+    settings = replace(settings, outputs=outputs)
+    for name, array in zip(outputs, file.tried(settings.input_shape, outputs), strict=True):
         settings = _meaning(settings, file, name, array)
     return settings
+
+
+def class_names(metadata: Mapping[str, str]) -> dict[int, str]:
+    """Return the names of the classes by their numbers; none where the file lists none."""
+    text = next((metadata[key] for key in NAMES if key in metadata), "")
+    names = _read(text) if len(text) <= LONGEST else None
+    if isinstance(names, list | tuple):
+        names = dict(enumerate(names))
+    if not isinstance(names, dict):
+        return {}
+    return {int(key): visible(str(name)) for key, name in names.items() if str(key).isdecimal()}
+
+
+def licence(metadata: Mapping[str, str]) -> str | None:
+    """Return what the file says of its licence, in one line; None where it says nothing."""
+    for key in LICENCES:
+        if text := " ".join(metadata.get(key, "").split()):
+            return visible(text if len(text) <= QUOTED else f"{text[:QUOTED]}...")
+    return None
 
 
 def is_labels(output: npt.NDArray[Any]) -> bool:
     """Return whether an output holds classes themselves, and not scores of each."""
     return bool(output.dtype.kind in "iub")
+
+
+def as_scores(output: npt.NDArray[Any], layout: str | None) -> npt.NDArray[Any] | None:
+    """Return an output as classes, rows and columns; None where it is no map of the image.
+
+    It is of one image, ``(1, C, h, w)``, or ``(1, h, w, C)`` where the input's layout is ``NHWC``,
+    or without the length of 1, or without classes.
+    """
+    array = output[0] if output.ndim > 2 and len(output) == 1 else output
+    if array.ndim == 3 and layout == "NHWC" and len(array) != 1:
+        array = array.transpose(2, 0, 1)
+    if array.ndim == 2:
+        array = array[None]
+    return array if array.ndim == 3 and min(array.shape[1:]) > 1 else None
 
 
 # --- The input ------------------------------------------------------------------------------------
@@ -61,44 +119,33 @@ def _input(settings: NetSettings, file: OnnxFile) -> NetSettings:
     layout = settings.layout or _layout(only, file)
     _, *sizes = only.shape
     count, rows, columns = sizes if layout == "NCHW" else (sizes[2], sizes[0], sizes[1])
-    channels = settings.channels or metadata.channel_order(file.metadata)
-    settings = replace(
-        settings,
-        layout=layout,
-        channels=channels or ("grey" if count == 1 else "rgb"),
-        size=_size(settings, columns, rows, file),
-    )
-    if count not in (None, channel_count(settings)):
-        raise file.question(f"its input has {count} channels, and {settings.channels} has others")
-    return settings
-
-
-def _layout(only: Tensor, file: OnnxFile) -> Literal["NCHW", "NHWC"]:
-    if only.shape[1] in _COUNTS:
-        return "NCHW"
-    if only.shape[3] in _COUNTS:
-        return "NHWC"
-    raise file.question("say which of its input's lengths is that of channels: `net.layout`")
-
-
-def _size(
-    settings: NetSettings, columns: int | None, rows: int | None, file: OnnxFile
-) -> tuple[int, int]:
-    asked = settings.size or (columns, rows)
-    width, height = asked
+    width, height = settings.size or (columns, rows)
     if width is None or height is None:
         raise file.question(
             "takes images of any size: say which by `net.size`, width and height as [512, 256]"
         )
     if columns not in (None, width) or rows not in (None, height):
         raise file.question(f"takes no input of {width}x{height}: see `net.size`")
-    return width, height
+    told = _ORDERS.get(file.metadata.get("Image.BitmapPixelFormat", "").lower())
+    channels = settings.channels or told or ("grey" if count == 1 else "rgb")
+    settings = replace(settings, layout=layout, channels=channels, size=(width, height))
+    if count not in (None, settings.channel_count):
+        raise file.question(f"its input has {count} channels, and {settings.channels} has others")
+    return settings
+
+
+def _layout(only: Tensor, file: OnnxFile) -> Literal["NCHW", "NHWC"]:
+    if only.shape[1] in (1, 3):
+        return "NCHW"
+    if only.shape[3] in (1, 3):
+        return "NHWC"
+    raise file.question("say which of its input's lengths is that of channels: `net.layout`")
 
 
 def _numbers(settings: NetSettings, file: OnnxFile) -> NetSettings:
     """State scale, mean and deviation."""
     whole = file.inputs[0].dtype == "uint8"
-    told = metadata.pixel_range(file.metadata)
+    told = _RANGES.get(file.metadata.get("Image.NominalPixelRange", "").lower())
     scale, mean = told or (1.0 if whole else 1 / 255, 0.0)
     settings = replace(
         settings,
@@ -107,10 +154,10 @@ def _numbers(settings: NetSettings, file: OnnxFile) -> NetSettings:
         deviation=settings.deviation or (1.0,),
     )
     for name in ("mean", "deviation"):
-        if len(getattr(settings, name)) not in (1, channel_count(settings)):
+        if len(getattr(settings, name)) not in (1, settings.channel_count):
             raise file.error(
                 f"`net.{name}` must hold one number, or one for each of the "
-                f"{channel_count(settings)} channels"
+                f"{settings.channel_count} channels"
             )
     return settings
 
@@ -118,31 +165,20 @@ def _numbers(settings: NetSettings, file: OnnxFile) -> NetSettings:
 # --- The outputs ----------------------------------------------------------------------------------
 
 
-def _outputs(settings: NetSettings, file: OnnxFile) -> tuple[str, ...]:
-    known = [output.name for output in file.outputs]
-    if settings.outputs is None and len(known) > 1:
-        raise file.question("gives several outputs: say which tell of road by `net.outputs`")
-    for name in settings.outputs or ():
-        if name not in known:
-            raise file.question(f"has no output {name!r}: see `net.outputs`")
-    return settings.outputs or (known[0],)
-
-
 def _meaning(
     settings: NetSettings, file: OnnxFile, name: str, output: npt.NDArray[Any]
 ) -> NetSettings:
     """State what an output means."""
-    assert settings.layout is not None
     assert settings.size is not None
     scores = as_scores(output, settings.layout)
     if scores is None or not _like(scores, settings.size):
         raise file.question(f"its output {name!r} is no map of the image, but {output.shape}")
+    count = len(scores)
     if is_labels(output):
-        if len(scores) != 1:
-            raise file.question(f"its output {name!r} holds whole numbers of {len(scores)} classes")
+        if count != 1:
+            raise file.question(f"its output {name!r} holds whole numbers of {count} classes")
         road = _road(settings, file, None)
         return replace(settings, road=road, activation="none", decide="argmax")
-    count = len(scores)
     decide = settings.decide or ("threshold" if count == 1 else "argmax")
     if decide == "argmax" and count == 1:
         raise file.question(
@@ -151,11 +187,10 @@ def _meaning(
     made = file.makers.get(name, "").lower()
     usual: Literal["softmax", "sigmoid"] = "sigmoid" if count == 1 else "softmax"
     activation = settings.activation or ("none" if made in ("softmax", "sigmoid") else usual)
-    settings = replace(settings, decide=decide, activation=activation)
     road = _road(settings, file, count)
     if decide == "argmax" and len(road) == count:
         raise file.question("all of its classes are road: see `net.road`")
-    return replace(settings, road=road)
+    return replace(settings, road=road, activation=activation, decide=decide)
 
 
 def _like(scores: npt.NDArray[Any], size: tuple[int, int]) -> bool:
@@ -166,13 +201,13 @@ def _like(scores: npt.NDArray[Any], size: tuple[int, int]) -> bool:
 
 def _road(settings: NetSettings, file: OnnxFile, count: int | None) -> tuple[int, ...]:
     """Return the numbers of the classes that are road, of ``count``; None: of labels."""
-    names = metadata.class_names(file.metadata)
+    names = class_names(file.metadata)
     if settings.road is not None:
         road = tuple(_number(each, names, file) for each in settings.road)
     elif count in (1, 2):
         road = (count - 1,)
     else:
-        road = metadata.road_classes(names)
+        road = tuple(n for n, name in names.items() if name.strip().lower() in ROAD_NAMES)
     if not road:
         of = "" if count is None else f" of its {count}"
         listed = f", which are {_listed(names)}" if names else ""
@@ -185,13 +220,23 @@ def _road(settings: NetSettings, file: OnnxFile, count: int | None) -> tuple[int
 def _number(named: int | str, names: dict[int, str], file: OnnxFile) -> int:
     if isinstance(named, int):
         return named
-    found: Sequence[int] = [number for number, name in names.items() if name == named]
-    if not found:
-        known = f"it has {_listed(names)}" if names else "its file names none, so give numbers"
-        raise file.question(f"has no class {named!r}; {known}: see `net.road`")
-    return found[0]
+    for number, name in names.items():
+        if name == named:
+            return number
+    known = f"it has {_listed(names)}" if names else "its file names none, so give numbers"
+    raise file.question(f"has no class {named!r}; {known}: see `net.road`")
 
 
 def _listed(names: dict[int, str], most: int = 30) -> str:
     shown = [f"{number} {name}" for number, name in list(names.items())[:most]]
     return ", ".join(shown) + (", ..." if len(names) > most else "")
+
+
+def _read(text: str) -> Any:
+    """Return the data that a text writes in JSON's or Python's form; None if it is neither."""
+    for read in (json.loads, ast.literal_eval):
+        try:
+            return read(text)
+        except (ValueError, SyntaxError, MemoryError, RecursionError):
+            continue
+    return None

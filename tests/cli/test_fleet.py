@@ -4,8 +4,6 @@ import pytest
 
 from roadeval.cli.app import main
 
-pytest.importorskip("distributed", reason="the extra fleet is not installed")
-
 
 @pytest.mark.parametrize(("words", "again"), [((), False), (("--retry-failed",), True)])
 def test_what_failed_is_tried_again_only_where_that_is_asked_for(words, again, monkeypatch, capsys):

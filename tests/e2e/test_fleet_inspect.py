@@ -130,7 +130,7 @@ def test_without_recordings_the_catalogue_says_how_to_keep_some(fleet, capsys):
 def test_without_datafusion_the_extra_is_named(made, monkeypatch, capsys):
     monkeypatch.setattr("roadeval.recording.screen.catalogue.find_spec", lambda name: None)
     assert main(["inspect", str(made / "f")]) == 1
-    assert "pip install 'roadeval[catalogue]'" in capsys.readouterr().err
+    assert "pip install 'rerun-sdk[catalog]'" in capsys.readouterr().err
 
 
 @catalogued

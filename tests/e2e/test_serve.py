@@ -80,7 +80,7 @@ def listening(process):
     return [row[1].partition(":")[0] for row in rows if row[3] == "0A" and row[9] in sockets]
 
 
-@pytest.mark.skipif(find_spec("datafusion") is None, reason="needs roadeval[catalogue]")
+@pytest.mark.skipif(find_spec("datafusion") is None, reason="needs rerun-sdk[catalog]")
 def test_whatever_listens_does_so_on_this_machine_alone(demo):
     with serving("--web", demo.recording) as (address, run):
         assert status(f"{address}0/frame/40/part") == 200

@@ -167,7 +167,7 @@ def likeness(seen, image):
 
 
 @pytest.mark.timeout(300)
-@pytest.mark.skipif(find_spec("datafusion") is None, reason="needs roadeval[catalogue]")
+@pytest.mark.skipif(find_spec("datafusion") is None, reason="needs rerun-sdk[catalog]")
 def test_the_web_viewer_opens_beside_the_page_at_that_frame_and_asks_nobody_else(demo, watched):
     with serving("--web", demo.recording) as (address, run):
         seen = watched(address)

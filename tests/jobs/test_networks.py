@@ -59,8 +59,7 @@ def test_results_tell_who_ran_which_network_and_how_long_it_took(once, folder):
     told = outcome.summary["methods"]["mine"]["net"]
     assert told["licence"] == "CC0: made by hand"
     assert told["file"] == "red.onnx"
-    assert told["backend"] in ("onnxruntime", "opencv")
-    assert told["version"]
+    assert told["onnxruntime"]
     assert outcome.summary["seconds"]["mine"]["net"] > 0
     assert outcome.summary["settings"]["mine"]["net"]["sha256"] == told["sha256"]
 
@@ -122,11 +121,9 @@ def test_a_network_that_has_changed_since_is_refused(once, folder, tmp_path):
         run(folder / "drive.mcap", tmp_path, again)
 
 
-def test_numbers_do_not_depend_on_threads_nor_on_the_backend(once, folder, tmp_path):
+def test_numbers_do_not_depend_on_threads(once, folder, tmp_path):
     to, _ = once
-    path = tmp_path / "mine.toml"
-    path.write_text(f"file = '{folder / 'red.onnx'}'\nbackend = 'opencv'\n")
-    run(folder / "drive.mcap", tmp_path, with_network(path, jobs=4))
+    run(folder / "drive.mcap", tmp_path, with_network(folder / "red.onnx", jobs=4))
     tables = [pd.read_csv(each / "reports" / "frames.csv") for each in (to, tmp_path)]
     assert tables[0].equals(tables[1])
 

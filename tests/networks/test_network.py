@@ -1,4 +1,4 @@
-"""A network's mask: the same from onnxruntime, OpenCV and NumPy, in the frame's size."""
+"""A network's mask: the one that NumPy computes, in the frame's size."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -6,24 +6,16 @@ import cv2
 import numpy as np
 import pytest
 
-from roadeval.networks.errors import NetworkError
-from roadeval.networks.network import FULL, Network
-from roadeval.networks.settings import NetSettings
+from roadeval.networks import FULL, NetSettings, Network, NetworkError
 from tests.networks.making import SIZE, balanced, network, scores
 
-BACKENDS = ("onnxruntime", "opencv")
 IMAGE = np.random.default_rng(5).integers(0, 256, (12, 16, 3), np.uint8)
 """Of the input's size."""
 FRAME = cv2.resize(IMAGE, (48, 30), interpolation=cv2.INTER_CUBIC)
 
 
-def opened(path, backend, **settings) -> Network:
-    return Network.of(NetSettings(file=str(path), backend=backend, **settings))
-
-
-@pytest.fixture(params=BACKENDS)
-def backend(request):
-    return request.param
+def opened(path, **settings) -> Network:
+    return Network.of(NetSettings(file=str(path), **settings))
 
 
 def softmax(values):
@@ -31,9 +23,9 @@ def softmax(values):
     return powers / powers.sum(axis=0)
 
 
-def test_the_mask_is_the_one_that_numpy_computes(backend, tmp_path):
+def test_the_mask_is_the_one_that_numpy_computes(tmp_path):
     values = balanced(IMAGE)
-    road = opened(network(tmp_path / "n.onnx", values=values), backend).road(IMAGE)
+    road = opened(network(tmp_path / "n.onnx", values=values)).road(IMAGE)
     share = softmax(scores(values, IMAGE.transpose(2, 0, 1) / 255))[1].astype(np.float32)
     expected = cv2.resize(share, SIZE)
     assert np.abs(road.codes / FULL - expected).max() < 1e-4
@@ -41,64 +33,53 @@ def test_the_mask_is_the_one_that_numpy_computes(backend, tmp_path):
     assert 0.2 < road.mask.mean() < 0.8
 
 
-@pytest.mark.parametrize("resize", ["stretch", "letterbox", "crop"])
-@pytest.mark.parametrize("last", [None, "Softmax", "Sigmoid"])
-def test_both_backends_give_the_same_mask(last, resize, tmp_path):
-    path = network(tmp_path / "n.onnx", values=balanced(IMAGE), last=last)
-    one, other = (opened(path, each, resize=resize).road(FRAME) for each in BACKENDS)
-    assert np.array_equal(one.mask, other.mask)
-    assert np.abs(one.codes.astype(int) - other.codes).max() <= 1
-    assert 0.1 < one.mask.mean() < 0.9
-
-
-def test_the_mask_is_where_the_probability_is_above_the_threshold(backend, tmp_path):
+def test_the_mask_is_where_the_probability_is_above_the_threshold(tmp_path):
     path = network(tmp_path / "n.onnx", values=balanced(IMAGE))
-    road = opened(path, backend, decide="threshold", threshold=0.7).road(FRAME)
+    road = opened(path, decide="threshold", threshold=0.7).road(FRAME)
     assert np.array_equal(road.mask, road.codes > round(0.7 * FULL))
     assert road.graded
 
 
-def test_of_three_classes_road_is_where_it_beats_the_others(backend, tmp_path):
+def test_of_three_classes_road_is_where_it_beats_the_others(tmp_path):
     values = balanced(IMAGE, 3)
     path = network(tmp_path / "n.onnx", classes=3, values=values)
-    road = opened(path, backend, road=(2,)).road(IMAGE)
+    road = opened(path, road=(2,)).road(IMAGE)
     found = scores(values, IMAGE.transpose(2, 0, 1) / 255)
     margin = (found[2] - found[:2].max(axis=0)).astype(np.float32)
     assert np.array_equal(road.mask, cv2.resize(1 / (1 + np.exp(-margin)), SIZE) > 0.5)
 
 
 @pytest.mark.parametrize("last", [None, "Softmax"])
-def test_the_probability_of_road_is_the_sum_over_its_classes(backend, last, tmp_path):
+def test_the_probability_of_road_is_the_sum_over_its_classes(last, tmp_path):
     values = balanced(IMAGE, 3)
     path = network(tmp_path / "n.onnx", classes=3, values=values, last=last)
-    road = opened(path, backend, road=(0, 2), decide="threshold").road(IMAGE)
+    road = opened(path, road=(0, 2), decide="threshold").road(IMAGE)
     shares = softmax(scores(values, IMAGE.transpose(2, 0, 1) / 255))
     expected = cv2.resize((shares[0] + shares[2]).astype(np.float32), SIZE)
     assert np.abs(road.codes / FULL - expected).max() < 1e-4
 
 
-def test_two_classes_can_be_road_together(backend, tmp_path):
+def test_two_classes_can_be_road_together(tmp_path):
     path = network(tmp_path / "n.onnx", classes=3, values=balanced(IMAGE, 3))
-    both = opened(path, backend, road=(0, 2)).road(IMAGE)
-    rest = opened(path, backend, road=(1,)).road(IMAGE)
+    both = opened(path, road=(0, 2)).road(IMAGE)
+    rest = opened(path, road=(1,)).road(IMAGE)
     assert np.array_equal(both.mask, 1 - rest.mask)
 
 
-def test_classes_are_brought_to_the_frame_by_the_nearest_pixel(backend, tmp_path):
+def test_classes_are_brought_to_the_frame_by_the_nearest_pixel(tmp_path):
     values = balanced(IMAGE)
     path = network(tmp_path / "n.onnx", values=values, last="ArgMax")
-    road = opened(path, backend, road=(1,)).road(IMAGE)
+    road = opened(path, road=(1,)).road(IMAGE)
     expected = scores(values, IMAGE.transpose(2, 0, 1) / 255).argmax(axis=0).astype(np.uint8)
     assert np.array_equal(road.mask, expected.repeat(2, axis=0).repeat(2, axis=1))
     assert not road.graded
 
 
-def test_channels_scale_mean_and_deviation_are_applied_in_this_order(backend, tmp_path):
+def test_channels_scale_mean_and_deviation_are_applied_in_this_order(tmp_path):
     values = balanced(IMAGE)
     mean, deviation = (0.4, 0.5, 0.6), (0.2, 0.25, 0.3)
     road = opened(
         network(tmp_path / "n.onnx", values=values),
-        backend,
         channels="bgr",
         mean=mean,
         deviation=deviation,
@@ -109,49 +90,49 @@ def test_channels_scale_mean_and_deviation_are_applied_in_this_order(backend, tm
 
 
 @pytest.mark.parametrize("last", [None, "Sigmoid"])
-def test_channels_can_come_last(backend, last, tmp_path):
+def test_channels_can_come_last(last, tmp_path):
     values = balanced(IMAGE)
     first = network(tmp_path / "first.onnx", values=values, last=last)
     tail = network(tmp_path / "last.onnx", values=values, last=last, input_shape=(1, 12, 16, 3))
-    one, other = (opened(path, backend).road(FRAME) for path in (first, tail))
+    one, other = (opened(path).road(FRAME) for path in (first, tail))
     assert np.array_equal(one.mask, other.mask)
-    assert opened(tail, backend).settings.layout == "NHWC"
+    assert opened(tail).settings.layout == "NHWC"
 
 
 def test_whole_numbers_are_handed_over_as_they_are(tmp_path):
     values = balanced(IMAGE)
     values["w1"] /= 255
     path = network(tmp_path / "n.onnx", values=values, dtype=2)
-    road = opened(path, "onnxruntime").road(IMAGE)
-    plain = opened(network(tmp_path / "p.onnx", values=balanced(IMAGE)), "onnxruntime").road(IMAGE)
+    road = opened(path).road(IMAGE)
+    plain = opened(network(tmp_path / "p.onnx", values=balanced(IMAGE))).road(IMAGE)
     assert np.abs(road.codes.astype(int) - plain.codes).max() <= 2
 
 
-def test_a_letterbox_shows_the_whole_frame_and_no_more(backend, tmp_path):
+def test_a_letterbox_shows_the_whole_frame_and_no_more(tmp_path):
     path = network(tmp_path / "n.onnx", classes=1, values=_everywhere(1))
     tall = np.zeros((64, 20, 3), np.uint8)
-    assert opened(path, backend, resize="letterbox").road(tall).mask.all()
+    assert opened(path, resize="letterbox").road(tall).mask.all()
 
 
-def test_what_a_crop_does_not_show_is_no_road(backend, tmp_path):
+def test_what_a_crop_does_not_show_is_no_road(tmp_path):
     path = network(tmp_path / "n.onnx", classes=1, values=_everywhere(1))
     wide = np.zeros((30, 80, 3), np.uint8)  # the input shows the 40 columns in the middle
-    mask = opened(path, backend, resize="crop").road(wide).mask
+    mask = opened(path, resize="crop").road(wide).mask
     assert mask[:, 21:59].all()
     assert not mask[:, :19].any()
     assert not mask[:, 61:].any()
 
 
-def test_of_several_outputs_road_is_what_one_of_them_calls_road(backend, tmp_path):
+def test_of_several_outputs_road_is_what_one_of_them_calls_road(tmp_path):
     path = network(tmp_path / "n.onnx", values=balanced(IMAGE), spare=True)
-    alone, other = (opened(path, backend, outputs=(n,), road=(1,)) for n in ("road", "r1"))
-    both = opened(path, backend, outputs=("road", "r1"), road=(1,)).road(IMAGE)
+    alone, other = (opened(path, outputs=(n,), road=(1,)) for n in ("road", "r1"))
+    both = opened(path, outputs=("road", "r1"), road=(1,)).road(IMAGE)
     expected = np.maximum(alone.road(IMAGE).codes, other.road(IMAGE).codes)
     assert np.array_equal(both.codes, expected)
 
 
-def test_threads_disturb_each_other_in_nothing(backend, tmp_path):
-    found = opened(network(tmp_path / "n.onnx", values=balanced(IMAGE)), backend)
+def test_threads_disturb_each_other_in_nothing(tmp_path):
+    found = opened(network(tmp_path / "n.onnx", values=balanced(IMAGE)))
     frames = [np.roll(FRAME, shift, axis=1) for shift in range(24)]
     alone = [found.road(frame).codes for frame in frames]
     with ThreadPoolExecutor(8) as pool:
@@ -164,7 +145,7 @@ def test_numbers_that_are_none_are_an_error(tmp_path):
     values["b2"][:] = np.nan
     path = network(tmp_path / "n.onnx", values=values)
     with pytest.raises(NetworkError, match="NaN"):
-        opened(path, "onnxruntime").road(FRAME)
+        opened(path).road(FRAME)
 
 
 def _everywhere(classes):

@@ -4,19 +4,12 @@ import numpy as np
 import pytest
 from onnx import TensorProto
 
-from roadeval.networks.errors import NetworkError
-from roadeval.networks.network import Network
-from roadeval.networks.settings import NetSettings
+from roadeval.networks import NetSettings, Network, NetworkError
 from tests.networks.making import network
 from tests.networks.test_onnx_file import with_weights_beside
 
 IMAGE = np.zeros((24, 32, 3), np.uint8)
 CITY = {"names": "{0: 'road', 1: 'sidewalk', 2: 'sky'}", "license": "MIT"}
-
-
-@pytest.fixture(params=["onnxruntime", "opencv"])
-def backend(request):
-    return request.param
 
 
 def read(path, **settings) -> NetSettings:
@@ -32,17 +25,16 @@ def asked(path, **settings) -> str:
     return said
 
 
-def test_everything_is_stated_of_a_network_of_two_classes(backend, tmp_path):
-    found = read(network(tmp_path / "n.onnx"), backend=backend)
+def test_everything_is_stated_of_a_network_of_two_classes(tmp_path):
+    found = read(network(tmp_path / "n.onnx"))
     assert (found.size, found.layout, found.channels) == ((16, 12), "NCHW", "rgb")
     assert (found.scale, found.mean, found.deviation) == (1 / 255, (0.0,), (1.0,))
     assert (found.outputs, found.road, found.decide) == (("road",), (1,), "argmax")
     assert found.activation == "softmax"
-    assert found.backend == backend
 
 
-def test_stated_settings_stay_as_they_are(backend, tmp_path):
-    found = read(network(tmp_path / "n.onnx"), backend=backend)
+def test_stated_settings_stay_as_they_are(tmp_path):
+    found = read(network(tmp_path / "n.onnx"))
     assert Network.of(found).settings == found
 
 
@@ -98,10 +90,10 @@ def test_results_tell_licence_inputs_outputs_and_road(tmp_path):
     assert facts["inputs"] == ["image float32 (1, 3, 12, 16)"]
 
 
-def test_weights_beside_the_file_are_used(backend, tmp_path):
+def test_weights_beside_the_file_are_used(tmp_path):
     path = with_weights_beside(tmp_path)
-    found = Network.of(NetSettings(file=str(path), backend=backend))
-    whole = Network.of(NetSettings(file=str(tmp_path / "whole.onnx"), backend=backend))
+    found = Network.of(NetSettings(file=str(path)))
+    whole = Network.of(NetSettings(file=str(tmp_path / "whole.onnx")))
     assert np.array_equal(found.road(IMAGE).codes, whole.road(IMAGE).codes)
 
 
@@ -130,15 +122,13 @@ def test_an_output_that_is_not_there(tmp_path):
     assert "has no output 'seg'" in asked(network(tmp_path / "n.onnx"), outputs=("seg",))
 
 
-def test_which_of_three_classes_are_road(backend, tmp_path):
-    assert "which classes of its 3 are road" in asked(
-        network(tmp_path / "n.onnx", classes=3), backend=backend
-    )
+def test_which_of_three_classes_are_road(tmp_path):
+    assert "which classes of its 3 are road" in asked(network(tmp_path / "n.onnx", classes=3))
 
 
-def test_which_labels_are_road(backend, tmp_path):
+def test_which_labels_are_road(tmp_path):
     path = network(tmp_path / "n.onnx", last="ArgMax")
-    assert "`net.road`" in asked(path, backend=backend)
+    assert "`net.road`" in asked(path)
 
 
 def test_a_class_that_is_not_there(tmp_path):
@@ -157,8 +147,8 @@ def test_an_input_that_takes_no_image(shape, tmp_path):
     assert "inputs: image" in asked(network(tmp_path / "n.onnx", input_shape=shape))
 
 
-def test_an_operator_that_is_not_known(backend, tmp_path):
-    said = asked(network(tmp_path / "n.onnx", operator="Unheard"), backend=backend)
+def test_an_operator_that_is_not_known(tmp_path):
+    said = asked(network(tmp_path / "n.onnx", operator="Unheard"))
     assert "cannot run the network" in said
     assert "Unheard" in said
 

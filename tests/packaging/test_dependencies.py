@@ -11,9 +11,7 @@ import roadeval
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-EXTRAS = ("fleet", "onnx", "remote", "video")
-DECLARED = [*PROJECT["dependencies"]]
-DECLARED += [each for extra in EXTRAS for each in PROJECT["optional-dependencies"][extra]]
+DECLARED = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["remote"]]
 
 
 def plain(name: str) -> str:

@@ -7,7 +7,7 @@ from contextlib import suppress
 from typing import Any, Final, Protocol
 
 from roadeval.images import ImageError, Limits
-from roadeval.logs.errors import BadMessage, FrameError, LogError
+from roadeval.logs.errors import BadMessage, FrameError
 from roadeval.logs.messages.pictures import CompressedPicture, DecodedPicture, Picture, codec_of
 from roadeval.logs.messages.video_size import size_in
 
@@ -34,21 +34,6 @@ class PictureSequence(Protocol):
         ...
 
 
-def import_av() -> Any:
-    """Import PyAV, which is an optional dependency.
-
-    Raises
-    ------
-    LogError
-        If it is not installed.
-    """
-    try:
-        import av
-    except ImportError as error:
-        raise LogError("video needs PyAV: install it with pip install 'roadeval[video]'") from error
-    return av
-
-
 class Video:
     """The frames of a video topic, by position; fastest one after the other.
 
@@ -58,15 +43,12 @@ class Video:
         Its messages.
     limits
         On the frames' size; what is larger is not decoded.
-
-    Raises
-    ------
-    LogError
-        If PyAV, which decodes video, is not installed.
     """
 
     def __init__(self, packets: PictureSequence, limits: Limits) -> None:
-        self._av = import_av()
+        import av
+
+        self._av: Final = av
         self._packets = packets
         self._limits = limits
         self._decoder: Any = None
@@ -204,7 +186,9 @@ def is_keyframe(packet: Picture) -> bool:
     codec = codec_of(packet)
     if not isinstance(packet, CompressedPicture) or codec is None:
         return False
-    av, data = import_av(), bytes(packet.data)
+    import av
+
+    data = bytes(packet.data)
     if codec in _PARAMETERS and _PARAMETERS[codec].search(data):
         return True
     parser = av.CodecContext.create(codec, "r")

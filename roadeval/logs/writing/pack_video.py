@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Final
 
 from roadeval.logs.errors import LogError
-from roadeval.logs.messages.video import import_av
 from roadeval.logs.times import NS
 
 VIDEO_SUFFIXES: Final = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".ts", ".mpg", ".mpeg")
@@ -22,11 +21,11 @@ def frames_of(video: Path) -> Iterator[tuple[int, bytes]]:
     Raises
     ------
     LogError
-        If it cannot be read, holds no video, or PyAV is not installed.
+        If it cannot be read, or holds no video.
     """
+    import av
     import cv2
 
-    av = import_av()
     try:
         with av.open(str(video)) as container:
             if not container.streams.video:

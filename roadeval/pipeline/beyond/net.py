@@ -9,8 +9,7 @@ import numpy as np
 
 from roadeval.data import Layer, LayerKind, LayerSpec, mask_spec
 from roadeval.data.packed import Packed
-from roadeval.networks.errors import NetworkError
-from roadeval.networks.settings import NetSettings
+from roadeval.networks import NetSettings, Network, NetworkError
 from roadeval.pipeline.stage import Output, Stage, StageError, View
 
 NET: Final = mask_spec("net", "Road by the network")
@@ -21,8 +20,6 @@ PROBABILITY: Final = LayerSpec(
 
 def bind(settings: NetSettings, _parameters: None) -> Callable[[View], Output]:
     """Return the network as a pure function of what it sees; a `NetworkError`, see `resolve`."""
-    from roadeval.networks.network import Network
-
     network = Network.of(settings)
 
     def run(view: View) -> Output:
@@ -46,15 +43,11 @@ def resolve(settings: NetSettings) -> NetSettings:
 
     A `NetworkError` if the file cannot be used, or leaves something open.
     """
-    from roadeval.networks.network import Network
-
     return Network.of(settings).settings
 
 
 def about(settings: NetSettings) -> Mapping[str, Any]:
-    """Return what results tell of the network: who runs it, its licence, inputs and outputs."""
-    from roadeval.networks.network import Network
-
+    """Return what results tell of the network: what runs it, its licence, inputs and outputs."""
     return Network.of(settings).facts()
 
 

@@ -137,7 +137,7 @@ def require_catalogue() -> None:
     if find_spec("datafusion") is None:
         raise RecordingError(
             "the catalogue of a fleet needs DataFusion, which is not installed: "
-            "pip install 'roadeval[catalogue]'"
+            "pip install 'rerun-sdk[catalog]'"
         )
 
 

@@ -1,6 +1,5 @@
 """Video in a log: frames that need the frames before them."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +7,7 @@ import pytest
 
 from roadeval.data import Frame
 from roadeval.images import Limits
-from roadeval.logs import FrameError, Instant, LogError, Span, TopicKind, open_log
+from roadeval.logs import FrameError, Instant, Span, TopicKind, open_log
 from roadeval.logs.errors import DamagedMessage
 from roadeval.logs.messages.pictures import CompressedPicture, Picture
 from roadeval.logs.messages.pixels import to_rgb
@@ -112,13 +111,6 @@ def test_a_video_without_its_keyframe_is_not_guessed_at(log: Path) -> None:
     packets = Packets(log, {0})
     with pytest.raises(FrameError, match=r"keyframe|builds upon"):
         Video(packets, Limits()).picture(1)
-
-
-@pytest.mark.parametrize("log", both("flavours", H264), indirect=True)
-def test_without_the_decoder_its_extra_is_named(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(LogError, match=r"pip install 'roadeval\[video\]'"):
-        frames(log)
 
 
 CODECS = [f"made:flavours/fox_pb_CompressedVideo_{codec}.mcap" for codec in ENCODERS]
