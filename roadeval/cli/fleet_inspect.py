@@ -28,17 +28,15 @@ class Asked:
 
 
 def inspect(fleet: Fleet, asked: Asked) -> int:
-    """List the worst frames of a fleet, open one of them, or serve the catalogue."""
+    """List the worst frames of a fleet, or open one of them, the worst of all by default."""
     if asked.frame is not None and asked.drive is None:
         raise typer.BadParameter("--frame of a fleet needs its drive: --drive ID")
     if asked.drive is not None and asked.worst is not None:
         raise typer.BadParameter("--worst counts over all drives; give it without --drive")
     if asked.listed:
         _list(fleet, asked)
-    elif asked.drive is not None or asked.worst is not None or asked.screenshot is not None:
-        _open(fleet, asked)
     else:
-        _catalogue(fleet)
+        _open(fleet, asked)
     return ExitCode.DONE
 
 
@@ -78,21 +76,3 @@ def _open(fleet: Fleet, asked: Asked) -> None:
         console.emit(f"{asked.screenshot}: {drive}, frame {shown}")
     for warning in (*opened.warnings, *warnings):
         messages.warning(warning)
-
-
-def _catalogue(fleet: Fleet) -> None:
-    """Serve all recordings, in a window where there is a screen, until it or the command ends."""
-    from roadeval.jobs import fleet_inspect as inspecting
-    from roadeval.recording.screen import viewer
-
-    with inspecting.catalogue(fleet) as catalogue:
-        for drive, first in catalogue.left_out.items():
-            messages.warning(f"{drive}: left out, for it shows the very frames of {first}")
-        count = len(catalogue.drives)
-        console.emit(f"{count} drive{'' if count == 1 else 's'} at {catalogue.address}")
-        console.flush()
-        if viewer.has_screen():
-            viewer.show_address(catalogue.address)
-        else:
-            messages.note(f"no screen here; open it with: rerun {catalogue.address} (Ctrl-C ends)")
-            inspecting.wait()

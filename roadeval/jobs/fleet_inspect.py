@@ -1,14 +1,12 @@
-"""A fleet looked into: its worst frames, a drive at one of them, and all its recordings."""
+"""A fleet looked into: its worst frames, and a drive at one of them."""
 
 from __future__ import annotations
 
 import tempfile
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from roadeval.config import OutputSettings, RunConfig, load_config
 from roadeval.errors import RoadevalError
@@ -18,16 +16,11 @@ from roadeval.jobs.fleet_models import model_path
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.replay import Outcome, replay
 from roadeval.results.fleet.folder import Fleet
-from roadeval.results.fleet.record import RECORDINGS, RESULTS, recording_path
+from roadeval.results.fleet.record import RESULTS, recording_path
 from roadeval.results.folder import RUN
-from roadeval.results.schema import ALL, TAG
-
-if TYPE_CHECKING:
-    from roadeval.recording.screen.catalogue import Catalogue
 
 FEWEST: Final = "worst:10"
 """The pictures that are recorded of a drive that is replayed to be looked at."""
-SORTED_BY: Final = "ERR"
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,55 +182,3 @@ def _replayed(source: str, config: RunConfig, recording: Path, on_progress: OnPr
             save=str(recording), reports=str(Path(reports, "reports")), record=record, figures=False
         )
         return replay(path, replace(config, output=output), on_progress=on_progress)
-
-
-@contextmanager
-def catalogue(fleet: Fleet) -> Iterator[Catalogue]:
-    """Serve the recordings that a fleet kept, on 127.0.0.1, until the block ends.
-
-    Raises
-    ------
-    RoadevalError
-        If none was kept, or they cannot be served.
-    """
-    from roadeval.recording import Recording
-    from roadeval.recording.screen import catalogue as shown
-
-    drives = [
-        shown.CataloguedDrive(row["drive"], path, _facts(row, rates))
-        for row, rates in _with_rates(fleet)
-        if (path := recording_path(fleet.path, row["drive"])).exists()
-    ]
-    if not drives:
-        raise RoadevalError(
-            f"{fleet.path / RECORDINGS}: no recording was kept; run the fleet's command again with "
-            "`fleet.keep` all or worst:N, or look at one frame with --worst K"
-        )
-    drives.sort(key=lambda each: -float(each.facts.get(SORTED_BY, -1)))
-    layout = Recording(drives[0].recording).layout
-    with shown.served(fleet.name, drives, layout, SORTED_BY) as served:
-        yield served
-
-
-def wait() -> None:
-    """Wait for a signal to end the process."""
-    while True:
-        time.sleep(1)
-
-
-def _with_rates(fleet: Fleet) -> Iterator[tuple[dict[str, Any], dict[str, Any]]]:
-    """Yield the row of each drive, and the scores of its first variant's final mask."""
-    scores: dict[str, dict[str, Any]] = {}
-    for row in fleet.table("scores").to_pylist():
-        if row["final"] and row["region"] == ALL:
-            scores.setdefault(row["drive"], row)
-    for row in fleet.table("drives").to_pylist():
-        yield row, scores.get(row["drive"], {})
-
-
-def _facts(row: dict[str, Any], rates: dict[str, Any]) -> dict[str, str | int | float]:
-    """Return what the catalogue's table shows of a drive."""
-    facts = {name: rates.get(name) for name in (SORTED_BY, "FPR", "FNR")}
-    facts |= {name: row[name] for name in ("evaluated", "status", "group", "luminance", "sun")}
-    facts |= {name.removeprefix(TAG): row[name] for name in row if name.startswith(TAG)}
-    return {name: value for name, value in facts.items() if value is not None}

@@ -12,9 +12,9 @@ from typing import Final
 from roadeval.errors import RoadevalError
 from roadeval.jobs.replayed import Replayer
 from roadeval.jobs.result import Result
-from roadeval.jobs.served import VIEWER, Served, ServedDrive, moved, policy
+from roadeval.jobs.served import Served, ServedDrive, moved, policy
 from roadeval.jobs.served_fleet import ServedFleet
-from roadeval.recording.screen import steered
+from roadeval.recording.screen.viewer import WindowViewer
 from roadeval.report.blocks import Document, Heading
 from roadeval.report.browse import LinkList
 from roadeval.report.findings import Commands
@@ -33,7 +33,6 @@ def serve(
     results: Paths,
     on_address: Callable[[str], None],
     *,
-    web: bool = False,
     commands: MakeCommands | None = None,
 ) -> None:
     """Serve results as pages on 127.0.0.1 until the process is told to end, as by Ctrl-C.
@@ -45,28 +44,21 @@ def serve(
     on_address
         Called with the address to open, before anything is answered. It holds a token without which
         nothing is answered.
-    web
-        Whether frames open in the viewer's web build, in the browser, and not in a window.
     commands
         Makes the commands that pages name; none by default.
 
     Raises
     ------
     RoadevalError
-        If a result cannot be read, or the web viewer cannot be had.
+        If a result cannot be read.
     """
-    with serving(results, web=web, commands=commands) as server:
+    with serving(results, commands) as server:
         on_address(server.address)
         server.serve()
 
 
 @contextmanager
-def serving(
-    results: Paths,
-    *,
-    web: bool = False,
-    commands: MakeCommands | None = None,
-) -> Iterator[LocalServer]:
+def serving(results: Paths, commands: MakeCommands | None = None) -> Iterator[LocalServer]:
     """Have a server of results, as `serve`; when the block ends, all that it started ends with it.
 
     Yields
@@ -77,10 +69,8 @@ def serving(
     with ExitStack() as stack:
         replayer = Replayer()
         opened = [_opened(Path(path), commands, replayer) for path in listed(results)]
-        viewer = steered.BrowserViewer() if web else steered.WindowViewer()
+        viewer = WindowViewer()
         stack.callback(viewer.close)
-        for each in opened:
-            each.begin(viewer)
         stack.callback(replayer.cancel)
         server = LocalServer(_Site(opened, viewer).answer)
         stack.callback(server.close)
@@ -95,9 +85,9 @@ def _opened(path: Path, commands: MakeCommands | None, replayer: Replayer) -> Se
 
 
 class _Site:
-    """Finds what answers a request: the list of results, one of them, or the web viewer."""
+    """Finds what answers a request: the list of results, or one of them."""
 
-    def __init__(self, served: Sequence[Served], viewer: steered.SteeredViewer) -> None:
+    def __init__(self, served: Sequence[Served], viewer: WindowViewer) -> None:
         self._served = served
         self._viewer = viewer
 
@@ -114,8 +104,6 @@ class _Site:
                 return self._home()
             case (name,) if name in _CODE and not request.acts:
                 return Response(code()[name], _CODE[name])
-            case (first, *rest) if first == VIEWER and not request.acts and len(rest) < 2:
-                return self._viewer_file("".join(rest))
             case (place, *rest) if place.isdecimal() and int(place) < len(self._served):
                 if not rest and not request.folder:
                     return moved(f"{place}/")
@@ -132,10 +120,3 @@ class _Site:
         blocks = [Heading("Results"), LinkList(links)]
         made = Document("roadeval", "Results", f"{len(links)} results", "", blocks)
         return Response(page(made, _PLACE), PAGE, headers=policy(_PLACE))
-
-    def _viewer_file(self, name: str) -> Response:
-        content = self._viewer.file(name)
-        if content is None:
-            return NOT_FOUND
-        allowed = {"Content-Security-Policy": steered.POLICY}
-        return Response(content, steered.FILES[name], headers=allowed, kept=bool(name))

@@ -14,7 +14,7 @@ from roadeval.errors import RoadevalError
 from roadeval.jobs.page_frames import StripMaker, browsed
 from roadeval.jobs.report_findings import collect
 from roadeval.jobs.result import Result
-from roadeval.recording.screen.steered import SteeredViewer
+from roadeval.recording.screen.viewer import WindowViewer
 from roadeval.report.blocks import Document, Heading
 from roadeval.report.browse import Strip
 from roadeval.report.drive import page_document
@@ -25,8 +25,6 @@ from roadeval.runtime.local_server import NOT_FOUND, PAGE, Request, Response, to
 
 STRIPS: Final = 40
 """Frames whose pictures are kept in memory."""
-VIEWER: Final = "viewer"
-"""Address of the web viewer, below that of the site."""
 _MEDIA: Final = {"jpg": "image/jpeg", "png": "image/png", "svg": "image/svg+xml"}
 
 
@@ -39,10 +37,7 @@ class Served(Protocol):
     def title(self) -> str:
         """Its name."""
 
-    def begin(self, viewer: SteeredViewer) -> None:
-        """Add to the viewer the recording that it will be asked to show, if it is known already."""
-
-    def answer(self, request: Request, viewer: SteeredViewer) -> Response:
+    def answer(self, request: Request, viewer: WindowViewer) -> Response:
         """Return what is asked for below its address."""
 
 
@@ -79,7 +74,6 @@ class ServedDrive:
         self._lock: Final = Lock()
         self._strips: Final[OrderedDict[int, Strip]] = OrderedDict()
         self._frames: Final = frozenset(self._result.pictured)
-        self._site: Final = site
         self._place: Final = Place("pictures/", site, "frame/{}", *above)
         self._frame_place: Final = Place(
             *("../pictures/", f"../{site}", "../frame/{}", "../", self.title), forms=True
@@ -90,12 +84,7 @@ class ServedDrive:
         """The drive's name."""
         return self._result.name
 
-    def begin(self, viewer: SteeredViewer) -> None:
-        """Make its recording known; of a folder nothing."""
-        if self._result.recording:
-            viewer.add(self.path, self.title, self._result.recording.layout)
-
-    def answer(self, request: Request, viewer: SteeredViewer) -> Response:
+    def answer(self, request: Request, viewer: WindowViewer) -> Response:
         """Return what is asked for below its address."""
         match request.parts:
             case () if not request.acts:
@@ -143,7 +132,7 @@ class ServedDrive:
             return self._strips[frame]
 
     def _frame(
-        self, frame: int, rest: tuple[str, ...], viewer: SteeredViewer, *, acts: bool
+        self, frame: int, rest: tuple[str, ...], viewer: WindowViewer, *, acts: bool
     ) -> Response:
         match rest, acts:
             case ("part",), False:
@@ -151,12 +140,10 @@ class ServedDrive:
             case (), False:
                 return self._frame_page(frame)
             case ("view",), True:
-                self.begin(viewer)
-                return viewed(viewer, self.path, frame, self._site)
+                return viewed(viewer, self.path, frame)
             case ("show",), True:
-                self.begin(viewer)
-                shown = viewed(viewer, self.path, frame, f"../../{self._site}")
-                return moved(shown.content.decode() or "../..") if shown.succeeded else shown
+                shown = viewed(viewer, self.path, frame)
+                return moved("../..") if shown.succeeded else shown
         return NOT_FOUND
 
     def _frame_page(self, frame: int) -> Response:
@@ -166,13 +153,13 @@ class ServedDrive:
         return Response(page(made, place), PAGE, headers=policy(place))
 
 
-def viewed(viewer: SteeredViewer, recording: Path, frame: int, site: str) -> Response:
-    """Show a frame in the viewer; answer where it is to be seen, if that is in the browser."""
+def viewed(viewer: WindowViewer, recording: Path, frame: int) -> Response:
+    """Show a frame in the viewer; the answer is empty, or says why it cannot be shown."""
     try:
-        added = viewer.show(recording, frame)
+        viewer.show(recording, frame)
     except RoadevalError as error:
         return told(HTTPStatus.CONFLICT, str(error))
-    return Response(f"{site}{VIEWER}/{added}".encode() if added else b"")
+    return Response(b"")
 
 
 def image(name: str, content: bytes | None) -> Response:

@@ -17,8 +17,7 @@ from roadeval.jobs.report import PICTURED
 from roadeval.jobs.report_fleet import collect_fleet
 from roadeval.jobs.result import Result
 from roadeval.jobs.served import ServedDrive, image, policy, viewed
-from roadeval.recording import Recording
-from roadeval.recording.screen.steered import SteeredViewer
+from roadeval.recording.screen.viewer import WindowViewer
 from roadeval.report.blocks import Document
 from roadeval.report.findings import Commands
 from roadeval.report.fleet.document import page_document
@@ -73,10 +72,7 @@ class ServedFleet:
         """The fleet's name."""
         return self._fleet.name
 
-    def begin(self, _viewer: SteeredViewer) -> None:
-        """Do nothing: a fleet has many recordings, of which few will be looked at."""
-
-    def answer(self, request: Request, viewer: SteeredViewer) -> Response:
+    def answer(self, request: Request, viewer: WindowViewer) -> Response:
         """Return what is asked for below its address."""
         match request.parts:
             case () if not request.acts:
@@ -118,7 +114,7 @@ class ServedFleet:
         return self._document.files()
 
     def _drive(
-        self, drive: str, rest: tuple[str, ...], request: Request, viewer: SteeredViewer
+        self, drive: str, rest: tuple[str, ...], request: Request, viewer: WindowViewer
     ) -> Response:
         """Answer below the address of a drive's own page."""
         if not rest and not request.folder:
@@ -136,7 +132,7 @@ class ServedFleet:
                 self._drives[path] = ServedDrive(path, self._commands, _SITE, above)
             return self._drives[path]
 
-    def _view(self, frame: FleetFrame, viewer: SteeredViewer) -> Response:
+    def _view(self, frame: FleetFrame, viewer: WindowViewer) -> Response:
         """Show one of the worst frames; its drive is replayed where no recording was kept."""
         recording, drive = recording_path(self.path, frame.drive), frame.drive
 
@@ -144,10 +140,9 @@ class ServedFleet:
             state = self._replayer.want(recording, drive, partial(self._replay, drive))
             if state:
                 return told(HTTPStatus.ACCEPTED, state)
-            viewer.add(recording, drive, Recording(recording).layout)
         except RoadevalError as error:
             return told(HTTPStatus.CONFLICT, str(error))
-        return viewed(viewer, recording, frame.frame, "../")
+        return viewed(viewer, recording, frame.frame)
 
     def _replay(self, drive: str, on_progress: OnProgress) -> None:
         """Make a drive's recording; nothing is left of one that is cancelled."""

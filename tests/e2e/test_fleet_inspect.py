@@ -1,18 +1,15 @@
-"""``roadeval inspect`` of a fleet: its worst frames, one of them, and all its recordings."""
+"""``roadeval inspect`` of a fleet: its worst frames, and one of them."""
 
 import json
 import shutil
-from importlib.util import find_spec
 
 import pytest
 
 import roadeval
-from roadeval.cli.app import main
 from roadeval.recording.screen import viewer
 from tests.e2e.commands import here
 from tests.e2e.test_fleet import Here, write
 
-catalogued = pytest.mark.skipif(find_spec("datafusion") is None, reason="no DataFusion")
 OPTIONS = {"training": {"frames": 4}}
 
 
@@ -61,6 +58,14 @@ def test_the_list_is_of_all_drives_the_worst_first(made, fleet):
     read = here("inspect", fleet, "--list").stdout
     assert max(map(len, read.splitlines())) <= 80
     assert "Where no recording was kept, --worst K replays the drive first." in read
+
+
+def test_by_default_the_worst_frame_of_all_opens(made, monkeypatch):
+    shown = []
+    monkeypatch.setattr(viewer, "show", lambda recording, frame: shown.append((recording, frame)))
+    assert here("inspect", made / "f").returncode == 0
+    first = worst(made / "f")
+    assert shown == [(made / "f" / "recordings" / f"{first.drive}.rrd", first.frame)]
 
 
 def test_a_drive_that_was_not_kept_is_replayed_and_its_results_stay(fleet, drawn):
@@ -117,58 +122,6 @@ def test_what_cannot_be_done_is_one_line(words, code, said, made):
     assert done.returncode == code
     assert said in done.stderr
     assert done.stderr.count("\n") == 1
-
-
-def test_without_recordings_the_catalogue_says_how_to_keep_some(fleet, capsys):
-    shutil.rmtree(fleet / "recordings")
-    assert main(["inspect", str(fleet)]) == 1
-    said = capsys.readouterr().err
-    assert "no recording was kept; run the fleet's command again with --keep all or worst:N" in said
-    assert said.count("\n") == 1
-
-
-def test_without_datafusion_the_extra_is_named(made, monkeypatch, capsys):
-    monkeypatch.setattr("roadeval.recording.screen.catalogue.find_spec", lambda name: None)
-    assert main(["inspect", str(made / "f")]) == 1
-    assert "pip install 'rerun-sdk[catalog]'" in capsys.readouterr().err
-
-
-@catalogued
-def test_the_catalogue_holds_every_drive_with_its_err_and_tells_of_copies(made, monkeypatch):
-    from rerun.catalog import CatalogClient
-
-    monkeypatch.setattr(viewer, "has_screen", lambda: False)
-    seen = {}
-
-    def look():
-        address, _, number = seen["address"].partition("/entry/")
-        (dataset,) = (e for e in CatalogClient(address).datasets() if str(e.id) == number)
-        seen["rows"] = dataset.segment_table().to_pandas()
-        seen["blueprints"] = dataset.default_blueprint(), dataset.default_segment_table_blueprint()
-
-    def emit(text):
-        seen["address"] = text.rpartition(" ")[2]
-
-    monkeypatch.setattr("roadeval.cli.console.emit", emit)
-    monkeypatch.setattr("roadeval.jobs.fleet_inspect.wait", look)
-    done = here("inspect", made / "f")
-    assert done.returncode == 0, done.stderr
-    assert seen["address"].startswith("rerun+http://127.0.0.1:")
-    drives = roadeval.Fleet(made / "f").drives
-    first, second = sorted(d for d in drives.drive if d.startswith("a-"))
-    told = [line for line in done.stderr.splitlines() if "left out" in line]
-    assert len(told) == 1
-    assert first in told[0]
-    assert second in told[0]
-    rows = {row["property:fleet:drive"][0]: row for _, row in seen["rows"].iterrows()}
-    assert len(rows) == 2
-    final = roadeval.Fleet(made / "f").scores.query(
-        "variant == 'filtered' and final and region == 'all'"
-    )
-    errors = final.set_index("drive").ERR
-    for drive, row in rows.items():
-        assert row["property:fleet:ERR"][0] == errors[drive]
-    assert all(seen["blueprints"])
 
 
 def test_a_fleet_from_elsewhere_loads_no_code(fleet, drawn):

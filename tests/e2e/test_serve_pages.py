@@ -1,11 +1,7 @@
 """``roadeval serve`` in a real browser: pictures on demand, and the viewer."""
 
 import re
-import time
-from importlib.util import find_spec
 
-import cv2
-import numpy as np
 import pytest
 
 import roadeval
@@ -138,53 +134,3 @@ def test_without_a_script_a_frames_page_opens_the_viewer(demo, watched, monkeypa
         tab.get_by_role("button", name="Open in viewer").click()
         tab.get_by_text("No screen to open a window on").wait_for()
         assert status(f"{address}0/frame/40/show", method="POST") == 403
-
-
-def shown_in(viewer, recording, numbers, seconds=100):
-    """Which frame's camera image the viewer's upper left corner shows, once it shows one."""
-    pictures = {number: recording.image(number) for number in numbers}
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        seen = cv2.imdecode(np.frombuffer(viewer.screenshot(), np.uint8), cv2.IMREAD_GRAYSCALE)
-        corner = cv2.pyrDown(seen[: seen.shape[0] // 2, : seen.shape[1] // 3])
-        scores = {number: likeness(corner, image) for number, image in pictures.items()}
-        best = max(scores, key=scores.get)
-        if scores[best] > 0.8:
-            return best
-        time.sleep(2)
-    return None
-
-
-def likeness(seen, image):
-    """The best correlation of an image, in any size that it may have there, with what is seen."""
-    grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
-    height, width = grey.shape
-    small = [
-        cv2.resize(grey, (each, each * height // width), interpolation=cv2.INTER_AREA)
-        for each in range(110, 180, 2)
-    ]
-    return max(cv2.matchTemplate(seen, each, cv2.TM_CCOEFF_NORMED).max() for each in small)
-
-
-@pytest.mark.timeout(300)
-@pytest.mark.skipif(find_spec("datafusion") is None, reason="needs rerun-sdk[catalog]")
-def test_the_web_viewer_opens_beside_the_page_at_that_frame_and_asks_nobody_else(demo, watched):
-    with serving("--web", demo.recording) as (address, run):
-        seen = watched(address)
-        seen.tab.locator(".stage").wait_for()
-        seen.tab.locator(".frames tbody tr").nth(60).locator("td").first.click()
-        seen.tab.locator("#frame-70 .tile").first.wait_for()
-        asked = []
-        seen.tab.context.on("request", lambda request: asked.append(request.url))
-        with seen.tab.expect_popup() as opened:
-            seen.tab.locator(".open").click()
-        viewer = opened.value
-        viewer.wait_for_url("**/viewer/?url=*")
-        assert f"when%3Dframe%40{frame(seen.tab)}" in viewer.url
-        viewer.wait_for_function("document.querySelector('canvas.visible')", timeout=60_000)
-        recording = roadeval.Recording(demo.recording)
-        assert shown_in(viewer, recording, (10, 45, 70, 95)) == frame(seen.tab) == 70
-        assert all(url.startswith(("http://127.0.0.1:", "data:", "blob:")) for url in asked)
-        assert any(url.endswith("re_viewer_bg.wasm") for url in asked)
-    # It has ended here, although the viewer's tab is still open.
-    assert run.returncode == 130

@@ -63,8 +63,8 @@ def inspect(
     """Open the viewer at a frame, or list the frames worth opening.
 
     The viewer works offline and listens on 127.0.0.1 alone. Of neighbouring frames only the worst
-    is listed. Of a fleet the frames of all drives are ranked together, and without a frame its
-    kept recordings open as a catalogue; a drive that was not kept is replayed from its log.
+    is listed. Of a fleet the frames of all drives are ranked together, and the worst of all opens
+    by default; a drive that was not kept is replayed from its log.
     """
     if frame is not None and worst is not None:
         raise typer.BadParameter("give --frame or --worst, not both")

@@ -22,11 +22,6 @@ def serve(
             readable=False,
         ),
     ],
-    *,
-    web: Annotated[
-        bool,
-        typer.Option("--web", help="Frames open in the browser, not in the viewer's own window."),
-    ] = False,
 ) -> int:
     """Serve results as pages to browse, on 127.0.0.1 alone.
 
@@ -35,7 +30,7 @@ def serve(
     """
     from roadeval.jobs import serve as job
 
-    job.serve(results, _tell, web=web, commands=commands_of)
+    job.serve(results, _tell, commands=commands_of)
     return ExitCode.DONE
 
 

@@ -12,9 +12,10 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import IO, Final, TypeVar
+from threading import Lock
+from typing import Final, TypeVar
 
 import rerun_cli
 from rerun.experimental import ViewerClient
@@ -67,17 +68,44 @@ def has_screen() -> bool:
     return os.name != "posix" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
 
 
-def show_address(address: str) -> None:
-    """Open a catalogue's address in the viewer, and wait until its window is closed.
+class WindowViewer:
+    """The viewer's window, led from frame to frame; opened again where somebody has closed it."""
 
-    Raises
-    ------
-    RecordingError
-        If the viewer does not come up.
-    """
-    with tempfile.TemporaryFile() as log, _process(address, _free_port(), [], log) as process:
-        if process.wait():
-            raise RecordingError(f"the viewer ended: {_reason(log.fileno())}")
+    def __init__(self) -> None:
+        self._stack: Final = ExitStack()
+        self._lock: Final = Lock()
+        self._shown: tuple[Path, subprocess.Popen[bytes], ViewerClient] | None = None
+
+    def show(self, recording: Path, frame: int) -> None:
+        """Show a frame of a recording.
+
+        Raises
+        ------
+        RecordingError
+            If there is no screen, or the viewer does not come up.
+        """
+        if not has_screen():
+            raise RecordingError(
+                "No screen to open a window on: type the command on a machine that has one."
+            )
+        with self._lock:
+            go(self._client(recording), frame)
+
+    def _client(self, recording: Path) -> ViewerClient:
+        """Return what steers the window, on a recording; it is opened where it is not there."""
+        if self._shown is not None:
+            shown, process, client = self._shown
+            if shown == recording and process.poll() is None:
+                return client
+        self._shown = None
+        self._stack.close()
+        process, client = self._stack.enter_context(opened(recording))
+        self._shown = recording, process, client
+        return client
+
+    def close(self) -> None:
+        """End the viewer."""
+        self._stack.close()
 
 
 def screenshot(recording: Path, picture: Path, frame: int | None = None) -> int | None:
@@ -116,62 +144,20 @@ def opened(
 ) -> Iterator[tuple[subprocess.Popen[bytes], ViewerClient]]:
     """Start the viewer on a recording; it ends with the block."""
     port = _free_port()
-    with (
-        tempfile.TemporaryFile() as log,
-        _process(str(recording), port, options, log, **environment) as process,
-    ):
-        yield process, _connect(process, port, log.fileno())
-
-
-@contextmanager
-def _process(
-    what: str, port: int, options: Sequence[str], log: IO[bytes], **environment: str
-) -> Iterator[subprocess.Popen[bytes]]:
-    """Start the viewer's process on a file or an address; it ends with the block."""
     address = ["--bind", "127.0.0.1", "--port", str(port), "--hide-welcome-screen"]
-    process = subprocess.Popen(
-        [_program(), *address, *options, what],
-        stdout=log,
-        stderr=log,
-        # With CI set the viewer sends no usage statistics.
-        env={**os.environ, "CI": "1", "NO_COLOR": "1", **environment},
-    )
-    try:
-        yield process
-    finally:
-        process.terminate()
-        process.wait()
-
-
-@contextmanager
-def hosted(address: str) -> Iterator[str]:
-    """Host the viewer's web build for a catalogue's address, on 127.0.0.1, until the block ends.
-
-    Yields where its files are.
-
-    Raises
-    ------
-    RecordingError
-        If it does not come up.
-    """
-    port = _free_port()
-    options = ["--serve-web", "--web-viewer-port", str(port)]
-    with (
-        tempfile.TemporaryFile() as log,
-        _process(address, _free_port(), options, log) as process,
-    ):
-        _wait_for(process, port, log.fileno())
-        yield f"http://127.0.0.1:{port}/"
-
-
-def _wait_for(process: subprocess.Popen[bytes], port: int, log: int) -> None:
-    """Wait until a process listens on a port."""
-    deadline = time.monotonic() + _LOADING_S
-    while time.monotonic() < deadline and process.poll() is None:
-        with suppress(OSError), socket.create_connection(("127.0.0.1", port), _POLL_S):
-            return
-        time.sleep(_POLL_S)
-    raise RecordingError(f"the web viewer did not start: {_reason(log)}")
+    with tempfile.TemporaryFile() as log:
+        process = subprocess.Popen(
+            [_program(), *address, *options, str(recording)],
+            stdout=log,
+            stderr=log,
+            # With CI set the viewer sends no usage statistics.
+            env={**os.environ, "CI": "1", "NO_COLOR": "1", **environment},
+        )
+        try:
+            yield process, _connect(process, port, log.fileno())
+        finally:
+            process.terminate()
+            process.wait()
 
 
 def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerClient:

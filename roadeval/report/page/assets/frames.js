@@ -187,9 +187,6 @@ async function openInViewer(button, address) {
   try {
     const answer = await whenDone(button, address);
     told = answer ? (await answer.text()).trim() : "Cancelled.";
-    // After a while a browser opens no window by itself.
-    if (answer?.ok && told) told = window.open(told, "rerun") ? "" : "It is there now: click again.";
-    else if (answer?.ok) told = "";
   } catch {
     // It is told below.
   }

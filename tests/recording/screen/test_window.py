@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from roadeval.recording.layout import RecordingError
-from roadeval.recording.screen import steered
-from roadeval.recording.screen.steered import WindowViewer
+from roadeval.recording.screen import viewer as module
+from roadeval.recording.screen.viewer import WindowViewer
 
 
 class Process:
@@ -32,16 +32,16 @@ def windows(monkeypatch):
         yield window["process"], window
         window["ended"] = True
 
-    monkeypatch.setattr(steered, "opened", opened)
-    monkeypatch.setattr(steered, "go", lambda window, frame: window["frames"].append(frame))
-    monkeypatch.setattr(steered, "has_screen", lambda: True)
+    monkeypatch.setattr(module, "opened", opened)
+    monkeypatch.setattr(module, "go", lambda window, frame: window["frames"].append(frame))
+    monkeypatch.setattr(module, "has_screen", lambda: True)
     return made
 
 
 def test_one_window_is_led_from_frame_to_frame(windows):
     viewer = WindowViewer()
     for frame in (84, 12):
-        assert viewer.show(Path("a.rrd"), frame) == ""
+        viewer.show(Path("a.rrd"), frame)
     (window,) = windows
     assert window["frames"] == [84, 12]
     assert not window["ended"]
@@ -73,7 +73,7 @@ def test_it_ends_with_whoever_started_it(windows):
 
 
 def test_without_a_screen_it_says_what_to_do(windows, monkeypatch):
-    monkeypatch.setattr(steered, "has_screen", lambda: False)
-    with pytest.raises(RecordingError, match="web viewer"):
+    monkeypatch.setattr(module, "has_screen", lambda: False)
+    with pytest.raises(RecordingError, match="on a machine that has one"):
         WindowViewer().show(Path("a.rrd"), 1)
     assert windows == []
