@@ -47,9 +47,8 @@ class Source:
     def frames(self, count: int) -> list[Frame]:
         """Decode the first frames that have a truth."""
         config = configure({"labels": {"road": self.road, "ignore": self.ignore}})
-        with logs.open_log(self.path) as log:
-            selection = log.select(config.topics, config.labels)
-            readable = (frame for frame in log.frames(selection) if frame.labelled)
+        with logs.open_log(self.path, config) as log:
+            readable = (frame for frame in log.frames(log.select()) if frame.labelled)
             return [each.decode() for each in islice(readable, count)]
 
 

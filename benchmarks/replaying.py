@@ -70,7 +70,7 @@ def lines_of(result: FrameResult) -> dict[str, str]:
 
 def hold(drive: Path, config: RunConfig) -> Held:
     """Run the pipeline once, before any clock runs, and keep what the floor needs."""
-    with logs.open_log(drive) as log:
+    with logs.open_log(drive, config) as log:
         run = prepare(log, config, ignore)
         results, sizes = [], []
         recorder = recorder_for(drive.with_suffix(".held.rrd"), run.layout(), ALL)
@@ -80,7 +80,7 @@ def hold(drive: Path, config: RunConfig) -> Held:
                 results.append(result)
                 encoded = recorder.encode(result, position, lines_of(result))
                 sizes.append(_layer_bytes(encoded.payloads))
-        frames = log.frames(run.selection, logs.Span.of(config.frames))
+        frames = log.frames(run.selection)
         files = [_files(logged) for logged in frames]
         return Held(files, results, run.layout(), float(np.mean(sizes)))
 
@@ -149,7 +149,7 @@ def floor(held: Held, folder: Path, jobs: int, codecs: AbstractContextManager[No
 
 def loop(drive: Path, config: RunConfig, folder: Path) -> Cost:
     """Do what `replay` does, without its training, its summary and its figures."""
-    with logs.open_log(drive) as log:
+    with logs.open_log(drive, config) as log:
         run = prepare(log, config, ignore)
         recorder = recorder_for(folder / "loop.rrd", run.layout(), ALL)
         meter = Meter()

@@ -13,7 +13,8 @@ from roadeval.cli.options import FLAGS, Given, with_flags
 from roadeval.errors import RoadevalError
 
 if TYPE_CHECKING:
-    from roadeval.config import DriveSettings, LogConfig, RunConfig, Variant
+    from roadeval.config import DriveSettings, RunConfig, Variant
+    from roadeval.logs import LogConfig
     from roadeval.report.pdf.typeset import Paper
 
 Drive = Annotated[
@@ -117,11 +118,11 @@ def configuration(given: Given) -> RunConfig:
 
 def of_a_log(given: Given) -> LogConfig:
     """Return what options ask of a log; wrong usage as in `configuration`."""
-    from roadeval.config import LogConfig
+    from roadeval.config import log_config
 
     with usage():
         _check_names([name for name, _ in given.get("topics.masks", ())])
-        return LogConfig.of(_tables(given))
+        return log_config(_tables(given))
 
 
 def _preset(given: Given) -> dict[str, str]:

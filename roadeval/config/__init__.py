@@ -10,7 +10,7 @@ from roadeval.runtime.on_demand import on_demand
 if TYPE_CHECKING:
     from roadeval.config.drives import DriveSettings
     from roadeval.config.errors import ConfigError
-    from roadeval.config.log import LogConfig
+    from roadeval.config.log import log_config
     from roadeval.config.names import check_variant_name
     from roadeval.config.networks import network_variant
     from roadeval.config.presets import PRESETS
@@ -25,13 +25,13 @@ __all__ = [
     "DriveSettings",
     "ExecutionSettings",
     "FleetSettings",
-    "LogConfig",
     "OutputSettings",
     "RunConfig",
     "Variant",
     "check_variant_name",
     "configure",
     "load_config",
+    "log_config",
     "network_variant",
     "read_tables",
 ]
@@ -42,13 +42,13 @@ _MODULES: Final = {
     "DriveSettings": "drives",
     "ExecutionSettings": "settings",
     "FleetSettings": "settings",
-    "LogConfig": "log",
     "OutputSettings": "settings",
     "RunConfig": "run",
     "Variant": "variants",
     "check_variant_name": "names",
     "configure": "run",
     "load_config": "toml",
+    "log_config": "log",
     "network_variant": "networks",
     "read_tables": "toml",
 }

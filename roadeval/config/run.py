@@ -46,7 +46,7 @@ from roadeval.config.variants import (
 from roadeval.data import FINAL_STAGE
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.logs.settings import FrameSettings, LabelSettings, MaskSettings, TopicSettings
+from roadeval.logs.settings import LabelSettings, LogConfig
 from roadeval.pipeline.chain import Pipeline
 from roadeval.recording import RecordRule
 from roadeval.training.settings import TrainingSettings
@@ -57,7 +57,7 @@ def _paper() -> Pipeline:
 
 
 @dataclass(frozen=True, slots=True)
-class RunConfig:
+class RunConfig(LogConfig):
     """Every option of a run.
 
     Parameters
@@ -68,10 +68,6 @@ class RunConfig:
         The chain of stages of the variants ``filtered`` and ``unfiltered``, and their settings.
     extra
         Further variants.
-    masks
-        Masks of other methods that lie beside the log, by the name of their variant.
-    topics, labels, frames
-        What is asked of the log.
     drives
         What is asked of some logs instead; later ones override earlier ones.
     training, evaluation
@@ -92,10 +88,6 @@ class RunConfig:
     preset: str = "paper"
     pipeline: Pipeline = field(default_factory=_paper)
     extra: tuple[Variant, ...] = ()
-    masks: Mapping[str, MaskSettings] = field(default_factory=dict)
-    topics: TopicSettings = field(default_factory=TopicSettings)
-    labels: LabelSettings = field(default_factory=LabelSettings)
-    frames: FrameSettings = field(default_factory=FrameSettings)
     drives: tuple[DriveSettings, ...] = ()
     training: TrainingSettings = field(default_factory=TrainingSettings)
     evaluation: EvaluationSettings = field(default_factory=EvaluationSettings)

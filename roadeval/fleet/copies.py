@@ -11,7 +11,7 @@ from typing import Final
 
 from roadeval.errors import RoadevalError
 from roadeval.fleet.entry import DriveEntry
-from roadeval.logs.files import files_of
+from roadeval.logs import files_of
 
 END: Final = 1 << 16
 """Bytes at a file's end that are compared first."""

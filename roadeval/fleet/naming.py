@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path, PurePath
 from typing import Any, Final
 
-from roadeval.logs.files import natural
+from roadeval.logs import natural
 
 METADATA: Final = "metadata.yaml"
 """The file in which rosbag2 describes the files beside it."""

@@ -17,7 +17,7 @@ from roadeval.fleet.manifest import ManifestEntry, is_manifest, read_manifest
 from roadeval.fleet.naming import counts, in_order, is_bag, is_log
 from roadeval.fleet.remote import drives_below
 from roadeval.fleet.urls import file_of, is_url, last_part, scheme_of
-from roadeval.logs.files import files_of
+from roadeval.logs import files_of
 from roadeval.runtime.text import visible
 
 _LONGER: Final = 8

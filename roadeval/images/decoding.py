@@ -12,6 +12,7 @@ own rows and columns.
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -27,13 +28,19 @@ from roadeval.images.formats import ImageFormat, format_of
 from roadeval.images.limits import Limits
 from roadeval.images.png import Png, decode
 from roadeval.images.samples import eight_bits
-from roadeval.images.scans import check_scans
 
 Array = npt.NDArray[Any]
 File = bytes | memoryview
 
 _SAMPLES: Final = ("L", "I;16", "I;16B", "I;16L", "I", "F")
 """Pillow's modes of images with one number a pixel."""
+MOST_SCANS: Final = 100
+"""Most scans of a file; libtiff has the same bound. Encoders write some ten. A scan of a few bytes
+can cost the decoder a walk through the whole image: 200 kB of them would take over a minute."""
+_SCAN: Final = b"\xff\xda"
+_IMAGE_END: Final = 0xD9
+_MARKER: Final = re.compile(rb"\xff[\xc0-\xcf\xd9-\xfe]")
+"""Markers that end a scan: in its data a byte 255 is followed by 0, or by a restart marker."""
 
 
 def to_rgb(data: File, limits: Limits) -> Rgb:
@@ -155,12 +162,30 @@ def _jpeg(data: File, limits: Limits) -> Rgb:
     import simplejpeg
 
     limits.check(*_jpeg_size(data))
-    check_scans(data)
+    _check_scans(data)
     try:
         pixels: Rgb = simplejpeg.decode_jpeg(data, "RGB", strict=not limits.keep_damaged)
     except ValueError as error:
         raise DamagedImageError(f"a damaged JPEG ({error})") from error
     return pixels
+
+
+def _check_scans(data: bytes | memoryview) -> None:
+    """Refuse a JPEG of too many scans, before it is decoded; an `ImageError`."""
+    data = bytes(data)
+    # What lies in a segment or behind the image can look like a scan: only a hundred of them tell.
+    if data.count(_SCAN) > MOST_SCANS and _scans(data) > MOST_SCANS:
+        raise ImageError(f"a JPEG of more than {MOST_SCANS} scans, which takes too long to decode")
+
+
+def _scans(data: bytes) -> int:
+    """Count the scans from the first marker to the image's end."""
+    at, count = 2, 0
+    while (found := _MARKER.search(data, at)) is not None and data[found.end() - 1] != _IMAGE_END:
+        at = found.end()
+        count += found.group() == _SCAN
+        at += int.from_bytes(data[at : at + 2], "big")
+    return count
 
 
 def _jpeg_size(data: File) -> tuple[int, int]:

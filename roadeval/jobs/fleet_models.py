@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -171,18 +171,12 @@ def _drawn(task: FoldTask) -> tuple[dict[Path, Sequence[Frame]], dict[str, str]]
 
 def _frames_of(entry: DriveEntry, own: RunConfig, held: HeldFrames) -> Iterator[Frame]:
     """Decode the training frames of a drive, and hold them as long as there is room."""
-    span, settings = logs.Span.of(own.frames), own.training
-    with (
-        staged(entry.source) as path,
-        logs.open_log(
-            path, keep_corrupt=own.frames.keep_corrupt, max_pixels=own.frames.max_pixels
-        ) as log,
-    ):
-        selection = log.select(own.topics, own.labels, scale=own.frames.scale)
+    with staged(entry.source) as path, logs.open_log(path, replace(own, masks={})) as log:
+        selection = log.select()
         if selection.truth is None:
             return
-        begin = partial(log.frames, selection, span)
-        for frame in learning.spread(begin, settings.frames, labelled=True):
+        begin = partial(log.frames, selection)
+        for frame in learning.spread(begin, own.training.frames, labelled=True):
             if frame.truth is None:
                 return
             if not held.add(frame):

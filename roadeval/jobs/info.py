@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from roadeval import logs
-from roadeval.config import LogConfig
-
-if TYPE_CHECKING:
-    from roadeval.config import RunConfig
 
 
-def info(drive: str | Path, config: RunConfig | LogConfig | None = None) -> logs.LogDescription:
+def info(drive: str | Path, config: logs.LogConfig | None = None) -> logs.LogDescription:
     """Describe a log: topics, rates, gaps, damage, and what a replay would pick and why.
 
     Raises
@@ -20,11 +15,4 @@ def info(drive: str | Path, config: RunConfig | LogConfig | None = None) -> logs
     RoadevalError
         If it is no log, or cannot be read.
     """
-    config = config or LogConfig()
-    return logs.describe(
-        drive,
-        config.topics,
-        config.labels,
-        keep_corrupt=config.frames.keep_corrupt,
-        max_pixels=config.frames.max_pixels,
-    )
+    return logs.describe(drive, config)

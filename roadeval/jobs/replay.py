@@ -92,10 +92,7 @@ def replay(
     given = {"save": save, "reports": reports, "mcap": mcap}
     wanted = {name: str(path) for name, path in given.items() if path is not None}
     config = (config or RunConfig()).for_drive(drive).override({"output": wanted}).resolved()
-    frames = config.frames
-    with logs.open_log(
-        drive, keep_corrupt=frames.keep_corrupt, max_pixels=frames.max_pixels
-    ) as log:
+    with logs.open_log(drive, config) as log:
         to = Outputs.of(config.output, log.name)
         with to.holding((drive, config.training.model)) as left:
             outcome = _written(log, config, to, on_progress, on_frame)

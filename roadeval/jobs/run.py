@@ -104,7 +104,7 @@ class Run:
         )
 
     def _properties(self) -> dict[str, str | int | float]:
-        masks = {name: each.digest() for name, each in self.selection.elsewhere.items()}
+        masks = self.selection.digests()
         return {
             "version": VERSION,
             # The recording's identity comes from its layout, this digest included.
@@ -112,7 +112,7 @@ class Run:
             "drive": self.log.name,
             "preset": self.config.preset,
             "image_topic": self.selection.image.name,
-            "truth_topic": self.selection.truth.topic.name if self.selection.truth else "",
+            "truth_topic": self.selection.truth.where if self.selection.truth else "",
             "trained_on": self.model.source,
             "training_frames": len(self.model.digests),
         }
@@ -126,10 +126,8 @@ def prepare(log: logs.Log, config: RunConfig, on_progress: OnProgress) -> Run:
     RoadevalError
         If the log, the configuration or the training leave nothing to run.
     """
-    selection = log.select(
-        config.topics, config.labels, masks=config.masks, scale=config.frames.scale
-    )
-    again = partial(log.frames, selection, logs.Span.of(config.frames))
+    selection = log.select()
+    again = partial(log.frames, selection)
     variants = config.variants()
     labelled = selection.truth is not None
     # Without truth no rate could tell the trainings apart.
@@ -190,11 +188,7 @@ def _bind(variants: tuple[Variant, ...], model: Model, path: str | None) -> Mapp
 
 def _external(selection: logs.Selection) -> tuple[VariantLayout, ...]:
     """Describe the variants whose masks another system has made."""
-    masks: Mapping[str, Any] = selection.masks
-    return (
-        *(frame.external_layout(name, label.topic.name) for name, label in masks.items()),
-        *(
-            frame.external_layout(name, mask.where, probable=mask.is_confidence)
-            for name, mask in selection.elsewhere.items()
-        ),
+    return tuple(
+        frame.external_layout(name, mask.where, probable=mask.is_confidence)
+        for name, mask in selection.masks.items()
     )

@@ -102,16 +102,14 @@ def _sizes(run: Run) -> tuple[str, ...]:
 
 def _missing(run: Run) -> Iterator[str]:
     """Yield a warning where masks of other systems are missing, or belong to no frame."""
-    seen, elsewhere = run.frames.accounting, run.selection.elsewhere
+    seen = run.frames.accounting
     totals = run.board.totals()
-    for name in (*run.selection.masks, *elsewhere):
+    for name, masks in run.selection.masks.items():
         if missing := seen.read - seen.masks[name]:
             without = f"{name}: {missing} of the {seen.read} frames read have no mask of it"
             rest = "it is scored on the others alone" if name in totals else "it has no score"
             yield f"{without}: {rest}"
-        if name not in elsewhere:
-            continue
-        pairing, where = elsewhere[name].pairing, elsewhere[name].where
+        pairing, where = masks.pairing, masks.where
         if pairing.unsure:
             yield (
                 f"{name}: the last {pairing.unsure} frames of the log have no mask of {where}: "
@@ -123,15 +121,17 @@ def _missing(run: Run) -> Iterator[str]:
 
 def _masks(run: Run) -> dict[str, Any]:
     """State where masks of other systems lie that are not in the log, and of which frames."""
+    digests = run.selection.digests()
     return {
         name: {
             "path": run.config.masks[name].path,
-            "sha256": each.digest(),
+            "sha256": digests[name],
             "pairing": each.why,
             "meaning": each.meaning.words,
             "frames": run.frames.accounting.masks[name],
         }
-        for name, each in run.selection.elsewhere.items()
+        for name, each in run.selection.masks.items()
+        if name in digests
     }
 
 

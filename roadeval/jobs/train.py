@@ -70,10 +70,8 @@ def _learnt(drives: Sequence[AnyPath], config: RunConfig, on_progress: OnProgres
     for drive in drives:
         own = config.for_drive(drive)
         several = len(drives) > 1 and own.labels == config.labels
-        with logs.open_log(
-            drive, keep_corrupt=own.frames.keep_corrupt, max_pixels=own.frames.max_pixels
-        ) as log:
-            selection = log.select(own.topics, own.labels, scale=own.frames.scale, several=several)
+        with logs.open_log(drive, replace(own, masks={})) as log:
+            selection = log.select(several=several)
             drawn[log.path] = _draw(log, selection, own, held, show)
     frames = {path: each.frames for path, each in drawn.items()}
     told = [sentence for each in drawn.values() for sentence in each.told]
@@ -94,7 +92,7 @@ def _draw(
     streams: list[logs.FrameStream] = []
 
     def begin() -> logs.FrameStream:
-        streams.append(log.frames(selection, logs.Span.of(own.frames)))
+        streams.append(log.frames(selection))
         return streams[-1]
 
     labelled = settings.source != "patch"
@@ -136,8 +134,8 @@ def _require_a_drive_for_each(config: RunConfig, drives: Sequence[AnyPath]) -> N
 
 def _understood(selection: logs.Selection, own: RunConfig) -> Iterator[str]:
     """Return a warning for a mask that was understood by itself although labels were given."""
-    if selection.truth and own.labels.road and selection.truth.labels.by_itself:
+    if selection.truth and own.labels.road and selection.truth.meaning.by_itself:
         yield (
-            f"none of the given labels occurs in {selection.truth.topic.name}, which "
-            f"was read as {selection.truth.labels.words}"
+            f"none of the given labels occurs in {selection.truth.where}, which "
+            f"was read as {selection.truth.meaning.words}"
         )

@@ -1,8 +1,9 @@
 """Camera logs (MCAP) in and out. No other room knows MCAP.
 
 A log goes from bytes to frames through its sub-rooms: ``container`` (records, chunks, damage),
-``messages`` (pictures, whatever their encoding) and ``topics`` (which topics, and which label
-belongs to which image); `Log.frames` puts them together. ``writing`` writes logs.
+``messages`` (pictures, whatever their encoding), ``topics`` (what there is, and which to replay)
+and ``truth`` (labels wherever they lie: what they mean, which image each belongs to); `Log.frames`
+puts them together. ``writing`` writes logs.
 
 Names are imported when they are first used: a command that reads settings needs little else.
 """
@@ -12,20 +13,23 @@ from typing import TYPE_CHECKING, Final
 from roadeval.runtime.on_demand import on_demand
 
 if TYPE_CHECKING:
-    from roadeval.logs.accounting import Accounting
     from roadeval.logs.container.damage import Damage
-    from roadeval.logs.description import LogDescription, describe
     from roadeval.logs.errors import FrameError, LogError
-    from roadeval.logs.frames import FrameStream
-    from roadeval.logs.log import Log, open_log
-    from roadeval.logs.logged_frame import LoggedFrame
-    from roadeval.logs.masks.elsewhere import mask_stamp
-    from roadeval.logs.messages.schemas import TopicKind
-    from roadeval.logs.settings import FrameSettings, LabelSettings, MaskSettings, TopicSettings
-    from roadeval.logs.span import Span
-    from roadeval.logs.times import Instant, parse_time
+    from roadeval.logs.files import files_of, natural
+    from roadeval.logs.frames import Accounting, FrameStream, LoggedFrame
+    from roadeval.logs.log import Log, LogDescription, describe, open_log
+    from roadeval.logs.messages.encoding import TopicKind
+    from roadeval.logs.selection import Selection
+    from roadeval.logs.settings import (
+        FrameSettings,
+        LabelSettings,
+        LogConfig,
+        MaskSettings,
+        TopicSettings,
+        parse_time,
+    )
     from roadeval.logs.topics.description import TopicInfo
-    from roadeval.logs.topics.selection import LabelTopic, Selection
+    from roadeval.logs.truth.source import LabelSource, mask_stamp
     from roadeval.logs.writing.pack import PackResult, pack
     from roadeval.logs.writing.sidecar import NoSidecar, SidecarWriter
     from roadeval.logs.writing.writer import LogWriter
@@ -36,10 +40,10 @@ __all__ = [
     "FrameError",
     "FrameSettings",
     "FrameStream",
-    "Instant",
     "LabelSettings",
-    "LabelTopic",
+    "LabelSource",
     "Log",
+    "LogConfig",
     "LogDescription",
     "LogError",
     "LogWriter",
@@ -49,45 +53,47 @@ __all__ = [
     "PackResult",
     "Selection",
     "SidecarWriter",
-    "Span",
     "TopicInfo",
     "TopicKind",
     "TopicSettings",
     "describe",
+    "files_of",
     "mask_stamp",
+    "natural",
     "open_log",
     "pack",
     "parse_time",
 ]
 
 _MODULES: Final = {
-    "Accounting": "accounting",
+    "Accounting": "frames",
     "Damage": "container.damage",
     "FrameError": "errors",
     "FrameSettings": "settings",
     "FrameStream": "frames",
-    "Instant": "times",
     "LabelSettings": "settings",
-    "LabelTopic": "topics.selection",
+    "LabelSource": "truth.source",
     "Log": "log",
-    "LogDescription": "description",
+    "LogConfig": "settings",
+    "LogDescription": "log",
     "LogError": "errors",
     "LogWriter": "writing.writer",
-    "LoggedFrame": "logged_frame",
+    "LoggedFrame": "frames",
     "MaskSettings": "settings",
     "NoSidecar": "writing.sidecar",
     "PackResult": "writing.pack",
-    "Selection": "topics.selection",
+    "Selection": "selection",
     "SidecarWriter": "writing.sidecar",
-    "Span": "span",
     "TopicInfo": "topics.description",
-    "TopicKind": "messages.schemas",
+    "TopicKind": "messages.encoding",
     "TopicSettings": "settings",
-    "describe": "description",
-    "mask_stamp": "masks.elsewhere",
+    "describe": "log",
+    "files_of": "files",
+    "mask_stamp": "truth.source",
+    "natural": "files",
     "open_log": "log",
     "pack": "writing.pack",
-    "parse_time": "times",
+    "parse_time": "settings",
 }
 
 if not TYPE_CHECKING:  # there every name is known

@@ -1,23 +1,203 @@
-"""The stream of a log's frames, in memory that does not grow with the log's length."""
+"""The frames of a log: read one after the other, decoded in any thread.
+
+They are read in memory that does not grow with the log's length.
+"""
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, Final, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
-from roadeval.logs.accounting import Accounting
-from roadeval.logs.logged_frame import SHADOW, TRUTH, FrameRules, LoggedFrame
-from roadeval.logs.messages.schemas import TopicKind
+from roadeval.data import IGNORE, Frame, Mask, Rgb
+from roadeval.images import Limits, format_of
+from roadeval.logs.errors import BadMessage, DamagedMessage, FrameError
+from roadeval.logs.messages.encoding import TopicKind
+from roadeval.logs.messages.pictures import CompressedPicture, Picture
+from roadeval.logs.messages.pixels import to_rgb
 from roadeval.logs.messages.video import PictureSequence, Video
-from roadeval.logs.span import Span
-from roadeval.logs.topics.label_reader import LabelReader, clocks_of, read_or_error
-from roadeval.logs.topics.pairing import UNREADABLE
-from roadeval.logs.topics.reader import TopicReader
-from roadeval.logs.topics.selection import Clock, Selection
-from roadeval.logs.topics.survey import repeats, tell_fringes, tell_repeats, tell_sizes
+from roadeval.logs.selection import Selection, scaled_size
+from roadeval.logs.topics.description import repeats, tell_repeats, tell_sizes
+from roadeval.logs.topics.reader import UNREADABLE
+from roadeval.logs.truth.meaning import Labels
+from roadeval.logs.truth.pairing import Clock, Partners
+from roadeval.logs.truth.source import Label, LabelSource, read_or_error
+
+T = TypeVar("T")
+Pixels = TypeVar("Pixels", npt.NDArray[np.uint8], npt.NDArray[np.uint16])
+
+TRUTH: Final = "/truth"
+SHADOW: Final = "/shadow"
+"""Keys among a frame's labels; no mask's name begins with a slash."""
+
+
+@dataclass(slots=True)
+class Accounting:
+    """Counts of frames and of truth, which grow while frames are read.
+
+    The dictionaries are by frame number, and any thread may add to them.
+    """
+
+    in_log: int = 0
+    """Messages of the image topic."""
+    in_range: int = 0
+    """Those inside the range, before its stride and its limit."""
+    read: int = 0
+    """Frames returned so far."""
+    labelled: int = 0
+    """Of these, those with truth."""
+    masks: Counter[str] = field(default_factory=Counter)
+    """Of these, those that have a mask of another method, by its name."""
+    undecodable: dict[int, str] = field(default_factory=dict)
+    """Of the frames returned, those that could not be decoded, and why."""
+    damaged: dict[int, str] = field(default_factory=dict)
+    """Those that are damaged and were decoded all the same, and what is wrong."""
+    sizes: dict[int, tuple[int, int]] = field(default_factory=dict)
+    """Width and height of those that are not of the topic's size."""
+    fringes: dict[tuple[int, str], tuple[int, int]] = field(default_factory=dict)
+    """By frame number and label source: pixels ignored because their value is too far from every
+    known one, and pixels in all. Only of images that have any."""
+    truth_unused: int = 0
+    """Truth messages between the first and last paired one that belong to no image (counted only
+    if every frame is read)."""
+
+    @property
+    def losses(self) -> tuple[str, ...]:
+        """The frames that could not be decoded, or only in part: a sentence each."""
+        frames = sorted((self.undecodable | self.damaged).items())
+        return tuple(f"frame {number}: {reason}" for number, reason in frames)
+
+    def tell_fringes(self) -> Iterator[str]:
+        """Say which share of a source's labels is ignored, for each that has any."""
+        sums: dict[str, tuple[int, int, int]] = {}
+        for (_, source), (pixels, size) in sorted(self.fringes.items()):
+            images, ignored, all_pixels = sums.get(source, (0, 0, 0))
+            sums[source] = images + 1, ignored + pixels, all_pixels + size
+        for source, (images, ignored, size) in sums.items():
+            yield (
+                f"{source}: {100 * ignored / size:.2g} % of the pixels of {images} label images "
+                "are ignored, being farther than `labels.tolerance` from every known value"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class _Rules:
+    """How the frames of a stream are decoded."""
+
+    limits: Limits
+    """On their images: how large, and whether damaged."""
+    size: tuple[int, int] | None
+    """Width and height of the topic's images, if known."""
+    resize_labels: bool
+    scale: float
+    """Scale of image and labels together."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoggedFrame:
+    """A frame as logged, not decoded yet."""
+
+    number: int
+    """Position in the image topic by log time, from 0, undecodable messages included."""
+    stamp_ns: int
+    """Header stamp; the log time where the log has no stamps."""
+    log_time_ns: int
+    picture: Picture | FrameError
+    """The image, or why it cannot be read."""
+    labels: Mapping[str, Label]
+    """The labels that belong to it: `TRUTH`, `SHADOW`, and masks by their name."""
+    rules: _Rules
+    accounting: Accounting
+    """Where it says what it found."""
+
+    @property
+    def labelled(self) -> bool:
+        """Whether there is truth for it."""
+        return TRUTH in self.labels
+
+    def decode(self) -> Frame:
+        """Decode image and labels; any thread may do so, and mostly releases the interpreter lock.
+
+        Raises
+        ------
+        FrameError
+            If the image or a label of it cannot be decoded.
+        """
+        try:
+            return at_scale(self._decode(), self.rules.scale)
+        except (BadMessage, FrameError) as error:
+            reason = f"frame {self.number}: {error}"
+            self.accounting.undecodable[self.number] = str(error)
+            raise FrameError(reason) from error
+
+    def _decode(self) -> Frame:
+        picture = self.picture
+        if isinstance(picture, FrameError):
+            raise picture
+        image, is_whole = self._pixels(lambda limits: to_rgb(picture, limits))
+        size = image.shape[1], image.shape[0]
+        if self.rules.size is not None and size != self.rules.size:
+            self.accounting.sizes[self.number] = size
+        labels = {name: self._label(label, image) for name, label in self.labels.items()}
+        truth, shadow = (labels.pop(name, None) for name in (TRUTH, SHADOW))
+        return Frame(
+            self.number,
+            self.stamp_ns,
+            self.log_time_ns,
+            image,
+            picture.data,
+            _media_type(picture) if is_whole else None,
+            None if truth is None else truth.truth,
+            None if shadow is None else shadow.truth,
+            {name: _as_mask(label.truth) for name, label in labels.items()},
+            {
+                name: label.probability
+                for name, label in labels.items()
+                if label.probability is not None
+            },
+        )
+
+    def _pixels(self, decode: Callable[[Limits], T], place: str = "") -> tuple[T, bool]:
+        """Decode, damaged or not as the limits say; return also whether it was undamaged."""
+        try:
+            return decode(replace(self.rules.limits, keep_damaged=False)), True
+        except DamagedMessage as error:
+            if not self.rules.limits.keep_damaged:
+                raise
+            found = decode(self.rules.limits)
+            where = f"{place}: " if place else ""
+            self.accounting.damaged[self.number] = f"{where}{error.damage}, used all the same"
+            return found, False
+
+    def _label(self, label: Label, image: Rgb) -> Labels:
+        """Decode a label, and bring it to the size of the image."""
+        try:
+            found, _ = self._pixels(label.read, label.place)
+        except BadMessage as error:
+            raise FrameError(f"{label.place}: {error}") from error
+        if found.fringe:
+            self.accounting.fringes[self.number, label.source] = found.fringe, found.truth.size
+        height, width = image.shape[:2]
+        high, wide = found.truth.shape
+        if (high, wide) == (height, width):
+            return found
+        if not self.rules.resize_labels:
+            raise FrameError(
+                f"{label.place} is {wide}x{high}, its image {width}x{height}: "
+                "scale the labels with `topics.resize_truth`"
+            )
+        probability = found.probability
+        return replace(
+            found,
+            truth=_nearest(found.truth, (width, height)),
+            probability=None if probability is None else _nearest(probability, (width, height)),
+        )
 
 
 class FrameStream:
@@ -29,26 +209,28 @@ class FrameStream:
         Counts of the frames so far.
     """
 
-    def __init__(
-        self, readers: Mapping[str, TopicReader], selection: Selection, span: Span, numbers: range
-    ) -> None:
-        self._images = readers[selection.image.name]
-        self._pictures: PictureSequence = self._images
-        if selection.image.kind is TopicKind.VIDEO:
-            self._pictures = Video(self._images, self._images.limits)
+    def __init__(self, selection: Selection, in_range: int, numbers: range) -> None:
+        """Begin a stream of the frames of these numbers, from a range of so many."""
+        camera = selection.camera
+        self._images = camera.images
+        self._pictures: PictureSequence = camera.images
+        if camera.topic.kind is TopicKind.VIDEO:
+            self._pictures = Video(camera.images, camera.images.limits)
         self._selection = selection
         self._numbers = numbers
-        self._labels = self._label_readers(readers)
-        self.accounting = Accounting(in_log=len(self._images), in_range=len(numbers))
-        self._span = span
-        self._rules = FrameRules(
-            limits=self._images.limits,
-            size=selection.image.size,
-            resize=selection.resize_truth,
-            scale=selection.scale,
+        chosen = {TRUTH: selection.truth, SHADOW: selection.shadow, **selection.masks}
+        begin = int(camera.images.log_times[numbers[0]])
+        self._labels: dict[str, tuple[LabelSource, Partners]] = {
+            name: (source, source.begin(begin))
+            for name, source in chosen.items()
+            if source is not None
+        }
+        self.accounting = Accounting(in_log=len(camera.images), in_range=in_range)
+        self._rules = _Rules(
+            camera.images.limits, camera.topic.size, camera.resize_labels, selection.scale
         )
         self._stamps = array("q")
-        self._iterator = self._run()
+        self._iterator = map(self._frame, numbers)
 
     def __iter__(self) -> Iterator[LoggedFrame]:
         return self
@@ -57,7 +239,7 @@ class FrameStream:
         return next(self._iterator)
 
     def __len__(self) -> int:
-        return len(self._taken)
+        return len(self._numbers)
 
     @cached_property
     def oddities(self) -> tuple[str, ...]:
@@ -66,60 +248,71 @@ class FrameStream:
         Ask for it after the last frame was decoded.
         """
         read, size = len(self._stamps), self._selection.image.size
-        numbers = self._taken[:read]
-        repeated = repeats(self._images, numbers, np.array(self._stamps, np.int64))
+        stamps = np.array(self._stamps, np.int64)
         return (
             *tell_sizes(self.accounting.sizes, read, size),
-            *tell_repeats(repeated, read),
-            *tell_fringes(self.accounting.fringes),
+            *tell_repeats(repeats(self._images, self._numbers[:read], stamps), read),
+            *self.accounting.tell_fringes(),
         )
-
-    @property
-    def _taken(self) -> range:
-        taken = self._numbers[:: self._span.every]
-        return taken[: self._span.max_frames or len(taken)]
-
-    def _run(self) -> Iterator[LoggedFrame]:
-        for number in self._taken:
-            yield self._frame(number)
 
     def _frame(self, number: int) -> LoggedFrame:
         labels = {
-            name: found for name, reader in self._labels.items() if (found := reader.of(number))
+            name: source.label(position)
+            for name, (source, partners) in self._labels.items()
+            if (position := partners.of(number)) is not None
         }
         self.accounting.read += 1
         self.accounting.labelled += TRUTH in labels
         self.accounting.masks.update(labels.keys() - {TRUTH, SHADOW})
-        if TRUTH in self._labels and self._span.every == 1:
-            self.accounting.truth_unused = self._labels[TRUTH].unused
+        if TRUTH in self._labels and self._numbers.step == 1:
+            self.accounting.truth_unused = self._labels[TRUTH][1].unused
         # Reading a message corrects its log time where the file's index is wrong.
         picture = read_or_error(self._pictures, number)
         log_time = int(self._images.log_times[number])
-        self._stamps.append(self._stamp(number, log_time))
+        stamped = self._selection.camera.clock is Clock.STAMP
+        stamp = self._images.stamp(number) if stamped else UNREADABLE
+        self._stamps.append(log_time if stamp == UNREADABLE else stamp)
         return LoggedFrame(
-            number=number,
-            stamp_ns=self._stamps[-1],
-            log_time_ns=log_time,
-            picture=picture,
-            labels=labels,
-            rules=self._rules,
-            accounting=self.accounting,
+            number, self._stamps[-1], log_time, picture, labels, self._rules, self.accounting
         )
 
-    def _stamp(self, number: int, log_time: int) -> int:
-        stamped = self._selection.clock is Clock.STAMP
-        stamp = self._images.stamp(number) if stamped else UNREADABLE
-        return log_time if stamp == UNREADABLE else stamp
 
-    def _label_readers(self, readers: Mapping[str, TopicReader]) -> dict[str, LabelReader]:
-        selection, images = self._selection, self._images
-        chosen = {TRUTH: selection.truth, SHADOW: selection.shadow, **selection.masks}
-        found = {}
-        for name, label in chosen.items():
-            if label is not None:
-                reader = readers[label.topic.name]
-                clocks = clocks_of(images, reader, selection.clock)
-                found[name] = LabelReader(
-                    reader, label.labels, images, clocks, selection.tolerance_ns
-                )
-        return found | {name: each.reader(images) for name, each in selection.elsewhere.items()}
+def at_scale(frame: Frame, scale: float) -> Frame:
+    """Reduce a frame to a share of its width and height, at most 1.
+
+    Colours are averaged over the area of each new pixel; labels are the nearest pixel's. The
+    payload stays the logged file, by which a frame is recognised, but no longer this image's.
+    """
+    if scale == 1:
+        return frame
+    import cv2
+
+    size = scaled_size((frame.image.shape[1], frame.image.shape[0]), scale)
+    return replace(
+        frame,
+        image=cv2.resize(frame.image, size, interpolation=cv2.INTER_AREA),
+        media_type=None,
+        truth=None if frame.truth is None else _nearest(frame.truth, size),
+        shadow_truth=None if frame.shadow_truth is None else _nearest(frame.shadow_truth, size),
+        external={name: _nearest(mask, size) for name, mask in frame.external.items()},
+        probabilities={name: _nearest(each, size) for name, each in frame.probabilities.items()},
+    )
+
+
+def _nearest(labels: Pixels, size: tuple[int, int]) -> Pixels:
+    """Resize labels, or probabilities, to a width and height, by the nearest pixel."""
+    import cv2
+
+    how = cv2.INTER_NEAREST_EXACT
+    return np.asarray(cv2.resize(labels, size, interpolation=how), labels.dtype)
+
+
+def _media_type(picture: Picture) -> str | None:
+    """Return the media type of a file that every viewer knows."""
+    format_ = format_of(picture.data) if isinstance(picture, CompressedPicture) else None
+    return format_.media_type if format_ else None
+
+
+def _as_mask(truth: npt.NDArray[Any]) -> Mask:
+    """Make ignored pixels non-road, because a mask has no third value."""
+    return np.where(truth == IGNORE, 0, truth).astype(np.uint8)

@@ -3,48 +3,37 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from mcap.records import Channel, Schema
 
-from roadeval.images import MAX_PIXELS, Limits
+from roadeval.images import Limits
 from roadeval.logs.container.damage import Damage, damage_of
 from roadeval.logs.container.file import Container
 from roadeval.logs.errors import BadRecord, LogError
 from roadeval.logs.files import files_of
 from roadeval.logs.frames import FrameStream
-from roadeval.logs.masks.elsewhere import log_and_topic, of_folder, of_topic
-from roadeval.logs.masks.folder import open_folder
-from roadeval.logs.messages.decoders import kind_of, message_is_whole
-from roadeval.logs.messages.schemas import TopicKind
-from roadeval.logs.settings import LabelSettings, MaskSettings, TopicSettings
-from roadeval.logs.span import Span
-from roadeval.logs.times import NS
+from roadeval.logs.messages.encoding import TopicKind
+from roadeval.logs.messages.pictures import kind_of, message_is_whole
+from roadeval.logs.selection import Selection, settle
+from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import named
-from roadeval.logs.topics.description import TopicInfo, describe_topic
-from roadeval.logs.topics.mask_source import MaskSource
+from roadeval.logs.topics.description import TopicInfo, describe_topic, survey
 from roadeval.logs.topics.reader import topic_readers
-from roadeval.logs.topics.selection import Selection, settle
-from roadeval.logs.topics.survey import survey
+from roadeval.logs.truth.folder import open_folder
+from roadeval.logs.truth.pairing import Camera
+from roadeval.logs.truth.source import LabelSource, in_folder, in_other_log, log_and_topic
 from roadeval.runtime.text import visible
 
 
-def open_log(path: str | Path, *, keep_corrupt: bool = False, max_pixels: int = MAX_PIXELS) -> Log:
+def open_log(path: str | Path, config: LogConfig | None = None) -> Log:
     """Open an MCAP file, or a rosbag2 folder of split files, as one log.
-
-    Parameters
-    ----------
-    path
-        File or folder.
-    keep_corrupt
-        Whether to use data whose checksum is wrong, and images of which a part is lost.
-    max_pixels
-        Most pixels of an image; one that has more is not decoded.
 
     Raises
     ------
@@ -54,7 +43,7 @@ def open_log(path: str | Path, *, keep_corrupt: bool = False, max_pixels: int = 
     path = Path(path)
     files, damage = files_of(path)
     try:
-        return Log(path, files, damage, Limits(max_pixels, keep_corrupt))
+        return Log(path, files, damage, config or LogConfig())
     except (BadRecord, OSError) as error:
         raise LogError(f"{path}: {error}") from error
 
@@ -66,31 +55,28 @@ class Log:
     ----------
     path, name
         Where it lies, and its name without folder and suffix, fit to be shown.
+    config
+        All that is asked of it.
     topics
         Every topic, by name.
-    damage
-        What could not be read.
     start_ns, end_ns
         Log times of the first and the last message of all topics; 0 in an empty log.
     """
 
     def __init__(
-        self,
-        path: Path,
-        files: Sequence[Path],
-        damage: Sequence[Damage],
-        limits: Limits,
+        self, path: Path, files: Sequence[Path], damage: Sequence[Damage], config: LogConfig
     ) -> None:
         self.path = path
         self.name = visible(path.stem if path.is_file() else path.resolve().name)
+        self.config = config
+        self._limits = Limits(config.frames.max_pixels, config.frames.keep_corrupt)
         self._lost_files = damage
-        self._limits = limits
         self._beside: list[Log] = []
         self._containers = [
-            Container(f, _is_image, message_is_whole, keep_corrupt=limits.keep_damaged)
+            Container(f, _is_image, message_is_whole, keep_corrupt=config.frames.keep_corrupt)
             for f in files
         ]
-        self._readers = topic_readers(self._containers, limits, lacks_files=bool(damage))
+        self._readers = topic_readers(self._containers, self._limits, lacks_files=bool(damage))
         self.topics: tuple[TopicInfo, ...] = tuple(
             describe_topic(reader) for _, reader in sorted(self._readers.items())
         )
@@ -159,29 +145,13 @@ class Log:
             return digests[0]
         return hashlib.sha256("".join(digests).encode()).hexdigest()
 
-    def select(
-        self,
-        topics: TopicSettings | None = None,
-        labels: LabelSettings | None = None,
-        *,
-        masks: Mapping[str, MaskSettings] | None = None,
-        scale: float = 1.0,
-        several: bool = False,
-    ) -> Selection:
-        """Settle what to replay.
+    def select(self, *, several: bool = False) -> Selection:
+        """Settle what to replay: what is asked for, and the rest where the log leaves no doubt.
+
+        Another log that holds masks stays open as long as this one.
 
         Parameters
         ----------
-        topics
-            What the user chose; the rest is chosen here, where the log leaves no doubt.
-        labels
-            What the values of the truth mean.
-        masks
-            Other methods' masks that lie beside the log, by name. Another log that holds some
-            stays open as long as this one.
-        scale
-            Of the frames that `frames` returns, with their labels, to the logged ones' width and
-            height.
         several
             Whether the labels are given for several logs at once, see `understand`.
 
@@ -191,36 +161,33 @@ class Log:
             If a topic is missing or the choice is not plain, a label value does not occur or
             cannot be understood, a label image has another size, or no mask belongs to a frame.
         """
-        topics, labels = topics or TopicSettings(), labels or LabelSettings()
         try:
-            found = settle(self.topics, self._readers, topics, labels, scale, several=several)
-            beside = {name: self._masks(name, own, found) for name, own in (masks or {}).items()}
+            found = settle(self.topics, self._readers, self.config, several=several)
+            truth = "" if found.truth is None else found.truth.where
+            beside = {
+                name: self._masks(name, own, found.camera, truth)
+                for name, own in self.config.masks.items()
+            }
         except LogError as error:
             raise LogError(f"{self.path.name}: {error}") from error
-        return replace(found, elsewhere=beside)
+        return replace(found, masks={**found.masks, **beside})
 
-    def _masks(self, name: str, settings: MaskSettings, selection: Selection) -> MaskSource:
+    def _masks(self, name: str, settings: MaskSettings, camera: Camera, truth: str) -> LabelSource:
         """Settle masks that lie beside the log; errors begin with their variant's name."""
-        images, place = self._readers[selection.image.name], log_and_topic(settings.path)
+        place = log_and_topic(settings.path)
         try:
             if place is None:
                 folder = open_folder(Path(settings.path), settings, self._limits)
-                return of_folder(folder, settings, selection, images)
-            limits = self._limits
-            other = open_log(
-                place[0], keep_corrupt=limits.keep_damaged, max_pixels=limits.max_pixels
-            )
+                return in_folder(folder, settings, camera)
+            other = open_log(place[0], LogConfig(frames=self.config.frames))
             self._beside.append(other)
             topic = named(other.topics, place[1], "topic").name
-            truth = selection.truth and selection.truth.topic.name
             if topic == truth and other.path.resolve() == self.path.resolve():
                 raise LogError(f"{topic} is the truth that it is held against")
-            reader = other._readers[topic]
-            return of_topic(
-                reader,
+            return in_other_log(
+                other._readers[topic],
                 settings,
-                selection,
-                images,
+                camera,
                 log=other.name,
                 digest=lambda: other.sha256,
             )
@@ -228,30 +195,25 @@ class Log:
             told = str(error).replace("`labels.", f"`masks.{name}.labels.")
             raise LogError(f"`masks` {name}: {told}") from error
 
-    def oddities(self, selection: Selection) -> tuple[str, ...]:
-        """Go through all selected images, without decoding them: see `LogDescription.oddities`."""
-        image = selection.image
-        return tuple(
-            f"{image.name}: {oddity}" for oddity in survey(self._readers[image.name], image.size)
-        )
-
-    def frames(self, selection: Selection, span: Span | None = None) -> FrameStream:
-        """Read the selected frames, by log time; each call begins anew.
+    def frames(self, selection: Selection) -> FrameStream:
+        """Read the frames of a selection that are asked for, by log time; each call begins anew.
 
         Raises
         ------
         LogError
-            If the span holds no frame.
+            If there is none in the range.
         """
-        span = span or Span()
-        times = self._readers[selection.image.name].log_times
-        start = span.start.resolve(self.start_ns) if span.start else None
-        end = span.end.resolve(self.start_ns) if span.end else None
-        first = 0 if start is None else int(np.searchsorted(times, start))
-        last = len(times) if end is None else int(np.searchsorted(times, end))
+        asked, times = self.config.frames, selection.camera.images.log_times
+        first, last = (
+            default
+            if text is None
+            else int(np.searchsorted(times, parse_time(text, self.start_ns)))
+            for text, default in ((asked.start, 0), (asked.end, len(times)))
+        )
         if first >= last:
             raise LogError(self._empty(times))
-        return FrameStream(self._readers, selection, span, range(first, last))
+        numbers = range(first, last, asked.every)
+        return FrameStream(selection, last - first, numbers[: asked.max_frames])
 
     def _empty(self, times: npt.NDArray[np.int64]) -> str:
         if not len(times):
@@ -274,6 +236,66 @@ class Log:
 
     def __exit__(self, *error: object) -> None:
         self.close()
+
+
+@dataclass(frozen=True, slots=True)
+class LogDescription:
+    """What a log holds, what is wrong with it, and what a replay would pick."""
+
+    path: str
+    bytes: int
+    """The size of its files."""
+    start_ns: int
+    end_ns: int
+    """Log times of its first and last message."""
+    topics: tuple[TopicInfo, ...]
+    picks: tuple[str, ...]
+    """What a replay would pick and why, a sentence each."""
+    problem: str
+    """Why a replay could not pick, or empty."""
+    oddities: tuple[str, ...]
+    """Of the images that a replay would pick: several sizes, repeated ones; a sentence each."""
+    damage: tuple[str, ...]
+    losses: tuple[str, ...]
+    """What is wrong with the files, and what is lost by it, a sentence each."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON has it: text, numbers, lists, objects."""
+        return asdict(self)
+
+
+def describe(path: str | Path, config: LogConfig | None = None) -> LogDescription:
+    """Read a log whole, so that all damage is found, and describe it.
+
+    Raises
+    ------
+    LogError
+        If it is missing, unreadable, or no MCAP log.
+    """
+    with open_log(path, config) as log:
+        picks: tuple[str, ...] = ()
+        oddities: tuple[str, ...] = ()
+        problem = ""
+        try:
+            selection = log.select()
+            images = selection.camera.images
+            odd = survey(images, selection.image.size)
+            picks, oddities = selection.reasons, tuple(f"{images.name}: {each}" for each in odd)
+        except LogError as error:
+            problem = str(error)
+        log.verify()
+        return LogDescription(
+            path=str(path),
+            bytes=log.size,
+            start_ns=log.start_ns,
+            end_ns=log.end_ns,
+            topics=log.topics,
+            picks=picks,
+            problem=problem,
+            oddities=oddities,
+            damage=tuple(map(str, log.damage)),
+            losses=log.losses,
+        )
 
 
 def _is_image(channel: Channel, schema: Schema | None) -> bool:

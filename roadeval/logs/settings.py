@@ -1,18 +1,63 @@
-"""Settings of a log: its topics, the meaning of its labels, and which frames are read."""
+"""What is asked of a log: its topics, the meaning of its labels, and which frames are read."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.images import MAX_PIXELS
 from roadeval.logs.errors import LogError
-from roadeval.logs.times import parse_time
+
+NS: Final = 1_000_000_000
+_EPOCH: Final = datetime.fromisoformat("1970-01-01T00:00:00+00:00")
+_RFC_3339: Final = re.compile(
+    r"(\d{4}-\d\d-\d\d[Tt ]\d\d:\d\d:\d\d)(?:\.(\d{1,9}))?([Zz]|[+-]\d\d:\d\d)"
+)
+
+
+def parse_time(text: str, start_ns: int = 0) -> int:
+    """Parse a moment as people write it; return nanoseconds of the clock of a log.
+
+    ``2.5`` and ``90`` are seconds after the log's first message, at ``start_ns``; a whole number
+    from 1000000000 on is nanoseconds of the log's clock (below it lies the clock's first second);
+    ``12s`` and ``12ns`` say which they are; and there is ``2013-05-01T12:00:00.5Z`` (RFC 3339).
+
+    Raises
+    ------
+    LogError
+        If it is none of these.
+    """
+    text = text.strip()
+    if match := _RFC_3339.fullmatch(text):
+        return _rfc_3339_ns(match, text)
+    if match := re.fullmatch(r"(\d+)(ns)?", text):
+        number = int(match[1])
+        return number if match[2] or number >= NS else start_ns + number * NS
+    if match := re.fullmatch(r"(\d*)\.?(\d*)s?", text):
+        whole, fraction = match.groups()
+        if whole or fraction:
+            return start_ns + int(whole or 0) * NS + int(fraction[:9].ljust(9, "0"))
+    raise LogError(
+        f"{text!r} is no time: give seconds from the start (2.5), nanoseconds, or "
+        "2013-05-01T12:00:00Z"
+    )
+
+
+def _rfc_3339_ns(match: re.Match[str], text: str) -> int:
+    moment, fraction, zone = match.groups()
+    try:
+        at = datetime.fromisoformat(moment.upper() + zone.upper().replace("Z", "+00:00"))
+    except ValueError as error:
+        raise LogError(f"{text!r} is no time: {error}") from error
+    since = at - _EPOCH
+    seconds = since.days * 86400 + since.seconds
+    return seconds * NS + int((fraction or "").ljust(9, "0"))
 
 
 def _as_text(moment: object) -> object:
@@ -149,3 +194,14 @@ class FrameSettings:
     max_pixels: Annotated[int, Field(ge=1, le=1 << 30)] = MAX_PIXELS
     """Most pixels of an image. One whose head claims more is not decoded: a damaged head may claim
     any size."""
+
+
+@dataclass(frozen=True, slots=True)
+class LogConfig:
+    """All that is asked of a log, without what becomes of its frames."""
+
+    masks: Mapping[str, MaskSettings] = field(default_factory=dict)
+    """Masks of other methods that lie beside the log, by the name of their variant."""
+    topics: TopicSettings = field(default_factory=TopicSettings)
+    labels: LabelSettings = field(default_factory=LabelSettings)
+    frames: FrameSettings = field(default_factory=FrameSettings)

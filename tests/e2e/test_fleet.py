@@ -296,11 +296,9 @@ class ThreadTasks(ThreadPoolExecutor):
 
 def digests(path):
     config = roadeval.RunConfig()
-    with logs.open_log(path) as log:
-        selection = log.select(config.topics, config.labels)
-        return {
-            each.decode().digest() for each in log.frames(selection, logs.Span.of(config.frames))
-        }
+    with logs.open_log(path, config) as log:
+        selection = log.select()
+        return {each.decode().digest() for each in log.frames(selection)}
 
 
 def test_a_folder_with_other_files_is_refused(drives, tmp_path):

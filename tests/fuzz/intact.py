@@ -17,7 +17,7 @@ from mcap.records import Chunk, Message
 from mcap.stream_reader import breakup_chunk
 from mcap.writer import CompressionType, IndexType
 
-from roadeval.logs import FrameError, LabelSettings, LogError, open_log
+from roadeval.logs import FrameError, FrameSettings, LabelSettings, LogConfig, LogError, open_log
 from tests.fixtures import broken, drives
 from tests.fixtures.flavours import file_of, png, protobuf
 from tests.fixtures.writing import Logged, Topic, Written
@@ -138,9 +138,10 @@ def read(path: Path, labels: LabelSettings = UNSAID, *, keep_corrupt: bool = Fal
     """Read a log as a replay does."""
     frames, told, without_truth = [], [], ""
     try:
-        with open_log(path, keep_corrupt=keep_corrupt) as log:
+        asked = LogConfig(labels=labels, frames=FrameSettings(keep_corrupt=keep_corrupt))
+        with open_log(path, asked) as log:
             log.verify()
-            selection = log.select(labels=labels)
+            selection = log.select()
             stream = log.frames(selection)
             for logged in stream:
                 try:

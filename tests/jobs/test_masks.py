@@ -10,12 +10,13 @@ from sklearn.metrics import average_precision_score, roc_auc_score
 import roadeval
 from roadeval import RoadevalError
 from roadeval.jobs.identity import identity
-from roadeval.logs import LogWriter, TopicSettings, open_log
+from roadeval.logs import LogConfig, LogWriter, TopicSettings, open_log
 from tests.e2e.commands import here
 from tests.e2e.test_fleet import Here
 from tests.jobs.making import FRAMES, settings, write_log
 
 IN_LOG = "/net/road_mask_prediction"
+WITH_MASKS = LogConfig(topics=TopicSettings(masks={"net": IN_LOG}))
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +27,8 @@ def places(tmp_path_factory) -> Path:
     kinds = ("number", "stamp", "npy", "classes", "confidence", "images", "named", "half")
     for kind in (*kinds, "sixteen"):
         (base / kind).mkdir()
-    with open_log(drive) as log, LogWriter(base / "other.mcap") as other:
-        selection = log.select(TopicSettings(masks={"net": IN_LOG}))
+    with open_log(drive, WITH_MASKS) as log, LogWriter(base / "other.mcap") as other:
+        selection = log.select()
         for frame in (logged.decode() for logged in log.frames(selection)):
             # Wrong somewhere, and elsewhere in each frame.
             mask = np.roll(frame.external["net"], frame.number % 5 - 2, 0)
@@ -65,8 +66,8 @@ def outcome(places, figures, tmp_path_factory):
     """A replay with the masks of all places side by side; with those in the log, rolled alike."""
     inside = tmp_path_factory.mktemp("inside")
     drive = inside / "drive.mcap"
-    with open_log(places / "drive.mcap") as log, LogWriter(drive) as writer:
-        selection = log.select(TopicSettings(masks={"net": IN_LOG}))
+    with open_log(places / "drive.mcap", WITH_MASKS) as log, LogWriter(drive) as writer:
+        selection = log.select()
         for frame in (logged.decode() for logged in log.frames(selection)):
             writer.image("/camera/image", frame.stamp_ns, bytes(frame.payload), "png")
             if frame.truth is not None:

@@ -18,7 +18,7 @@ from roadeval import RoadevalError
 from roadeval.jobs.processing import process
 from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import prepare
-from roadeval.logs import TopicSettings, open_log
+from roadeval.logs import LogConfig, TopicSettings, open_log
 from roadeval.pipeline.paper import svm
 from roadeval.results import schema
 from roadeval.results.folder import ResultsFolder
@@ -289,9 +289,10 @@ def test_folders_are_made_and_a_run_that_is_refused_leaves_nothing(drive, tmp_pa
 def test_results_become_a_log_with_the_images_own_times(drive, tmp_path):
     roadeval.replay(drive, save=tmp_path / "o.rrd", reports=tmp_path, mcap=tmp_path / "side.mcap")
     scored = pd.read_csv(tmp_path / "frames.csv").query("variant == 'filtered' and stage == 'post'")
-    with open_log(tmp_path / "side.mcap") as side:
+    topics = TopicSettings(image="/roadeval/filtered/post", truth="")
+    with open_log(tmp_path / "side.mcap", LogConfig(topics=topics)) as side:
         counts = {topic.name: topic.count for topic in side.topics}
-        masks = side.select(TopicSettings(image="/roadeval/filtered/post", truth=""))
+        masks = side.select()
         stamps = [logged.stamp_ns for logged in side.frames(masks)]
     assert counts["/roadeval/unfiltered/svm"] == FRAMES
     assert counts["/roadeval/metrics/filtered/post"] == len(scored)

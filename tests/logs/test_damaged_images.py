@@ -6,7 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from roadeval.logs import FrameError, FrameStream, LogError, TopicSettings, open_log
+from roadeval.logs import (
+    FrameError,
+    FrameSettings,
+    FrameStream,
+    LogConfig,
+    LogError,
+    TopicSettings,
+    open_log,
+)
 from tests.images.making import EXACT, LOSSY, jpeg_of_size, zeroed
 from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log
 
@@ -26,7 +34,7 @@ def masks(*files: bytes) -> list[tuple[str, int, dict[str, Any]]]:
 def read(path: Path, **options: Any) -> tuple[list[Any], FrameStream]:
     """Return every frame, or the message of its error, and the stream they came from."""
     found: list[Any] = []
-    with open_log(path, **options) as log:
+    with open_log(path, LogConfig(frames=FrameSettings(**options))) as log:
         stream = log.frames(log.select())
         for logged in stream:
             try:
@@ -127,14 +135,15 @@ def test_messages_of_two_kinds_on_a_topic_are_read_as_what_they_are(tmp_path: Pa
 def test_a_topic_without_messages_that_was_named_is_refused(tmp_path: Path, topic: str) -> None:
     path = ros2_log(tmp_path / "a.mcap", camera(JPEG), empty=("/empty",))
     with (
-        open_log(path) as log,
+        open_log(path, LogConfig(topics=TopicSettings(**{topic: "/empty"}))) as log,
         pytest.raises(LogError, match=rf"`topics\.{topic}` /empty: the topic holds no message"),
     ):
-        log.select(TopicSettings(**{topic: "/empty"}))
+        log.select()
 
 
 def test_labels_of_which_nothing_can_be_decoded_are_refused(tmp_path: Path) -> None:
     path = ros2_log(tmp_path / "a.mcap", camera(JPEG) + masks(EXACT["PNG"][:60]))
     reason = "nothing of /road_mask can be decoded: a damaged PNG"
-    with open_log(path) as log, pytest.raises(LogError, match=reason):
-        log.select(TopicSettings(truth="/road_mask"))
+    asked = LogConfig(topics=TopicSettings(truth="/road_mask"))
+    with open_log(path, asked) as log, pytest.raises(LogError, match=reason):
+        log.select()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.logs import FrameError, LogError, TopicSettings, open_log
+from roadeval.logs import FrameError, LogConfig, LogError, TopicSettings, open_log
 from roadeval.logs.container.file import OUTSIDE, Container
 from tests.logs.making import CAMERA, CONTAINERS, small_log
 
@@ -92,9 +92,10 @@ KINDS: tuple[Callable[[bytes, random.Random], Bad], ...] = (flip, overwrite, cut
 def read(path: Path) -> tuple[dict[int, tuple[int, bytes]], tuple[str, ...]]:
     """Stamp and file of every image that decodes, by log time; and what is said to be lost."""
     found = {}
-    with open_log(path) as log:
+    only = LogConfig(topics=TopicSettings(image=CAMERA, truth=""))
+    with open_log(path, only) as log:
         log.verify()
-        for logged in log.frames(log.select(TopicSettings(image=CAMERA, truth=""))):
+        for logged in log.frames(log.select()):
             try:
                 frame = logged.decode()
             except FrameError:

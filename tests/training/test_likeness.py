@@ -106,9 +106,11 @@ DRIVES = [DEMO, *(sorted((SHARED / "drives").glob("*.mcap")) if SHARED else [])]
 
 @pytest.mark.parametrize("path", DRIVES, ids=lambda path: path.stem)
 def test_a_frame_in_another_encoding_is_nearer_than_the_frame_beside_it(path):
-    with logs.open_log(path) as log:
-        selection = log.select(logs.TopicSettings(truth="", shadow=""))
-        frames = log.frames(selection, logs.Span(max_frames=40))
+    asked = logs.LogConfig(
+        topics=logs.TopicSettings(truth="", shadow=""), frames=logs.FrameSettings(max_frames=40)
+    )
+    with logs.open_log(path, asked) as log:
+        frames = log.frames(log.select())
         images = [frame.decode().image for frame in frames]
     few = images[::8]
     again = {how: distances(few, [encode(i) for i in few]) for how, encode in ENCODINGS.items()}

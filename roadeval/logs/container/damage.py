@@ -11,7 +11,7 @@ import numpy as np
 
 from roadeval.logs.container.file import Container
 from roadeval.logs.container.scan import Gap
-from roadeval.logs.times import NS
+from roadeval.logs.settings import NS
 
 BEFORE_ALL: Final = int(np.iinfo(np.int64).min)
 """A log time before all others."""

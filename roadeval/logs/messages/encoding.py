@@ -1,64 +1,129 @@
-"""Message encodings: from a message's bytes to its fields."""
+"""Message encodings: from a message's bytes to its fields.
+
+The image messages are known by their schema's name, whatever the schema's text: the layouts are
+those of ROS's ``sensor_msgs``, of ``ffmpeg_image_transport_msgs`` and of Foxglove's schemas. They
+serve where a schema has no text, or one in a language that no library reads.
+"""
 
 from __future__ import annotations
 
 import io
+import re
+import struct
 from collections.abc import Callable, Mapping
 from contextlib import redirect_stderr
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from enum import StrEnum
+from types import SimpleNamespace
+from typing import Any, Final, NamedTuple
 
 from mcap.records import Schema
 
 from roadeval.logs.container.readers import Buffer
-from roadeval.logs.messages.schemas import TopicKind
+from roadeval.logs.errors import BadMessage
+
+
+class TopicKind(StrEnum):
+    """What a topic carries."""
+
+    IMAGE = "image"
+    COMPRESSED = "compressed"
+    VIDEO = "video"
+    OTHER = "other"
+
+
+Fields = tuple[tuple[str, str], ...]
+"""Names and types of a message's fields, in the order of their bytes."""
+_CODES: Final = {"u1": "B", "u4": "I", "i4": "i", "u8": "Q"}
+"""Of the numbers among the types, as `struct` names them."""
+
+
+class ImageSchema(NamedTuple):
+    """A message that carries an image."""
+
+    kind: TopicKind
+    fields: Fields
+
+
+def _schema(kind: TopicKind, fields: str) -> ImageSchema:
+    pairs = (field.partition(":") for field in fields.split())
+    return ImageSchema(kind, tuple((name, type_) for name, _, type_ in pairs))
+
+
+_ROS: Final = "header:header"
+_FOXGLOVE: Final = "timestamp:time frame_id:str"
+
+SCHEMAS: Final = {
+    "sensor_msgs/Image": _schema(
+        TopicKind.IMAGE,
+        f"{_ROS} height:u4 width:u4 encoding:str is_bigendian:u1 step:u4 data:bytes",
+    ),
+    "sensor_msgs/CompressedImage": _schema(TopicKind.COMPRESSED, f"{_ROS} format:str data:bytes"),
+    "ffmpeg_image_transport_msgs/FFMPEGPacket": _schema(
+        TopicKind.VIDEO,
+        f"{_ROS} width:i4 height:i4 encoding:str pts:u8 flags:u1 is_bigendian:u1 data:bytes",
+    ),
+    "foxglove/RawImage": _schema(
+        TopicKind.IMAGE, f"{_FOXGLOVE} width:u4 height:u4 encoding:str step:u4 data:bytes"
+    ),
+    "foxglove/CompressedImage": _schema(TopicKind.COMPRESSED, f"{_FOXGLOVE} data:bytes format:str"),
+    "foxglove/CompressedVideo": _schema(TopicKind.VIDEO, f"{_FOXGLOVE} data:bytes format:str"),
+}
+"""By package and message."""
+
+KINDS: Final = {name.partition("/")[2]: schema.kind for name, schema in SCHEMAS.items()}
+"""By the message alone: its package may be another, with fields of the same names."""
+
+
+def parts_of(schema_name: str) -> list[str]:
+    """Split a name such as ``sensor_msgs/msg/Image``, ``foxglove.RawImage`` or ``a::b``."""
+    return [part for part in re.split(r"[/.:]", schema_name) if part]
+
+
+def fields_of(schema: Schema | None) -> Fields | None:
+    """Return the fields of a message whose schema's name is known.
+
+    >>> fields_of(Schema(1, b"", "", "foxglove_msgs/msg/CompressedVideo"))
+    (('timestamp', 'time'), ('frame_id', 'str'), ('data', 'bytes'), ('format', 'str'))
+    """
+    parts = parts_of(schema.name) if schema else []
+    if len(parts) < 2:
+        return None
+    package = "foxglove" if parts[0] == "foxglove_msgs" else parts[0]
+    found = SCHEMAS.get(f"{package}/{parts[-1]}")
+    return found.fields if found else None
+
 
 Decode = Callable[[Buffer], Any]
 """From a message's bytes to an object that has its fields as attributes."""
 
 
 class MessageReader(NamedTuple):
-    """Reads the messages of one channel; any exception means that a message cannot be decoded.
-
-    Parameters
-    ----------
-    decode
-        Return a message with the fields of an image, named as ROS or Foxglove name them:
-        ``data`` and ``format``, or ``data``, ``width``, ``height``, ``encoding`` and ``step``; and
-        the stamp in ``header.stamp`` or ``timestamp``.
-    stamp
-        Return the stamp alone, where that is cheaper than to decode the message.
-    is_whole
-        Return whether a message is exactly as long as its fields say. Without it, a message is
-        whole if it can be decoded.
-    """
+    """Reads the messages of one channel; any exception means that a message cannot be decoded."""
 
     decode: Decode
+    """Return a message with the fields of an image, named as ROS or Foxglove name them: ``data``
+    and ``format``, or ``data``, ``width``, ``height``, ``encoding`` and ``step``; the stamp in
+    ``header.stamp`` or ``timestamp``, the camera's name in ``header.frame_id`` or ``frame_id``."""
     stamp: Decode | None = None
+    """Return the stamp alone, where that is cheaper than to decode the message."""
     is_whole: Callable[[Buffer], bool] | None = None
+    """Return whether a message is exactly as long as its fields say. Without it, a message is whole
+    if it can be decoded."""
 
 
 @dataclass(frozen=True, slots=True)
 class Encoding:
-    """A message encoding.
-
-    Parameters
-    ----------
-    name
-        A channel's ``message_encoding``.
-    reader
-        Return what reads the messages of a schema, or None if nothing does.
-    kinds
-        What messages carry by the last part of their schema's name, for schemas that are not in
-        `roadeval.logs.messages.schemas`.
-    without_schema
-        What the messages of a channel without a schema may carry; the first ones are looked at.
-    """
+    """A message encoding."""
 
     name: str
+    """A channel's ``message_encoding``."""
     reader: Callable[[Schema | None], MessageReader | None]
+    """Return what reads the messages of a schema, or None if nothing does."""
     kinds: Mapping[str, TopicKind] = field(default_factory=dict)
+    """What messages carry by the last part of their schema's name, for schemas not in `SCHEMAS`."""
     without_schema: TopicKind = TopicKind.OTHER
+    """What the messages of a channel without a schema may carry; the first ones are looked at."""
 
 
 def decode_by_library(factory: Any, encoding: str, schema: Schema | None) -> Decode | None:
@@ -80,3 +145,93 @@ def decode_by_library(factory: Any, encoding: str, schema: Schema | None) -> Dec
     except Exception:  # a schema's text can be wrong in any way; its name may still do
         return None
     return None if decode is None else lambda data: decode(bytes(data))
+
+
+class FieldReader:
+    """Reads one field after the other.
+
+    Parameters
+    ----------
+    order, start
+        Byte order as `struct` names it, and the position of the first field.
+    aligned, widest
+        Whether numbers stand at multiples of their size, and the largest such size.
+    """
+
+    def __init__(
+        self, data: Buffer, order: str, start: int, *, aligned: bool, widest: int = 8
+    ) -> None:
+        self._data = memoryview(data)
+        self._order = order
+        self._start = self._at = start
+        self._aligned = aligned
+        self._widest = widest
+
+    @property
+    def left(self) -> int:
+        """Bytes not read yet."""
+        return len(self._data) - self._at
+
+    def read(self, fields: Fields) -> SimpleNamespace:
+        """Read a message's fields, or the first of them."""
+        return SimpleNamespace(**{name: self._field(kind) for name, kind in fields})
+
+    def _field(self, kind: str) -> Any:
+        if kind == "header":
+            if not self._aligned:
+                self._number("u4")  # ROS 1 counts its headers
+            return SimpleNamespace(stamp=self._field("time"), frame_id=self._field("str"))
+        if kind == "time":
+            return SimpleNamespace(sec=self._number("u4"), nanosec=self._number("u4"))
+        if kind == "str":
+            return bytes(self._take(self._number("u4"))).rstrip(b"\0").decode("utf-8", "replace")
+        if kind == "bytes":
+            return self._take(self._number("u4"))
+        return self._number(kind)
+
+    def _number(self, kind: str) -> int:
+        code = struct.Struct(self._order + _CODES[kind])
+        if self._aligned:
+            width = min(code.size, self._widest)
+            self._at += -(self._at - self._start) % width
+        value: int = code.unpack(self._take(code.size))[0]
+        return value
+
+    def _take(self, length: int) -> memoryview:
+        if length > self.left:
+            raise BadMessage("a message that is cut off")
+        self._at += length
+        return self._data[self._at - length : self._at]
+
+
+@dataclass(frozen=True, slots=True)
+class Layouts:
+    """The layouts that messages of a channel can have.
+
+    Some writers log two kinds of message on a topic under the schema of the first.
+    """
+
+    own: Fields
+    """The one that the channel's schema names."""
+    begin: Callable[[Buffer], FieldReader]
+    """Return a reader of a message's fields."""
+    padding: int = 1
+    """A message may be longer by fewer bytes than that."""
+
+    def read(self, data: Buffer, decode: Decode | None) -> Any:
+        """Read a message by ``decode``, or by another image's layout if it fits that alone."""
+        if not self.fits(self.own, data):
+            # Of the others that begin as the own one does.
+            for fields in (schema.fields for schema in SCHEMAS.values()):
+                if fields[0] == self.own[0] and fields != self.own and self.fits(fields, data):
+                    return self.begin(data).read(fields)
+        return decode(data) if decode else self.begin(data).read(self.own)
+
+    def fits(self, fields: Fields, data: Buffer) -> bool:
+        """Whether a message is exactly as long as these fields say."""
+        try:
+            reader = self.begin(data)
+            reader.read(fields)
+        except (BadMessage, struct.error):
+            return False
+        return reader.left < self.padding

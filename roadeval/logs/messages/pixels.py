@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Final
 
+import numpy as np
 import numpy.typing as npt
 
 from roadeval import images
 from roadeval.data import Rgb
 from roadeval.images import DamagedImageError, ImageError, Limits
 from roadeval.images.decoding import without_colours
+from roadeval.images.samples import eight_bits
 from roadeval.logs.container.readers import Buffer
 from roadeval.logs.errors import BadMessage, DamagedMessage
 from roadeval.logs.messages.pictures import (
@@ -21,15 +24,138 @@ from roadeval.logs.messages.pictures import (
     RawPicture,
     codec_of,
 )
-from roadeval.logs.messages.pixel_formats import (
-    PixelFormat,
-    check_size,
-    format_of,
-    raw_to_rgb,
-    rows_of,
-)
 
 Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class PixelFormat:
+    """How an encoding lays out its pixels.
+
+    ``dtype`` and ``channels`` give a row's items; ``rows`` the rows stored per image row (3/2
+    for planar 4:2:0); ``code`` names OpenCV's conversion to RGB, None for RGB itself. Width and
+    height are whole multiples of ``block``: pixels of one block share their colours.
+    """
+
+    dtype: str
+    channels: int
+    code: str | None
+    rows: float = 1.0
+    block: tuple[int, int] = (1, 1)
+
+    @property
+    def is_grey(self) -> bool:
+        """Whether a pixel is a single value."""
+        return self.code == "COLOR_GRAY2RGB"
+
+
+def _formats() -> dict[str, PixelFormat]:
+    formats = {
+        "yuv422": PixelFormat("u1", 2, "COLOR_YUV2RGB_UYVY", block=(2, 1)),
+        "uyvy": PixelFormat("u1", 2, "COLOR_YUV2RGB_UYVY", block=(2, 1)),
+        "yuyv": PixelFormat("u1", 2, "COLOR_YUV2RGB_YUY2", block=(2, 1)),
+        "yuv422_yuy2": PixelFormat("u1", 2, "COLOR_YUV2RGB_YUY2", block=(2, 1)),
+        "nv12": PixelFormat("u1", 1, "COLOR_YUV2RGB_NV12", 1.5, (2, 2)),
+        "nv21": PixelFormat("u1", 1, "COLOR_YUV2RGB_NV21", 1.5, (2, 2)),
+        "32fc1": PixelFormat("f4", 1, "COLOR_GRAY2RGB"),
+    }
+    for bits, dtype in (("8", "u1"), ("16", "u2")):
+        formats |= {
+            f"mono{bits}": PixelFormat(dtype, 1, "COLOR_GRAY2RGB"),
+            f"{bits}uc1": PixelFormat(dtype, 1, "COLOR_GRAY2RGB"),
+            f"rgb{bits}": PixelFormat(dtype, 3, None),
+            f"bgr{bits}": PixelFormat(dtype, 3, "COLOR_BGR2RGB"),
+            f"{bits}uc3": PixelFormat(dtype, 3, "COLOR_BGR2RGB"),
+            f"rgba{bits}": PixelFormat(dtype, 4, "COLOR_RGBA2RGB"),
+            f"bgra{bits}": PixelFormat(dtype, 4, "COLOR_BGRA2RGB"),
+            f"{bits}uc4": PixelFormat(dtype, 4, "COLOR_BGRA2RGB"),
+        }
+        for order in ("rggb", "bggr", "grbg", "gbrg"):
+            code = f"COLOR_Bayer{order.upper()}2RGB"
+            formats[f"bayer_{order}{bits}"] = PixelFormat(dtype, 1, code)
+    return formats
+
+
+FORMATS: Final = _formats()
+"""Every raw encoding, by its name in lower case."""
+
+
+def format_of(picture: RawPicture) -> PixelFormat:
+    """Return the pixel format of a picture's encoding.
+
+    Raises
+    ------
+    BadMessage
+        If there is none.
+    """
+    format_ = FORMATS.get(picture.encoding.lower())
+    if format_ is None:
+        raise BadMessage(f"its encoding {picture.encoding!r} is unknown")
+    return format_
+
+
+def rows_of(picture: RawPicture, format_: PixelFormat, limits: Limits) -> Array:
+    """Return the samples of a picture as rows, without padding, in this machine's byte order.
+
+    Raises
+    ------
+    BadMessage
+        If the data is shorter than its size says, or the size cannot be.
+    ImageError
+        If it is larger than the limits allow.
+    """
+    width, height = picture.width, picture.height
+    check_size(picture, format_, limits)
+    rows = int(height * format_.rows)
+    dtype = np.dtype(format_.dtype).newbyteorder(">" if picture.big_endian else "<")
+    row = width * format_.channels * dtype.itemsize
+    step = picture.step or row
+    if step < row:
+        raise BadMessage(f"an image of {width}x{height} with {step} bytes a row")
+    needed = step * (rows - 1) + row
+    if len(picture.data) < needed:
+        raise BadMessage(f"{len(picture.data)} bytes of pixels where {needed} are needed")
+    strides = (step, dtype.itemsize * format_.channels, dtype.itemsize)
+    shape = (rows, width, format_.channels)
+    array = np.ndarray(shape, dtype, picture.data, 0, strides)
+    if format_.channels == 1:
+        array = array[..., 0]
+    return np.ascontiguousarray(array, dtype.newbyteorder("="))
+
+
+def check_size(picture: RawPicture, format_: PixelFormat, limits: Limits) -> None:
+    """Refuse a size that the limits forbid, or that the format cannot have."""
+    width, height = picture.width, picture.height
+    limits.check(width, height)
+    wide, high = format_.block
+    if width % wide or height % high:
+        even = "width and height" if high > 1 else "width"
+        raise BadMessage(
+            f"an image of {width}x{height} in {picture.encoding}, which needs an even {even}"
+        )
+
+
+def raw_to_rgb(picture: RawPicture, limits: Limits) -> Rgb:
+    """Convert a picture to ``(H, W, 3)`` uint8 RGB, an array of its own.
+
+    Raises
+    ------
+    BadMessage, ImageError
+        If its encoding is unknown, or as `rows_of`.
+    """
+    import cv2
+
+    format_ = format_of(picture)
+    samples = eight_bits(rows_of(picture, format_, limits))
+    if format_.code is None:
+        # An array of its own: a part of a message may not be written to.
+        return np.require(samples, requirements=["C", "W"])
+    try:
+        rgb = cv2.cvtColor(samples, getattr(cv2, format_.code))
+    except cv2.error as error:
+        size = f"{picture.width}x{picture.height}"
+        raise BadMessage(f"an image of {size} in {picture.encoding}: {error.err}") from error
+    return np.asarray(rgb, np.uint8)
 
 
 def to_rgb(picture: Picture, limits: Limits) -> Rgb:
@@ -104,6 +230,15 @@ def lossy_format(picture: Picture) -> str:
         return "video"
     format_ = images.format_of(picture.data)
     return "" if format_ is None or format_.exact else format_.name
+
+
+def lossy_labels(name: str) -> str:
+    """Return what is wrong with label images in a format that changes values, and the way out."""
+    return (
+        f"is {name}, whose compression changes the values at every edge: log labels as PNG, or "
+        "give `labels.tolerance` (32, for example), and values farther than that from 0 and from "
+        "those that mean road are ignored"
+    )
 
 
 @contextmanager

@@ -9,7 +9,6 @@ from typing import Any, Final, Protocol
 from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage, FrameError
 from roadeval.logs.messages.pictures import CompressedPicture, DecodedPicture, Picture, codec_of
-from roadeval.logs.messages.video_size import size_in
 
 PATIENCE: Final = 16
 """Packets to feed beyond a frame before it counts as not decodable."""
@@ -150,7 +149,7 @@ class Video:
         try:
             frames = self._decoder.decode(unit)
         except self._av.FFmpegError as error:
-            raise BadMessage(self._reason(error, unit)) from error
+            raise BadMessage(self._reason(error)) from error
         for frame in frames:
             damage = self._damage_of(frame)
             packet = self._waiting.pop(frame.pts, None)
@@ -159,18 +158,17 @@ class Video:
                 found = DecodedPicture(packet.stamp_ns, packet.data, pixels, damage)
                 self._ready[frame.pts] = found
 
-    def _reason(self, error: Any, unit: Any) -> str:
-        """Return why a packet cannot be decoded: its size, if that is it."""
-        size = self._decoder.width, self._decoder.height
-        if not all(size):
-            data = b"" if unit is None else bytes(unit)
-            size = size_in(self._av, self._decoder.codec.canonical_name, data) or (0, 0)
-        if all(size):
-            try:
-                self._limits.check(*size)
-            except ImageError as too_large:
-                return str(too_large)
-        return f"its video cannot be decoded: {error.strerror}"
+    def _reason(self, error: Any) -> str:
+        """Return why a packet cannot be decoded: its size, where the decoder tells it."""
+        reason = f"its video cannot be decoded: {error.strerror}"
+        if not (self._decoder.width and self._decoder.height):
+            most = f"{self._limits.max_pixels} pixels that `frames.max_pixels` allows"
+            return f"{reason}, or it has more than the {most}"
+        try:
+            self._limits.check(self._decoder.width, self._decoder.height)
+        except ImageError as too_large:
+            return str(too_large)
+        return reason
 
     def _damage_of(self, frame: Any) -> str:
         """Return what is wrong with a frame, in which the decoder has filled in what is damaged."""

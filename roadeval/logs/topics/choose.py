@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
 from roadeval.logs.errors import LogError
+from roadeval.logs.messages.pixels import lossy_labels
 from roadeval.logs.settings import LabelSettings
 from roadeval.logs.topics.description import TopicInfo
-from roadeval.logs.topics.labels import lossy
 
 
 def _set(text: str) -> frozenset[str]:
@@ -122,7 +122,7 @@ def choose_truth(
         why = f"no topic is plainly road truth; `topics.truth` takes one of: {_names(roads)}"
         return Choice(None, why)
     if found:
-        why = f"{found[0].name} {lossy(found[0].lossy)}"
+        why = f"{found[0].name} {lossy_labels(found[0].lossy)}"
         if labels != LabelSettings():
             raise LogError(why)
         return Choice(None, why)

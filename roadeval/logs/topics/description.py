@@ -1,7 +1,9 @@
-"""Descriptions of topics: kind, encoding, size, rate, gaps."""
+"""Descriptions of topics: kind, encoding, size, rate, gaps; and what is odd about their images."""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -9,68 +11,55 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.logs.errors import BadMessage, FrameError, LogError
-from roadeval.logs.messages.decoders import kind_of
-from roadeval.logs.messages.pictures import CompressedPicture, RawPicture, codec_of
-from roadeval.logs.messages.pixels import lossy_format, raw_format, to_labels
-from roadeval.logs.messages.schemas import TopicKind
+from roadeval.logs.messages.encoding import TopicKind
+from roadeval.logs.messages.pictures import CompressedPicture, RawPicture, codec_of, kind_of
+from roadeval.logs.messages.pixels import lossy_format, raw_format, size_of, to_labels
 from roadeval.logs.messages.video import Video
-from roadeval.logs.times import NS
-from roadeval.logs.topics.reader import TopicReader
+from roadeval.logs.settings import NS
+from roadeval.logs.topics.reader import UNREADABLE, TopicReader
 
 PROBES: Final = 3
 """Messages to try before a topic counts as undecodable."""
 GAP: Final = 2.5
 """A step of more than so many median periods is a gap."""
 
+Size = tuple[int, int]
+"""Width and height."""
+
 
 @dataclass(frozen=True, slots=True)
 class TopicInfo:
-    """One topic of a log.
-
-    Parameters
-    ----------
-    name, schema, encoding
-        Topic, schema's name, and encoding of the messages (``cdr``, ``protobuf``, ...).
-    kind
-        What its messages carry, by the schema's name.
-    count
-        Messages that are in the log, readable or not.
-    first_ns, last_ns
-        Log times of the first and the last message, None if there is none.
-    rate_hz
-        One over the median time between messages; None below two messages.
-    gaps
-        Log times around each step of more than 2.5 median periods (for images only).
-    format
-        For images: the pixel encoding or file format of the first readable message.
-    size
-        For images: width and height of it.
-    channels
-        For images: 1 if it is an image of single values, 3 if of colours.
-    lossy
-        For images: the format of the first readable one if its compression changes values, as
-        JPEG; else empty.
-    frame_id
-        For images: the camera's name in the header of the first readable message, or empty.
-    problem
-        Why no message could be decoded, or empty.
-    """
+    """One topic of a log."""
 
     name: str
     schema: str
+    """Its name."""
     encoding: str
+    """Of the messages: ``cdr``, ``protobuf``, ..."""
     kind: TopicKind
+    """What its messages carry, by the schema's name."""
     count: int
+    """Messages that are in the log, readable or not."""
     first_ns: int | None = None
     last_ns: int | None = None
+    """Log times of the first and the last message, None if there is none."""
     rate_hz: float | None = None
+    """One over the median time between messages; None below two messages."""
     gaps: tuple[tuple[int, int], ...] = ()
+    """Log times around each step of more than 2.5 median periods (for images only)."""
     format: str = ""
+    """For images: the pixel encoding or file format of the first readable message."""
     size: tuple[int, int] | None = None
+    """For images: width and height of it."""
     channels: int | None = None
+    """For images: 1 if it is an image of single values, 3 if of colours."""
     lossy: str = ""
+    """For images: the format of the first readable one if its compression changes values, as JPEG;
+    else empty."""
     frame_id: str = ""
+    """For images: the camera's name in the header of the first readable message, or empty."""
     problem: str = ""
+    """Why no message could be decoded, or empty."""
 
     @property
     def is_image(self) -> bool:
@@ -166,3 +155,67 @@ def _video_size(reader: TopicReader) -> tuple[int, int] | None:
     except (FrameError, LogError):
         return None
     return pixels.shape[1], pixels.shape[0]
+
+
+def survey(reader: TopicReader, size: Size | None) -> tuple[str, ...]:
+    """Go through all messages of a topic whose images are of a size; return what is odd."""
+    positions = range(len(reader))
+    stamps = np.array([reader.stamp(position) for position in positions], np.int64)
+    repeated = repeats(reader, positions, stamps)
+    sizes = dict(_other_sizes(reader, size)) if size else {}
+    return (*tell_sizes(sizes, len(reader), size), *tell_repeats(repeated, len(reader)))
+
+
+def repeats(reader: TopicReader, positions: Sequence[int], stamps: npt.NDArray[np.int64]) -> int:
+    """Count the messages that repeat an earlier one: the same stamp, and the same bytes."""
+    order = np.argsort(stamps, kind="stable")
+    same = np.diff(stamps[order]) == 0
+    groups = np.split(order, np.flatnonzero(~same) + 1)
+    return sum(
+        _repeats_in(reader, [positions[i] for i in group])
+        for group in groups
+        if len(group) > 1 and stamps[group[0]] != UNREADABLE
+    )
+
+
+def _repeats_in(reader: TopicReader, positions: Iterable[int]) -> int:
+    contents = []
+    for position in positions:
+        try:
+            contents.append(bytes(reader.message(position).data))
+        except FrameError:
+            continue
+    return len(contents) - len(set(contents))
+
+
+def _other_sizes(reader: TopicReader, size: Size) -> Iterable[tuple[int, Size]]:
+    """Yield the positions of images of another size, by what their heads say."""
+    for position in range(len(reader)):
+        try:
+            found = size_of(reader.picture(position))
+        except (FrameError, BadMessage):
+            continue
+        if found not in (None, size):
+            yield position, found
+
+
+def tell_sizes(others: Mapping[int, Size], total: int, size: Size | None) -> tuple[str, ...]:
+    """Say that images of other sizes, by frame number, are among the ``total``; if they are."""
+    if not others or size is None:
+        return ()
+    counts = Counter(others.values()).most_common()
+    listed = ", ".join(f"{count} of {width}x{height}" for (width, height), count in counts)
+    return (
+        f"not all of the {total} images are {size[0]}x{size[1]}: {listed}, from frame "
+        f"{min(others)} on",
+    )
+
+
+def tell_repeats(repeated: int, total: int) -> tuple[str, ...]:
+    """Say that images are repeated, if they are."""
+    if not repeated:
+        return ()
+    return (
+        f"{repeated} of the {total} images repeat an earlier one, by stamp and content: each is "
+        "counted as often as it is there",
+    )

@@ -16,10 +16,10 @@ from roadeval.logs.container.damage import sure_until
 from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError
-from roadeval.logs.messages.decoders import Decoder, decoder_for
-from roadeval.logs.messages.pictures import Picture
-from roadeval.logs.topics.pairing import UNREADABLE
+from roadeval.logs.messages.pictures import Decoder, Picture, decoder_for
 
+UNREADABLE: Final = -(2**63) + 1
+"""A stamp that cannot be read."""
 UNREAD: Final = UNREADABLE - 1
 """A stamp not read yet."""
 
@@ -175,7 +175,7 @@ class TopicReader:
 
     @property
     def sure(self) -> int:
-        """How many messages, from the first one on, surely have the positions they were written at.
+        """How many messages, from the first one on, are certain to have their original positions.
 
         Damage may have taken an unknown number of messages before the others.
         """

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Final
 
 from roadeval.images import ImageError, ImageFormat, Limits, format_of, size_of, to_png
 from roadeval.logs.errors import LogError
-from roadeval.logs.image_folder import IMAGES, by_name, listed, ordered
-from roadeval.logs.times import NS
-from roadeval.logs.writing.pack_video import VIDEO_SUFFIXES, frames_of
+from roadeval.logs.files import IMAGES, by_name, listed, ordered
+from roadeval.logs.settings import NS
 from roadeval.logs.writing.writer import LogWriter
 from roadeval.runtime.files import check_input
 
@@ -23,31 +23,25 @@ NAMED: Final = 3
 LABEL_DELAY_NS: Final = 1
 """A label is logged right after its image."""
 
+VIDEO_SUFFIXES: Final = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".ts", ".mpg", ".mpeg")
+QUALITY: Final = 95
+"""JPEG quality of a video's frames, 0 to 100."""
 GREATEST: Final = 1 << 30
 """Most pixels of an image that is converted."""
 
 
 @dataclass(frozen=True, slots=True)
 class PackResult:
-    """The log that was written, and what a user should know of it.
-
-    Parameters
-    ----------
-    path
-        The log.
-    frames, labelled
-        Images, and how many of them have a mask.
-    stamps
-        Source of the stamps, in words.
-    warnings
-        Images without a mask (if there are masks), and masks without an image.
-    """
+    """The log that was written, and what a user should know of it."""
 
     path: Path
     frames: int
     labelled: int
+    """Images, and how many of them have a mask."""
     stamps: str
+    """Source of the stamps, in words."""
     warnings: tuple[str, ...] = ()
+    """Images without a mask (if there are masks), and masks without an image."""
 
 
 def pack(
@@ -134,7 +128,7 @@ def _stamps(files: list[Path], rate_hz: float | None) -> tuple[dict[Path, int], 
 def _pack_video(video: Path, output: Path, rate_hz: float | None) -> PackResult:
     count = 0
     with LogWriter(output) as log:
-        for count, (time_ns, jpeg) in enumerate(frames_of(video), start=1):
+        for count, (time_ns, jpeg) in enumerate(_frames_of(video), start=1):
             if rate_hz is not None:
                 time_ns = round((count - 1) * NS / rate_hz)  # noqa: PLW2901
             log.image(CAMERA, time_ns, jpeg, "jpeg")
@@ -142,6 +136,34 @@ def _pack_video(video: Path, output: Path, rate_hz: float | None) -> PackResult:
             raise LogError(f"{video}: a video without frames")
     words = "the video's own times" if rate_hz is None else f"{rate_hz:g} images a second"
     return PackResult(output, count, 0, words)
+
+
+def _frames_of(video: Path) -> Iterator[tuple[int, bytes]]:
+    """Yield each frame's time in nanoseconds after the first, and the frame as a JPEG.
+
+    Raises
+    ------
+    LogError
+        If it cannot be read, or holds no video.
+    """
+    import av
+    import cv2
+
+    try:
+        with av.open(str(video)) as container:
+            if not container.streams.video:
+                raise LogError(f"{video}: it holds no video")
+            stream = container.streams.video[0]
+            first: int | None = None
+            for index, frame in enumerate(container.decode(stream)):
+                pts = index if frame.pts is None else frame.pts
+                first = pts if first is None else first
+                unit = stream.time_base or Fraction(1, 25)
+                bgr = frame.to_ndarray(format="bgr24")
+                _, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+                yield round((pts - first) * unit * NS), jpeg.tobytes()
+    except (av.FFmpegError, OSError) as error:
+        raise LogError(f"{video}: not a readable video ({error.strerror})") from error
 
 
 def _image(file: Path) -> tuple[bytes, str]:

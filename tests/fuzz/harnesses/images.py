@@ -12,10 +12,16 @@ from mcap.records import Channel, Schema
 from roadeval.images import ImageError, Limits, to_png
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage
-from roadeval.logs.messages.decoders import Decoder, decoder_for, message_is_whole
-from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPicture, codec_of
-from roadeval.logs.messages.pixel_formats import FORMATS
-from roadeval.logs.messages.pixels import to_labels, to_rgb
+from roadeval.logs.messages.pictures import (
+    CompressedPicture,
+    Decoder,
+    Picture,
+    RawPicture,
+    codec_of,
+    decoder_for,
+    message_is_whole,
+)
+from roadeval.logs.messages.pixels import FORMATS, to_labels, to_rgb
 from tests.fixtures.flavours import FLAVOURS, NoEncoderError, file_of, scenes
 from tests.fuzz.choices import Choices
 from tests.fuzz.harness import Harness

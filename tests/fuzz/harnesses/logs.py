@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 
-from roadeval.logs import LogError, describe
+from roadeval.logs import FrameSettings, LogConfig, LogError, describe
 from tests.fixtures import broken
 from tests.fixtures.flavours import FLAVOURS, NoEncoderError
 from tests.fixtures.writing import Written
@@ -28,7 +28,7 @@ def check(data: bytes) -> None:
     for keep_corrupt in (False, True):
         read(path, keep_corrupt=keep_corrupt)
         with suppress(LogError):
-            describe(path, keep_corrupt=keep_corrupt)
+            describe(path, LogConfig(frames=FrameSettings(keep_corrupt=keep_corrupt)))
 
 
 def seeds() -> list[bytes]:

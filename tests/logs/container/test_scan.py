@@ -8,7 +8,7 @@ import pytest
 import zstandard
 from mcap.opcode import Opcode
 
-from roadeval.logs import LogError, TopicSettings, open_log
+from roadeval.logs import FrameSettings, LogConfig, LogError, TopicSettings, open_log
 from roadeval.logs.container.compression import BLOCK, _blocks, _Stream
 from roadeval.logs.container.readers import MemoryReader
 from roadeval.logs.container.records import Chunk, parse
@@ -26,11 +26,8 @@ LENGTH_AT = 1
 
 def kept(path: Path) -> list[int]:
     """Positions in the good log of the images that are kept whole."""
-    with open_log(path) as log:
-        frames = [
-            frame.decode()
-            for frame in log.frames(log.select(TopicSettings(image=CAMERA, truth="")))
-        ]
+    with open_log(path, LogConfig(topics=TopicSettings(image=CAMERA, truth=""))) as log:
+        frames = [frame.decode() for frame in log.frames(log.select())]
     return [round(float(frame.image.mean()) / 20) for frame in frames]
 
 
@@ -157,7 +154,7 @@ def test_a_definition_that_does_not_add_up_costs_what_it_defines(tmp_path: Path)
     data = path.read_bytes()
     topic_length = data.index(b"\x07\0\0\0/camera")
     changed(path, topic_length, b"\xff\xff")
-    with open_log(path, keep_corrupt=True) as log:
+    with open_log(path, LogConfig(frames=FrameSettings(keep_corrupt=True))) as log:
         log.verify()
         assert any("used all the same" in loss for loss in log.losses)
         assert len(list(log.frames(log.select()))) == FRAMES

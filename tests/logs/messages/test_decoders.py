@@ -11,8 +11,13 @@ from mcap_ros2._dynamic import serialize_dynamic
 
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage
-from roadeval.logs.messages.decoders import decoder_for, message_is_whole
-from roadeval.logs.messages.pictures import CompressedPicture, Picture, RawPicture
+from roadeval.logs.messages.pictures import (
+    CompressedPicture,
+    Picture,
+    RawPicture,
+    decoder_for,
+    message_is_whole,
+)
 from tests.logs.making import COMPRESSED, IMAGE, compressed, grey, raw
 
 STAMP = 1_700_000_000_123_456_789

@@ -8,14 +8,13 @@ import pytest
 from mcap.writer import Writer
 
 from roadeval.logs import TopicKind, describe, open_log
-from roadeval.logs.messages import decoders, encodings
+from roadeval.logs.messages import encodings, pictures
 from tests.logs.making import grey, png
 
 SOURCE = """
 from types import SimpleNamespace
 
-from roadeval.logs.messages.encoding import Encoding, MessageReader
-from roadeval.logs.messages.schemas import TopicKind
+from roadeval.logs.messages.encoding import Encoding, MessageReader, TopicKind
 
 
 def read(data):
@@ -32,9 +31,9 @@ ENCODING = Encoding(
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder that counts as part of the encodings' own."""
     monkeypatch.setattr(encodings, "__path__", [*encodings.__path__, str(tmp_path)])
-    decoders.message_encodings.cache_clear()
+    pictures.message_encodings.cache_clear()
     yield tmp_path
-    decoders.message_encodings.cache_clear()
+    pictures.message_encodings.cache_clear()
 
 
 @pytest.fixture

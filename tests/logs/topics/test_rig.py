@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.logs import LogError, TopicSettings, open_log
+from roadeval.logs import LogConfig, LogError, Selection, TopicSettings, open_log
 from tests.logs.making import SECOND, compressed, grey, jpeg, raw, ros2_log
 
 FRONT = "/camera/front/image_raw/compressed"
@@ -28,10 +28,15 @@ def named(message: dict, frame_id: str) -> dict:
     return message | {"header": message["header"] | {"frame_id": frame_id}}
 
 
+def selected(path: Path, image: str, truth: str | None = None) -> Selection:
+    asked = LogConfig(topics=TopicSettings(image=image, truth=truth))
+    with open_log(path, asked) as log:
+        return log.select()
+
+
 def truth(path: Path, image: str, asked: str | None = None) -> str | None:
-    with open_log(path) as log:
-        found = log.select(TopicSettings(image=image, truth=asked)).truth
-    return found.topic.name if found else None
+    found = selected(path, image, asked).truth
+    return found.where if found else None
 
 
 def test_another_cameras_truth_is_refused_by_its_path(tmp_path: Path) -> None:
@@ -63,8 +68,7 @@ def test_of_two_truths_the_cameras_own_is_taken(tmp_path: Path) -> None:
 
 def test_a_rig_is_told_that_its_truth_names_no_other_camera(tmp_path: Path) -> None:
     path = rig(tmp_path, {FRONT: "front", REAR: "rear"}, {"/camera/front/labels": "front"})
-    with open_log(path) as log:
-        reasons = " ".join(log.select(TopicSettings(image=FRONT)).reasons)
+    reasons = " ".join(selected(path, FRONT).reasons)
     assert "no other camera's by path and frame_id" in reasons
 
 
@@ -122,6 +126,5 @@ def test_a_coded_camera_and_its_raw_images_are_one(tmp_path: Path) -> None:
 
 def test_another_cameras_shadow_is_left_out(tmp_path: Path) -> None:
     path = rig(tmp_path, {FRONT: "", REAR: ""}, {"/camera/front/shadow_mask": ""})
-    with open_log(path) as log:
-        assert log.select(TopicSettings(image=FRONT)).shadow is not None
-        assert log.select(TopicSettings(image=REAR)).shadow is None
+    assert selected(path, FRONT).shadow is not None
+    assert selected(path, REAR).shadow is None

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from roadeval.logs import LabelSettings, Span, describe, open_log
+from roadeval.logs import FrameSettings, LabelSettings, LogConfig, describe, open_log
 from tests.logs.making import compressed, grey, jpeg, png, raw, ros2_log
 
 SIZES = [(8, 6)] * 3 + [(16, 12)] * 2 + [(4, 3)]
@@ -21,10 +21,10 @@ def repeated(path: Path, *, apart: int = 0) -> Path:
     return ros2_log(path, sorted(messages, key=lambda message: message[1]))
 
 
-def oddities(path: Path, span: Span | None = None) -> tuple[str, ...]:
+def oddities(path: Path, **asked: int) -> tuple[str, ...]:
     """Return what is told after all frames were read."""
-    with open_log(path) as log:
-        stream = log.frames(log.select(), span)
+    with open_log(path, LogConfig(frames=FrameSettings(**asked))) as log:
+        stream = log.frames(log.select())
         for frame in stream:
             frame.decode()
         return stream.oddities
@@ -35,7 +35,7 @@ def test_images_of_other_sizes_are_told(tmp_path: Path) -> None:
     told = "not all of the 6 images are 8x6: 2 of 16x12, 1 of 4x3, from frame 3 on"
     assert oddities(path) == (told,)
     assert describe(path).oddities == (f"/camera: {told}",)
-    assert oddities(path, Span(max_frames=3)) == ()
+    assert oddities(path, max_frames=3) == ()
 
 
 def test_images_that_repeat_others_are_told_wherever_they_lie(tmp_path: Path) -> None:
@@ -59,8 +59,8 @@ def test_the_share_of_ignored_fringes_is_told(tmp_path: Path) -> None:
     messages = [("/camera", 1, compressed(1, png(grey(9)), "png"))]
     messages.append(("/road_mask", 1, compressed(1, png(mask), "png")))
     path = ros2_log(tmp_path / "a.mcap", messages)
-    with open_log(path) as log:
-        stream = log.frames(log.select(None, LabelSettings(tolerance=32)))
+    with open_log(path, LogConfig(labels=LabelSettings(tolerance=32))) as log:
+        stream = log.frames(log.select())
         truth = next(stream).decode().truth
         assert truth is not None
         assert truth[0].tolist() == [255] * 6 + [1] * 2

@@ -8,7 +8,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from roadeval.logs import LabelSettings, LogError, open_log, pack
+from roadeval.logs import LabelSettings, LogConfig, LogError, open_log, pack
 from roadeval.logs.writing.pack import CAMERA, TRUTH
 from tests.fixtures.shared import shared
 from tests.logs.making import grey, jpeg, png
@@ -158,10 +158,11 @@ def painted(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 def test_images_and_colour_masks_of_the_road(painted: Path, tmp_path: Path) -> None:
     packed = pack(painted / "imgs", tmp_path / "comma.mcap", masks=painted / "masks")
     labels = LabelSettings(road_colors=(ROAD, MARKING), ignore_colors=(OWN_CAR,))
-    with open_log(packed.path) as log:
-        with pytest.raises(LogError, match=r"/truth/road.*`labels\.road_colors`"):
-            log.select()
-        frames = [frame.decode() for frame in log.frames(log.select(labels=labels))]
+    asks = pytest.raises(LogError, match=r"/truth/road.*`labels\.road_colors`")
+    with open_log(packed.path) as log, asks:
+        log.select()
+    with open_log(packed.path, LogConfig(labels=labels)) as log:
+        frames = [frame.decode() for frame in log.frames(log.select())]
     first = cv2.imread(str(min((painted / "masks").glob("*.png"))))[..., ::-1]
     road = (first == ROAD).all(2) | (first == MARKING).all(2)
     assert len(frames) == 11

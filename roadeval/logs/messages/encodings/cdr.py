@@ -9,9 +9,15 @@ from mcap.records import Schema
 from roadeval.logs.container.readers import Buffer
 from roadeval.logs.container.records import LARGEST, PADDING
 from roadeval.logs.errors import BadMessage
-from roadeval.logs.messages.encoding import Encoding, MessageReader, decode_by_library
-from roadeval.logs.messages.encodings._fields import FieldReader, Layouts
-from roadeval.logs.messages.schemas import Fields, fields_of
+from roadeval.logs.messages.encoding import (
+    Encoding,
+    FieldReader,
+    Fields,
+    Layouts,
+    MessageReader,
+    decode_by_library,
+    fields_of,
+)
 
 _ZSTD: Final = b"\x28\xb5\x2f\xfd"
 

@@ -10,8 +10,7 @@ from typing import Any
 from mcap.records import Schema
 
 from roadeval.logs.container.readers import Buffer
-from roadeval.logs.messages.encoding import Encoding, MessageReader
-from roadeval.logs.messages.schemas import Fields, fields_of, parts_of
+from roadeval.logs.messages.encoding import Encoding, Fields, MessageReader, fields_of, parts_of
 
 
 def _reader(schema: Schema | None) -> MessageReader | None:

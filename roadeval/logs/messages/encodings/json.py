@@ -9,8 +9,7 @@ from types import SimpleNamespace
 from mcap.records import Schema
 
 from roadeval.logs.container.readers import Buffer
-from roadeval.logs.messages.encoding import Encoding, MessageReader
-from roadeval.logs.messages.schemas import TopicKind
+from roadeval.logs.messages.encoding import Encoding, MessageReader, TopicKind
 
 
 def _reader(_schema: Schema | None) -> MessageReader:

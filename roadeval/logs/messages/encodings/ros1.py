@@ -6,9 +6,14 @@ from functools import partial
 
 from mcap.records import Schema
 
-from roadeval.logs.messages.encoding import Encoding, MessageReader, decode_by_library
-from roadeval.logs.messages.encodings._fields import FieldReader, Layouts
-from roadeval.logs.messages.schemas import fields_of
+from roadeval.logs.messages.encoding import (
+    Encoding,
+    FieldReader,
+    Layouts,
+    MessageReader,
+    decode_by_library,
+    fields_of,
+)
 
 
 def _reader(schema: Schema | None) -> MessageReader | None:

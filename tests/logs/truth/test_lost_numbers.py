@@ -9,7 +9,7 @@ from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType
 
 from roadeval.data import Frame
-from roadeval.logs import FrameError, LogError, MaskSettings, open_log
+from roadeval.logs import FrameError, FrameSettings, LogConfig, LogError, MaskSettings, open_log
 from tests.fixtures import broken
 from tests.fixtures.broken import (
     FRAMES,
@@ -54,8 +54,8 @@ def masks(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def paired(path: Path, settings: MaskSettings) -> tuple[dict[int, int], int]:
     """Return the number of each frame's mask by the number that its stamp is, and `unsure`."""
     found = {}
-    with open_log(path) as log:
-        selection = log.select(masks={"net": settings})
+    with open_log(path, LogConfig(masks={"net": settings})) as log:
+        selection = log.select()
         for logged in log.frames(selection):
             try:
                 frame = logged.decode()
@@ -63,7 +63,7 @@ def paired(path: Path, settings: MaskSettings) -> tuple[dict[int, int], int]:
                 continue
             if "net" in frame.external:
                 found[_number(frame)] = _told(frame)
-        return found, selection.elsewhere["net"].pairing.unsure
+        return found, selection.masks["net"].pairing.unsure
 
 
 def _number(frame: Frame) -> int:
@@ -87,6 +87,10 @@ def damaged(folder: Path, name: str) -> Path:
 
 def by_number(masks: Path) -> MaskSettings:
     return MaskSettings(path=str(masks))
+
+
+def keeping(masks: Path) -> LogConfig:
+    return LogConfig({"net": by_number(masks)}, frames=FrameSettings(keep_corrupt=True))
 
 
 @pytest.mark.parametrize("name", WHOLE)
@@ -146,8 +150,8 @@ def test_times_that_damage_has_changed_leave_no_number_after_them_sure(masks, tm
     data = broken.log(compression=CompressionType.NONE, index_types=IndexType.NONE).bytes()
     image = next(at for at in inside(data, chunk(7, data)) if data[at] == Opcode.MESSAGE)
     path = saved(tmp_path, over(data, image + HEAD + 2 + 4, bytes(8)))
-    with open_log(path, keep_corrupt=True) as log:
-        selection = log.select(masks={"net": by_number(masks)})
+    with open_log(path, keeping(masks)) as log:
+        selection = log.select()
         assert not any("net" in frame.labels for frame in log.frames(selection))
 
 
@@ -156,11 +160,11 @@ def test_times_that_damage_has_changed_leave_no_number_after_them_sure(masks, tm
 def test_damaged_chunks_that_are_kept_shift_no_number_before_or_after_they_are_read(
     masks, tmp_path, name, verified
 ):
-    with open_log(damaged(tmp_path, name), keep_corrupt=True) as log:
+    with open_log(damaged(tmp_path, name), keeping(masks)) as log:
         if verified:
             log.verify()
-        selection = log.select(masks={"net": by_number(masks)})
-    assert selection.elsewhere["net"].pairing.unsure == 0
+        selection = log.select()
+    assert selection.masks["net"].pairing.unsure == 0
 
 
 @pytest.mark.parametrize(
@@ -208,17 +212,21 @@ def test_masks_of_another_log_lose_their_numbers_too(tmp_path, later_ns):
     other = tmp_path / "other.mcap"
     other.write_bytes(over(data, begin, bytes(end - begin)))
     settings = MaskSettings(path=f"{other}:{broken.MASK}", pair="number")
-    with open_log(saved(tmp_path, good())) as log:
-        selection = log.select(masks={"net": settings})
+    with open_log(saved(tmp_path, good()), LogConfig(masks={"net": settings})) as log:
+        selection = log.select()
         seen = [frame.number for frame in log.frames(selection) if "net" in frame.labels]
     assert seen == list(range(6))
-    assert selection.elsewhere["net"].pairing.unsure == FRAMES - 6
+    assert selection.masks["net"].pairing.unsure == FRAMES - 6
 
 
 def test_the_truth_is_not_held_against_itself_by_the_log_s_own_path(tmp_path):
     path = saved(tmp_path, good())
-    with open_log(path) as log, pytest.raises(LogError, match="is the truth that it is held"):
-        log.select(masks={"net": MaskSettings(path=f"{path}:{broken.MASK}")})
+    itself = LogConfig(masks={"net": MaskSettings(path=f"{path}:{broken.MASK}")})
+    with (
+        open_log(path, itself) as log,
+        pytest.raises(LogError, match="is the truth that it is held"),
+    ):
+        log.select()
 
 
 @pytest.mark.parametrize("count", [FRAMES - 1, FRAMES + 1])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from roadeval.logs.topics.pairing import UNREADABLE
-from roadeval.logs.topics.selection import ALONE_NS, Clock, clock_of, tolerance
+from roadeval.logs.topics.reader import UNREADABLE
+from roadeval.logs.truth.pairing import ALONE_NS, Clock, clock_of, tolerance
 
 BAD = UNREADABLE
 TIMES = [100, 200, 300]

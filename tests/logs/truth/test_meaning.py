@@ -13,8 +13,7 @@ from roadeval.logs import LabelSettings, LogError
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.pictures import CompressedPicture
 from roadeval.logs.messages.pixels import to_labels
-from roadeval.logs.topics.label_meaning import understand
-from roadeval.logs.topics.labels import seen_in
+from roadeval.logs.truth.meaning import seen_in, understand
 from tests.images.making import file
 from tests.logs.making import grey, jpeg, png
 
@@ -158,7 +157,7 @@ def test_colours_can_mean_road_and_ignore() -> None:
     picture = colors([ROAD, LANE, SKY, CAR])
     labels = LabelSettings(road_colors=(ROAD, LANE), ignore_colors=(CAR,))
     table = understand(labels, seen_in(picture, labels, "/labels", LIMITS), "/labels")
-    assert table.read(picture, LIMITS)[0].tolist() == [[1, 1, 0, 255]]
+    assert table.read(picture, LIMITS).truth.tolist() == [[1, 1, 0, 255]]
     assert table.words == "road is 64,32,32 255,0,0, 204,0,255 is ignored"
 
 
@@ -185,7 +184,7 @@ def test_of_a_palette_the_indices_count_or_its_colours_as_asked() -> None:
     assert to_labels(picture, LIMITS).tolist() == [[0, 1, 2]]
     labels = LabelSettings(road_colors=(ROAD,))
     table = understand(labels, seen_in(picture, labels, "/labels", LIMITS), "/labels")
-    assert table.read(picture, LIMITS)[0].tolist() == [[0, 1, 0]]
+    assert table.read(picture, LIMITS).truth.tolist() == [[0, 1, 0]]
 
 
 def test_a_palette_of_greys_is_a_grey_image() -> None:
@@ -201,8 +200,8 @@ def fringed(values: list[int], labels: LabelSettings) -> tuple[list[int], int]:
     """Return the truth of an exact image of these values, and how many are fringes."""
     table = understand(labels, values, "/labels")
     picture = CompressedPicture(0, "", png(np.array([values], np.uint8)))
-    found, fringe = table.read(picture, LIMITS)
-    return found[0].tolist(), fringe
+    found = table.read(picture, LIMITS)
+    return found.truth[0].tolist(), found.fringe
 
 
 def test_with_a_tolerance_values_far_from_all_known_ones_are_ignored_and_counted() -> None:
@@ -248,7 +247,8 @@ def test_labels_compressed_with_loss_are_read_with_a_tolerance() -> None:
     picture = CompressedPicture(0, "jpeg", file("JPEG", mask, quality=20))
     labels = LabelSettings(tolerance=20)
     table = understand(labels, seen_in(picture, labels, "/labels", LIMITS), "/labels")
-    found, fringe = table.read(picture, LIMITS)
-    assert 0 < fringe < 200
-    assert np.count_nonzero(found == 255) == fringe
+    labels = table.read(picture, LIMITS)
+    found = labels.truth
+    assert 0 < labels.fringe < 200
+    assert np.count_nonzero(found == 255) == labels.fringe
     np.testing.assert_array_equal(found == 1, (mask == 255) & (found != 255))

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from roadeval.logs.topics.pairing import UNREADABLE, Pairing
+from roadeval.logs.topics.reader import UNREADABLE
+from roadeval.logs.truth.pairing import Pairing
 
 
 class Stamps:
@@ -19,8 +20,8 @@ class Stamps:
 
 
 def pairs(images: Sequence[int], labels: Sequence[int], tolerance: int = 0) -> list[int | None]:
-    pairing = Pairing(Stamps(images), Stamps(labels), tolerance)
-    return [pairing.partner(image) for image in range(len(images))]
+    partners = Pairing(Stamps(images), Stamps(labels), tolerance).begin()
+    return [partners.of(image) for image in range(len(images))]
 
 
 def test_equal_stamps_are_a_pair() -> None:
@@ -75,5 +76,5 @@ def test_no_labels_no_partner() -> None:
 
 def test_only_stamps_near_the_one_looked_for_are_read() -> None:
     images, labels = Stamps(range(0, 100_000, 10)), Stamps(range(0, 100_000, 10))
-    assert Pairing(images, labels, 5).partner(7_000) == 7_000
+    assert Pairing(images, labels, 5).begin().of(7_000) == 7_000
     assert len(images.read) + len(labels.read) < 60

@@ -5,13 +5,12 @@ import pytest
 
 from roadeval.images import Limits
 from roadeval.logs import LogError, MaskSettings
-from roadeval.logs.masks.elsewhere import log_and_topic
-from roadeval.logs.masks.folder import open_folder
-from roadeval.logs.masks.npy import npy_picture
 from roadeval.logs.messages.pictures import CompressedPicture
-from roadeval.logs.topics.confidence import Confidence
+from roadeval.logs.truth.folder import npy_picture, open_folder
+from roadeval.logs.truth.meaning import Confidence
+from roadeval.logs.truth.source import log_and_topic
 from tests.logs.making import png
-from tests.logs.masks.test_npy import file_of
+from tests.logs.truth.test_npy import file_of
 
 
 def folder(tmp_path, *names):
@@ -118,7 +117,7 @@ def test_confidences_of_eight_and_sixteen_bits_and_fractions_are_the_same(tmp_pa
         npy_picture(file_of((levels / 255).astype(np.float32)), Limits()),
     ]
     for picture in pictures:
-        codes = confidence.read(picture, Limits())
+        codes = confidence.codes(picture, Limits())
         np.testing.assert_array_equal(codes, levels.astype(np.uint16) * 257)
     np.testing.assert_array_equal(confidence.road(codes), levels / 255 >= 0.5)
 

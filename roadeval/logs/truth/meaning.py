@@ -1,0 +1,321 @@
+"""What label pictures mean: values, colours or confidences become truth."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, ClassVar, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import IGNORE, NON_ROAD, ROAD, Mask, Probability, Truth
+from roadeval.images import Limits
+from roadeval.logs.errors import BadMessage, LogError
+from roadeval.logs.messages.pictures import Picture, RawPicture
+from roadeval.logs.messages.pixels import (
+    format_of,
+    lossy_format,
+    lossy_labels,
+    rows_of,
+    to_labels,
+    to_rgb,
+)
+from roadeval.logs.settings import Color, LabelSettings
+
+UNKNOWN: Final = 254
+"""Marks a value whose meaning is not known."""
+FRINGE: Final = 253
+"""Marks a value that lies too far from every known one, as compression makes them at edges."""
+TOP: Final = np.iinfo(np.uint16).max
+"""The code of a confidence of 1."""
+_MASKS: Final = (
+    {0: NON_ROAD, 255: ROAD, 128: IGNORE},
+    {0: NON_ROAD, 1: ROAD, 255: IGNORE},
+)
+"""Masks that need no settings: what their values mean."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Labels:
+    """A decoded label picture."""
+
+    truth: Truth
+    """``(H, W)`` uint8: 0 non-road, 1 road, 255 ignore."""
+    fringe: int = 0
+    """How many pixels are ignored because their value is too far from every known one."""
+    probability: Probability | None = None
+    """``(H, W)`` uint16 codes of a confidence map."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClassMap:
+    """The meaning of the values, or of the colours, of label pictures."""
+
+    meaning: Mapping[int, int]
+    """Truth by label value, or by packed colour (`pack_colors`)."""
+    others: int
+    """Truth of any other value. With `UNKNOWN` such a value is an error where it occurs, with
+    `FRINGE` it is ignored and counted."""
+    by_color: bool
+    """Whether colours are looked up instead of values."""
+    words: str
+    """The meaning in words."""
+    tolerance: int = 0
+    """How far a value may lie from one in ``meaning`` to mean the same."""
+
+    @property
+    def by_itself(self) -> bool:
+        """Whether a mask was understood without settings."""
+        return self.others == UNKNOWN
+
+    @cached_property
+    def _table(self) -> npt.NDArray[np.uint8]:
+        """``(65536,)`` truth by label value."""
+        table = np.full(65536, self.others, np.uint8)
+        for value, truth in self.meaning.items():
+            table[max(value - self.tolerance, 0) : value + self.tolerance + 1] = truth
+        return table
+
+    def read(self, picture: Picture, limits: Limits) -> Labels:
+        """Decode a label picture.
+
+        Raises
+        ------
+        BadMessage
+            If it cannot be decoded, or holds an unknown value, or colours instead of values; or
+            is compressed in a way that changes values, without a tolerance for that.
+        """
+        if self.others != FRINGE and (name := lossy_format(picture)):
+            raise BadMessage(f"a {name}, whose compression changes label values")
+        if self.by_color:
+            colors = pack_colors(to_rgb(picture, limits))
+            truth = np.full(colors.shape, self.others, np.uint8)
+            for color, meaning in self.meaning.items():
+                truth[colors == color] = meaning
+            return Labels(truth)
+        values = to_labels(picture, limits)
+        if values.ndim != 2:
+            raise BadMessage("it holds colours, not label values")
+        truth = self.of_values(values)
+        if self.others != FRINGE:
+            return Labels(truth)
+        fringe = truth == FRINGE
+        truth[fringe] = IGNORE
+        return Labels(truth, int(np.count_nonzero(fringe)))
+
+    def of_values(self, labels: npt.NDArray[Any]) -> Truth:
+        """Translate ``(H, W)`` uint8 or uint16 labels; a `BadMessage` if a value is unknown."""
+        if labels.dtype == np.uint8:
+            import cv2
+
+            truth: Truth = cv2.LUT(np.ascontiguousarray(labels), self._table[:256])
+        else:
+            truth = self._table[labels]
+        if self.by_itself and (truth == UNKNOWN).any():
+            value = int(labels[truth == UNKNOWN][0])
+            raise BadMessage(f"it holds the value {value}, unlike the frames before ({self.words})")
+        return truth
+
+
+@dataclass(frozen=True, slots=True)
+class Confidence:
+    """Confidence maps: road is what has at least the ``threshold``, from 0 to 1."""
+
+    threshold: float
+    by_itself: ClassVar[bool] = False
+
+    @property
+    def words(self) -> str:
+        """The meaning in words."""
+        return f"a confidence map: road is {self.threshold:g} or more"
+
+    def road(self, probability: Probability) -> Mask:
+        """Return the road of ``(H, W)`` uint16 codes."""
+        return (probability >= self.threshold * TOP).astype(np.uint8)
+
+    def read(self, picture: Picture, limits: Limits) -> Labels:
+        """Decode a confidence map; errors as of `codes`."""
+        probability = self.codes(picture, limits)
+        return Labels(self.road(probability), probability=probability)
+
+    def codes(self, picture: Picture, limits: Limits) -> Probability:
+        """Decode a confidence map to ``(H, W)`` uint16 codes 0..65535 that span 0..1.
+
+        Raises
+        ------
+        BadMessage
+            If it cannot be decoded, holds colours or a number beyond 0..1, or is compressed in a
+            way that changes values.
+        """
+        if name := lossy_format(picture):
+            raise BadMessage(f"a {name}, whose compression changes confidences")
+        if isinstance(picture, RawPicture) and format_of(picture).dtype == "f4":
+            values = rows_of(picture, format_of(picture), limits)
+            if not ((values >= 0) & (values <= 1)).all():
+                raise BadMessage("it holds a confidence that is not from 0 to 1")
+            return np.rint(values.astype(np.float64) * TOP).astype(np.uint16)
+        levels = to_labels(picture, limits)
+        if levels.ndim != 2:
+            raise BadMessage("it holds colours, not confidences")
+        # 257 times 255 is 65535.
+        return levels.astype(np.uint16) * 257 if levels.dtype == np.uint8 else levels
+
+
+Meaning = ClassMap | Confidence
+"""How label pictures of one source are read."""
+
+
+def seen_in(picture: Picture, labels: LabelSettings, name: str, limits: Limits) -> set[int]:
+    """Return the values, or packed colours, that occur in a label picture of a topic or folder.
+
+    Raises
+    ------
+    BadMessage
+        If it cannot be decoded.
+    LogError
+        If it holds colours, and values are looked for; or is compressed in a way that changes
+        values, without a tolerance for that.
+    """
+    if labels.tolerance is None and (format_ := lossy_format(picture)):
+        raise LogError(f"{name} {lossy_labels(format_)}")
+    if labels.road_colors:
+        return set(np.unique(pack_colors(to_rgb(picture, limits))).tolist())
+    pixels = to_labels(picture, limits)
+    if pixels.ndim != 2:
+        colors = map(_color_name, np.unique(pack_colors(pixels)).tolist())
+        raise LogError(
+            f"{name} holds the colours {_listed(colors)}: name those that mean road with "
+            "`labels.road_colors`"
+        )
+    return set(np.flatnonzero(np.bincount(pixels.ravel())).tolist())
+
+
+def understand(
+    labels: LabelSettings, seen: Iterable[int], name: str, *, several: bool = False
+) -> ClassMap:
+    """Decide what the values of label pictures mean.
+
+    Parameters
+    ----------
+    labels
+        The meaning as the user gave it.
+    seen
+        The values, or packed colours, that occur in some of the pictures, once for each picture in
+        which they do.
+    name
+        Of their topic or folder, for messages.
+    several
+        Whether the labels are given for several logs at once. Then a mask that needs no settings
+        is understood by itself where none of the given values occurs in it.
+
+    Raises
+    ------
+    LogError
+        If a given value does not occur, or none is given and the values are class ids.
+    """
+    pictures = Counter(seen)
+    values = sorted(pictures)
+    if labels.tolerance is not None:
+        return _within(labels, labels.tolerance, values, name)
+    # A mask of 0 and 1 could as well be class ids of a log without the given ones.
+    given = {*labels.road, *labels.ignore}
+    if several and {255} <= {*values} <= _MASKS[0].keys() - given:
+        labels = LabelSettings()
+    if labels.road_colors:
+        road, ignore = map(_packed, labels.road_colors), map(_packed, labels.ignore_colors)
+        wanted = {"`labels.road_colors`": tuple(road), "`labels.ignore_colors`": tuple(ignore)}
+        return _as_given(wanted, values, name, by_color=True, several=several)
+    if labels.road:
+        wanted = {"`labels.road`": labels.road, "`labels.ignore`": labels.ignore}
+        return _as_given(wanted, values, name, by_color=False, several=several)
+    for meaning in _MASKS:
+        if {*values} <= meaning.keys() and _is_plain(meaning, pictures):
+            of_road = [str(value) for value, truth in meaning.items() if truth == ROAD]
+            ignored = [str(value) for value in values if meaning[value] == IGNORE]
+            words = f"a mask of {_listed(map(str, values))}: {_words(of_road, ignored)}"
+            return ClassMap(meaning, UNKNOWN, False, words)
+    raise LogError(
+        f"{name} holds the values {_listed(map(str, values))}: name those that mean road with "
+        "`labels.road`, and those to leave out with `labels.ignore`"
+    )
+
+
+def _is_plain(meaning: Mapping[int, int], pictures: Mapping[int, int]) -> bool:
+    """Whether values leave no doubt about their meaning, by the number of pictures with each.
+
+    A 1 in few pictures of a mask of 0 and 255 may be damage: were it road, all the road would be
+    ignored.
+    """
+    road = next(value for value, truth in meaning.items() if truth == ROAD)
+    return road > 1 or 2 * pictures.get(road, 0) >= pictures.get(255, 0)
+
+
+def _as_given(
+    wanted: Mapping[str, tuple[int, ...]],
+    seen: list[int],
+    name: str,
+    *,
+    by_color: bool,
+    several: bool,
+) -> ClassMap:
+    """Return the meaning that the settings give to road and to ignore, in this order."""
+    text = _color_name if by_color else str
+    help_ = "; say with `drives` what holds for this drive alone" if several else ""
+    for setting, values in wanted.items():
+        for value in values:
+            if value not in seen:
+                raise LogError(
+                    f"{setting} {text(value)} does not occur in {name}, whose frames hold "
+                    f"{_listed(map(text, seen))}{help_}"
+                )
+    road, ignore = wanted.values()
+    meaning = dict.fromkeys(road, ROAD) | dict.fromkeys(ignore, IGNORE)
+    return ClassMap(meaning, NON_ROAD, by_color, _words(map(text, road), map(text, ignore)))
+
+
+def _within(labels: LabelSettings, tolerance: int, seen: list[int], name: str) -> ClassMap:
+    """Return the meaning of a mask whose values are near the known ones: 0 is non-road."""
+    road, ignore = labels.road or (255,), labels.ignore
+    meaning = {0: NON_ROAD} | dict.fromkeys(road, ROAD) | dict.fromkeys(ignore, IGNORE)
+    for low, high in pairwise(sorted(meaning)):
+        if meaning[low] != meaning[high] and high - low <= 2 * tolerance:
+            raise LogError(
+                f"{name}: `labels.tolerance` {tolerance} does not keep {low} and {high} apart"
+            )
+    for value in (*labels.road, *ignore):
+        if not any(abs(value - each) <= tolerance for each in seen):
+            raise LogError(
+                f"{name} holds nothing within {tolerance} of {value}; its frames hold "
+                f"{_listed(map(str, seen))}"
+            )
+    words = f"{_words(map(str, road), map(str, ignore))}, 0 is non-road, each within {tolerance}"
+    return ClassMap(meaning, FRINGE, False, words, tolerance)
+
+
+def pack_colors(colors: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint32]:
+    """``(H, W)`` numbers for ``(H, W, 3)`` colours: red * 65536 + green * 256 + blue."""
+    wide = colors.astype(np.uint32)
+    return np.asarray(wide[..., 0] << 16 | wide[..., 1] << 8 | wide[..., 2], np.uint32)
+
+
+def _packed(color: Color) -> int:
+    return color[0] << 16 | color[1] << 8 | color[2]
+
+
+def _color_name(packed: int) -> str:
+    return f"{packed >> 16},{packed >> 8 & 255},{packed & 255}"
+
+
+def _words(road: Iterable[str], ignored: Iterable[str]) -> str:
+    left_out = _listed(ignored)
+    return f"road is {_listed(road)}" + (f", {left_out} is ignored" if left_out else "")
+
+
+def _listed(names: Iterable[str], limit: int = 16) -> str:
+    """Return names in a row, the first ones where there are many."""
+    shown = list(names)
+    return " ".join(shown[:limit] + ["..."] * (len(shown) > limit))
