@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from roadeval.data import FrameResult, Role
-from roadeval.report.figures.figure import ExampleFrame
+from roadeval.report.images import ExampleFrame
 
 SHOWN: Final = 4
 

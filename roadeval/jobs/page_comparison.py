@@ -20,7 +20,8 @@ from roadeval.jobs.report_frames import rates_by_frame
 from roadeval.jobs.result import Result
 from roadeval.recording import Recording
 from roadeval.report.browse import Strip
-from roadeval.report.figures.values import over_frames
+from roadeval.report.chart import looks_of_results
+from roadeval.report.charts.rates import over_frames
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import LayerImage, faded
 from roadeval.report.sections.browse import BrowsedFrames, FrameFacts, strip
@@ -85,7 +86,11 @@ def browsed(
         variants=[mask.name for mask in masks],
         pictured=frozenset(),
         strips=[],
-        charts=over_frames(table, [*SHORT]),
+        charts=over_frames(
+            table,
+            [*SHORT],
+            looks_of_results({mask.name: (mask.result, mask.variant) for mask in masks}),
+        ),
         inspect=album.command if inspect and album.newest else None,
     )
     made = (strip for frame in [*wanted][:PICTURED] if (strip := album.strip(frame)))

@@ -15,7 +15,7 @@ from roadeval.evaluation.settings import EvaluationSettings, settings_of
 from roadeval.jobs.report_frames import LAYERS, FramePicker, evenly, rates_by_frame
 from roadeval.jobs.result import Result
 from roadeval.report.browse import Strip
-from roadeval.report.figures.values import over_frames
+from roadeval.report.charts.rates import over_frames
 from roadeval.report.sections.browse import SMALL, BrowsedFrames, FrameFacts, strip
 from roadeval.results.notes import notes
 

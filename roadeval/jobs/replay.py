@@ -20,8 +20,7 @@ from roadeval.jobs.processing import process
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import Run, prepare
 from roadeval.recording import NullRecorder, RecordRule, SelectiveRecorder, recorder_for
-from roadeval.report.figures.figure import ExampleFrame, FigureData, ThresholdData
-from roadeval.report.figures.files import write_figures
+from roadeval.report.images import ExampleFrame
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import as_arrays, csv_lines, effect_rows, score_rows, sum_rows
 from roadeval.results.schema import TABLES
@@ -130,10 +129,11 @@ def _written(
         del run  # figures take the room of its frames and models
         trim()
         if config.output.figures:
+            from roadeval.report.figures import FigureData, write_figures
+
             with results.explained():
-                windows, levels = (as_arrays(n, rows[n]) for n in ("windows", "probabilities"))
-                curves = ThresholdData(levels, facts.get("curves", {}), facts["totals"])
-                data = FigureData(log.name, windows, examples, curves)
+                windows = as_arrays("windows", rows["windows"])
+                data = FigureData(log.name, windows, examples)
                 write_figures(results.folder, data)
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
     files = [to.reports / name for name in facts["files"]] + ([to.mcap] if to.mcap else [])

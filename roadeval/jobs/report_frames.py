@@ -10,9 +10,8 @@ from roadeval.evaluation import analysis, scored
 from roadeval.evaluation.metrics import SHORT
 from roadeval.jobs.result import Result
 from roadeval.recording import Recording
-from roadeval.report.figures.figure import ExampleFrame
 from roadeval.report.findings import NotableFrame, PairedComparison
-from roadeval.report.images import LayerImage, faded
+from roadeval.report.images import ExampleFrame, LayerImage, faded
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Final
 
-from roadeval.report.chart import Chart, HeatMap
+from roadeval.report.chart import Chart, HeatMap, legend
+from roadeval.report.drawing import (
+    Drawing,
+    HeatDrawing,
+    drawn,
+    key_on_paper,
+    span_of_frames,
+)
 
 _SUFFIXES: Final = {b"<?xml": "svg", b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
 
@@ -139,22 +146,21 @@ class Table(Block):
 
 @dataclass(frozen=True, slots=True)
 class Figure(Block):
-    """A picture across ``width`` of the text (0..1), with its caption below.
+    """Charts beside each other below one legend, with a caption."""
 
-    ``charts`` are the same as data, for whoever draws it anew; without any, only the picture is.
-    Their caption is ``of_charts``, where the picture's speaks of what only that has.
-    """
-
-    picture: ImageFile
+    charts: Sequence[Chart | HeatMap]
     caption: str
-    width: float = 1.0
-    charts: Sequence[Chart | HeatMap] = ()
-    of_charts: str = ""
 
     def as_json(self) -> dict[str, Any]:
-        """Return its fields as JSON has them, without the charts."""
-        return {"kind": self.kind, "caption": self.caption, "width": self.width} | {
-            "picture": self.picture.name
+        """Return what paper needs to draw it."""
+        span, keys = span_of_frames(self.charts), legend(self.charts)
+        told = [f"{chart.title}, {chart.unit}" for chart in self.charts]
+        return {
+            "kind": self.kind,
+            "caption": self.caption,
+            "alt": f"{'; '.join(told)}: {', '.join(key.name for key in keys)}".rstrip(": "),
+            "legend": [key_on_paper(key) for key in keys],
+            "charts": [_on_paper(drawn(chart, span)) for chart in self.charts],
         }
 
 
@@ -218,6 +224,12 @@ class Document(Block):
         return {image.name: image.content for image in self.images()}
 
 
+def _on_paper(drawing: Drawing | HeatDrawing) -> dict[str, Any]:
+    if isinstance(drawing, HeatDrawing):
+        return drawing.on_paper() | {"picture": ImageFile(drawing.chart.picture()).name}
+    return drawing.on_paper()
+
+
 def _as_json(value: Any) -> Any:
     match value:
         case ImageFile():
@@ -235,7 +247,7 @@ def _images(value: Any) -> Iterator[ImageFile]:
         case ImageFile():
             yield value
         case HeatMap():
-            yield ImageFile(value.picture)
+            yield ImageFile(value.picture())
         case Block():
             yield from value.images()
         case list() | tuple():

@@ -1,12 +1,13 @@
-"""Charts as data, for a page that draws them itself and shows the values under the pointer.
+"""Charts as data: what is drawn, with its values and how it looks, for paper and for a page.
 
-A figure that is a picture may carry the same content as charts: see `roadeval.report.blocks`.
+`roadeval.report.charts` makes them of a result's rows, `roadeval.report.drawing` finds where
+everything lies, and the templates of `roadeval.report.pdf` and `roadeval.report.page` draw it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
@@ -14,8 +15,81 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, colours
+
 POINTS: Final = 1500
 """Points of a series along the drive, at most: more do not fit beside each other on a screen."""
+
+
+# --- How variants look ----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a series is drawn; no two variants differ by their colour alone."""
+
+    colour: str
+    """As ``#RRGGBB``."""
+    dash: str = "solid"
+    """``solid``, ``dashed``, ``dotted`` or ``dash-dotted``, as CSS and Typst call them."""
+    mark: str = "circle"
+    """On paper: ``circle``, ``square``, ``triangle``, ``diamond`` or ``cross``."""
+    hollow: bool = False
+    """Whether the mark is an outline."""
+
+
+FAINT: Final = "#666666"
+WORSE: Final = colours.hex_of(colours.VERMILLION)
+BETTER: Final = colours.hex_of(colours.BLUE)
+
+_KNOWN: Final = {
+    FILTERED: Look(colours.hex_of(colours.FILTERED)),
+    UNFILTERED: Look(colours.hex_of(colours.UNFILTERED), "dashed", "square", hollow=True),
+    BASELINE: Look(colours.hex_of(colours.on_paper(colours.BLIND)), "dotted", "cross"),
+}
+_FURTHER: Final = (
+    Look("", "dash-dotted", "triangle"),
+    Look("", "dashed", "diamond", hollow=True),
+    Look("", "solid", "square"),
+    Look("", "dotted", "triangle", hollow=True),
+    Look("", "dash-dotted", "diamond"),
+)
+_DASHES: Final = ("solid", "dashed", "dotted", "dash-dotted")
+
+
+def looks(variants: Sequence[str]) -> dict[str, Look]:
+    """Return each variant's look; those that do not come by default take turns at the others."""
+    further = (
+        replace(own, colour=colours.hex_of(colours.on_paper(colour)))
+        for own, colour in zip(_FURTHER, colours.EXTRA, strict=True)
+    )
+    cycle = [*further]
+    others = [name for name in variants if name not in _KNOWN]
+    found = {name: cycle[place % len(cycle)] for place, name in enumerate(others)}
+    return {name: _KNOWN.get(name) or found[name] for name in variants}
+
+
+def looks_of_results(masks: Mapping[str, tuple[str, str]]) -> dict[str, Look]:
+    """Return the looks of masks of several results, each given by its result and variant.
+
+    A variant keeps its colour; the dash and the filling of the marks tell results apart. Where the
+    variants of one result are compared, each has its own look.
+    """
+    if all(result == variant for result, variant in masks.values()):
+        return looks([*masks])
+    results = list(dict.fromkeys(result for result, _ in masks.values()))
+    own = looks(list(dict.fromkeys(variant for _, variant in masks.values())))
+    return {
+        name: replace(
+            own[variant],
+            dash=_DASHES[results.index(result) % len(_DASHES)],
+            hollow=results.index(result) % 2 == 1,
+        )
+        for name, (result, variant) in masks.items()
+    }
+
+
+# --- Charts ---------------------------------------------------------------------------------------
 
 
 class ChartKind(StrEnum):
@@ -30,32 +104,18 @@ class ChartKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """Numbers of one colour.
-
-    Parameters
-    ----------
-    name
-        For the legend.
-    colour
-        As ``#RRGGBB``.
-    x
-        Frame numbers, or positions in `Chart.names`; rising.
-    y
-        A number each, in the chart's unit; NaN where undefined.
-    low, high
-        Ends of an interval around each, or none at all.
-    dashed, hollow
-        How it differs from others beside its colour.
-    """
+    """Numbers of one look."""
 
     name: str
-    colour: str
+    """For the legend."""
+    look: Look
     x: Sequence[float]
+    """Frame numbers, or positions in `Chart.names`; rising."""
     y: Sequence[float]
+    """A number each, in the chart's unit; NaN where undefined."""
     low: Sequence[float] = ()
     high: Sequence[float] = ()
-    dashed: bool = False
-    hollow: bool = False
+    """Ends of an interval around each, or none at all."""
 
     def points(self) -> Iterator[tuple[float, float]]:
         """Yield the points that are defined."""
@@ -73,101 +133,116 @@ class Level:
 
 
 @dataclass(frozen=True, slots=True)
-class Chart:
-    """A chart.
+class Key:
+    """An entry of a legend: a name and what it stands for."""
 
-    Parameters
-    ----------
-    title
-        Of what is drawn, with its unit, as ``ERR, %``.
-    kind
-        How it is drawn.
-    series
-        What is drawn.
-    names
-        Of the positions 0, 1, ... on the axis; without any, positions are numbers of frames, and
-        all such charts share one range.
-    unit
-        Of the values, ``%`` or ``pp``.
-    from_zero
-        Whether the axis of values begins at zero.
-    share
-        A share of the whole at each name, drawn as a pale bar behind the marks; or none.
-    level
-        A value that is drawn across.
-    across
-        What positions are where they are neither frames nor names, as ``recall``; in `unit`.
-    x_range, y_range
-        Ends of the axes; by default as the numbers are.
-    """
+    name: str
+    kind: str
+    """``line``, ``mark``, ``both``, ``bar``, ``level`` or ``share``."""
+    look: Look = Look(FAINT)
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """A chart."""
 
     title: str
+    """What is drawn, without its unit, as ``ERR``."""
     kind: ChartKind
     series: Sequence[Series]
     names: Sequence[str] = ()
+    """Of the positions 0, 1, ... on the axis; without any, positions are numbers of frames, and all
+    such charts share one range."""
     unit: str = "%"
+    """Of the values, ``%`` or ``pp``."""
     from_zero: bool = True
+    """Whether the axis of values begins at zero."""
     share: Sequence[float] = ()
+    """A share of the pixels at each name, drawn as a pale bar behind the marks; or none."""
     level: Level | None = None
+    """A value that is drawn across."""
     across: str = ""
+    """What positions are where they are neither frames nor names, as ``recall``; in `unit`."""
     x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None
+    """Ends of the axes; by default as the numbers are."""
+    sums: int = 0
+    """How many of the last names sum up the others; a rule sets them apart."""
 
     @property
     def of_frames(self) -> bool:
         """Whether positions are numbers of frames."""
         return not self.names and not self.across
 
+    def legend(self) -> Iterator[Key]:
+        """Yield the entries of its legend."""
+        kinds = {ChartKind.BARS: "bar", ChartKind.POINTS: "mark", ChartKind.MARKS: "mark"}
+        for each in (own for own in self.series if own.x):
+            line = "line" if self.across else "both"
+            kind = kinds.get(self.kind) or ("mark" if len(each.x) == 1 else line)
+            yield Key(each.name, kind, each.look)
+        if self.level:
+            yield Key(self.level.name, "level")
+        if self.share:
+            yield Key("share of the pixels", "share")
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeatMap:
-    """How often something is so in each part of the image.
-
-    Parameters
-    ----------
-    title
-        What is.
-    values
-        ``(rows, columns)`` in ``unit``; NaN where it is not known.
-    top
-        The value of the darkest shade.
-    shades
-        Some colours from that of 0 to that of ``top``, as ``#RRGGBB``.
-    picture
-        A PNG file of a pixel a cell.
-    unit
-        Of the values.
-    """
+    """How often something is so in each part of the image."""
 
     title: str
     values: npt.NDArray[np.float64]
+    """``(rows, columns)`` in percent; NaN where it is not known."""
     top: float
-    shades: Sequence[str]
-    picture: bytes
-    unit: str = "% of the frames"
+    """The value of the darkest shade."""
+    colour: colours.Colour
+    """Half-way from white to the darkest shade."""
 
-    @property
-    def kind(self) -> ChartKind:
-        """How it is drawn."""
-        return ChartKind.MAP
+    kind = ChartKind.MAP
+    unit = "% of the frames"
+    of_frames = False
+
+    def legend(self) -> Iterator[Key]:
+        """Yield nothing: the shades have a scale of their own."""
+        yield from ()
 
     @property
     def most(self) -> float:
         """The greatest value that is known."""
         return float(np.nan_to_num(self.values).max())
 
-    @property
-    def of_frames(self) -> bool:
-        """Whether positions are numbers of frames: they are places in the image."""
-        return False
+    def shades(self, count: int) -> npt.NDArray[np.uint8]:
+        """Return ``(count, 3)`` RGB: from white at zero to the darkest."""
+        ends = np.array([(255, 255, 255), self.colour, colours.MOST_ERRORS], float)
+        places = np.linspace(0, 2, count)
+        mixed = np.stack([np.interp(places, [0, 1, 2], each) for each in ends.T], axis=1)
+        shades: npt.NDArray[np.uint8] = np.rint(mixed).astype(np.uint8)
+        return shades
+
+    def picture(self) -> bytes:
+        """Return a PNG file of a pixel a cell."""
+        import cv2
+
+        known = np.nan_to_num(np.clip(self.values / self.top, 0, 1))
+        cells = self.shades(256)[np.rint(known * 255).astype(int)]
+        cells[np.isnan(self.values)] = colours.NEVER_LABELLED
+        done, content = cv2.imencode(".png", np.ascontiguousarray(cells[..., ::-1]))
+        assert done
+        return bytes(content)
+
+
+def legend(charts: Sequence[Chart | HeatMap]) -> list[Key]:
+    """Return what several charts show, each once."""
+    return list(dict.fromkeys(key for chart in charts for key in chart.legend()))
 
 
 def thinned(series: Series, most: int = POINTS) -> Series:
     """Return a series of at most ``most`` points: each is the mean of neighbours.
 
-    >>> thinned(Series("a", "#000000", [0, 1, 2, 3], [1.0, 3.0, 5.0, 7.0]), most=2)
-    Series(name='a', colour='#000000', x=[0, 2], y=[2.0, 6.0], low=(), high=(), \
-dashed=False, hollow=False)
+    >>> made = thinned(Series("a", Look("#000000"), [0, 1, 2, 3], [1.0, 3.0, 5.0, 7.0]), most=2)
+    >>> made.x, made.y
+    ([0, 2], [2.0, 6.0])
     """
     size = -(-len(series.x) // most)
     if size <= 1:

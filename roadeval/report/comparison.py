@@ -22,13 +22,9 @@ from roadeval.report.blocks import (
     TableOfContents,
     Text,
 )
+from roadeval.report.charts import differences, rates
 from roadeval.report.comparison_rows import breaks, interval_of, named, naming_columns
 from roadeval.report.comparison_where import disagreement_table, where
-from roadeval.report.figures import row_values
-from roadeval.report.figures.charts import forest, levels
-from roadeval.report.figures.fig3a_error_rate import FIGURE
-from roadeval.report.figures.figure import FigureData
-from roadeval.report.figures.files import svg, svg_of
 from roadeval.report.markdown import table as markdown_table
 from roadeval.results.certainty import correction, too_few
 from roadeval.results.comparison import judged, verdict, warnings
@@ -112,17 +108,13 @@ def _blocks(
     finals = [row for row in comparison.changes if row.final]
     if comparison.same_drive:
         yield Figure(
-            svg(lambda: forest(finals)),
-            "Change of the final mask's rates against the base; bars are intervals, where given.",
-            charts=row_values.changes(finals),
+            differences.changes(finals), "Change of the final mask's rates against the base."
         )
-        yield Heading("Over the drive", 2)
-        data = FigureData("the common frames", windows)
-        if picture := svg_of(FIGURE, data):
-            yield Figure(picture, "", charts=FIGURE.charts(data))
+        if charts := rates.over_windows(windows, ["ERR"]):
+            yield Heading("Over the drive", 2)
+            yield Figure(charts, "ERR of the final masks over the common frames.")
     else:
-        charts = row_values.levels(finals)
-        yield Figure(svg(lambda: levels(finals)), "Rates of the final masks.", charts=charts)
+        yield Figure(differences.levels(finals), "Rates of the final masks.")
     yield from where(comparison)
     if comparison.moved:
         yield Heading("Frames that changed most", 2)

@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Rows
-from roadeval.report.figures.figure import ExampleFrame, FigureData, ThresholdData
-from roadeval.report.images import LayerImage
+from roadeval.report.images import ExampleFrame, LayerImage
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -187,12 +186,6 @@ class Findings:
     def drive(self) -> str:
         """The drive's name."""
         return str(self.summary["drive"]["name"])
-
-    @property
-    def figure_data(self) -> FigureData:
-        """The data that the figures of the results folder are drawn from."""
-        curves = ThresholdData(self.levels, self.summary.get("curves", {}), self.totals)
-        return FigureData(self.drive, self.windows, self.examples, curves)
 
     @property
     def totals(self) -> Totals:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import LayerKind, LayerSpec, Rgb
+from roadeval.data import LayerKind, LayerSpec, Mask, Rgb, Truth
 from roadeval.report.blocks import ImageFile
 
+EXAMPLE_WIDTH: Final = 400
+"""Pixels across an example's picture, at most."""
 WIDTH: Final = 420
 """Pixels across a picture, at most: about 200 an inch at a quarter of the page."""
 QUALITY: Final = 85
@@ -26,23 +29,43 @@ _LEVELS: Final = np.arange(256, dtype=np.uint8)[:, None]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LayerImage:
-    """One layer of one frame.
-
-    Parameters
-    ----------
-    title
-        A few words.
-    image
-        ``(H, W, 3)`` uint8 RGB: the camera's image.
-    spec, array
-        The layer, as in `roadeval.data.Layer`; None for the camera's image alone. A scalar map
-        is in its own unit.
-    """
+    """One layer of one frame."""
 
     title: str
+    """A few words."""
     image: Rgb
+    """``(H, W, 3)`` uint8 RGB: the camera's image."""
     spec: LayerSpec | None = None
     array: npt.NDArray[Any] | None = None
+    """The layer, as in `roadeval.data.Layer`; None for the camera's image alone. A scalar map is in
+    its own unit."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExampleFrame:
+    """A frame to show: its image, its truth if it has one, and the final masks of variants."""
+
+    frame: int
+    image: Rgb
+    """``(H, W, 3)`` uint8 RGB."""
+    truth: Truth | None
+    """``(H, W)`` uint8 (0, 1, 255)."""
+    masks: Mapping[str, Mask]
+    """``(H, W)`` uint8 (0, 1) by variant; one whose masks another system has made may have none."""
+
+    def small(self) -> ExampleFrame:
+        """Return the example in the size in which it is drawn, of which a run can hold a few."""
+        return ExampleFrame(
+            self.frame,
+            shrink(self.image, EXAMPLE_WIDTH),
+            None if self.truth is None else shrink(self.truth, EXAMPLE_WIDTH, labels=True),
+            {name: shrink(mask, EXAMPLE_WIDTH, labels=True) for name, mask in self.masks.items()},
+        )
+
+
+def variants_of(examples: Sequence[ExampleFrame]) -> list[str]:
+    """Return the variants that have a mask of one of the frames."""
+    return list(dict.fromkeys(name for example in examples for name in example.masks))
 
 
 def jpeg(layer: LayerImage, width: int = WIDTH) -> ImageFile:

@@ -40,6 +40,15 @@ def visible_lines(text: str) -> str:
     return "\n".join(map(visible, text.split("\n")))
 
 
+def elided(name: str, letters: int) -> str:
+    """Return a name, its middle left out where it is long: both ends tell names apart."""
+    name = visible(name)
+    if len(name) <= letters:
+        return name
+    half = (letters - 1) // 2
+    return f"{name[: letters - 1 - half]}\N{HORIZONTAL ELLIPSIS}{name[len(name) - half :]}"
+
+
 def is_utf8(text: str) -> bool:
     """Return whether text is Unicode, and not the bytes of a name in another encoding."""
     try:

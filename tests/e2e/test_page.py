@@ -8,13 +8,12 @@ import pandas as pd
 import pytest
 
 from roadeval.report.blocks import Figure
-from roadeval.report.chart import Chart, ChartKind, Series
+from roadeval.report.chart import Chart, ChartKind, Look, Series
 from roadeval.report.page.files import write_page
 from roadeval.results.fleet.folder import Fleet
 from tests.e2e.commands import here
 from tests.fixtures.browser import missing, violations, wait_until
 from tests.report.making import a_document
-from tests.report.page.test_render import JPEG
 from tests.results.fleet.making import fleet_of
 
 if reason := missing():
@@ -260,10 +259,10 @@ def test_the_mean_difference_and_its_interval_are_told(drive, demo, watched):
 
 
 def test_curves_are_told_where_they_are_and_masks_near_their_own_place(tmp_path, watched):
-    curve = Series("a", "#0072B2", [0.0, 40.0, 90.0], [100.0, 95.0, 60.0])
-    mask = Series("a: the mask", "#0072B2", [40.0], [93.0])
+    curve = Series("a", Look("#0072B2"), [0.0, 40.0, 90.0], [100.0, 95.0, 60.0])
+    mask = Series("a: the mask", Look("#0072B2"), [40.0], [93.0])
     chart = Chart("precision", ChartKind.LINES, [curve, mask], across="recall", x_range=(0, 101))
-    page = write_page(tmp_path / "page.html", a_document(Figure(JPEG, "", charts=[chart])))
+    page = write_page(tmp_path / "page.html", a_document(Figure([chart], "")))
     tab = watched(page.as_uri()).tab
     tab.locator(".area").focus()
     said = []

@@ -18,6 +18,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from roadeval.cli.app import main
+from roadeval.report import blocks
 from tests.golden import drawings, drive
 
 DONE: Final = "told.json"
@@ -107,14 +108,20 @@ def run(name: str) -> dict[str, Any]:
 
 @contextmanager
 def _drawn() -> Iterator[list[str]]:
-    """Describe every figure that is saved as vectors meanwhile."""
+    """Describe every figure of the paper and every chart of a report that is drawn meanwhile."""
     figures: list[str] = []
-    save = Figure.savefig
+    save, set_ = Figure.savefig, blocks.Figure.as_json
 
     def saved(figure: Figure, *given: Any, **options: Any) -> None:
         save(figure, *given, **options)
-        if options.get("format") != "png":
-            figures.append(drawings.described(figure))
+        figures.append(drawings.described(figure))
 
-    with mock.patch.object(Figure, "savefig", saved):
+    def on_paper(figure: blocks.Figure) -> dict[str, Any]:
+        figures.append(drawings.charted(figure))
+        return set_(figure)
+
+    with (
+        mock.patch.object(Figure, "savefig", saved),
+        mock.patch.object(blocks.Figure, "as_json", on_paper),
+    ):
         yield figures

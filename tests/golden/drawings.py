@@ -1,4 +1,4 @@
-"""What Matplotlib is asked to draw, as text: every line, bar, mark and picture with its numbers."""
+"""What is drawn, as text: every line, bar, mark and picture with its numbers."""
 
 from __future__ import annotations
 
@@ -10,11 +10,45 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
 
-from roadeval.report.figures.picture import Picture
+from roadeval.report import blocks
+from roadeval.report.chart import Chart, HeatMap
+from roadeval.report.figures import Picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+def charted(figure: blocks.Figure) -> str:
+    """The charts of a report's figure."""
+    return "\n".join([f"figure: {figure.caption}", *map(_charted, figure.charts)])
+
+
+def _charted(chart: Chart | HeatMap) -> str:
+    told = f"  {chart.kind} {chart.title!r} in {chart.unit}"
+    if isinstance(chart, HeatMap):
+        known = chart.values[~np.isnan(chart.values)]
+        shades = " ".join(to_hex(shade / 255) for shade in chart.shades(3))
+        size = f"{chart.values.shape}, mean {known.mean():.5g}, {len(known)} known"
+        return f"{told}: {size}, 0 to {chart.top:.4g} as {shades}"
+    lines = [f"{told}{', from zero' if chart.from_zero else ''}"]
+    lines += [f"    names {' | '.join(chart.names)}"] if chart.names else []
+    lines += [f"    share {_numbers(chart.share)}"] if chart.share else []
+    lines += [f"    across {chart.across}"] if chart.across else []
+    for axis, ends in (("x", chart.x_range), ("y", chart.y_range)):
+        lines += [f"    {axis} from {ends[0]:.4g} to {ends[1]:.4g}"] if ends else []
+    if level := chart.level:
+        ends = _numbers((level.value, level.low, level.high))
+        lines.append(f"    level {level.name!r}: {ends}")
+    for each in chart.series:
+        look = f"{each.look.colour} {each.look.dash} {each.look.mark}{' hollow' * each.look.hollow}"
+        lines.append(f"    {each.name!r}, {look}: {_points(each.x, each.y)}")
+        lines += [f"        from {_numbers(each.low)} to {_numbers(each.high)}"] if each.low else []
+    return "\n".join(lines)
+
+
+def _numbers(values: Any) -> str:
+    return " ".join(f"{each:.4g}" for each in values)
 
 
 def described(figure: Figure) -> str:
@@ -29,7 +63,8 @@ def described(figure: Figure) -> str:
 def _words(figure: Figure) -> Iterator[str]:
     for text in figure.texts:
         yield f"  text {text.get_text()!r}"
-    for legend in figure.legends:
+    for legend in (found for axes in figure.axes if (found := axes.get_legend())):
+        yield f"  legend {legend.get_title().get_text()!r}"
         # By its lines: Matplotlib draws copies of what it was given.
         for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True):
             yield f"  legend {text.get_text()!r}: {_look(handle)}"

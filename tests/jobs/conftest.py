@@ -3,10 +3,11 @@
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from functools import partial
-from importlib import import_module
 from unittest import mock
 
 import pytest
+
+from roadeval.report import figures as drawn
 
 Figures = Callable[[], AbstractContextManager[object]]
 """Within ``with figures():`` replays draw them."""
@@ -14,7 +15,6 @@ Figures = Callable[[], AbstractContextManager[object]]
 
 @pytest.fixture(scope="module", autouse=True)
 def figures() -> Iterator[Figures]:
-    replay = import_module("roadeval.jobs.replay")
-    drawing = partial(mock.patch.object, replay, "write_figures", replay.write_figures)
-    with mock.patch.object(replay, "write_figures", return_value=[]):
+    drawing = partial(mock.patch.object, drawn, "write_figures", drawn.write_figures)
+    with mock.patch.object(drawn, "write_figures", return_value=[]):
         yield drawing

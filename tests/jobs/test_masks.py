@@ -160,14 +160,13 @@ def test_curves_are_counted_on_the_evaluated_frames(outcome, places):
     assert own["post"]["threshold"] == pytest.approx(155 / 255)
 
 
-def test_curves_are_in_the_tables_the_recording_and_the_figures(outcome):
+def test_curves_are_in_the_tables_and_the_recording(outcome):
     table = roadeval.Recording(outcome.recording).table("probabilities")
     assert set(table["variant"]) == {"confidence"}
     assert table["level"].tolist() == [100, 155]
     recorded = roadeval.Recording(outcome.recording)
     assert recorded.summary["curves"] == outcome.summary["curves"]
     assert "## Over thresholds" in recorded.result("overview")
-    assert (outcome.reports / "thresholds.png").exists()
 
 
 def test_workers_make_no_difference_to_curves(places, tmp_path):
@@ -183,13 +182,11 @@ def test_workers_make_no_difference_to_curves(places, tmp_path):
     assert found[0] == found[1]
 
 
-def test_without_a_probability_there_are_no_curves(places, figures, tmp_path):
+def test_without_a_probability_there_are_no_curves(places, tmp_path):
     config = settings(record="none").override({"masks": masks(places, net={"path": "number"})})
-    with figures():
-        done = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "reports")
+    done = roadeval.replay(places / "drive.mcap", config, reports=tmp_path / "reports")
     assert "curves" not in done.summary
     assert not (tmp_path / "reports" / "probabilities.csv").exists()
-    assert not (tmp_path / "reports" / "thresholds.png").exists()
 
 
 def test_variants_are_compared_where_they_differ(outcome):

@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 
 import pandas as pd
@@ -20,6 +19,7 @@ from roadeval.jobs.progress import ignore
 from roadeval.jobs.run import prepare
 from roadeval.logs import LogConfig, TopicSettings, open_log
 from roadeval.pipeline.paper import svm
+from roadeval.report import figures as drawn
 from roadeval.results import schema
 from roadeval.results.folder import ResultsFolder
 from roadeval.results.summary import summary_text
@@ -413,7 +413,7 @@ def test_where_figures_cannot_be_written_the_earlier_outputs_stay_all_three(
     def fail(*given):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(import_module("roadeval.jobs.replay"), "write_figures", fail)
+    monkeypatch.setattr(drawn, "write_figures", fail)
     with pytest.raises(RoadevalError, match=r"reports: cannot write results \(No space") as caught:
         roadeval.replay(
             drive,
@@ -436,7 +436,7 @@ def test_a_recording_whose_name_is_taken_away_at_the_end_is_told_where_it_is(
         (tmp_path / "out.rrd").mkdir()
         return []
 
-    monkeypatch.setattr(import_module("roadeval.jobs.replay"), "write_figures", take)
+    monkeypatch.setattr(drawn, "write_figures", take)
     with pytest.raises(RoadevalError, match=r"out\.rrd: cannot be written: Is a") as caught:
         run(drive, tmp_path, max_frames=12)
     (left,) = tmp_path.glob("out.*.partial.rrd")

@@ -7,7 +7,7 @@ import pandas as pd
 from pypdf import PdfReader
 
 from roadeval.report.blocks import Cell, Document
-from roadeval.report.figures.figure import FigureData
+from roadeval.report.figures import FigureData
 from roadeval.report.findings import Commands, Findings, PairedComparison
 from roadeval.results.rows import as_arrays
 from tests.evaluation.making import rows_of

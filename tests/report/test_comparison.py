@@ -155,4 +155,4 @@ def test_of_a_frame_of_disagreement_the_sum_of_both_shares_is_bold():
 
 def test_its_contents_lead_to_its_parts():
     made = document(a_comparison(), LIMITS, NO_WINDOWS)
-    assert links_within(pdf(made)) == 3
+    assert links_within(pdf(made)) == 2

@@ -9,20 +9,11 @@ from typing import Any, Final
 from roadeval.data.words import interval, number, points
 from roadeval.evaluation.drives import Stratum
 from roadeval.report.blocks import Block, Cell, Table, Text
-from roadeval.report.figures.forest import EXTREMES, NAMED, ForestMean, ForestRow, cut
 from roadeval.results.certainty import MARK, stands
 from roadeval.results.schema import LIGHT, TAG
 
 STRATA: Final = 30
 """Parts of a fleet that a table has, at most."""
-_ROWS: Final = (
-    "A row a drive, with its own interval, the worst above; the group that it belongs to in "
-    "brackets. Below them the mean over drives and its interval."
-)
-_POINTS: Final = (
-    "A point a drive, with its own interval, the worst on the left. Dashed: the mean over drives; "
-    "grey band: its interval."
-)
 _LIGHT: Final = {column.name for column in LIGHT}
 
 
@@ -115,29 +106,6 @@ def _legend(rows: Sequence[MarkedRow], left_out: int) -> str:
     if left_out:
         told += f" {left_out} smaller parts are left out."
     return told
-
-
-def caption(rows: Sequence[ForestRow], mean: ForestMean) -> str:
-    """Return what a forest plot shows."""
-    told = ["A line a drive, with its own interval, the worst above."]
-    if len(rows) > NAMED:
-        told.append(f"The {EXTREMES} at either end are named.")
-    elif any(row.group for row in rows):
-        told.append("On the right, the groups that drives belong to.")
-    if missing := sum(row.low is None for row in rows):
-        told.append(f"{missing} drive{' has' if missing == 1 else 's have'} no interval.")
-    if beyond := cut(rows, mean):
-        told.append(f"{beyond} interval{' reaches' if beyond == 1 else 's reach'} beyond the edge.")
-    if mean.low is None:
-        told.append("The mean has no interval: too few drives or groups of drives.")
-    else:
-        told.append("Diamond: the mean over drives and its interval.")
-    return " ".join(told)
-
-
-def caption_of_charts(rows: Sequence[ForestRow]) -> str:
-    """Return what the chart of a page shows in place of a forest plot."""
-    return _ROWS if len(rows) <= NAMED else _POINTS
 
 
 def q_value(q: float) -> str:

@@ -20,13 +20,9 @@ from roadeval.report.blocks import (
     TableOfContents,
     Text,
 )
-from roadeval.report.figures import row_values
-from roadeval.report.figures.files import svg
-from roadeval.report.figures.forest import ForestMean, ForestRow, forest
+from roadeval.report.charts.differences import MEAN, ForestRow, caption, forest
 from roadeval.report.fleet.common import (
     MarkedRow,
-    caption,
-    caption_of_charts,
     q_value,
     strata_table,
 )
@@ -135,14 +131,9 @@ def _plot(comparison: FleetComparison, change: FleetChange) -> Iterator[Block]:
     if not rows:
         return
     over = change.difference[TESTED]
-    mean = ForestMean(over.mean, over.low, over.high)
-    label = f"change of {TESTED} of {change.variant}, pp"
-    yield Figure(
-        svg(lambda: forest(rows, mean, label)),
-        caption(rows, mean),
-        charts=row_values.forest(rows, mean, label.removesuffix(", pp")),
-        of_charts=caption_of_charts(rows),
-    )
+    mean = ForestRow(MEAN, None, over.mean, over.low, over.high)
+    label = f"change of {TESTED} of {change.variant}"
+    yield Figure(forest(rows, mean, label), caption(rows, mean))
 
 
 def _strata(comparison: FleetComparison) -> Iterator[Block]:

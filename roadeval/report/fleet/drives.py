@@ -7,10 +7,7 @@ from typing import Any, Final
 
 from roadeval.data.words import number, percent, points
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
-from roadeval.report.figures import row_values
-from roadeval.report.figures.files import svg
-from roadeval.report.figures.forest import ForestMean, ForestRow, forest
-from roadeval.report.fleet.common import caption, caption_of_charts
+from roadeval.report.charts.differences import MEAN, ForestRow, caption, forest
 from roadeval.report.fleet.findings import FleetFindings, Row
 
 NAMED: Final = 12
@@ -60,14 +57,9 @@ def _plot(findings: FleetFindings, told: Mapping[str, Any]) -> Iterator[Block]:
     ]
     if not rows:
         return
-    mean = ForestMean(told["mean"], told["low"], told["high"])
-    label = f"ERR of {told['variant']} minus that of {told['base']}, pp"
-    yield Figure(
-        svg(lambda: forest(rows, mean, label)),
-        caption(rows, mean),
-        charts=row_values.forest(rows, mean, label.removesuffix(", pp")),
-        of_charts=caption_of_charts(rows),
-    )
+    mean = ForestRow(MEAN, None, told["mean"], told["low"], told["high"])
+    label = f"ERR of {told['variant']} minus that of {told['base']}"
+    yield Figure(forest(rows, mean, label), caption(rows, mean))
 
 
 def worst_table(findings: FleetFindings) -> Table:

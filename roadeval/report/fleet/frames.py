@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 
 from roadeval.data.words import percent
 from roadeval.report.blocks import Block, Cell, Heading, ImageGrid, Table, Text
-from roadeval.report.figures.layout import short
 from roadeval.report.fleet.findings import FleetFindings, WorstFrame
+from roadeval.runtime.text import elided
 
 ACROSS = 4
 LACKING = 12
@@ -57,7 +57,7 @@ def commands_table(findings: FleetFindings, inspect: Callable[[int], str]) -> Ta
 
 
 def _caption(findings: FleetFindings, frame: WorstFrame) -> str:
-    name = short(findings.names[frame.drive], LONGEST)
+    name = elided(findings.names[frame.drive], LONGEST)
     return f"{frame.rank}. {name}, frame {frame.frame}: ERR {percent(frame.rates['ERR'], 1)} %"
 
 

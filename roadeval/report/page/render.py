@@ -18,8 +18,8 @@ from typing import Any, Final, NoReturn
 
 from roadeval.report.blocks import Block, Cell, Document, ImageFile, Table
 from roadeval.report.browse import FrameBrowser
-from roadeval.report.page.drawing import Drawing, drawn, span_of_frames
-from roadeval.report.page.heat import HeatDrawing
+from roadeval.report.chart import legend
+from roadeval.report.drawing import Drawing, HeatDrawing, drawn, span_of_frames
 from roadeval.report.page.outline import charts, sections
 from roadeval.runtime.text import visible
 
@@ -137,6 +137,8 @@ def _rendered(template: str, place: Place, document: Document | None, **values: 
     environment = _environment()
     made = environment.get_template(template).render(
         drawn=drawing,
+        legend=legend,
+        picture=lambda chart: ImageFile(chart.picture()),
         source=lambda image: _source(image, place),
         frame_link=lambda frame: _frame_link(frame, place),
         filled=_filled,

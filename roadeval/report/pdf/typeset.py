@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from enum import StrEnum
 from functools import cache
 from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -150,10 +151,14 @@ def _dejavu() -> TemporaryDirectory[str]:
     figure is set in one font, and if it had but one letter that DejaVu Sans lacks, as in a drive's
     name, all of it would be such signs.
     """
-    from matplotlib import get_data_path
-
+    # Found without the import, which takes longer than a whole report.
+    found = find_spec("matplotlib")
+    assert found is not None
+    assert found.origin is not None
     folder = TemporaryDirectory(prefix="roadeval-")
-    for font in Path(get_data_path(), "fonts", "ttf").glob("DejaVuSans*.ttf"):
+    for font in (
+        Path(found.origin).with_name("mpl-data").joinpath("fonts", "ttf").glob("DejaVuSans*.ttf")
+    ):
         try:
             Path(folder.name, font.name).symlink_to(font)
         except OSError:  # a system on which not everyone may link

@@ -9,10 +9,9 @@ from roadeval.data import TRUTH, mask_spec
 from roadeval.data.words import percent
 from roadeval.evaluation.metrics import SHORT
 from roadeval.report.blocks import Cell, ImageFile
-from roadeval.report.figures.figure import ExampleFrame, variants_of
-from roadeval.report.figures.style import looks
+from roadeval.report.chart import looks
 from roadeval.report.findings import Findings
-from roadeval.report.images import LayerImage, faded, jpeg
+from roadeval.report.images import ExampleFrame, LayerImage, faded, jpeg, variants_of
 
 SIDE_BY_SIDE: Final = 3
 """More variants than this do not fit beside each other under several rates."""

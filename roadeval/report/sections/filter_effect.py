@@ -8,9 +8,7 @@ from typing import Any
 from roadeval.data import BASELINE
 from roadeval.data.words import DASH, defined, interval, listing, number, percent, points
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
-from roadeval.report.figures import values
-from roadeval.report.figures.charts import difference
-from roadeval.report.figures.files import svg
+from roadeval.report.charts.differences import difference
 from roadeval.report.findings import Findings, PairedComparison
 from roadeval.report.sections.common import sampled_frames, variant_cell
 from roadeval.results.certainty import MARK, correction, stands, too_few
@@ -47,11 +45,10 @@ def _paired(findings: Findings, pair: PairedComparison) -> Iterator[Block]:
     yield Text(frames_changed(pair))
     if pair.pixels is not None:
         yield Text(pixels_changed(findings, pair))
+    frames, changes = pair.frames.index.to_numpy(), pair.frames["ERR"].to_numpy()
     yield Figure(
-        svg(lambda: difference(pair.frames, pair.treated, pair.control, change)),
-        f"ERR of {pair.treated} minus {pair.control}, frame by frame. Dashed: the mean; grey band: "
-        "its interval, where one is given.",
-        charts=[values.difference(pair.frames, pair.treated, pair.control, change)],
+        [difference(frames, changes, pair.treated, pair.control, change)],
+        f"ERR of {pair.treated} minus {pair.control}, frame by frame.",
     )
 
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from roadeval.report.blocks import Block, Figure, Heading, ImageGrid, Text
-from roadeval.report.figures import values
-from roadeval.report.figures.charts import coverage
-from roadeval.report.figures.figure import variants_of
-from roadeval.report.figures.files import svg
+from roadeval.report.charts.rates import coverage
 from roadeval.report.findings import Findings
+from roadeval.report.images import variants_of
 from roadeval.report.sections.common import example_pictures
 
 
@@ -24,8 +22,9 @@ def section(findings: Findings) -> Iterator[Block]:
         pictures = list(example_pictures(findings.examples))
         yield ImageGrid(pictures, len(variants_of(findings.examples)) + 1)
     if len(findings.coverage):
+        table = findings.coverage
+        shares = {str(name): table[name].to_numpy() for name in table}
         yield Figure(
-            svg(lambda: coverage(findings.coverage)),
+            [coverage(table.index.to_numpy(), shares)],
             "The share of the image that the final masks call road. A jump is worth a look.",
-            charts=[values.coverage(findings.coverage)],
         )

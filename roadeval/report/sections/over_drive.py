@@ -19,9 +19,9 @@ from roadeval.report.blocks import (
     Table,
     Text,
 )
-from roadeval.report.figures.figure import figures, variants_of
-from roadeval.report.figures.files import svg_of
+from roadeval.report.charts.rates import figures_over_drive
 from roadeval.report.findings import Findings
+from roadeval.report.images import variants_of
 from roadeval.report.sections.common import SIDE_BY_SIDE, example_pictures
 from roadeval.results.claims import NO_NUMBERS, claim_rows
 
@@ -40,10 +40,9 @@ def section(findings: Findings) -> Iterator[Block]:
         pictures = list(example_pictures(findings.examples))
         yield ImageGrid(pictures, len(variants_of(findings.examples)) + 2)
         yield Text("The paper's figure 2: input and output images, and the truth.", "note")
-    for figure in figures():
-        if figure.in_report and (picture := svg_of(figure, findings.figure_data)):
-            charts = figure.charts(findings.figure_data)
-            yield Figure(picture, figure.caption, charts=charts)
+    for figure in figures_over_drive():
+        if charts := figure.charts(findings.windows):
+            yield Figure(charts, figure.caption)
     yield from _claims(findings)
 
 

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from functools import partial
 from typing import Final
 
+from roadeval.data import Rows
 from roadeval.data.words import percent
 from roadeval.evaluation.regions import partitions, titles
 from roadeval.report.blocks import Block, Figure, Heading, Table, Text
-from roadeval.report.figures import values
-from roadeval.report.figures.charts import regions as chart
-from roadeval.report.figures.files import svg
-from roadeval.report.figures.heatmaps import MAPS_SHARE, heatmap
+from roadeval.report.charts import rates
 from roadeval.report.findings import Findings
 from roadeval.report.sections.common import SIDE_BY_SIDE, sampled_frames
 
 SHARES: Final = {"ERR": "ERR within, %", "errors": "share of its wrong pixels, %"}
 """Columns of `Findings.regions` that are tabulated for each variant, with their titles."""
-MAPS: Final = 2
-"""Variants whose heat maps share a figure."""
 
 
 def section(findings: Findings) -> Iterator[Block]:
@@ -27,24 +22,21 @@ def section(findings: Findings) -> Iterator[Block]:
     yield Heading("Where the errors are")
     height = findings.summary["drive"].get("height") or 0
     names = titles(findings.regions["region"].unique().tolist(), height)
+    table = Rows({str(name): findings.regions[name].to_numpy() for name in findings.regions})
     yield Figure(
-        svg(lambda: chart(findings.regions, [*findings.finals], names)),
+        rates.regions(table, [*findings.finals], names),
         "Error rate within each region, and the region's share of all wrong pixels beside its "
         "share of all pixels: a mark to the right of the grey bar is more than its share.",
-        charts=values.regions(findings.regions, [*findings.finals], names),
     )
     together = len(findings.finals) <= SIDE_BY_SIDE
     for columns in [[*SHARES]] if together else [[column] for column in SHARES]:
         yield regions_table(findings, names, {column: SHARES[column] for column in columns})
     yield Text(_note(findings), "note")
-    for place in range(0, len(findings.heatmaps), MAPS):
-        maps = findings.heatmaps[place : place + MAPS]
+    if findings.heatmaps:
         yield Figure(
-            svg(partial(heatmap, maps, findings.heatmaps)),
-            f"Where the final masks go wrong, over {sampled_frames(findings)}. "
-            "Percent of the frames that label the pixel; grey: none does.",
-            width=MAPS_SHARE,
-            charts=[*values.heat(maps, findings.heatmaps)],
+            [*rates.heat(findings.heatmaps)],
+            f"Where the final masks go wrong, over {sampled_frames(findings)}. FP: non-road called "
+            "road; FN: road missed. Percent of the frames that label the pixel; grey: none does.",
         )
 
 

@@ -10,9 +10,7 @@ from roadeval.evaluation.analysis import merged
 from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
 from roadeval.evaluation.scored import FILTER
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
-from roadeval.report.figures import values
-from roadeval.report.figures.charts import stages as chart
-from roadeval.report.figures.files import svg
+from roadeval.report.charts import rates
 from roadeval.report.findings import Findings
 from roadeval.report.sections.common import rate_cells, sampled_frames, variant_cell
 
@@ -21,9 +19,9 @@ def section(findings: Findings) -> Iterator[Block]:
     """Yield what each stage did to the mask, and which part of the error is whose."""
     yield Heading("Which stage broke it")
     yield Figure(
-        svg(lambda: chart(findings.totals)),
-        f"Rates of each stage's mask, means over the frames. Dotted: {BASELINE}, for scale.",
-        charts=values.stages(findings.totals),
+        rates.stages(findings.totals),
+        f"Rates of each stage's mask, means over the frames; {BASELINE}, which has no stages, for "
+        "scale.",
     )
     yield stages_table(findings)
     if len(findings.changes):

@@ -3,32 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Final
+from typing import Any
 
 from roadeval.data.words import number, percent
 from roadeval.evaluation.thresholds import BINS
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
-from roadeval.report.figures.files import svg_of
-from roadeval.report.figures.thresholds import FIGURE
+from roadeval.report.charts.thresholds import CAPTION, curves
 from roadeval.report.findings import Findings
 from roadeval.report.sections.common import variant_cell
-
-OF_CHARTS: Final = (
-    "Precision over recall, ROC, and reliability: the share of road among pixels of about the same "
-    "probability, which on the dashed line is what it says. A curve belongs to a variant that says "
-    "how probable road is; a mark is a mask at its own threshold. Axes begin where the masks lie."
-)
 
 
 def section(findings: Findings) -> Iterator[Block]:
     """Yield the curves and what is quoted of them; nothing without a probability."""
     quoted = findings.summary.get("curves", {})
-    picture = svg_of(FIGURE, findings.figure_data)
-    if not quoted or picture is None:
+    charts = curves(findings.levels, quoted, findings.totals)
+    if not quoted or not charts:
         return
     yield Heading("Over thresholds")
-    charts = FIGURE.charts(findings.figure_data)
-    yield Figure(picture, FIGURE.caption, charts=charts, of_charts=OF_CHARTS)
+    yield Figure(charts, CAPTION)
     yield _table(findings, quoted)
     yield Text(
         "All labelled pixels of the evaluated frames together. F is the harmonic mean of precision "

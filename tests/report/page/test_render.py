@@ -32,14 +32,14 @@ from roadeval.report.browse import (
     PictureRow,
     Strip,
 )
-from roadeval.report.chart import Chart, ChartKind, Series
+from roadeval.report.chart import Chart, ChartKind, Look, Series
 from roadeval.report.page.files import Beside, write_page
 from roadeval.report.page.render import page
 from tests.report.making import a_document
 
 JPEG = ImageFile(b"\xff\xd8\xff\xe0 not much of a picture")
 HOSTILE = "<script>alert(1)</script>\"'&\x1b[2J javascript:alert(2)"
-CHART = Chart("ERR", ChartKind.LINES, [Series(HOSTILE, "#0072B2", [0, 1], [1.0, 2.0])])
+CHART = Chart("ERR", ChartKind.LINES, [Series(HOSTILE, Look("#0072B2"), [0, 1], [1.0, 2.0])])
 MARKS = Chart("ERR", ChartKind.MARKS, CHART.series, names=[HOSTILE, "b"], share=[1.0, 2.0])
 
 
@@ -57,8 +57,7 @@ def every_block(text):
         BulletList(text, [text], "warning"),
         table,
         LongTable(table, text),
-        Figure(JPEG, text),
-        Figure(JPEG, text, charts=[CHART, MARKS]),
+        Figure([CHART, MARKS], text),
         ImageGrid([(text, JPEG)], 4, skip=1),
         KeepTogether([Text(text)]),
         TwoColumns([Text(text)], [Text(text)]),
@@ -162,7 +161,7 @@ def test_tables_name_their_columns_and_rows_and_fill_in_what_a_row_takes_from_ab
 def test_pictures_have_words_for_who_does_not_see_them():
     made = Reader(rendered(*every_block("word")))
     pictures = [own for own in made.all("img") if "src" in own]
-    assert len(pictures) == 3
+    assert len(pictures) == 2
     assert all(own["alt"] for own in pictures)
 
 
@@ -177,7 +176,7 @@ def test_pictures_have_words_for_who_does_not_see_them():
 def test_a_picture_inside_a_page_says_of_which_kind_it_is(content, media):
     encoded = base64.b64encode(content).decode()
     address = f"data:{media};base64,{encoded}"
-    made = Reader(rendered(Figure(ImageFile(content), "It.")))
+    made = Reader(rendered(ImageGrid([("It.", ImageFile(content))], 1)))
     assert [own["src"] for own in made.all("img") if "src" in own] == [address]
 
 

@@ -6,6 +6,7 @@ import tempfile
 import zlib
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from roadeval.report.blocks import (
@@ -23,6 +24,7 @@ from roadeval.report.blocks import (
     Text,
     TwoColumns,
 )
+from roadeval.report.chart import Chart, ChartKind, HeatMap, Level, Look, Series, looks
 from roadeval.report.pdf.typeset import Paper, ReportError, pdf, write_file
 from tests.report.making import a_document, reader, text
 
@@ -40,6 +42,62 @@ def a_png():
     return ImageFile(b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts))
 
 
+def a_chart(title, kind=ChartKind.LINES, **more):
+    names = [f"{title} of one", f"{title} of two"]
+    drawn = zip(names, looks(names).values(), strict=True)
+    given = {"low": [0.5, 1], "high": [2, 9]}
+    return Chart(title, kind, [Series(n, k, [0, 1], [1, 2], **given) for n, k in drawn], **more)
+
+
+CHARTS = {
+    "lines": a_chart("ERR", names=["svm", "post"], level=Level("the mean", 1.5)),
+    "bars": a_chart("ERR", ChartKind.BARS, unit="pp", level=Level("the mean", 1.5, 1, 2)),
+    "points": a_chart("ERR", ChartKind.POINTS, names=["a", "b"]),
+    "curves": a_chart("precision", across="recall"),
+    "marks": a_chart("ERR", ChartKind.MARKS, names=["a", "b"], share=[3, 4], y_range=(0, 4)),
+    "map": HeatMap("FP of a", np.array([[1.0, np.nan]]), 2.0, (213, 94, 0)),
+}
+
+
+@pytest.mark.parametrize("name", CHARTS)
+def test_every_kind_of_chart_is_drawn_with_its_words(name):
+    chart = CHARTS[name]
+    content = pdf(a_document(Figure([chart, chart, chart], "What it shows.")))
+    words = text(content)
+    wanted = [f"{chart.title}, {chart.unit}", "What it shows.", *(k.name for k in chart.legend())]
+    wanted += [] if name in ("points", "map") else getattr(chart, "names", ())
+    assert [each for each in wanted if each not in words] == []
+    # A legend is one, the titles are three.
+    assert all(words.count(key.name) == 1 for key in chart.legend())
+    assert words.count(f"{chart.title}, {chart.unit}") == 3
+
+
+def test_names_of_stages_are_turned_where_they_have_no_room():
+    stages = ["similarity_as_printed", "svm_as_printed", "post_as_printed"]
+    series = [Series("a", Look("#0072B2"), [0, 1, 2], [1, 2, 3])]
+    for names, turned in ((["similarity", "svm", "post"], False), (stages, True)):
+        chart = Chart("ERR", ChartKind.LINES, series, names=names)
+        slopes = {}
+
+        def visit(found, matrix, *_, slopes=slopes):
+            if found.strip():
+                slopes[found.strip()] = abs(matrix[1]) > 0.1
+
+        page = reader(pdf(a_document(Figure([chart] * 3, "")))).pages[0]
+        page.extract_text(visitor_text=visit)
+        assert any(slopes.values()) is turned
+
+
+def test_a_long_legend_takes_lines_and_stays_on_the_page():
+    names = [f"{LONG}{place}" for place in range(6)]
+    series = [Series(name, look, [0, 1], [1, 2]) for name, look in looks(names).items()]
+    content = pdf(a_document(Figure([Chart("ERR", ChartKind.LINES, series)], "")))
+    starts = [x for word, x in places(content).items() if word.startswith(LONG)]
+    assert starts
+    assert max(starts) < 400
+    assert "".join(text(content).split()).count(LONG) == len(names)
+
+
 @pytest.mark.parametrize(
     "block",
     [
@@ -51,7 +109,8 @@ def a_png():
         Command(HOSTILE),
         BulletList(HOSTILE, [HOSTILE], "warning"),
         Table([HOSTILE], [[HOSTILE]], caption=HOSTILE),
-        Figure(a_png(), HOSTILE),
+        Figure([a_chart(HOSTILE)], ""),
+        Figure([a_chart("ERR")], HOSTILE),
         ImageGrid([(HOSTILE, a_png())], 1),
     ],
     ids=lambda block: type(block).__name__,
@@ -70,7 +129,7 @@ def test_control_characters_and_broken_unicode_are_shown_escaped():
 
 
 def test_the_same_document_gives_the_same_bytes():
-    document = a_document(Heading("one"), TableOfContents(), Figure(a_png(), "two"))
+    document = a_document(Heading("one"), TableOfContents(), Figure([a_chart("two")], ""))
     assert pdf(document) == pdf(document)
 
 
@@ -84,13 +143,13 @@ def test_headings_are_the_outline_and_the_table_of_contents():
 
 def test_who_listens_to_a_document_is_told_what_each_part_is_and_what_pictures_show():
     table = Table(["variant", "ERR"], [["filtered", "1.00"]], caption="Rates")
-    made = reader(pdf(a_document(Heading("One"), table, Figure(a_png(), "What it shows"))))
+    made = reader(pdf(a_document(Heading("One"), table, Figure([a_chart("ERR")], ""))))
     root = made.trailer["/Root"]
     assert root["/MarkInfo"]["/Marked"]
     assert root["/Lang"] == "en"
     kinds = list(parts(root["/StructTreeRoot"]))
     assert {"/H1", "/Table", "/TH", "/TD", "/Figure"} <= {kind for kind, _ in kinds}
-    assert ("/Figure", "What it shows") in kinds
+    assert ("/Figure", "ERR, %: ERR of one, ERR of two") in kinds
 
 
 def parts(element):
@@ -180,7 +239,7 @@ def test_a_name_of_64_letters_stays_in_its_column(block):
 
 
 def test_equal_pictures_are_kept_once():
-    document = a_document(Figure(a_png(), "one"), Figure(a_png(), "two"))
+    document = a_document(*(ImageGrid([(name, a_png())], 1) for name in ("one", "two")))
     assert len(document.files()) == 1
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from roadeval.report.blocks import Figure, ImageGrid, KeepTogether, Table, Text
-from roadeval.report.figures.figure import ExampleFrame
+from roadeval.report.images import ExampleFrame
 from roadeval.report.sections.over_drive import section
 from tests.evaluation.making import rows_of
 from tests.report.making import plain_rows, rates, some_findings, the

@@ -45,7 +45,7 @@ def test_a_region_that_no_one_knows_is_shown_by_its_name():
     (table,) = tables(findings)
     assert [row[0] for row in table.rows][-1] == "wet asphalt"
     (figure,) = (block for block in section(findings) if isinstance(block, Figure))
-    assert b"wet asphalt" in figure.picture.content
+    assert figure.charts[0].names[-1] == "wet asphalt"
 
 
 def test_row_bands_are_named_by_their_rows_below_a_rule():

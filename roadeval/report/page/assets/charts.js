@@ -149,7 +149,7 @@ class ChartView {
     this.cursor.removeAttribute("d");
     if (x === null) return;
     this.pointed = this.snapped(x);
-    this.cursor.setAttribute("d", `M${this.pointed} 0V1000`);
+    this.cursor.setAttribute("d", `M${this.pointed} 0V100`);
   }
 
   /** What stands at the position that is pointed at. */
@@ -188,14 +188,14 @@ class ChartView {
   select(from, to) {
     this.chosen?.remove();
     if (from === null) return;
-    this.chosen = svg("rect", { class: "chosen", x: Math.min(from, to), y: 0, width: Math.abs(to - from), height: 1000 });
+    this.chosen = svg("rect", { class: "chosen", x: Math.min(from, to), y: 0, width: Math.abs(to - from), height: 100 });
     this.area.append(this.chosen);
   }
 
   show(low, high) {
     [this.low, this.high] = [low, high];
     this.whole.hidden = low === range.whole[0] && high === range.whole[1];
-    this.area.setAttribute("viewBox", `${low} 0 ${high - low} 1000`);
+    this.area.setAttribute("viewBox", `${low} 0 ${high - low} 100`);
     const ticks = roundNumbers(low, high, Math.max(2, Math.min(8, this.area.clientWidth / 60)));
     this.element.querySelector(".xs").replaceChildren(
       ...ticks.map((each) => {
@@ -207,7 +207,7 @@ class ChartView {
   }
 
   mark(frame) {
-    this.here.setAttribute("d", `M${frame} 0V1000`);
+    this.here.setAttribute("d", `M${frame} 0V100`);
   }
 }
 

@@ -1,0 +1,195 @@
+"""Charts of rates: over the drive, by stage, by region, and over the image."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from roadeval.data import BASELINE, Rows, colours
+from roadeval.data.rows import Cells
+from roadeval.data.words import in_percent
+from roadeval.evaluation import scored
+from roadeval.evaluation.analysis import merged
+from roadeval.evaluation.metrics import METRICS, SHORT
+from roadeval.report.chart import Chart, ChartKind, HeatMap, Look, Series, looks, thinned
+from roadeval.runtime.discovery import found_in
+
+if TYPE_CHECKING:
+    from roadeval.report.findings import ErrorHeatmap, Totals
+
+LEAST_SHARE: Final = 1.0
+"""Percent of the frames to which a heat map's shades reach at least."""
+
+
+# --- Over the drive -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class OverDrive:
+    """A figure of a drive's report."""
+
+    caption: str
+    charts: Callable[[Rows], Sequence[Chart]]
+    """Return its charts of the rows of ``windows.csv``, any number of variants; or none."""
+
+
+def figures_over_drive() -> tuple[OverDrive, ...]:
+    """Return the paper's figures 3a and 3b, and what the modules of this package add."""
+    from roadeval.report import charts
+
+    return (
+        OverDrive("The paper's figure 3a: error rate.", lambda rows: over_windows(rows, ["ERR"])),
+        OverDrive(
+            "The paper's figure 3b: false positive and false negative error rates.",
+            lambda rows: over_windows(rows, ["FPR", "FNR"]),
+        ),
+        OverDrive("Further rates over the drive.", _further_rates),
+        *found_in(charts, "FIGURE"),
+    )
+
+
+def _further_rates(windows: Rows) -> list[Chart]:
+    """Return a chart of each rate of short tables that the paper's figures lack."""
+    further = [name for name in SHORT if name not in ("ERR", "FPR", "FNR")]
+    # In results that were made before a metric was added it is undefined everywhere.
+    known = [name for name in further if len(windows) and not np.isnan(windows[name]).all()]
+    return over_windows(windows, known)
+
+
+def over_windows(windows: Rows, rates: Sequence[str]) -> list[Chart]:
+    """Return a chart a rate: each variant's final mask, window by window."""
+    if not len(windows):
+        return []
+    final = scored.finals(windows)
+    return _along(final, (final["first_frame"] + final["last_frame"]) / 2, rates)
+
+
+def over_frames(
+    frames: Rows, rates: Sequence[str], drawn: Mapping[str, Look] | None = None
+) -> list[Chart]:
+    """Return a chart a rate: each variant's final mask, frame by frame."""
+    final = scored.finals(frames)
+    return _along(final, final["frame"], rates, drawn)
+
+
+def _along(
+    final: Rows, x: Cells, rates: Sequence[str], drawn: Mapping[str, Look] | None = None
+) -> list[Chart]:
+    """Return a chart a rate of rows that lie at ``x`` along the drive."""
+    order = np.argsort(x, kind="stable")
+    rows = final.take(order).replace(x=x[order])
+    drawn = drawn or looks(final.distinct("variant"))
+    return [
+        Chart(
+            f"{rate}: {METRICS[rate].in_words}",
+            ChartKind.LINES,
+            [
+                thinned(series(name, look, own["x"], 100 * own[rate]))
+                for name, look in drawn.items()
+                for own in [rows.of_variant(name)]
+            ],
+            from_zero=not METRICS[rate].higher_is_better,
+        )
+        for rate in rates
+    ]
+
+
+def coverage(frames: Cells, shares: Mapping[str, Cells]) -> Chart:
+    """Return the share of the image that each variant calls road, frame by frame."""
+    return Chart(
+        "Share of the image called road",
+        ChartKind.LINES,
+        [
+            thinned(series(name, look, frames, 100 * shares[name]))
+            for name, look in looks([*shares]).items()
+        ],
+    )
+
+
+# --- By stage, by region, over the image ----------------------------------------------------------
+
+
+def stages(totals: Totals) -> list[Chart]:
+    """Return a chart a rate: each stage's mask, a line a variant."""
+    names = merged(own for variant, own in totals.items() if variant != BASELINE)
+    return [
+        Chart(
+            f"{rate}: {metric.in_words}",
+            ChartKind.LINES,
+            [
+                _of_stages(variant, look, totals[variant], names, rate)
+                for variant, look in looks([*totals]).items()
+            ],
+            names=names,
+            from_zero=not metric.higher_is_better,
+        )
+        for rate, metric in SHORT.items()
+    ]
+
+
+def _of_stages(
+    variant: str, look: Look, own: Mapping[str, Mapping[str, Any]], names: Sequence[str], rate: str
+) -> Series:
+    """Return a variant's rate by stage; of the baseline, which has no stages, a level."""
+    if variant == BASELINE:
+        (total,) = own.values()
+        return series(variant, look, range(len(names)), [in_percent(total.get(rate))] * len(names))
+    values = [in_percent(total.get(rate)) for total in own.values()]
+    return series(variant, look, [names.index(stage) for stage in own], values)
+
+
+def regions(table: Rows, variants: Sequence[str], titles: Mapping[str, str]) -> list[Chart]:
+    """Return the error rate in each region, and its share of the errors beside that of pixels.
+
+    Parameters
+    ----------
+    table
+        ``variant``, ``region``, ``ERR``, ``pixels`` and ``errors``.
+    variants
+        Those to draw, in order.
+    titles
+        The regions to draw, from top to bottom, with their titles.
+    """
+    columns = ("region", "variant", "ERR", "pixels", "errors")
+    rows = {row[:2]: row[2:] for row in zip(*(table[name] for name in columns), strict=True)}
+    missing = (np.nan, np.nan, np.nan)
+
+    def column(place: int, variant: str) -> list[float]:
+        return [in_percent(rows.get((region, variant), missing)[place]) for region in titles]
+
+    return [
+        Chart(
+            title,
+            ChartKind.MARKS,
+            [
+                series(name, look, range(len(titles)), column(place, name))
+                for name, look in looks(variants).items()
+            ],
+            names=[*titles.values()],
+            share=column(1, variants[0]) if place == 2 else (),
+        )
+        for place, title in ((0, "ERR within the region"), (2, "Share of the wrong pixels"))
+    ]
+
+
+def heat(maps: Sequence[ErrorHeatmap]) -> Iterator[HeatMap]:
+    """Yield where each variant has false positives and negatives; equal shades are equal shares."""
+    fp, fn = (
+        100 * max([float(np.nan_to_num(share).max()) for share in shares] or [0.0])
+        for shares in ([each.fp for each in maps], [each.fn for each in maps])
+    )
+    for each in maps:
+        for outcome, shares, top, colour in (
+            ("FP", each.fp, fp, colours.FP),
+            ("FN", each.fn, fn, colours.FN),
+        ):
+            title = f"{outcome} of {each.variant}"
+            yield HeatMap(title, 100 * shares, max(top, LEAST_SHARE), colour)
+
+
+def series(name: str, look: Look, x: Any, y: Any) -> Series:
+    """Return a series of any numbers."""
+    return Series(name, look, [float(each) for each in x], np.asarray(y, float).tolist())

@@ -1,0 +1,225 @@
+"""Which charts are made of which rows: each number where it belongs, in its own look."""
+
+import sys
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from roadeval.data import colours
+from roadeval.evaluation.comparison_result import MaskComparison
+from roadeval.evaluation.metrics import METRICS, SHORT
+from roadeval.evaluation.uncertainty import Difference
+from roadeval.report import charts as folder
+from roadeval.report.chart import ChartKind, Look, legend, looks, looks_of_results
+from roadeval.report.charts import differences, rates
+from roadeval.report.charts.differences import MEAN, NAMED, ForestRow
+from roadeval.report.charts.rates import figures_over_drive
+from roadeval.report.findings import ErrorHeatmap
+from tests.evaluation.making import a_table, rows_of
+
+FILTERED, UNFILTERED = (colours.hex_of(c) for c in (colours.FILTERED, colours.UNFILTERED))
+CHANGE = Difference(0.01, -0.02, 0.04, 0.95, 0.5, 12, None)
+
+
+def numbers(series):
+    return [*zip(series.x, series.y, strict=True)]
+
+
+# --- Looks ----------------------------------------------------------------------------------------
+
+
+def test_variants_differ_by_more_than_their_colour():
+    names = ["filtered", "unfiltered", "blind", "a", "b", "c", "d", "e"]
+    for one, other in combinations(looks(names).values(), 2):
+        assert one.colour != other.colour
+        assert replace(one, colour="") != replace(other, colour="")
+
+
+def test_the_colours_are_those_of_the_design():
+    found = looks(["filtered", "unfiltered", "blind"])
+    assert [look.colour for look in found.values()] == [FILTERED, UNFILTERED, "#8A8A8A"]
+    assert found["blind"].dash == "dotted"
+
+
+def test_of_several_results_a_variant_keeps_its_hue_and_a_result_its_dash():
+    masks = {f"{r}: {v}": (r, v) for v in ("filtered", "robust") for r in ("old", "new")}
+    found = looks_of_results(masks)
+    assert len({look.colour for look in found.values()}) == 2
+    assert found["old: robust"].colour == found["new: robust"].colour
+    assert found["old: robust"].dash == found["old: filtered"].dash == "solid"
+    assert found["new: robust"].dash == found["new: filtered"].dash == "dashed"
+
+
+def test_variants_of_one_result_are_compared_in_their_own_looks():
+    names = ["filtered", "robust"]
+    assert looks_of_results({name: (name, name) for name in names}) == looks(names)
+
+
+# --- Rates ----------------------------------------------------------------------------------------
+
+
+def test_lines_go_along_the_drive_whatever_the_table_s_order():
+    rows = rows_of(a_table({("net", "svm"): [90, 90, 90], ("net", "post"): [10, 20, 30]}))
+    (chart,) = rates.over_frames(rows.take(np.array([4, 3, 2, 5, 0, 1])), ["ERR"])
+    (line,) = chart.series
+    assert numbers(line) == [(0, 10), (1, 20), (2, 30)]
+
+
+def test_each_rate_of_the_stages_has_its_own_chart_and_the_baseline_is_a_level():
+    own = {"ERR": 0.1, "FPR": 0.2, "FNR": None}
+    totals = {"filtered": {"svm": own, "post": own}, "blind": {"post": own}}
+    for chart, value in zip(rates.stages(totals), (10, 20, np.nan), strict=True):
+        for series in chart.series:
+            np.testing.assert_allclose(series.y, [value, value])
+
+
+def test_stages_of_variants_stand_in_the_order_of_their_chains():
+    chains = {"filtered": ("svm", "post"), "robust": ("trees", "post")}
+    totals = {
+        name: dict.fromkeys(chain, dict.fromkeys(SHORT, 0.1)) for name, chain in chains.items()
+    }
+    assert rates.stages(totals)[0].names == ["svm", "trees", "post"]
+
+
+def test_a_rate_that_is_better_higher_need_not_begin_at_zero(monkeypatch):
+    monkeypatch.setattr(rates, "SHORT", {name: METRICS[name] for name in ("ERR", "ACC")})
+    made = rates.stages({"filtered": {"post": {"ERR": 0.1, "ACC": 0.9}}})
+    assert [chart.from_zero for chart in made] == [True, False]
+
+
+def test_a_region_has_its_error_rate_and_its_share_of_the_errors():
+    row = {"variant": ["filtered"], "region": ["lit"], "pixels": [0.5], "ERR": [0.1]}
+    table = {name: np.array(column) for name, column in (row | {"errors": [0.3]}).items()}
+    titles = {"lit": "in light", "dark": "not counted"}
+    left, right = rates.regions(table, ["filtered"], titles)
+    assert left.names == right.names == ["in light", "not counted"]
+    np.testing.assert_allclose(left.series[0].y, [10, np.nan])
+    np.testing.assert_allclose(right.series[0].y, [30, np.nan])
+    np.testing.assert_allclose(right.share, [50, np.nan])
+
+
+def test_equal_shades_are_equal_shares_in_every_map():
+    maps = [ErrorHeatmap(n, np.array([[e]]), np.array([[e]])) for n, e in (("a", 0.1), ("b", 0.4))]
+    made = [*rates.heat(maps)]
+    assert [each.title for each in made] == ["FP of a", "FN of a", "FP of b", "FN of b"]
+    assert [each.top for each in made] == pytest.approx([40] * 4)
+    assert (made[0].most, made[0].colour, made[1].colour) == (10, colours.FP, colours.FN)
+
+
+def test_the_covered_share_is_in_percent():
+    chart = rates.coverage(np.array([3, 8]), {"filtered": np.array([0.25, 0.5])})
+    assert numbers(chart.series[0]) == [(3, 25), (8, 50)]
+
+
+ADDED = """
+from roadeval.report.charts.rates import OverDrive, over_windows
+
+FIGURE = OverDrive("Accuracy.", lambda windows: over_windows(windows, ["ACC"]))
+"""
+
+
+def test_a_figure_over_the_drive_is_one_file_in_the_folder(tmp_path, monkeypatch):
+    (tmp_path / "accuracy.py").write_text(ADDED)
+    monkeypatch.setattr(folder, "__path__", [*folder.__path__, str(tmp_path)])
+    *_, last = figures_over_drive()
+    assert last.caption == "Accuracy."
+    sys.modules.pop("roadeval.report.charts.accuracy")
+
+
+# --- Differences ----------------------------------------------------------------------------------
+
+
+def test_a_frame_that_got_worse_has_the_colour_of_the_other_variant():
+    mean = {"mean": -0.05, "low": None, "high": None}
+    frames, changes = np.array([7, 9]), np.array([0.1, -0.2])
+    chart = differences.difference(frames, changes, "filtered", "unfiltered", mean)
+    worse, better = chart.series
+    assert [*worse.points()] == [(7, pytest.approx(10))]
+    assert [*better.points()] == [(9, pytest.approx(-20))]
+    assert (worse.look.colour, better.look.colour) == (UNFILTERED, FILTERED)
+    assert (worse.name, better.name) == ("filtered worse", "filtered better")
+    assert (chart.level.name, chart.level.value) == ("mean", -5)
+
+
+def test_a_comparison_shows_changes_with_their_intervals():
+    unsure = replace(CHANGE, low=None, high=None)
+    changes = {"ERR": CHANGE, "FPR": unsure, "FNR": CHANGE}
+    row = MaskComparison("new", "filtered", "post", True, 12, {}, {}, changes)
+    first, second, _ = differences.changes([row])
+    (own,) = first.series
+    assert (own.y, own.low, own.high) == ([1], [-2], [4])
+    assert np.isnan(second.series[0].low).all()
+
+
+def test_each_result_of_another_drive_has_a_row():
+    own = {"ERR": 0.1, "FPR": 0.2, "FNR": 0.3}
+    rows = [MaskComparison(n, "filtered", "post", True, 12, {}, own, {}) for n in ("old", "new")]
+    made = differences.levels(rows)
+    assert [chart.names for chart in made] == [["old", "new"]] * 3
+    assert [chart.series[0].y for chart in made] == [[10, 10], [20, 20], [30, 30]]
+
+
+# --- Drive by drive -------------------------------------------------------------------------------
+
+OVER = ForestRow(MEAN, None, 0.01, -0.01, 0.03)
+
+
+def drives(count, group=None):
+    return [ForestRow(f"drive_{n}", group, n / 1000, (n - 1) / 1000, None) for n in range(count)]
+
+
+def test_few_drives_have_a_row_each_and_below_them_the_mean():
+    (chart,) = differences.forest(drives(3), OVER, "change")
+    assert chart.kind is ChartKind.MARKS
+    assert chart.names == ["drive_2", "drive_1", "drive_0", MEAN]
+    assert chart.sums == 1
+    *_, mean = chart.series
+    assert (mean.x, mean.y, mean.low, mean.high) == ([3], [1], [-1], [3])
+
+
+def test_it_is_told_that_the_mean_has_no_interval():
+    over = replace(OVER, low=None, high=None)
+    (chart,) = differences.forest(drives(3), over, "change")
+    assert np.isnan(chart.series[-1].low).all()
+    assert "The mean has no interval" in differences.caption(drives(3), over)
+
+
+def test_many_drives_are_points_from_the_worst_on_and_the_mean_lies_across():
+    many = drives(NAMED + 1)
+    (chart,) = differences.forest(many, OVER, "change")
+    assert chart.kind is ChartKind.POINTS
+    assert chart.names[0] == f"drive_{NAMED}"
+    assert (chart.level.value, chart.level.low, chart.level.high) == (1.0, -1.0, 3.0)
+    worse, better = chart.series
+    assert (worse.x[0], worse.y[0], better.x) == (0, NAMED / 10, [NAMED])
+    told = differences.caption(many, OVER)
+    assert f"The worst: drive_{NAMED} (+6.00), drive_{NAMED - 1} (+5.90)" in told
+    assert "The best: drive_0 (0.00)" in told
+
+
+def test_the_group_of_a_drive_stands_beside_its_name():
+    (chart,) = differences.forest(drives(1, "monday"), OVER, "change")
+    assert chart.names[0] == "drive_0 (monday)"
+
+
+def test_one_huge_interval_does_not_hide_the_rest_and_is_counted():
+    some = [ForestRow(str(n), None, 0.0, -0.01, 0.015) for n in range(20)]
+    many = [*some, ForestRow("huge", None, 0.0, -0.9, 0.9)]
+    (chart,) = differences.forest(many, OVER, "change")
+    low, high = chart.y_range
+    assert -2 < low < -1
+    assert 3 < high < 4
+    assert "1 interval reaches beyond the edge" in differences.caption(many, OVER)
+
+
+# --- Legends --------------------------------------------------------------------------------------
+
+
+def test_a_legend_has_what_several_charts_show_once():
+    rows = rows_of(a_table({("net", "post"): [10, 20], ("blind", "post"): [1, 2]}))
+    keys = legend(rates.over_frames(rows, ["ERR", "FPR"]))
+    assert [(key.name, key.kind) for key in keys] == [("net", "both"), ("blind", "both")]
+    assert keys[0].look == looks(["net"])["net"]
+    assert isinstance(keys[0].look, Look)
