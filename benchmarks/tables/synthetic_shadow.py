@@ -9,11 +9,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from benchmarks.world import RenderSettings
+from benchmarks.world.drive import SynthFrame, render_drive
 from roadeval.config import configure
 from roadeval.data import ROAD, Frame
 from roadeval.pipeline.stage import View
-from roadeval.synth import RenderSettings
-from roadeval.synth.drive import SynthFrame, render_drive
 from roadeval.training import fit
 
 SEEDS: Final = (0, 1, 2)

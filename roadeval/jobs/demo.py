@@ -1,32 +1,29 @@
-"""The synthetic drive with known truth."""
+"""The demo drive that ships with roadeval."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
+from roadeval.errors import RoadevalError
 from roadeval.jobs.outputs import holding
-from roadeval.jobs.progress import OnProgress, Progress, ignore
+from roadeval.runtime.files import put
 from roadeval.runtime.paths import AnyPath
-from roadeval.synth import RenderSettings, write_drive
+
+_PACKAGE: Final = Path(__file__).parents[1]
+_PLACES: Final = (_PACKAGE / "demo.mcap", _PACKAGE.parent / "recordings" / "demo.mcap")
+"""Where the drive is: in an installation, and in a checkout (see ``setup.py``)."""
 
 
-def demo(
-    output: AnyPath,
-    settings: RenderSettings | None = None,
-    *,
-    on_progress: OnProgress = ignore,
-) -> Path:
-    """Render the synthetic drive with known truth of road and shadow into a log.
+def demo(output: AnyPath) -> Path:
+    """Write the demo drive, which ships with roadeval, to a file.
+
+    100 frames of 640x480 pixels at 10 Hz of a synthetic road, with the truth of road and shadow.
 
     Parameters
     ----------
     output
         The log to write.
-    settings
-        What to render; by default 100 frames of 640x480 pixels at 10 Hz, with seed 0. The same
-        settings give the same bytes.
-    on_progress
-        Called after every frame.
 
     Returns
     -------
@@ -36,21 +33,22 @@ def demo(
     Raises
     ------
     RoadevalError
-        If the log cannot be written.
+        If it cannot be written.
 
     Examples
     --------
     >>> import roadeval
-    >>> from roadeval.synth import RenderSettings
-    >>> log = roadeval.demo("short.mcap", RenderSettings(frames=2, width=64, height=48, seed=7))
+    >>> log = roadeval.demo("road.mcap")
     >>> [topic.name for topic in roadeval.info(log).topics]
     ['/camera/image', '/truth/road', '/truth/shadow']
     """
     path = Path(output)
+    source = next((each for each in _PLACES if each.is_file()), None)
+    if source is None:
+        raise RoadevalError("this installation lacks the demo drive; install roadeval again")
     with holding(path):
-        write_drive(
-            path,
-            settings or RenderSettings(),
-            lambda done, total: on_progress(Progress(done, total, "rendering")),
-        )
+        try:
+            put(path, source.read_bytes())
+        except OSError as error:
+            raise RoadevalError(f"{path}: cannot be written: {error.strerror}") from error
     return path

@@ -1,4 +1,4 @@
-"""``roadeval demo``: the synthetic drive with known truth."""
+"""``roadeval demo``: the demo drive that ships."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 import typer
 
-from roadeval.cli import arguments, console, progress
+from roadeval.cli import arguments, console
 from roadeval.cli.exit_codes import ExitCode
 
 DEFAULT: Final = Path("recordings", "demo.mcap")
@@ -20,19 +20,15 @@ def demo(
             "-o", "--output", metavar="DRIVE.mcap", help="Where the log lands.", readable=False
         ),
     ] = DEFAULT,
-    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Another drive.")] = 0,
     quiet: arguments.Quiet = False,
 ) -> int:
-    """Render the synthetic drive with known truth.
+    """Write the demo drive: a synthetic road with known truth.
 
-    100 frames, 640x480, 10 Hz; truth of the road and of shadow. The same seed gives the same
-    drive.
+    100 frames, 640x480, 10 Hz; truth of the road and of shadow.
     """
-    from roadeval.jobs.demo import demo as render
-    from roadeval.synth import RenderSettings
+    from roadeval.jobs.demo import demo as write
 
-    with progress.watched(quiet) as watch:
-        log = render(output, RenderSettings(seed=seed), on_progress=watch)
+    log = write(output)
     if not quiet:
         console.emit(str(log))
     return ExitCode.DONE
