@@ -14,10 +14,9 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
-
 from roadeval.evaluation.drives import AcrossSettings, DriveEffect, across_drives
 from roadeval.evaluation.drives.effect import Clusters
+from scipy import special
 
 Values = npt.NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Values]

@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from roadeval.evaluation.autocorrelation import mean_distribution
+from roadeval.evaluation.uncertainty import holm, mean_difference
 from scipy import signal, special, stats
 
-from roadeval.evaluation.autocorrelation import mean_distribution
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.uncertainty import holm, mean_difference
 
 Drives = npt.NDArray[np.float64]
 """``(drives, frames)`` differences of mean 0 and variance 1."""

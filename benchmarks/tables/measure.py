@@ -13,7 +13,7 @@ from roadeval.data import FINAL_STAGE
 
 SEEDS: Final = 5
 RATES: Final = ("ERR", "FPR", "FNR")
-KEPT: Final = ("mean", "low", "high", "p", "p_holm", "comparisons", "frames")
+KEPT: Final = ("mean", "low", "high", "p", "p_holm", "comparisons", "units")
 
 
 @dataclass(frozen=True, slots=True)

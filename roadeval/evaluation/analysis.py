@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from roadeval.data import Counts
 from roadeval.data.counts import OUTCOMES
-from roadeval.evaluation import differences, metrics
+from roadeval.evaluation import effects, metrics
 from roadeval.evaluation.regions import partitions
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def merged(chains: Iterable[Iterable[str]]) -> list[str]:
 def finals(frames: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of each variant's final mask, as `scored.finals` does for rows of arrays."""
     masks = frames[["variant", "stage"]].drop_duplicates()
-    last = differences.final_stages(masks.itertuples(index=False))
+    last = effects.final_stages(masks.itertuples(index=False))
     return frames[frames["stage"] == frames["variant"].map(last)]
 
 

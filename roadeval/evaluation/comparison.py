@@ -1,88 +1,323 @@
-"""Comparison of results: what changed on the same frames, with intervals.
+"""Comparison of results: what changed on the same frames of the same drives, with intervals.
 
-Results of the same log are matched frame by frame, by their stamps; a frame that either trained
-on, or that either lacks, is left out of both. Results of different logs are only put side by side:
-a difference between them would mix the scene with the method.
+Drives are matched by their names, else by their logs, and their frames by their stamps; a frame
+that either result trained on, or that either lacks, is left out of both. Results without a drive in
+common are only put side by side: a difference between them would mix the scene with the method.
+
+Where one drive is compared, intervals are those of its frames; where several are, those of drives.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from roadeval.data import BASELINE, UNFILTERED, Rows
-from roadeval.errors import RoadevalError
-from roadeval.evaluation import scored, where
-from roadeval.evaluation.comparison_result import (
-    ComparedResult,
-    Comparison,
-    Disagreement,
-    DrivesDiffer,
-    FramesLeftOut,
-    LogUnknown,
-    MaskComparison,
-    MovedFrame,
-    Note,
-    RegionComparison,
-    SettingsDiffer,
-    TruthDiffers,
-    VariantLeftOut,
-)
-from roadeval.evaluation.differences import final_stages
-from roadeval.evaluation.frame_counts import sum_up
-from roadeval.evaluation.matching import common_masks
-from roadeval.evaluation.metrics import COMPARED, METRICS
-from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.uncertainty import holm, mean_difference
+import numpy as np
 
+from roadeval.data import BASELINE, UNFILTERED, Counts, Rows
+from roadeval.errors import RoadevalError
+from roadeval.evaluation import metrics, scored
+from roadeval.evaluation.effects import TESTED
+from roadeval.evaluation.frame_counts import FourCounts, means
+from roadeval.evaluation.metrics import COMPARED, METRICS
+from roadeval.evaluation.pairing import (
+    Because,
+    LeftOut,
+    MaskPair,
+    Match,
+    Part,
+    Side,
+    common_masks,
+    match_drives,
+)
+from roadeval.evaluation.regions import titles
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.stats import (
+    Difference,
+    DriveMean,
+    Stratum,
+    benjamini_hochberg,
+    group_means,
+    holm,
+    over_drives,
+    strata,
+    within_drive,
+)
+
+Mask = tuple[str, str]
+"""Variant and stage."""
 MOVED: Final = 5
-"""Frames named of those that changed most, in each direction."""
+"""Frames named of those that changed most, in each direction; and of those that two masks disagree
+on."""
+FALSE: Final = 0.05
+"""The share of the drives called changed that may be false, on average."""
+SHADOWS: Final = ("true_shadow", "shadow")
+SHADED: Final = 1 / 3
+"""The share of the frames that are called those with most shadow."""
+_OF_THE_LOG: Final = ("topics.", "labels.", "frames.every", "frames.scale")
+"""Settings that change the frames and their truth, and not the method."""
 
 
 class ComparisonError(RoadevalError):
     """Results that cannot be compared."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Side:
-    """One of the results that are compared.
+# --- What comes out -------------------------------------------------------------------------------
 
-    Parameters
-    ----------
-    label
-        What it is called in tables; its own among all.
-    drive, digest
-        The log's name and SHA-256, None where the result does not know it.
-    frames
-        The rows of ``frames.csv``.
-    asked
-        What was asked of the log, by the settings' names as ``frames.scale``; empty where the
-        result does not know it.
-    regions, disagreements
-        The rows of the tables of these names; None where nobody asks for them.
-    own_names
-        What the result itself calls its variants, where they are compared under other names.
-    """
+
+@dataclass(frozen=True, slots=True)
+class ComparedResult:
+    """One of the results."""
 
     label: str
+    drives: int
+    scored: int
+    """Drives that it has, and how many of them are scored."""
+    drive: str | None
+    sha256: str | None
+    """The one drive's name and its log's SHA-256; None for several, or where it is not known."""
+    frames: int
+    """Evaluated frames of the drives that are compared."""
+    scale: float | None
+    """``frames.scale``, where it is known and one for all drives."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What changed in a mask of a new result: one stage of one variant."""
+
+    result: str
+    """Label of the new result."""
+    variant: str
+    stage: str
+    final: bool
+    """Whether it is the variant's final mask."""
+    drives: int
+    frames: int
+    """Drives and frames that both have."""
+    base: Mapping[str, float]
+    new: Mapping[str, float]
+    """Metrics: means over drives of the drives' means, each group of drives alike; ``pooled_*`` and
+    those of the overlap are of all pixels together. ``base`` is empty where nothing is
+    subtracted."""
+    difference: Mapping[str, Difference]
+    """New minus base by metric; empty where nothing is subtracted."""
+
+    @property
+    def name(self) -> str:
+        """The result and its variant, which may be called the same."""
+        return self.result if self.result == self.variant else f"{self.result}: {self.variant}"
+
+
+@dataclass(frozen=True, slots=True)
+class DriveChange:
+    """What changed in the ERR of a final mask on one of several drives."""
+
+    result: str
+    variant: str
+    stage: str
     drive: str
-    digest: str | None
-    frames: Rows
-    asked: Mapping[str, Any] = field(default_factory=dict)
-    regions: Rows | None = None
-    disagreements: Rows | None = None
-    own_names: Mapping[str, str] = field(default_factory=dict)
+    """Its name."""
+    frames: int
+    base: float
+    new: float
+    difference: Difference
+    q: float | None
+    """The p-value after Benjamini and Hochberg's correction over all drives."""
+
+    @property
+    def changed(self) -> bool:
+        """Whether it is among the drives that are called changed."""
+        return self.q is not None and self.q <= FALSE
 
 
-def variants_as_sides(whole: Side, chosen: Sequence[str] | None = None) -> list[Side]:
+@dataclass(frozen=True, slots=True)
+class StratumChange:
+    """What changed in the ERR of a final mask on a part of the drives."""
+
+    result: str
+    variant: str
+    stage: str
+    stratum: Stratum
+
+
+@dataclass(frozen=True, slots=True)
+class RegionChange:
+    """What changed in the ERR of a final mask within a region, or on the frames of a shade.
+
+    ``base`` and ``new`` are means over the ``frames`` on which both have labelled pixels there.
+    """
+
+    result: str
+    variant: str
+    region: str
+    title: str
+    """For people."""
+    frames: int
+    base: float
+    new: float
+    difference: Difference
+
+
+@dataclass(frozen=True, slots=True)
+class MovedFrame:
+    """A frame whose final ERR changed much: that of the base and of the new result."""
+
+    result: str
+    variant: str
+    frame: int
+    stamp_ns: int
+    base: float
+    new: float
+    change: float
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """A frame on which two final masks disagree much."""
+
+    result: str
+    variant: str
+    frame: int
+    stamp_ns: int
+    base_right: float
+    new_right: float
+    """Shares of its labelled pixels that the base's mask, or the new one's, alone has right."""
+
+
+@dataclass(frozen=True, slots=True)
+class FramesLeftOut:
+    """Frames that a result evaluated, and that another lacks or trained on."""
+
+    result: str
+    other: str
+    frames: int
+
+
+@dataclass(frozen=True, slots=True)
+class VariantLeftOut:
+    """A variant that two results have, but on no frame both."""
+
+    base: str
+    new: str
+    variant: str
+
+
+@dataclass(frozen=True, slots=True)
+class SameLogs:
+    """Drives that have other names in two results, and are the same by their logs."""
+
+    base: str
+    new: str
+    drives: int
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsDiffer:
+    """Settings that two results do not share: both values by the setting's name."""
+
+    base: str
+    new: str
+    settings: Mapping[str, tuple[Any, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class TruthDiffers:
+    """Frames whose truth is another in two results, and whether their settings explain that."""
+
+    base: str
+    new: str
+    frames: int
+    settings_differ: bool
+
+
+@dataclass(frozen=True, slots=True)
+class LogUnknown:
+    """A result that does not know which log it is of, so that nothing is subtracted."""
+
+    result: str
+
+
+@dataclass(frozen=True, slots=True)
+class DrivesDiffer:
+    """Two results of different drives, so that nothing is subtracted."""
+
+    result: str
+    other: str
+
+
+@dataclass(frozen=True, slots=True)
+class EndMissing:
+    """A result whose run was stopped: it holds a part of the drive."""
+
+    result: str
+
+
+Note = (
+    FramesLeftOut
+    | VariantLeftOut
+    | LeftOut
+    | SameLogs
+    | SettingsDiffer
+    | TruthDiffers
+    | LogUnknown
+    | DrivesDiffer
+    | EndMissing
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Results compared with the first of them."""
+
+    paired: bool
+    """Whether each new result shares a drive with the base. If not, nothing is subtracted:
+    ``changes`` are ``levels``."""
+    results: tuple[ComparedResult, ...]
+    """The base first."""
+    changed_settings: tuple[SettingsDiffer, ...]
+    """All settings that a new result does not share with the base."""
+    changes: tuple[Change, ...]
+    """Each mask of each new result, on the frames that it shares with the base."""
+    levels: tuple[Change, ...]
+    """The same on all of its own frames; side by side those of every result."""
+    drives: tuple[DriveChange, ...]
+    """Where several drives are compared: each, mask by mask, the surest first."""
+    strata: tuple[StratumChange, ...]
+    """Parts of several drives, by the new result's tags."""
+    regions: tuple[RegionChange, ...]
+    """The final masks of each new result, region by region."""
+    moved: tuple[MovedFrame, ...]
+    """The frames of one drive that changed most."""
+    disagreements: tuple[Disagreement, ...]
+    """The frames of one drive on which final masks of one run disagree most."""
+    notes: tuple[Note, ...]
+    """What was left out, and what makes the results less comparable than they look."""
+    settings: EvaluationSettings
+    """The confidence of the intervals, and what is negligible."""
+
+    def finals(self) -> list[Change]:
+        """Return the final masks; without the baseline's, which tells nothing of a method."""
+        finals = [change for change in self.changes if change.final]
+        return [change for change in finals if change.variant != BASELINE] or finals
+
+
+# --- How it is made -------------------------------------------------------------------------------
+
+
+def variants_as_sides(
+    whole: Side, there: Sequence[str], chosen: Sequence[str] | None = None
+) -> list[Side]:
     """Return the variants of one result as results of their own, the base first.
 
     Parameters
     ----------
     whole
         The result.
+    there
+        Its variants.
     chosen
         Variants in order; all but the baseline by default, ``unfiltered`` first.
 
@@ -91,18 +326,18 @@ def variants_as_sides(whole: Side, chosen: Sequence[str] | None = None) -> list[
     ComparisonError
         If a variant is not there, or fewer than two are.
     """
-    frames, drive = whole.frames, whole.drive
-    there = frames.distinct("variant")
     pipelines = sorted((n for n in there if n != BASELINE), key=lambda name: name != UNFILTERED)
     names = list(chosen or pipelines)
     for name in names:
         if name not in there:
-            raise ComparisonError(f"{drive}: no variant {name}; there are {', '.join(there)}")
+            raise ComparisonError(f"{whole.label}: no variant {name}; there are {', '.join(there)}")
     if len(names) < 2:
+        only = f"{names[0]} alone" if names else "no variant"
         raise ComparisonError(
-            f"{drive}: {len(names)} variant to compare; two are needed, or a second result"
+            f"{whole.label}: {only} cannot be compared; name two of its variants with --variant "
+            f"({', '.join(there) or 'it has none'}), or a second result"
         )
-    return [replace(whole, label=name, frames=frames.of_variant(name)) for name in names]
+    return [replace(whole, label=name, variants={name: name}) for name in names]
 
 
 def compare(
@@ -125,175 +360,488 @@ def compare(
         If a result has nothing to compare, or two have no frame in common.
     """
     for side in sides:
-        if not len(side.frames):
+        if not side.scored:
             raise ComparisonError(f"{side.label}: nothing was scored, so nothing can be compared")
-    results = tuple(_result(side) for side in sides)
     base, *others = sides
-    if base.digest is None or len({side.digest for side in sides}) > 1:
-        levels = tuple(row for side in sides for row in _levels(side))
-        return Comparison(False, results, levels, levels, (), (_why_apart(sides),), settings)
-    pairs = [_Pair(base, new, settings, across_variants=across_variants) for new in others]
+    if across_variants:
+        same = Match([(part, part) for part in base.scored], 0, [])
+        matches = [same] * len(others)
+    else:
+        matches = [match_drives(base, new) for new in others]
+    if not all(match.pairs for match in matches):
+        return _side_by_side(sides, matches, settings)
+    found = [
+        _Against(base, new, match, settings, across_variants=across_variants)
+        for new, match in zip(others, matches, strict=True)
+    ]
+    frames = [found[0].base_frames, *(each.new_frames for each in found)]
+    changes = [change for each in found for change in each.changes()]
     return Comparison(
-        same_drive=True,
-        results=results,
-        changes=_corrected([row for pair in pairs for row in pair.changes()]),
-        levels=tuple(row for side in others for row in _levels(side)),
-        moved=tuple(frame for pair in pairs for frame in pair.moved()),
-        regions=_corrected_regions([row for pair in pairs for row in pair.regions()]),
-        disagreements=tuple(frame for pair in pairs for frame in pair.disagreements()),
-        notes=tuple(note for pair in pairs for note in pair.notes()),
+        paired=True,
+        results=tuple(_result(*each) for each in zip(sides, frames, strict=True)),
+        changed_settings=tuple(note for each in found for note in each.changed_settings()),
+        changes=tuple(_corrected(changes)),
+        levels=tuple(row for each in found for row in each.levels.rows()),
+        drives=tuple(row for each in found for row in each.drives()),
+        strata=tuple(row for each in found for row in each.strata()),
+        regions=_corrected_regions([row for each in found for row in each.regions()]),
+        moved=tuple(frame for each in found for frame in each.moved),
+        disagreements=tuple(frame for each in found for frame in each.disagreements),
+        notes=tuple(note for each in found for note in each.notes()),
         settings=settings,
     )
 
 
-def _corrected(rows: Sequence[MaskComparison]) -> tuple[MaskComparison, ...]:
-    """Correct the changes of ERR, of every variant and stage, for how many they are."""
-    found = holm([row.difference["ERR"] for row in rows])
-    return tuple(
-        replace(row, difference={**row.difference, "ERR": change})
-        for row, change in zip(rows, found, strict=True)
+def _side_by_side(
+    sides: Sequence[Side], matches: Sequence[Match], settings: EvaluationSettings
+) -> Comparison:
+    levels = [_Levels(side.label) for side in sides]
+    for side, own in zip(sides, levels, strict=True):
+        for part in side.scored:
+            own.add(part, part.group or part.drive, side.rows(part, "frames"))
+    rows = tuple(row for own in levels for row in own.rows())
+    counted = zip(sides, (own.frames for own in levels), strict=True)
+    apart = next(
+        (sides[0], new) for new, match in zip(sides[1:], matches, strict=True) if not match.pairs
+    )
+    unknown = [s.label for s in apart if any(part.digest is None for part in s.scored)]
+    labels = [side.label for side in apart]
+    note = LogUnknown(unknown[0]) if unknown else DrivesDiffer(*labels)
+    results = tuple(_result(*each) for each in counted)
+    return Comparison(False, results, (), rows, rows, (), (), (), (), (), (note,), settings)
+
+
+def _result(side: Side, frames: int) -> ComparedResult:
+    only = side.parts[0] if len(side.parts) == 1 else None
+    scales = {part.asked.get("frames.scale") for part in side.scored}
+    return ComparedResult(
+        label=side.label,
+        drives=len(side.parts),
+        scored=len(side.scored),
+        drive=only.name if only else None,
+        sha256=only.digest if only else None,
+        frames=frames,
+        scale=scales.pop() if len(scales) == 1 else None,
     )
 
 
-def _corrected_regions(rows: Sequence[RegionComparison]) -> tuple[RegionComparison, ...]:
-    """Correct the changes of ERR in regions for how many they are."""
+def _corrected(changes: Sequence[Change]) -> Iterator[Change]:
+    """Correct the changes of ERR of final masks, but for the baseline's, for how many they are."""
+    told = [each.final and each.variant != BASELINE for each in changes]
+    family = (each.difference[TESTED] for each, own in zip(changes, told, strict=True) if own)
+    found = iter(holm([*family]))
+    for each, own in zip(changes, told, strict=True):
+        difference = {TESTED: next(found)} if own else {}
+        yield replace(each, difference={**each.difference, **difference})
+
+
+def _corrected_regions(rows: Sequence[RegionChange]) -> tuple[RegionChange, ...]:
     found = holm([row.difference for row in rows])
     return tuple(replace(row, difference=each) for row, each in zip(rows, found, strict=True))
 
 
-class _Pair:
-    """A base and a new result of the same drive, on the frames that both evaluated."""
+# --- One new result against the base --------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sum:
+    """A mask's frames on one drive, summed up."""
+
+    drive: str
+    group: str
+    frames: int
+    means: Mapping[str, float]
+    counts: FourCounts
+    """``(4,)``."""
+
+    @classmethod
+    def of(cls, drive: str, group: str, counts: FourCounts) -> _Sum:
+        return cls(drive, group, len(counts), means(metrics.table(counts)), counts.sum(axis=0))
+
+
+def _mean(sums: Sequence[_Sum], rate: str) -> float:
+    """Average drives as their differences are, so that these lie between two rates."""
+    own = group_means(DriveMean(each.drive, each.group, each.means[rate]) for each in sums)
+    return float(own.mean()) if len(own) else np.nan
+
+
+def _rates(sums: Sequence[_Sum]) -> dict[str, float]:
+    """Return the means over drives, and the rates of all their pixels together."""
+    total = Counts(*np.sum([each.counts for each in sums], axis=0).tolist())
+    pooled = {f"pooled_{name}": value for name, value in metrics.of(total).items()}
+    return {name: _mean(sums, name) for name in METRICS} | pooled | metrics.overlap(total)
+
+
+class _Levels:
+    """A result's own rates, whatever the base has."""
+
+    def __init__(self, label: str) -> None:
+        self.label: Final = label
+        self.frames = 0
+        self._sums: Final[defaultdict[Mask, list[_Sum]]] = defaultdict(list)
+        self._final: Final[dict[Mask, bool]] = {}
+
+    def add(self, part: Part, group: str, rows: Rows) -> None:
+        """Add a drive."""
+        self.frames += len(np.unique(rows["frame"]))
+        last = scored.final_stages(rows)
+        for variant, stage, places in rows.masks():
+            mask, counts = (variant, stage), scored.counts(rows.take(places))
+            self._sums[mask].append(_Sum.of(part.drive, group, counts))
+            self._final[mask] = self._final.get(mask, True) and stage == last[variant]
+
+    def rows(self) -> Iterator[Change]:
+        """Yield a row a mask."""
+        for mask, own in self._sums.items():
+            frames, rates = sum(each.frames for each in own), _rates(own)
+            final = self._final[mask]
+            yield Change(self.label, *mask, final, len(own), frames, {}, rates, {})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _OnDrive:
+    """What a mask, or a region of it, changed on one drive."""
+
+    name: str
+    base: _Sum
+    new: _Sum
+    means: Mapping[str, float]
+    """Of the frames' differences, by rate."""
+    within: Mapping[str, Difference]
+    """Those of which an interval is asked for."""
+    final: bool = True
+    title: str = ""
+
+
+class _Against:
+    """A new result against the base, on the frames that both evaluated."""
 
     def __init__(
-        self, base: Side, new: Side, settings: EvaluationSettings, *, across_variants: bool
+        self,
+        base: Side,
+        new: Side,
+        match: Match,
+        settings: EvaluationSettings,
+        *,
+        across_variants: bool,
     ) -> None:
-        self._base, self._new, self._settings = base, new, settings
-        self._across = across_variants
-        self._common = common_masks(base.frames, new.frames, new.label if across_variants else None)
-        if not self._common:
+        self._base, self._new, self._match, self._settings = base, new, match, settings
+        self._across: Final = across_variants
+        self._several: Final = len(match.pairs) > 1
+        self.base_frames = 0
+        self.levels: Final = _Levels(new.label)
+        self._left = [0, 0]
+        self._relabelled = 0
+        self._apart: Final[list[LeftOut]] = []
+        self._uncommon: Final[dict[str, None]] = {}
+        self._masks: Final[defaultdict[Mask, list[_OnDrive]]] = defaultdict(list)
+        self._regions: Final[defaultdict[Mask, list[_OnDrive]]] = defaultdict(list)
+        self.moved: tuple[MovedFrame, ...] = ()
+        self.disagreements: tuple[Disagreement, ...] = ()
+        firsts: dict[str | None, str] = {}
+        for part in new.scored:
+            firsts.setdefault(part.digest, part.drive)
+        before = {id(own): other for other, own in match.pairs}
+        for part in new.scored:
+            rows = new.rows(part, "frames")
+            other = before.get(id(part))
+            # Copies of a log count as one drive.
+            group = part.group or (other and other.group) or firsts[part.digest]
+            self.levels.add(part, group, rows)
+            if other is not None:
+                self._add(other, part, group, base.rows(other, "frames"), rows)
+        if not self._masks:
             raise ComparisonError(
-                f"{base.label} and {new.label} have no evaluated frame and stage in common"
-            )
-        self._finals = final_stages((mask.variant, mask.stage) for mask in self._common)
-
-    def changes(self) -> Iterator[MaskComparison]:
-        """Yield a row for each variant and stage that both have."""
-        for mask in self._common:
-            yield MaskComparison(
-                result=self._new.label,
-                variant=mask.variant,
-                stage=mask.stage,
-                final=mask.stage == self._finals[mask.variant],
-                frames=len(mask.after),
-                base=_rates(mask.before),
-                new=_rates(mask.after),
-                difference={
-                    name: mean_difference(mask.after[name], mask.before[name], self._settings)
-                    for name in COMPARED
-                },
+                f"{base.label} and {new.label} have no evaluated frame and stage in common, so "
+                "nothing can be compared; replay the same range into both"
             )
 
-    def moved(self) -> Iterator[MovedFrame]:
-        """Yield the frames whose final ERR changed most, the first variant's."""
-        first = next(iter(self._finals.items()))
-        (mask,) = (each for each in self._common if (each.variant, each.stage) == first)
-        after, base = mask.after, mask.before["ERR"]
-        changes = after["ERR"] - base
-        for harmed in (True, False):
-            places = scored.most_changed(after["stamp_ns"], changes, MOVED, harmed=harmed)
-            for place in places.tolist():
-                was, change = float(base[place]), float(changes[place])
-                yield MovedFrame(
-                    result=self._new.label,
-                    variant=mask.variant,
-                    frame=int(after["frame"][place]),
-                    stamp_ns=int(after["stamp_ns"][place]),
-                    base=was,
-                    new=was + change,
-                    change=change,
-                )
+    @property
+    def new_frames(self) -> int:
+        """Frames of the new result."""
+        return self.levels.frames
 
-    def regions(self) -> Iterator[RegionComparison]:
-        """Yield what changed by region and shade, of the final masks that look at the image."""
-        base, new = self._base.regions, self._new.regions
-        if base is None or new is None:
+    def _add(self, base: Part, new: Part, group: str, before: Rows, after: Rows) -> None:
+        """Add a drive that both have."""
+        masks = common_masks(before, after, self._new.label if self._across else None)
+        self.base_frames += len(np.unique(before["frame"]))
+        if not masks:
+            self._apart.append(
+                LeftOut(new.name, self._new.label, self._base.label, Because.NO_FRAME)
+            )
             return
-        for mask in self._common:
-            if mask.stage == self._finals[mask.variant] and mask.variant != BASELINE:
-                own = self._base.label if self._across else mask.variant
-                before = where.region_counts(base, own, mask.stage, mask.before["frame"])
-                after = where.region_counts(new, mask.variant, mask.stage, mask.after["frame"])
-                names = {"result": self._new.label, "variant": mask.variant}
-                yield from where.by_region(before, after, self._settings, **names)
-                rates = mask.before, mask.after
-                yield from where.by_shade(before, after, rates, self._settings, **names)
+        for place, rows in enumerate((before, after)):
+            common = [(mask.before, mask.after)[place]["frame"] for mask in masks]
+            own = len(np.unique(rows["frame"])) - len(np.unique(np.concatenate(common)))
+            self._left[place] += own
+        differing = [mask.before["frame"][mask.truth_differs] for mask in masks]
+        self._relabelled += len(np.unique(np.concatenate(differing)))
+        compared = {mask.variant for mask in masks}
+        if not self._across:
+            theirs = set(after.distinct("variant")) - compared
+            self._uncommon.update(
+                dict.fromkeys(v for v in before.distinct("variant") if v in theirs)
+            )
+        for mask in masks:
+            tested = COMPARED
+            if self._several:
+                tested = (TESTED,) if mask.final and mask.variant != BASELINE else ()
+            made = self._on_drive(new, group, mask.counts, tested)
+            self._masks[mask.variant, mask.stage].append(replace(made, final=mask.final))
+        regions = self._base.rows(base, "regions"), self._new.rows(new, "regions")
+        for mask in (mask for mask in masks if mask.final and mask.variant != BASELINE):
+            self._add_regions(new, group, mask, *regions)
+        if not self._several:
+            first = next((mask for mask in masks if mask.final), masks[-1])
+            self.moved = tuple(_moved(self._new.label, first))
+            if self._across:
+                table, names = new.rows("disagreements"), (self._base.label, self._new.label)
+                self.disagreements = tuple(disagreements(table, masks[0].after, *names))
 
-    def disagreements(self) -> Iterator[Disagreement]:
-        """Yield the frames on which two variants of a run disagree most."""
-        table = self._new.disagreements
-        if table is not None and self._across:
-            frames = next(mask.after for mask in self._common)
-            yield from where.disagreements(table, frames, self._base.label, self._new.label)
+    def _on_drive(
+        self,
+        part: Part,
+        group: str,
+        counts: tuple[FourCounts, FourCounts],
+        tested: Collection[str],
+    ) -> _OnDrive:
+        before, after = (metrics.table(each) for each in counts)
+        columns = {name: place for place, name in enumerate(METRICS) if name in tested}
+        within = {
+            name: within_drive(after[:, place], before[:, place], self._settings)
+            for name, place in columns.items()
+        }
+        base, new = (_Sum.of(part.drive, group, each) for each in counts)
+        return _OnDrive(part.name, base, new, means(after - before), within)
+
+    def _add_regions(self, part: Part, group: str, mask: MaskPair, base: Rows, new: Rows) -> None:
+        """Add what changed by region and shade in a final mask that looks at the image."""
+        called = self._base.label if self._across else mask.variant
+        before = region_counts(base, called, mask.base_stage, mask.before)
+        after = region_counts(new, mask.variant, mask.stage, mask.after)
+        tested = () if self._several else (TESTED,)
+        for region, title, *counts in _parts(before, after, mask):
+            made = self._on_drive(part, group, (counts[0], counts[1]), tested)
+            self._regions[mask.variant, region].append(replace(made, title=title))
+
+    def changes(self) -> Iterator[Change]:
+        """Yield a row for each mask that both have."""
+        for mask, own in self._masks.items():
+            yield Change(
+                result=self._new.label,
+                variant=mask[0],
+                stage=mask[1],
+                final=all(each.final for each in own),
+                drives=len(own),
+                frames=sum(each.base.frames for each in own),
+                base=_rates([each.base for each in own]),
+                new=_rates([each.new for each in own]),
+                difference={rate: self._difference(own, rate) for rate in COMPARED},
+            )
+
+    def regions(self) -> Iterator[RegionChange]:
+        """Yield what changed by region and shade."""
+        for (variant, region), own in self._regions.items():
+            yield RegionChange(
+                result=self._new.label,
+                variant=variant,
+                region=region,
+                title=own[0].title,
+                frames=sum(each.base.frames for each in own),
+                base=_mean([each.base for each in own], TESTED),
+                new=_mean([each.new for each in own], TESTED),
+                difference=self._difference(own, TESTED),
+            )
+
+    def drives(self) -> Iterator[DriveChange]:
+        """Yield each of several drives' changes of final masks, the surest first."""
+        for (variant, stage), own in self._tested():
+            values = benjamini_hochberg([each.within[TESTED].p for each in own])
+            rows = [
+                DriveChange(
+                    *(self._new.label, variant, stage, each.name, each.base.frames),
+                    *(each.base.means[TESTED], each.new.means[TESTED], each.within[TESTED], q),
+                )
+                for each, q in zip(own, values, strict=True)
+            ]
+            yield from sorted(rows, key=_surest)
+
+    def strata(self) -> Iterator[StratumChange]:
+        """Yield the changes of final masks by the new result's tags."""
+        tags = {part.drive: part.tags for part in self._new.parts}
+        keys = sorted({key for own in tags.values() for key in own})
+        for (variant, stage), own in self._tested():
+            values = {key: [tags[each.new.drive].get(key) for each in own] for key in keys}
+            drives = [_drive_mean(each, TESTED) for each in own]
+            for stratum in strata(drives, values, {}, self._settings.confidence):
+                yield StratumChange(self._new.label, variant, stage, stratum)
+
+    def _tested(self) -> Iterator[tuple[Mask, list[_OnDrive]]]:
+        """Yield the final masks of several drives."""
+        for mask, own in self._masks.items() if self._several else ():
+            if kept := [each for each in own if TESTED in each.within]:
+                yield mask, kept
+
+    def _difference(self, own: Sequence[_OnDrive], rate: str) -> Difference:
+        """Return the difference within the one drive, or over several."""
+        if not self._several:
+            return own[0].within[rate]
+        drives = [_drive_mean(each, rate) for each in own]
+        better = METRICS[rate].higher_is_better
+        return over_drives(drives, self._settings.confidence, higher_is_better=better)
+
+    def changed_settings(self) -> Iterator[SettingsDiffer]:
+        """Yield the settings that are others in the new result, if there are any."""
+        if differing := self._differing():
+            yield SettingsDiffer(self._base.label, self._new.label, differing)
+
+    def _differing(self) -> dict[str, tuple[Any, Any]]:
+        """Return both values of the settings that both know and do not share."""
+        found: dict[str, tuple[Any, Any]] = {}
+        for base, new in self._match.pairs:
+            own, other = base.asked, new.asked
+            for name in own:
+                if name in other and own[name] != other[name]:
+                    found.setdefault(name, (own[name], other[name]))
+        return found
 
     def notes(self) -> Iterator[Note]:
         """Yield what was left out, and what makes the two less comparable than they look."""
-        base, new = self._base, self._new
-        both = len(set().union(*(mask.keys for mask in self._common)))
-        for side, other in ((base, new), (new, base)):
-            rest = len(side.frames.distinct("frame")) - both
-            if rest:
-                yield FramesLeftOut(side.label, other.label, rest)
-        compared = {mask.variant for mask in self._common}
-        for variant in [] if self._across else base.frames.distinct("variant"):
-            if variant not in compared and variant in new.frames.distinct("variant"):
-                yield VariantLeftOut(base.label, new.label, variant)
-        settings = _differing(base.asked, new.asked)
-        if settings:
-            yield SettingsDiffer(base.label, new.label, settings)
-        frames = self._relabelled()
-        if frames:
-            yield TruthDiffers(base.label, new.label, frames, bool(settings))
-
-    def _relabelled(self) -> int:
-        """Count the frames whose truth differs."""
-        keys = (
-            key
-            for mask in self._common
-            for key, differs in zip(mask.keys, mask.truth_differs, strict=True)
-            if differs
-        )
-        return len(set(keys))
+        base, new = self._base.label, self._new.label
+        if self._several and self._match.by_log:
+            yield SameLogs(base, new, self._match.by_log)
+        yield from self._match.left_out
+        yield from self._apart
+        for label, other, frames in zip((base, new), (new, base), self._left, strict=True):
+            if frames:
+                yield FramesLeftOut(label, other, frames)
+        for variant in self._uncommon:
+            if all(variant != mask[0] for mask in self._masks):
+                yield VariantLeftOut(base, new, variant)
+        of_the_log = {k: v for k, v in self._differing().items() if k.startswith(_OF_THE_LOG)}
+        if of_the_log:
+            yield SettingsDiffer(base, new, of_the_log)
+        if self._relabelled:
+            yield TruthDiffers(base, new, self._relabelled, bool(of_the_log))
 
 
-def _differing(base: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
-    """Return both values of the settings that two results know and differ in."""
-    return {
-        name: (base[name], new[name]) for name in base if name in new and base[name] != new[name]
-    }
+def _drive_mean(own: _OnDrive, rate: str) -> DriveMean:
+    return DriveMean(own.new.drive, own.new.group, own.means[rate])
 
 
-def _rates(rows: Rows) -> dict[str, float]:
-    """Sum up rows of one mask: mean and pooled metrics, and those of the overlap."""
-    total = sum_up(scored.counts(rows))
-    names = (*METRICS, *(f"pooled_{name}" for name in METRICS))
-    return {name: total[name] for name in names} | scored.overlap(total)
+def _surest(row: DriveChange) -> tuple[float, float, str]:
+    known = 2.0 if row.q is None else row.q
+    return known, -abs(np.nan_to_num(row.difference.mean)), row.drive
 
 
-def _levels(side: Side) -> Iterator[MaskComparison]:
-    last = scored.final_stages(side.frames)
-    for variant, stage, places in side.frames.masks():
-        new, final = _rates(side.frames.take(places)), stage == last[variant]
-        yield MaskComparison(side.label, variant, stage, final, len(places), {}, new, {})
+def _moved(result: str, mask: MaskPair) -> Iterator[MovedFrame]:
+    """Yield the frames whose ERR changed most."""
+    place = list(METRICS).index(TESTED)
+    before, after = (rates[:, place] for rates in mask.rates)
+    stamps, changes = mask.after["stamp_ns"], after - before
+    for harmed in (True, False):
+        for frame in scored.most_changed(stamps, changes, MOVED, harmed=harmed).tolist():
+            was, change = float(before[frame]), float(changes[frame])
+            yield MovedFrame(
+                result=result,
+                variant=mask.variant,
+                frame=int(mask.after["frame"][frame]),
+                stamp_ns=int(stamps[frame]),
+                base=was,
+                new=was + change,
+                change=change,
+            )
 
 
-def _result(side: Side) -> ComparedResult:
-    frames, scale = len(side.frames.distinct("frame")), side.asked.get("frames.scale")
-    return ComparedResult(side.label, side.drive, side.digest, frames, scale)
+# --- Where it changed -----------------------------------------------------------------------------
 
 
-def _why_apart(sides: Sequence[Side]) -> Note:
-    for side in sides:
-        if side.digest is None:
-            return LogUnknown(side.label)
-    a, b = next((a, b) for a, b in pairwise(sides) if a.digest != b.digest)
-    return DrivesDiffer(a.label, b.label)
+def region_counts(regions: Rows, variant: str, stage: str, frames: Rows) -> dict[str, FourCounts]:
+    """Return a mask's counts by region, ``(n, 4)`` each; 0 on a frame that the table lacks.
+
+    Parameters
+    ----------
+    regions
+        The rows of ``regions.csv``.
+    variant, stage
+        Whose mask.
+    frames
+        The mask's rows of ``frames.csv``, in any order.
+    """
+    numbers = frames["frame"]
+    own = regions.take((regions["variant"] == variant) & (regions["stage"] == stage))
+    own = own.take(np.isin(own["frame"], numbers))
+    order = np.argsort(numbers)
+    found = {}
+    for name in own.distinct("region"):
+        rows = own.take(own["region"] == name)
+        found[name] = np.zeros((len(numbers), 4), np.int64)
+        found[name][order[np.searchsorted(numbers[order], rows["frame"])]] = scored.counts(rows)
+    return found
+
+
+def _parts(
+    base: Mapping[str, FourCounts], new: Mapping[str, FourCounts], mask: MaskPair
+) -> Iterator[tuple[str, str, FourCounts, FourCounts]]:
+    """Yield a mask's regions and shades: name, title, and the counts of both there.
+
+    A region that is not the same pixels in both, as the shadow that another filter found, is left
+    out: its ERR would tell of other places. So is one without a labelled pixel.
+    """
+    for name, title in titles([*base]).items():
+        if name in new and _same_pixels(base[name], new[name]):
+            known = base[name].any(axis=1)
+            if known.any():
+                yield name, title, base[name][known], new[name][known]
+    # True shadow counts where the log has it, else what both results detected alike.
+    alike = [
+        name
+        for name in SHADOWS
+        if name in base and name in new and _same_pixels(base[name], new[name])
+    ]
+    if not alike:
+        return
+    share = base[alike[0]].sum(axis=1) / np.maximum(mask.before["N"], 1)
+    much = share >= max(np.sort(share)[-max(round(SHADED * len(share)), 1)], 1e-9)
+    if much.any() and not much.all():
+        before, after = mask.counts
+        yield "frames_with_shadow", "frames with most shadow", before[much], after[much]
+        yield "other_frames", "the other frames", before[~much], after[~much]
+
+
+def _same_pixels(base: FourCounts, new: FourCounts) -> bool:
+    """Whether two regions may be the same pixels: of each frame as many, and as much road."""
+    same = np.array_equal(base.sum(axis=1), new.sum(axis=1))
+    return same and np.array_equal(base[:, [0, 3]].sum(axis=1), new[:, [0, 3]].sum(axis=1))
+
+
+def disagreements(table: Rows, frames: Rows, base: str, new: str) -> Iterator[Disagreement]:
+    """Yield the frames on which two variants of a run disagree most; of neighbours only one.
+
+    Parameters
+    ----------
+    table
+        The rows of ``disagreements.csv``.
+    frames
+        Rows with the frames' stamps.
+    base, new
+        The variants.
+    """
+    pairs = ((base, new, "repaired", "spoiled"), (new, base, "spoiled", "repaired"))
+    stamps = dict(zip(frames["frame"].tolist(), frames["stamp_ns"].tolist(), strict=True))
+    for one, other, new_right, base_right in pairs:
+        own = table.take((table["from_variant"] == one) & (table["to_variant"] == other))
+        own = own.take(np.isin(own["frame"], [*stamps]) & (own["N"] > 0))
+        if not len(own):
+            continue
+        mine, theirs = own[new_right] / own["N"], own[base_right] / own["N"]
+        times = np.array([stamps[number] for number in own["frame"].tolist()], np.int64)
+        for place in scored.most_changed(times, mine + theirs, MOVED, harmed=True).tolist():
+            yield Disagreement(
+                result=new,
+                variant=new,
+                frame=int(own["frame"][place]),
+                stamp_ns=int(times[place]),
+                base_right=float(theirs[place]),
+                new_right=float(mine[place]),
+            )

@@ -12,7 +12,8 @@ A condition is a quantity, an operator and a limit, and may ask for certainty::
 ``post.filtered.ERR > +0.5pp`` holds where the error rate of the final mask has risen by more than
 half a percentage point; ``post.filtered.ERR > 20%`` where it is above a fifth. A change is that of
 the frames that both results evaluated; a level is that of all the frames of the new result, and
-needs no base: between different drives it is judged on every result. Nothing is ever executed.
+needs no base: between different drives it is judged on every result. Of several drives both are
+means over drives, each group of drives alike. Nothing is ever executed.
 
 ``post.filtered.ERR > +0.5pp surely`` holds where the whole interval of the change lies beyond the
 limit. The interval is in doubt about frames, not about what the training's seed draws, so the limit
@@ -25,8 +26,9 @@ that nobody evaluated.
 A condition that cannot be judged is an error, and never taken for one that is kept: where a rate
 is undefined, where a change is asked for between different drives or scales, where certainty is
 asked for and there is no interval, and where too few frames tell. They must be at least as many as
-an interval needs (``evaluation.least_frames``, 10 by default), and for a change at least half
-of the frames of the shorter result.
+an interval needs (``evaluation.least_frames``, 10 by default), and for a change at least half of
+the frames of the shorter result; where several drives are compared, half of the scored drives of
+the smaller one.
 """
 
 from __future__ import annotations
@@ -39,7 +41,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.comparison_result import ComparedResult, Comparison, MaskComparison
+from roadeval.evaluation.comparison import Change, ComparedResult, Comparison
 from roadeval.evaluation.metrics import COMPARED, METRICS, OVERLAP
 from roadeval.evaluation.settings import EvaluationSettings
 
@@ -112,7 +114,7 @@ class Condition:
             match["surely"] is not None,
         )
 
-    def judge(self, mask: MaskComparison) -> Judgement:
+    def judge(self, mask: Change) -> Judgement:
         """Judge the condition on what was found of the mask that it names.
 
         Raises
@@ -121,48 +123,45 @@ class Condition:
             If the rate is undefined there, or its change has no interval and one is asked for.
         """
         before, after = mask.base.get(self.rate, math.nan), mask.new[self.rate]
-        value = 100 * (after - before if self.is_change else after)
+        difference = mask.difference.get(self.rate) if self.is_change else None
+        value = after - before if self.is_change else after
+        low = high = None
+        if difference is not None:
+            value, low, high = difference.mean, difference.low, difference.high
         if math.isnan(value):
             raise ConditionError(f"{self.text}: undefined in {mask.result}, so not judged")
-        difference = mask.difference.get(self.rate)
-        low, high = (difference.low, difference.high) if difference else (None, None)
+        limited = value
         if self.surely:
             # The end of the interval that is nearest to keeping the limit.
             end = low if self.operator in (">", ">=") else high
             if end is None:
+                assert difference is not None
                 raise ConditionError(
-                    f"{self.text}: not judged, because too few frames of {mask.result} tell how "
-                    "sure the change is; replay more of it, or leave out 'surely'"
+                    f"{self.text}: not judged in {mask.result}, because "
+                    f"{difference.none_because}; replay more, or leave out 'surely'"
                 )
-            value = 100 * end
-        holds = OPERATORS[self.operator](value, self.limit)
-        return Judgement(self, mask.result, before, after, low, high, holds)
+            limited = end
+        holds = OPERATORS[self.operator](100 * limited, self.limit)
+        return Judgement(self, mask.result, mask.drives, before, after, value, low, high, holds)
 
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """A condition that was judged on a result.
-
-    Parameters
-    ----------
-    condition
-        The condition.
-    result
-        Label of the new result.
-    before, after
-        The rate of the base, NaN for a level, and of the new result.
-    low, high
-        The interval of the change, None where there is none.
-    holds
-        Whether the condition holds.
-    """
+    """A condition that was judged on a result."""
 
     condition: Condition
     result: str
+    """Label of the new result."""
+    drives: int
+    """How many tell."""
     before: float
     after: float
+    """The rate of the base, NaN for a level, and of the new result."""
+    value: float
+    """What was judged: the change, or the level."""
     low: float | None
     high: float | None
+    """The interval of the change, None where there is none."""
     holds: bool
 
 
@@ -206,9 +205,9 @@ def _check_certainty(text: str, rate: str, unit: str) -> None:
         )
 
 
-def _named(condition: Condition, comparison: Comparison) -> list[MaskComparison]:
+def _named(condition: Condition, comparison: Comparison) -> list[Change]:
     """Return what was found of the mask that a condition names, a row a result."""
-    if condition.is_change and not comparison.same_drive:
+    if condition.is_change and not comparison.paired:
         raise ConditionError(
             f"{condition.text}: not judged, because the results are of different drives, whose "
             "difference mixes the scene with the method; limits in % can be judged"
@@ -225,7 +224,7 @@ def _named(condition: Condition, comparison: Comparison) -> list[MaskComparison]
 
 
 def _check_frames(
-    condition: Condition, mask: MaskComparison, results: Sequence[ComparedResult], least: int
+    condition: Condition, mask: Change, results: Sequence[ComparedResult], least: int
 ) -> None:
     """Refuse a condition on a mask of which too few frames tell, or other frames than the base's.
 
@@ -249,14 +248,16 @@ def _check_frames(
             f"{not_judged} {names} were replayed with `frames.scale` {base.scale:g} and "
             f"{new.scale:g}; replay both at one scale, or limit in %"
         )
-    shorter = min(base.frames, new.frames)
-    if mask.frames < least or 2 * mask.frames < shorter:
+    unit, common, smaller = "evaluated frames", mask.frames, min(base.frames, new.frames)
+    if min(base.scored, new.scored) > 1:
+        unit, common, smaller = "drives", mask.drives, min(base.scored, new.scored)
+    if mask.frames < least or 2 * common < smaller:
         few = (
             f"and {least} are needed"
             if mask.frames < least
-            else f"fewer than half of the {shorter} of the shorter one"
+            else f"fewer than half of the {smaller} of the smaller one"
         )
         raise ConditionError(
-            f"{not_judged} {names} have {mask.frames} evaluated frames in common, {few}; replay "
-            "both over the same range"
+            f"{not_judged} {names} have {common} {unit} in common, {few}; replay the same "
+            f"{'drives' if unit == 'drives' else 'range'} into both"
         )

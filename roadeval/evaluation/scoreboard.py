@@ -22,8 +22,8 @@ from roadeval.data import (
     VariantResult,
 )
 from roadeval.evaluation.claims import evidence
-from roadeval.evaluation.differences import DriveDifferences, drive_differences
 from roadeval.evaluation.edges_and_flicker import EdgesAndFlicker
+from roadeval.evaluation.effects import Effect, drive_effects
 from roadeval.evaluation.frame_counts import (
     FrameCounts,
     GrowingCounts,
@@ -154,9 +154,9 @@ class Scoreboard:
         rows = (cut(mask, self._frames, self._settings.window) for mask in self._masks())
         return heapq.merge(*rows, key=attrgetter("number"))
 
-    def differences(self) -> DriveDifferences:
+    def effects(self) -> list[Effect]:
         """Return the paired differences of the drive."""
-        return drive_differences(self._masks(), self._settings)
+        return drive_effects(self._masks(), self._settings)
 
     def repeats(self) -> dict[str, Any]:
         """Return the rates with each seed: see `roadeval.evaluation.scoreboard.Repeats.rates`."""

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from roadeval.data import FILTERED, UNFILTERED, Counts, Rows
 from roadeval.data.counts import OUTCOMES
-from roadeval.evaluation import differences, metrics
+from roadeval.evaluation import effects, metrics
 from roadeval.evaluation.frame_counts import FourCounts, FrameCounts, Window, cut, sum_up
 
 FILTER: Final = "filter"
@@ -27,7 +27,7 @@ Ints = npt.NDArray[np.int64]
 
 def final_stages(rows: Rows) -> dict[str, str]:
     """Return each variant's final stage: ``post``, or the last that it has."""
-    return differences.final_stages((variant, stage) for variant, stage, _ in rows.masks())
+    return effects.final_stages((variant, stage) for variant, stage, _ in rows.masks())
 
 
 def each_window(windows: Rows) -> Rows:

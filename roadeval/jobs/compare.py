@@ -1,10 +1,11 @@
-"""Results side by side: from recordings or results folders to a comparison and its files."""
+"""Results side by side: from recordings, results folders and fleets to a comparison."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,14 +15,15 @@ from roadeval.data import BASELINE, Rows
 from roadeval.data.rows import joined
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import comparison, scored
-from roadeval.evaluation.comparison import Side
-from roadeval.evaluation.comparison_result import Comparison, EndMissing
+from roadeval.evaluation.comparison import Comparison, EndMissing
 from roadeval.evaluation.conditions import Condition, Judgement, judge
 from roadeval.evaluation.frame_counts import Window
+from roadeval.evaluation.pairing import Side, one_drive
 from roadeval.evaluation.settings import settings_of
 from roadeval.jobs.result import Result
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
-from roadeval.results.comparison import as_dict, judged
+from roadeval.results.comparison import as_dict, judged, warnings
+from roadeval.results.fleet.kind import is_fleet
 from roadeval.results.rows import as_arrays, window_rows
 from roadeval.results.summary import json_text, plain
 from roadeval.runtime.paths import Paths, listed
@@ -30,13 +32,10 @@ from roadeval.runtime.text import visible
 if TYPE_CHECKING:
     from roadeval.report.blocks import Document
     from roadeval.report.sections.browse import BrowsedFrames
+    from roadeval.results.fleet.folder import Fleet
 
-ASKED: Final = {
-    "topics": ("image", "truth", "shadow", "masks", "sync_tolerance_ms", "resize_truth"),
-    "labels": ("road", "ignore", "road_colors", "ignore_colors"),
-    "frames": ("every", "scale"),
-}
-"""Settings that change a frame's numbers, or which frames are seen."""
+NO_NUMBER: Final = ("output", "run", "fleet")
+"""Tables of a run's settings that change no number."""
 Inspect = Callable[[Path, int], str]
 """Returns the command that opens a frame of a recording."""
 Writer = Callable[["Compared", Paper, Inspect | None], bytes]
@@ -47,39 +46,30 @@ ROWS: Final = 60
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
-    """A comparison with its judged conditions.
-
-    Parameters
-    ----------
-    comparison
-        See `roadeval.evaluation.comparison.compare`.
-    judgements
-        Of the conditions, see `roadeval.evaluation.conditions.judge`.
-    sides
-        The results.
-    recordings
-        By the results' labels; a results folder has none.
-    """
+    """A comparison with its judged conditions."""
 
     comparison: Comparison
     judgements: tuple[Judgement, ...]
     sides: tuple[Side, ...]
+    """The results with the one drive that is compared; none where several are."""
     recordings: Mapping[str, Path]
+    """By the results' labels; a folder has none."""
 
     @property
     def windows(self) -> Rows:
-        """ERR and the rest over the drive, with each result as a variant.
-
-        Without rows for different drives.
-        """
-        size = self.comparison.settings.window
-        found = _windows(self.sides, size) if self.comparison.same_drive else ()
+        """ERR and the rest over the one drive that is compared, with each result as a variant."""
+        found = _windows(self.sides, self.comparison.settings.window)
         return as_arrays("windows", window_rows(found))
 
     @property
     def content(self) -> dict[str, Any]:
         """The content of the JSON file."""
         return as_dict(self.comparison, self.judgements)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was left out, and what makes the results less comparable than they look."""
+        return warnings(self.comparison)
 
     @property
     def held(self) -> list[str]:
@@ -98,7 +88,7 @@ def compare(
     Parameters
     ----------
     results
-        Recordings or results folders. Of a single one the variants are compared.
+        Recordings, results folders or fleets' folders. Of a single one the variants are compared.
     variants
         Of several results: only these, where ``a=b`` holds the base's ``a`` against the others'
         ``b``. Of a single one: these, the first being the base; by default all, ``unfiltered``
@@ -113,28 +103,152 @@ def compare(
         judged.
     """
     conditions = [Condition.parse(text) for text in fail_if]
-    opened = [Result(path) for path in listed(results)]
-    across = len(opened) == 1
+    paths = [Path(path) for path in listed(results)]
+    across = len(paths) == 1
+    opened = [_opened(path) for path in paths]
     if across:
-        (only,) = opened
-        names = [only.name]
-        sides = comparison.variants_as_sides(_side(only.name, only, only.rows), variants)
+        whole = Side(opened[0].name, opened[0].parts)
+        sides = comparison.variants_as_sides(whole, opened[0].variants, variants)
+        opened *= len(sides)
     else:
-        names = labels_of([each.path for each in opened])
-        sides = _sides(names, opened, variants)
-        names = [side.label for side in sides]
+        sides = _sides(opened, labels_of(paths), variants)
     settings = settings_of(opened[0].summary)
     found = comparison.compare(sides, settings, across_variants=across)
-    cut = [EndMissing(name) for name, each in zip(names, opened, strict=True) if not each.complete]
-    found = replace(found, notes=(*cut, *found.notes))
-    judgements = judge(found, conditions, settings)
-    held = opened * len(sides) if across else opened
-    recordings = {
-        side.label: result.path
-        for side, result in zip(sides, held, strict=True)
-        if result.recording is not None
-    }
-    return Compared(found, judgements, tuple(sides), recordings)
+    labelled = [*zip(sides, opened, strict=True)]
+    cut = [EndMissing(side.label) for side, each in labelled if not each.complete]
+    found = replace(found, notes=(*dict.fromkeys(cut), *found.notes))
+    alone = sides if across and len(whole.scored) == 1 else one_drive(sides)
+    recordings = {side.label: each.recording for side, each in labelled if each.recording}
+    return Compared(found, judge(found, conditions, settings), tuple(alone or ()), recordings)
+
+
+# --- Opening results ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """A drive of an opened result, as `roadeval.evaluation.pairing.Part`."""
+
+    drive: str
+    name: str
+    digest: str | None
+    scored: bool
+    asked: Mapping[str, Any]
+    rows: Callable[[str], Rows]
+    group: str | None = None
+    tags: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Opened:
+    """A result that was opened."""
+
+    name: str
+    summary: Mapping[str, Any]
+    parts: Sequence[_Part]
+    variants: Sequence[str]
+    complete: bool = True
+    recording: Path | None = None
+
+
+def _opened(path: Path) -> _Opened:
+    if is_fleet(path):
+        from roadeval.results.fleet.folder import Fleet
+
+        fleet = Fleet(path)
+        there = [*dict.fromkeys(row["variant"] for row in fleet.summary["rates"])]
+        return _Opened(fleet.name, fleet.summary, list(_drives(fleet)), there)
+    result = Result(path)
+    rows, digest = result.rows, result.summary.get("log", {}).get("sha256")
+    part = _Part(
+        *(result.name, result.name, str(digest) if digest else None),
+        *(len(rows) > 0, asked(result.summary), cache(result.table)),
+    )
+    recording = result.path if result.recording is not None else None
+    variants = rows.distinct("variant")
+    return _Opened(result.name, result.summary, [part], variants, result.complete, recording)
+
+
+def _drives(fleet: Fleet) -> Iterator[_Part]:
+    columns = ["drive", "sha256", "evaluated"]
+    about = {row["drive"]: row for row in fleet.table("drives", columns).to_pylist()}
+    members = fleet.summary["drives"]
+    counted = Counter(member["name"] for member in members)
+    settings = asked(fleet.summary)
+    for member in members:
+        drive, row = member["drive"], about[member["drive"]]
+
+        def rows(table: str, drive: str = drive) -> Rows:
+            # A fleet keeps its drives' frames alone.
+            return _frames(fleet, drive) if table == "frames" else as_arrays(table, ())
+
+        yield _Part(
+            drive=drive,
+            # Two drives of a fleet may have one name.
+            name=member["name" if counted[member["name"]] == 1 else "drive"],
+            digest=row["sha256"] or None,
+            scored=bool(row["evaluated"]),
+            asked=settings,
+            rows=rows,
+            group=member["group"],
+            tags=member["tags"],
+        )
+
+
+def _frames(fleet: Fleet, drive: str) -> Rows:
+    from roadeval.results.fleet.record import frames_path
+    from roadeval.results.fleet.tables import read_frames
+    from roadeval.results.tables import AGAIN, ResultsError, parquet_rows
+
+    try:
+        return parquet_rows(read_frames(fleet.path, drive), "frames")
+    except FileNotFoundError:
+        path = frames_path(fleet.path, drive)
+        raise ResultsError(f"{path}: is not there; {AGAIN}") from None
+
+
+def asked(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings of a run that may change its numbers, by names as ``frames.scale``."""
+    found: dict[str, Any] = {}
+    for table, own in summary.get("run", {}).items():
+        if table in NO_NUMBER:
+            continue
+        nested = own.items() if isinstance(own, dict) else [("", own)]
+        found |= {f"{table}.{key}".rstrip("."): value for key, value in nested}
+    return found
+
+
+def _sides(
+    opened: Sequence[_Opened], labels: Sequence[str], variants: Sequence[str] | None
+) -> list[Side]:
+    """Return several results, each with those of its variants that are compared."""
+    pairs = [name.partition("=")[::2] for name in variants or ()]
+    of_base = {own: other or own for own, other in pairs}
+    of_others = {name: name for name in of_base.values()}
+    renamed = ", ".join(own for own, other in of_base.items() if own != other)
+    sides: list[Side] = []
+    for label, each in zip(labels, opened, strict=True):
+        names = of_others if sides else of_base
+        if pairs and not {*names} & {*each.variants}:
+            wanted, known = ", ".join(names), ", ".join(each.variants)
+            raise RoadevalError(f"{label}: no variant {wanted}; there are {known}")
+        named = f"{label} ({renamed})" if renamed and not sides else label
+        sides.append(Side(named, each.parts, names if pairs else None))
+    return sides
+
+
+def labels_of(paths: Sequence[Path]) -> list[str]:
+    """Call each result by its file's name, or where that is not its own by its whole path."""
+    stems = [visible(path.stem or path.resolve().stem or str(path)) for path in paths]
+    counted = Counter(stems)
+    labels: list[str] = []
+    for stem, path in zip(stems, paths, strict=True):
+        label = stem if counted[stem] == 1 else visible(str(path))
+        labels.append(f"{label} ({labels.count(label) + 1})" if label in labels else label)
+    return labels
+
+
+# --- Writing files --------------------------------------------------------------------------------
 
 
 def write(
@@ -190,8 +304,6 @@ def _page(compared: Compared, _: Paper, inspect: Inspect | None) -> bytes:
     from roadeval.report.sections import browse
 
     made = _document(compared, inspect)
-    if not compared.comparison.same_drive:
-        return page(made)
 
     def rendered(frames: BrowsedFrames) -> bytes:
         return page(replace(made, blocks=[*made.blocks, *browse.section(frames)]))
@@ -227,87 +339,16 @@ def as_json(compared: Compared) -> str:
     return json_text(plain(compared.content))
 
 
-def asked(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a result's log was asked for that changes a frame's numbers, by the settings."""
-    run = summary.get("run", {})
-    return {
-        f"{table}.{key}": run[table][key]
-        for table, keys in ASKED.items()
-        for key in keys
-        if key in run.get(table, {})
-    }
-
-
-def _sides(
-    labels: Sequence[str], opened: Sequence[Result], variants: Sequence[str] | None
-) -> list[Side]:
-    """Return several results, each with those of its variants that are compared."""
-    pairs = [name.partition("=")[::2] for name in variants or ()]
-    of_base = {own: other or own for own, other in pairs}
-    of_others = {name: name for name in of_base.values()}
-    renamed = ", ".join(own for own, other in of_base.items() if own != other)
-    sides = []
-    for place, (label, each) in enumerate(zip(labels, opened, strict=True)):
-        whole = _side(label, each, each.rows)
-        if pairs:
-            whole = _chosen(whole, of_others if place else of_base)
-        if renamed and not place:
-            whole = replace(whole, label=f"{label} ({renamed})")
-        sides.append(whole)
-    return sides
-
-
-def _chosen(side: Side, names: Mapping[str, str]) -> Side:
-    """Return a result with these variants alone, each under its new name."""
-    there = side.frames.distinct("variant")
-    if not set(names) & set(there):
-        wanted, known = ", ".join(names), ", ".join(there)
-        raise RoadevalError(f"{side.label}: no variant {wanted}; there are {known}")
-    regions = None if side.regions is None else _under(side.regions, names)
-    own = {name: each for each, name in names.items()}
-    return replace(side, frames=_under(side.frames, names), regions=regions, own_names=own)
-
-
-def _under(rows: Rows, names: Mapping[str, str]) -> Rows:
-    own = rows.take(np.isin(rows["variant"], [*names]))
-    return own.replace(variant=np.array([names[name] for name in own["variant"].tolist()], str))
-
-
-def _side(label: str, opened: Result, rows: Rows) -> Side:
-    return Side(
-        label,
-        opened.name,
-        _digest(opened),
-        rows,
-        asked(opened.summary),
-        opened.table("regions"),
-        opened.table("disagreements"),
-    )
-
-
-def _digest(opened: Result) -> str | None:
-    digest = opened.summary.get("log", {}).get("sha256")
-    return str(digest) if digest else None
-
-
-def labels_of(paths: Sequence[Path]) -> list[str]:
-    """Call each result by its file's name, or where that is not its own by its whole path."""
-    stems = [visible(path.stem or str(path)) for path in paths]
-    counted = Counter(stems)
-    labels: list[str] = []
-    for stem, path in zip(stems, paths, strict=True):
-        label = stem if counted[stem] == 1 else visible(str(path))
-        labels.append(f"{label} ({labels.count(label) + 1})" if label in labels else label)
-    return labels
-
-
 def _windows(sides: Sequence[Side], size: int) -> Iterator[Window]:
     """Cut each result's first variant, and the base's baseline, into windows of common frames."""
+    if not sides:
+        return
+    frames = [side.rows(side.parts[0], "frames") for side in sides]
     tables = []
-    for side in sides:
-        own = side.frames.of_variant(side.frames["variant"][0])
+    for side, rows in zip(sides, frames, strict=True):
+        own = rows.of_variant(rows["variant"][0])
         tables.append(own.replace(variant=np.full(len(own), side.label)))
     common = set.intersection(*(set(table["frame"].tolist()) for table in tables))
-    together = joined([*tables, sides[0].frames.of_variant(BASELINE)])
+    together = joined([*tables, frames[0].of_variant(BASELINE)])
     size *= max(-(-len(common) // (size * ROWS)), 1)
-    return scored.windows(together.take(np.isin(together["frame"], [*common])), size)
+    yield from scored.windows(together.take(np.isin(together["frame"], [*common])), size)

@@ -12,9 +12,9 @@ import numpy as np
 from roadeval.data import BASELINE, ERRORS, TRUTH, Rows
 from roadeval.data.rows import joined
 from roadeval.evaluation import scored
-from roadeval.evaluation.comparison import Side
-from roadeval.evaluation.comparison_result import Comparison
+from roadeval.evaluation.comparison import Comparison
 from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.pairing import Side
 from roadeval.jobs.page_frames import BYTES, PICTURED, fitting
 from roadeval.jobs.report_frames import rates_by_frame
 from roadeval.jobs.result import Result
@@ -52,14 +52,14 @@ def browsed(
 ) -> BrowsedFrames | None:
     """Collect the frames that all results have of a variant, all their masks side by side.
 
-    None where no variant is in all of them.
+    None where no variant is in all of them, or several drives are compared.
 
     Parameters
     ----------
     comparison
         Of one drive.
     sides
-        The results.
+        The results with this drive; none where several are compared.
     recordings
         By the results' labels, where there are any.
     inspect
@@ -68,10 +68,11 @@ def browsed(
         Returns the bytes of a page with these frames and none of their pictures: of those as many
         are there as keep it below `roadeval.jobs.page_frames.BYTES`.
     """
-    masks = list(_masks(sides))
+    rows = {side.label: side.rows(side.parts[0], "frames") for side in sides}
+    masks = list(_masks(sides, rows))
     if not masks:
         return None
-    table = _table(masks, {side.label: side for side in sides})
+    table = _table(masks, rows)
     masks = [mask for mask in masks if mask.name in table.distinct("variant")]
     if not masks:
         return None
@@ -98,19 +99,20 @@ def browsed(
     return replace(without, strips=strips, pictured=frozenset(each.frame for each in strips))
 
 
-def _masks(sides: Sequence[Side]) -> Iterator[_Mask]:
+def _masks(sides: Sequence[Side], rows: Mapping[str, Rows]) -> Iterator[_Mask]:
     """Yield the final masks that all results have, one result after the other for each variant."""
-    if all(side.frames.distinct("variant") == [side.label] for side in sides):
-        yield from (_Mask(side.label, side.label, side.label, side.label) for side in sides)
+    there = {label: own.distinct("variant") for label, own in rows.items()}
+    if all(names == [label] for label, names in there.items()):
+        yield from (_Mask(label, label, label, label) for label in there)
         return
-    for variant in sides[0].frames.distinct("variant"):
-        if variant != BASELINE and all(variant in s.frames.distinct("variant") for s in sides):
+    for variant in next(iter(there.values())):
+        if variant != BASELINE and all(variant in names for names in there.values()):
             for side in sides:
-                own = side.own_names.get(variant, variant)
+                own = side.own_name(variant)
                 yield _Mask(f"{side.label}: {variant}", side.label, variant, own)
 
 
-def _table(masks: Sequence[_Mask], sides: Mapping[str, Side]) -> Rows:
+def _table(masks: Sequence[_Mask], frames: Mapping[str, Rows]) -> Rows:
     """Return the rows of the masks, each under its name as variant.
 
     Of a variant they are those of the frames on which all results have its mask.
@@ -118,7 +120,7 @@ def _table(masks: Sequence[_Mask], sides: Mapping[str, Side]) -> Rows:
     parts = []
     for variant in dict.fromkeys(mask.variant for mask in masks):
         own = [mask for mask in masks if mask.variant == variant]
-        found = [scored.finals(sides[mask.result].frames.of_variant(variant)) for mask in own]
+        found = [scored.finals(frames[mask.result].of_variant(variant)) for mask in own]
         common = [*set.intersection(*(set(rows["frame"].tolist()) for rows in found))]
         for mask, rows in zip(own, found, strict=True):
             there = rows.take(np.isin(rows["frame"], common))

@@ -20,7 +20,7 @@ _DRIVES: Final = [
     *("trained_on", "model", "luminance", "contrast", "shadow", "sun"),
 ]
 _EFFECTS: Final = [
-    *("drive", "kind", "variant", "stage", "final", "base", "metric"),
+    *("drive", "base", "variant", "stage", "final", "metric"),
     *("mean", "low", "high", "p", "frames"),
 ]
 
@@ -70,7 +70,7 @@ def _effects(fleet: Fleet) -> dict[tuple[str, str], list[Row]]:
     found: defaultdict[tuple[str, str], list[Row]] = defaultdict(list)
     for row in table.filter(wanted).to_pylist():
         if row["mean"] is not None:
-            found[row["kind"], row["variant"]].append(row)
+            found[row["base"], row["variant"]].append(row)
     return dict(found)
 
 

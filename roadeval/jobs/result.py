@@ -12,11 +12,11 @@ import numpy as np
 from roadeval.data import Rows
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import scored
-from roadeval.evaluation.differences import drive_differences
+from roadeval.evaluation.effects import as_parts, drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.recording.layout import DamagedError, RecordingError
 from roadeval.results.folder import RUN, ResultsFolder
-from roadeval.results.verdict import verdict_of
+from roadeval.results.sentences import verdict
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -184,7 +184,7 @@ class Result:
         """Make the summary that a killed run did not get to write, of what it had scored."""
         assert self.recording is not None
         layout, settings = self.recording.layout, EvaluationSettings()
-        differences = drive_differences(list(scored.mask_counts(self.rows)), settings)
+        effects = drive_effects(list(scored.mask_counts(self.rows)), settings)
         return {
             "drive": {"name": layout.drive, "width": layout.width, "height": layout.height},
             "frames": {
@@ -200,8 +200,8 @@ class Result:
             "seconds": {},
             "training": {"source": layout.properties.get("trained_on")},
             "totals": (totals := scored.totals(self.rows)),
-            "verdict": verdict_of(totals, differences, settings),
-            **differences.as_dict(),
+            "verdict": verdict(totals, effects, settings),
+            **as_parts(effects),
         }
 
 

@@ -10,8 +10,9 @@ from typing import Any, Final
 
 from roadeval.config import RunConfig
 from roadeval.data import BASELINE, Role
+from roadeval.evaluation.effects import as_parts
 from roadeval.jobs.run import Run
-from roadeval.results.verdict import verdict_of
+from roadeval.results.sentences import verdict
 from roadeval.version import VERSION
 
 PACKAGES: Final = (
@@ -26,12 +27,12 @@ FLATTERED: Final = "look alike, which flatters the result: use a model of other 
 
 def of(run: Run) -> dict[str, Any]:
     """Return the content of ``summary.json``, but for its format, of a run at its end."""
-    found, differences = run.board.summary(), run.board.differences()
+    found, effects = run.board.summary(), run.board.effects()
     repeats = run.board.repeats()
     seeds = {"seeds": [run.config.training.seed, *run.repeats], **repeats} if repeats else None
     return found | {
-        "verdict": verdict_of(found["totals"], differences, run.config.evaluation),
-        **differences.as_dict(),
+        "verdict": verdict(found["totals"], effects, run.config.evaluation),
+        **as_parts(effects),
         **({"seeds": seeds} if seeds else {}),
         "drive": _drive(run),
         "frames": _accounting(run),

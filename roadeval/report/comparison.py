@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict
+from itertools import pairwise
 from typing import Final
 
 from roadeval.data import Rows
-from roadeval.data.words import listing, number, percent, points, timestamp
-from roadeval.evaluation.comparison_result import Comparison, MaskComparison
+from roadeval.data.words import DASH, interval, listing, number, percent, points, timestamp
+from roadeval.evaluation.comparison import (
+    Change,
+    ComparedResult,
+    Comparison,
+    Disagreement,
+    DriveChange,
+    MovedFrame,
+    RegionChange,
+)
 from roadeval.evaluation.conditions import Judgement
+from roadeval.evaluation.effects import TESTED
 from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
+from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import (
     Block,
     BulletList,
@@ -23,18 +33,36 @@ from roadeval.report.blocks import (
     Text,
 )
 from roadeval.report.charts import differences, rates
-from roadeval.report.comparison_rows import breaks, interval_of, named, naming_columns
-from roadeval.report.comparison_where import disagreement_table, where
+from roadeval.report.charts.differences import MEAN, ForestRow
+from roadeval.report.fleet.common import MarkedRow, q_value, strata_table
 from roadeval.report.markdown import table as markdown_table
-from roadeval.results.certainty import correction, too_few
-from roadeval.results.comparison import judged, verdict, warnings
+from roadeval.results.comparison import (
+    changed_drives,
+    changed_settings,
+    discovery_note,
+    judged,
+    verdict,
+    warnings,
+)
 from roadeval.results.comparison import where as told_where
+from roadeval.results.sentences import MARK, correction, stands
 from roadeval.runtime.text import as_markdown
 
 Inspect = Callable[[str, int], str]
-_COMMAND: Final = ("in the viewer",)
-OTHERS: Final = tuple(name for name in SHORT if name != "ERR")
+Row = Change | MovedFrame | RegionChange | Disagreement | DriveChange
+"""Something about a variant of a new result."""
+OTHERS: Final = tuple(name for name in SHORT if name != TESTED)
 """The rates of short tables without ERR, which has columns of its own."""
+NAMED: Final = 20
+"""Drives that a table of changed ones names, of each mask."""
+_COMMAND: Final = ("in the viewer",)
+_REGIONS: Final = "ERR of the final masks, percent: means over the frames that label any of it."
+_FRAMES: Final = "Percent of the labelled pixels that one of the two final masks has right alone."
+_LEFT_OUT: Final = (
+    "A region that is not the same pixels in both, as the shadow that another filter found, is "
+    "left out. Frames with most shadow are a third, by the share of their pixels in true shadow, "
+    "or in that which both detected."
+)
 
 
 def document(
@@ -60,9 +88,7 @@ def document(
     return Document(
         kicker="roadeval comparison",
         title=listing(labels),
-        subtitle="; ".join(
-            f"{each.label}: {each.frames} frames of {each.drive}" for each in comparison.results
-        ),
+        subtitle="; ".join(map(_about, comparison.results)),
         footer=f"comparison of {listing(labels)}",
         blocks=list(_blocks(comparison, judgements, windows, inspect)),
         keywords=["road recognition", "comparison"],
@@ -71,7 +97,9 @@ def document(
 
 def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     """Return a comparison as Markdown."""
-    lines = ["# roadeval comparison", "", as_markdown(verdict(comparison)), ""]
+    lines = ["# roadeval comparison", ""]
+    lines += [line for each in changed_settings(comparison) for line in (as_markdown(each), "")]
+    lines += [as_markdown(verdict(comparison)), ""]
     lines += [
         f"- {'**FAIL**' if each.holds else 'ok'}: {as_markdown(judged(each))}"
         for each in judgements
@@ -79,14 +107,22 @@ def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     lines += ["", *markdown_table(_rates_table(comparison)), ""]
     lines += [line for legend in _legend(comparison) for line in (as_markdown(legend), "")]
     lines += [*(f"- {as_markdown(sentence)}" for sentence in told_where(comparison)), ""]
-    if comparison.disagreements:
-        table = disagreement_table(comparison)
-        lines += ["Frames on which they disagree most:", "", *markdown_table(table), ""]
-    if comparison.moved:
-        lines += ["Frames that changed most:", "", *markdown_table(_moved_table(comparison)), ""]
+    for title, table in (
+        ("Drives that changed:", _drives_table([r for r in comparison.drives if r.changed])),
+        ("Frames on which they disagree most:", _disagreement_table(comparison)),
+        ("Frames that changed most:", _moved_table(comparison)),
+    ):
+        if table.rows:
+            lines += [title, "", *markdown_table(table), ""]
     lines += [f"- {as_markdown(warning)}" for warning in warnings(comparison)]
     lines += ["", _unit(comparison)]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _about(result: ComparedResult) -> str:
+    if result.drive is not None:
+        return f"{result.label}: {result.frames} frames of {result.drive}"
+    return f"{result.label}: {number(result.scored)} of {number(result.drives)} drives scored"
 
 
 def _blocks(
@@ -96,26 +132,34 @@ def _blocks(
     inspect: Inspect | None,
 ) -> Iterator[Block]:
     yield Heading("What changed")
+    yield from (Text(line) for line in changed_settings(comparison))
     yield Text(verdict(comparison), "verdict")
-    yield from _limits(judgements)
+    for title, holds, tone in (
+        ("Limits exceeded", True, "warning"),
+        ("Limits kept", False, "plain"),
+    ):
+        if told := [judged(each) for each in judgements if each.holds == holds]:
+            yield BulletList(title, told, tone)
     yield _rates_table(comparison)
     yield Text(_unit(comparison), "note")
     yield from (Text(legend, "note") for legend in _legend(comparison))
-    yield from _why_nointerval_of(comparison.changes)
     if comparison.notes:
         yield BulletList("Beware", warnings(comparison), "warning")
     yield TableOfContents(depth=2)
     finals = [row for row in comparison.changes if row.final]
-    if comparison.same_drive:
+    if comparison.paired:
         yield Figure(
             differences.changes(finals), "Change of the final mask's rates against the base."
         )
-        if charts := rates.over_windows(windows, ["ERR"]):
-            yield Heading("Over the drive", 2)
-            yield Figure(charts, "ERR of the final masks over the common frames.")
     else:
         yield Figure(differences.levels(finals), "Rates of the final masks.")
-    yield from where(comparison)
+    if charts := rates.over_windows(windows, [TESTED]):
+        first = finals[0].variant
+        alone = all(row.result == row.variant for row in finals)
+        yield Heading("Over the drive" if alone else f"Over the drive: {first}", 2)
+        yield Figure(charts, "ERR of the final masks over the common frames.")
+    yield from _drives(comparison)
+    yield from _where(comparison)
     if comparison.moved:
         yield Heading("Frames that changed most", 2)
         yield _moved_table(comparison, inspect)
@@ -123,75 +167,229 @@ def _blocks(
 
 def _legend(comparison: Comparison) -> Iterator[str]:
     """Yield what the mark in the table means, where something was corrected."""
-    changes = [row.difference["ERR"] for row in comparison.changes if row.difference]
-    if legend := correction(map(asdict, changes)):
+    changes = [row.difference[TESTED] for row in comparison.changes if row.difference]
+    if legend := correction(changes):
         yield legend
 
 
-def _limits(judgements: Sequence[Judgement]) -> Iterator[Block]:
-    failed = [judged(each) for each in judgements if each.holds]
-    kept = [judged(each) for each in judgements if not each.holds]
-    if failed:
-        yield BulletList("Limits exceeded", failed, "warning")
-    if kept:
-        yield BulletList("Limits kept", kept)
-
-
 def _unit(comparison: Comparison) -> str:
-    if not comparison.same_drive:
+    if not comparison.paired:
         return "Percent over each result's own frames."
-    return (
-        "Percent over the frames that both evaluated; differences are new minus base, in "
-        "percentage points."
+    over = (
+        "Percent: means over the drives that both have, of the frames that both evaluated; a group "
+        "of drives counts as one."
+        if comparison.drives
+        else "Percent over the frames that both evaluated."
     )
+    return f"{over} Differences are new minus base, in percentage points."
 
 
-# --- Tables ---------------------------------------------------------------------------------------
+# --- Rates ----------------------------------------------------------------------------------------
 
 
 def _rates_table(comparison: Comparison) -> Table:
-    """Tabulate the rates of every result, variant and stage, and on one drive their changes."""
+    """Tabulate the rates of every result, variant and stage, and their changes."""
     rows = comparison.changes
-    return _changes_table(rows) if comparison.same_drive else _levels_table(rows)
+    return _changes_table(rows) if comparison.paired else _levels_table(rows)
 
 
-def _changes_table(rows: Sequence[MaskComparison]) -> Table:
-    names = naming_columns(rows)
+def _changes_table(rows: Sequence[Change]) -> Table:
+    names = _naming_columns(rows)
+    counted = ("drives",) if any(row.drives > 1 for row in rows) else ()
     return Table(
-        [*names, "stage", "base", "new", "difference", "interval", *OTHERS],
+        [*names, "stage", *counted, "base", "new", "difference", "interval", *OTHERS],
         [
             [
-                *named(row, names),
+                *_named(row, names),
                 row.stage,
-                percent(row.base["ERR"]),
-                percent(row.new["ERR"]),
-                Cell(points(row.difference["ERR"].mean), bold=row.final),
-                interval_of(row.difference["ERR"]),
-                *(points(row.new[rate] - row.base[rate]) for rate in OTHERS),
+                *(number(row.drives) for _ in counted),
+                percent(row.base[TESTED]),
+                percent(row.new[TESTED]),
+                Cell(points(row.difference[TESTED].mean), bold=row.final),
+                _interval(row.difference[TESTED]),
+                *(points(row.difference[rate].mean) for rate in OTHERS),
             ]
             for row in rows
         ],
         text_columns=range(len(names) + 1),
-        breaks=breaks(rows),
-        groups=[("", len(names) + 1), ("ERR", 4), ("difference", len(OTHERS))],
+        breaks=_breaks(rows),
+        groups=[("", len(names) + 1 + len(counted)), (TESTED, 4), ("difference", len(OTHERS))],
         small=True,
     )
 
 
-def _levels_table(rows: Sequence[MaskComparison]) -> Table:
-    rates = (*SHORT, *SHORT_OVERLAP)
+def _levels_table(rows: Sequence[Change]) -> Table:
+    shown = (*SHORT, *SHORT_OVERLAP)
     return Table(
-        ["result", "variant", "stage", "frames", *rates],
+        ["result", "variant", "stage", "frames", *shown],
         [
             [
                 *(row.result, row.variant, row.stage),
                 number(row.frames),
-                *(percent(row.new[rate]) for rate in rates),
+                *(percent(row.new[rate]) for rate in shown),
             ]
             for row in rows
         ],
         text_columns=range(3),
-        breaks=breaks(rows),
+        breaks=_breaks(rows),
+        small=True,
+    )
+
+
+def _naming_columns(rows: Sequence[Row]) -> tuple[str, ...]:
+    """Return the columns that name a row; without the result's, where the variants are that."""
+    alone = all(row.result == row.variant for row in rows)
+    return ("variant",) if alone else ("result", "variant")
+
+
+def _named(row: Row, names: Sequence[str]) -> list[str]:
+    return [{"result": row.result, "variant": row.variant}[name] for name in names]
+
+
+def _breaks(rows: Sequence[Row]) -> list[int]:
+    """Return the rows at which another result begins."""
+    results = [row.result for row in rows]
+    return [place for place, (above, own) in enumerate(pairwise(results), 1) if above != own]
+
+
+def _interval(change: Difference) -> str:
+    """Return an interval, with a mark where the change stands after correction."""
+    mark = f" {MARK}" if stands(change.p_holm, change.confidence) else ""
+    return interval(change.low, change.high) + mark
+
+
+# --- Drives ---------------------------------------------------------------------------------------
+
+
+def _drives(comparison: Comparison) -> Iterator[Block]:
+    """Yield which of several drives changed, the plot of all, and the changes by tag."""
+    if not comparison.drives:
+        return
+    yield Heading("Which drives changed")
+    yield from (Text(line) for line in changed_drives(comparison))
+    yield Text(discovery_note(), "note")
+    masks = dict.fromkeys((row.result, row.variant) for row in comparison.drives)
+    for place, mask in enumerate(masks):
+        own = [row for row in comparison.drives if (row.result, row.variant) == mask]
+        if not place:
+            yield from _plot(comparison, own)
+        if rows := [row for row in own if row.changed]:
+            shown = f" ({NAMED} of {len(rows)})" if len(rows) > NAMED else ""
+            title = " of ".join(reversed(mask)) if len(comparison.results) > 2 else mask[1]
+            yield Heading(f"Drives on which {title} changed{shown}, the surest first", 2)
+            yield _drives_table(rows)
+    for mask in masks:
+        parts = [
+            MarkedRow.of_stratum(each.stratum)
+            for each in comparison.strata
+            if (each.result, each.variant) == mask
+        ]
+        if any(part.mean for part in parts):
+            yield Heading(f"Change of {TESTED} of {mask[1]} by tag", 2)
+            yield from strata_table(parts)
+
+
+def _plot(comparison: Comparison, own: Sequence[DriveChange]) -> Iterator[Block]:
+    first = own[0]
+    rows = [
+        ForestRow(row.drive, None, row.difference.mean, row.difference.low, row.difference.high)
+        for row in own
+        if row.difference.units
+    ]
+    if not rows:
+        return
+    key = (first.result, first.variant, first.stage)
+    (over,) = (
+        each.difference[TESTED]
+        for each in comparison.changes
+        if (each.result, each.variant, each.stage) == key
+    )
+    mean = ForestRow(MEAN, None, over.mean, over.low, over.high)
+    label = f"change of {TESTED} of {first.variant}"
+    yield Figure(differences.forest(rows, mean, label), differences.caption(rows, mean))
+
+
+def _drives_table(rows: Sequence[DriveChange]) -> Table:
+    """Tabulate drives that changed, the surest first."""
+    names = _naming_columns(rows)
+    return Table(
+        [*names, "drive", "frames", "base", "new", "difference", "interval", "q"],
+        [
+            [
+                *_named(row, names),
+                row.drive,
+                number(row.frames),
+                percent(row.base),
+                percent(row.new),
+                Cell(points(row.difference.mean), bold=True),
+                interval(row.difference.low, row.difference.high),
+                DASH if row.q is None else q_value(row.q),
+            ]
+            for row in rows[:NAMED]
+        ],
+        text_columns=range(len(names) + 1),
+        small=True,
+    )
+
+
+# --- Where ----------------------------------------------------------------------------------------
+
+
+def _where(comparison: Comparison) -> Iterator[Block]:
+    """Yield where one of two methods is better: by region and shade, and where they disagree."""
+    if comparison.regions:
+        legend = correction(row.difference for row in comparison.regions)
+        yield Heading("Where it is better, and where worse", 2)
+        yield _region_table(comparison.regions)
+        yield Text(f"{legend} {_LEFT_OUT}".strip(), "note")
+    if comparison.disagreements:
+        yield Heading("Frames on which they disagree most", 2)
+        yield _disagreement_table(comparison)
+
+
+def _region_table(rows: Sequence[RegionChange]) -> Table:
+    names = _naming_columns(rows)
+    return Table(
+        [*names, "region, or frames", "frames", "base", "new", "difference", "interval"],
+        [
+            [
+                *_named(row, names),
+                row.title,
+                str(row.frames),
+                percent(row.base),
+                percent(row.new),
+                Cell(points(row.difference.mean), bold=True),
+                _interval(row.difference),
+            ]
+            for row in rows
+        ],
+        text_columns=range(len(names) + 1),
+        breaks=_breaks(rows),
+        caption=_REGIONS,
+        small=True,
+    )
+
+
+def _disagreement_table(comparison: Comparison) -> Table:
+    """Tabulate the frames on which final masks disagree most, and which of them is right."""
+    rows = comparison.disagreements
+    names = _naming_columns(rows)
+    return Table(
+        [*names, "frame", "stamp", "disagree", "base right", "new right"],
+        [
+            [
+                *_named(row, names),
+                str(row.frame),
+                timestamp(row.stamp_ns),
+                Cell(percent(row.base_right + row.new_right), bold=True),
+                percent(row.base_right),
+                percent(row.new_right),
+            ]
+            for row in rows
+        ],
+        text_columns=[*range(len(names)), len(names) + 1],
+        breaks=_breaks(rows),
+        caption=_FRAMES,
         small=True,
     )
 
@@ -199,12 +397,12 @@ def _levels_table(rows: Sequence[MaskComparison]) -> Table:
 def _moved_table(comparison: Comparison, inspect: Inspect | None = None) -> Table:
     """Tabulate the frames whose error rate changed most, with what opens each of the new result."""
     rows = comparison.moved
-    names = naming_columns(rows)
+    names = _naming_columns(rows)
     return Table(
         [*names, "frame", "stamp", "ERR base", "new", "difference", *_COMMAND[: bool(inspect)]],
         [
             [
-                *named(row, names),
+                *_named(row, names),
                 str(row.frame),
                 timestamp(row.stamp_ns),
                 percent(row.base),
@@ -215,24 +413,6 @@ def _moved_table(comparison: Comparison, inspect: Inspect | None = None) -> Tabl
             for row in rows
         ],
         text_columns=[*range(len(names)), len(names) + 1, len(names) + 5],
-        breaks=breaks(rows),
+        breaks=_breaks(rows),
         small=True,
     )
-
-
-# --- Sentences ------------------------------------------------------------------------------------
-
-
-def _why_nointerval_of(rows: Sequence[MaskComparison]) -> Iterator[Text]:
-    """Yield the reason why there is no interval, once for each result and variant."""
-    reasons = [
-        f"{_name(row)}: no interval for ERR, because {too_few(change.frames)}."
-        for row in rows
-        if row.final and (change := row.difference.get("ERR")) and change.low is None
-    ]
-    yield from (Text(reason, "note") for reason in dict.fromkeys(reasons))
-
-
-def _name(row: MaskComparison) -> str:
-    same = row.result == row.variant
-    return row.result if same else f"{row.result}, {row.variant}"

@@ -6,25 +6,29 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any, Final
 
-from roadeval.data import BASELINE
 from roadeval.data.words import percent, plain_points
-from roadeval.evaluation.comparison_result import (
+from roadeval.evaluation.comparison import (
+    FALSE,
+    Change,
     Comparison,
     DrivesDiffer,
     EndMissing,
     FramesLeftOut,
     LogUnknown,
-    MaskComparison,
     Note,
+    SameLogs,
     SettingsDiffer,
     TruthDiffers,
     VariantLeftOut,
 )
 from roadeval.evaluation.conditions import Judgement
-from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.certainty import Degree, degree_of, stands, too_few
+from roadeval.evaluation.effects import TESTED
+from roadeval.evaluation.pairing import Because, LeftOut
+from roadeval.results.sentences import sentence, stands
 
-FORMAT: Final = {"name": "roadeval-comparison", "version": 1}
+FORMAT: Final = {"name": "roadeval-comparison", "version": 2}
+NAMED: Final = 5
+"""Drives of those left out for one reason, and settings that changed, which are named."""
 
 
 def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dict[str, Any]:
@@ -34,35 +38,67 @@ def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dic
         {"kind": type(note).__name__, **fact}
         for note, fact in zip(comparison.notes, facts.pop("notes"), strict=True)
     ]
+    drives = [
+        {**fact, "changed": row.changed}
+        for row, fact in zip(comparison.drives, facts.pop("drives"), strict=True)
+    ]
     return {
         "format": FORMAT,
+        "changed": changed_settings(comparison),
         "verdict": verdict(comparison),
         "where": where(comparison),
         **facts,
+        "drives": drives,
+        "false_discovery_rate": FALSE,
         "notes": notes,
         "warnings": warnings(comparison),
-        "conditions": [_condition(each) for each in judgements],
+        "conditions": [
+            {**(fact := asdict(each)).pop("condition"), **fact, "sentence": judged(each)}
+            for each in judgements
+        ],
     }
 
 
+def changed_settings(comparison: Comparison, most: int | None = None) -> list[str]:
+    """Return the settings that new results do not share with the base, a line a result.
+
+    With ``most`` only the first so many are named.
+    """
+    lines = []
+    for each in comparison.changed_settings:
+        named = [f"`{name}` {_value(a)} to {_value(b)}" for name, (a, b) in each.settings.items()]
+        more = f" and {len(named) - most} more" if most and len(named) > most else ""
+        of = f" in {each.new}" if len(comparison.results) > 2 else ""
+        lines.append(f"Changed settings{of}: {', '.join(named[:most])}{more}.")
+    return lines
+
+
 def verdict(comparison: Comparison) -> str:
-    """Return whether results are better or worse than the base, and how sure that is."""
-    if not comparison.same_drive:
+    """Return what changed in the final masks, and how sure that is."""
+    if not comparison.paired:
         return "Different drives, side by side: no difference is given."
-    finals = [row for row in comparison.changes if row.final]
-    # The baseline never looks at the image: its change tells nothing of a method.
-    told = [row for row in finals if row.variant != BASELINE] or finals
-    base, settings = comparison.results[0].label, comparison.settings
-    changes = "; ".join(_change(row, settings) for row in told)
-    return f"Against {base}: {changes} ({percent(settings.confidence, 0)} % intervals)."
+    finals = comparison.finals()
+    base = comparison.results[0].label
+    several = len({change.variant for change in finals}) > 1
+    return " ".join(_sentence(change, base, comparison, several=several) for change in finals)
+
+
+def _sentence(change: Change, base: str, comparison: Comparison, *, several: bool) -> str:
+    what = f"{change.result} instead of {base}"
+    rate = f"{TESTED} of {change.stage}"
+    told = sentence(change.difference[TESTED], what, rate, comparison.settings)
+    if change.result == change.variant or not several:
+        return told
+    return f"{change.variant}: {told[0].lower()}{told[1:]}"
 
 
 def where(comparison: Comparison) -> list[str]:
-    """Return where final masks are surely better or worse, and where they disagree."""
+    """Return where final masks are surely better or worse: regions, frames and drives."""
     masks = dict.fromkeys((row.result, row.variant) for row in comparison.regions)
     return [
         *(_by_region(comparison, *mask) for mask in masks),
         *_disagreements(comparison),
+        *changed_drives(comparison),
     ]
 
 
@@ -76,8 +112,12 @@ def _by_region(comparison: Comparison, result: str, variant: str) -> str:
             parts.append(f"{word} everywhere")
         elif names:
             parts.append(f"{word} ({'; '.join(names)})")
-    name = result if result == variant else f"{variant} of {result}"
-    return f"{name} by region and shade: {', '.join(parts) or 'no change is sure in any'}"
+    told = ", ".join(parts) or "no change is sure in any"
+    return f"{_whose(result, variant)} by region and shade: {told}"
+
+
+def _whose(result: str, variant: str) -> str:
+    return result if result == variant else f"{variant} of {result}"
 
 
 def _disagreements(comparison: Comparison) -> Iterator[str]:
@@ -88,50 +128,45 @@ def _disagreements(comparison: Comparison) -> Iterator[str]:
         yield f"{result} disagrees most on frames {', '.join(frames)}"
 
 
+def changed_drives(comparison: Comparison) -> list[str]:
+    """Return on how many single drives each final mask changed, and in which direction."""
+    lines = []
+    for mask in dict.fromkeys((row.result, row.variant) for row in comparison.drives):
+        own = [row for row in comparison.drives if (row.result, row.variant) == mask]
+        tested = sum(row.q is not None for row in own)
+        changed = [row for row in own if row.changed]
+        worse = sum(row.difference.mean > 0 for row in changed)
+        lines.append(
+            f"{_whose(*mask)}: {TESTED} changed on {len(changed)} of {tested} drives (worse on "
+            f"{worse}, better on {len(changed) - worse}; false discovery rate "
+            f"{percent(FALSE, 0)} %)"
+        )
+    return lines
+
+
 def warnings(comparison: Comparison) -> list[str]:
     """Return what was left out and what makes results less comparable than they look."""
-    return [note(each) for each in comparison.notes]
+    drives: dict[tuple[str, str, Because], list[str]] = {}
+    told = []
+    for each in comparison.notes:
+        if isinstance(each, LeftOut):
+            drives.setdefault((each.result, each.other, each.because), []).append(each.drive)
+        else:
+            told.append(note(each))
+    return [*(_left_out(names, *key) for key, names in drives.items()), *told]
 
 
-def judged(judgement: Judgement) -> str:
-    """Return what was found of a condition, and whether it holds."""
-    condition = judgement.condition
-    rate = f"{condition.stage}.{condition.variant}.{condition.rate} of {judgement.result}"
-    holds = "holds" if judgement.holds else "does not hold"
-    after = f"{percent(judgement.after)} %"
-    if not condition.is_change:
-        return f"{rate} is {after}: {condition.text} {holds}"
-    change = f"{plain_points(judgement.after - judgement.before)} pp"
-    if condition.surely:
-        change += f" [{plain_points(judgement.low)}, {plain_points(judgement.high)}]"
-    before = f"{percent(judgement.before)} %"
-    return f"{rate} changed by {change} ({before} to {after}): {condition.text} {holds}"
-
-
-def _condition(judgement: Judgement) -> dict[str, Any]:
-    """Return the facts of a judged condition, and the sentence on them."""
-    facts = asdict(judgement)
-    return {**facts.pop("condition"), **facts, "sentence": judged(judgement)}
-
-
-def _change(row: MaskComparison, settings: EvaluationSettings) -> str:
-    """Return in a clause what happened to the ERR of a mask, and how sure that is."""
-    change = row.difference["ERR"]
-    name = row.result if row.result == row.variant else f"{row.variant} of {row.result}"
-    better = "worse" if change.mean > 0 else "better"
-    mean = f"ERR {plain_points(change.mean)} pp"
-    sure = f"{mean} [{plain_points(change.low)}, {plain_points(change.high)}]"
-    most = percent(max(-(change.low or 0), change.high or 0))
-    clauses = {
-        Degree.UNDEFINED: f"{name}: ERR is undefined on every frame",
-        Degree.FEW: f"{name}: {too_few(change.frames)}, {mean}",
-        Degree.SAME: f"{name} has the same ERR on every frame",
-        Degree.SURE: f"{name} is {better}, {sure}",
-        Degree.LITTLE: f"{name} is neither better nor worse by more than {most} pp, {sure}",
-        Degree.PROBABLE: f"{name} is probably {better}, {sure}",
-        Degree.UNKNOWN: f"{name}: cannot tell, {sure}",
-    }
-    return clauses[degree_of(change, settings)]
+def _left_out(names: Sequence[str], result: str, other: str, because: Because) -> str:
+    reason = {
+        Because.ABSENT: f"not in {other}",
+        Because.UNSCORED: "not scored in both",
+        Because.OTHER_LOG: f"of another log in {other}",
+        Because.LOG_UNKNOWN: "log unknown",
+        Because.NO_FRAME: f"no evaluated frame in common with {other}",
+    }[because]
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    count = "1 drive is" if len(names) == 1 else f"{len(names)} drives are"
+    return f"{count} left out of {result} ({reason}): {', '.join(names[:NAMED])}{more}"
 
 
 def note(told: Note) -> str:
@@ -143,7 +178,14 @@ def note(told: Note) -> str:
                 "lacks them or trained on them"
             )
         case VariantLeftOut(base, new, variant):
-            said = f"{variant} is left out: {base} and {new} have it on no frame both"
+            said = f"{variant} is left out: {base} and {new} share no frame of it"
+        case LeftOut(drive, result, other, because):
+            said = _left_out([drive], result, other, because)
+        case SameLogs(base, new, drives):
+            said = (
+                f"{drives} drives have other names in {base} and {new}, and are taken for the same "
+                "by the SHA-256 of their logs"
+            )
         case SettingsDiffer(base, new, settings):
             both = (f"`{name}` {_value(a)} and {_value(b)}" for name, (a, b) in settings.items())
             said = (
@@ -168,8 +210,33 @@ def note(told: Note) -> str:
     return said
 
 
+def judged(judgement: Judgement) -> str:
+    """Return what was found of a condition, and whether it holds."""
+    condition, drives = judgement.condition, judgement.drives
+    rate = f"{condition.stage}.{condition.variant}.{condition.rate} of {judgement.result}"
+    holds = "holds" if judgement.holds else "does not hold"
+    after, over = f"{percent(judgement.after)} %", f" over {drives} drives" if drives > 1 else ""
+    if not condition.is_change:
+        return f"{rate} is {after}{over}: {condition.text} {holds}"
+    change = f"{plain_points(judgement.value)} pp"
+    if condition.surely:
+        change += f" [{plain_points(judgement.low)}, {plain_points(judgement.high)}]"
+    before = f"{percent(judgement.before)} %"
+    return f"{rate} changed by {change}{over} ({before} to {after}): {condition.text} {holds}"
+
+
+def discovery_note() -> str:
+    """Return what it means that a drive is called changed."""
+    return (
+        f"Of the drives that are called changed, at most {percent(FALSE, 0)} % on average are not "
+        "(Benjamini and Hochberg's correction over the drives; q is the p-value after it)."
+    )
+
+
 def _value(value: Any) -> str:
     """Write a setting's value for a person."""
     if value is None or value in ({}, [], ()):
         return "not given"
+    if isinstance(value, list | tuple):
+        return ", ".join(map(str, value))
     return f"{value:g}" if isinstance(value, float) else str(value)

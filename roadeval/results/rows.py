@@ -21,7 +21,7 @@ from roadeval.data import (
     Rows,
     Transition,
 )
-from roadeval.evaluation.differences import final_stages
+from roadeval.evaluation.effects import final_stages
 from roadeval.evaluation.frame_counts import Window
 from roadeval.evaluation.maps import HeatMap, Name
 from roadeval.evaluation.scoreboard import DriveSums
@@ -217,19 +217,20 @@ def score_rows(
 
 
 def effect_rows(facts: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield the rows of ``effects``: the filter's by stage, and each variant's against blind."""
+    """Yield the rows of ``effects``: each variant minus ``unfiltered``, and minus ``blind``."""
     stages = _final_stages(facts)
     for stage, rates in facts["difference"].items():
-        pair = (FILTERED, stage), (UNFILTERED, stage)
-        yield from _effects(facts, "filter", *pair, rates, final=stages[FILTERED] == stage)
-    for variant, rates in facts["against_blind"].items():
-        pair = (variant, stages[variant]), (BASELINE, stages[BASELINE])
-        yield from _effects(facts, "blind", *pair, rates, final=True)
+        final = stages[FILTERED] == stage
+        pair = (FILTERED, stage), (UNFILTERED, stages[UNFILTERED] if final else stage)
+        yield from _effects(facts, *pair, rates, final=final)
+    for base in (UNFILTERED, BASELINE):
+        for variant, rates in facts[f"against_{base}"].items():
+            pair = (variant, stages[variant]), (base, stages[base])
+            yield from _effects(facts, *pair, rates, final=True)
 
 
 def _effects(
     facts: Mapping[str, Any],
-    kind: str,
     mask: tuple[str, str],
     base: tuple[str, str],
     rates: Mapping[str, Mapping[str, Any]],
@@ -237,16 +238,17 @@ def _effects(
     final: bool,
 ) -> Iterator[dict[str, Any]]:
     mine, theirs = (facts["totals"][variant][stage] for variant, stage in (mask, base))
-    copied = ("mean", "standard_error", "low", "high", "p", "frames", "effective_frames")
+    copied = ("mean", "standard_error", "low", "high", "p")
     for metric, found in rates.items():
         yield {
-            "kind": kind,
+            "base": base[0],
             "variant": mask[0],
             "stage": mask[1],
             "final": final,
-            "base": base[0],
             "metric": metric,
             **{name: found[name] for name in copied},
+            "frames": found["units"],
+            "effective_frames": found["effective"],
             "base_wrong": theirs["FP"] + theirs["FN"],
             "base_N": theirs["N"],
             "wrong": mine["FP"] + mine["FN"],

@@ -283,9 +283,8 @@ _OF_DRIVES: Final = (
         "A row per drive, camera, difference between two masks, and rate.",
         (
             *KEY,
-            Column("kind", Kind.NAME, "`filter`: with it minus without; `blind`: minus that"),
+            Column("base", Kind.NAME, "the variant that is subtracted: `unfiltered` or `blind`"),
             *(VARIANT, STAGE, FINAL),
-            Column("base", Kind.NAME, "the variant that is subtracted"),
             Column("metric", Kind.NAME, "the rate"),
             Column("mean", Kind.RATE, "of the frames' differences"),
             Column("standard_error", Kind.NUMBER, "of that, as frames of a drive are alike"),

@@ -13,11 +13,12 @@ from roadeval.results.tables import ResultsError
 from roadeval.runtime.files import check_input
 from roadeval.runtime.text import visible, visible_lines
 
-FORMAT: Final[Mapping[str, Any]] = {"name": "roadeval-summary", "version": 3}
+FORMAT: Final[Mapping[str, Any]] = {"name": "roadeval-summary", "version": 4}
 SUMMARY: Final = "summary.json"
 PARTS: Final = (
     *("format", "verdict", "drive", "frames", "totals", "beyond", "curves", "difference"),
-    *("against_blind", "seeds", "oracles", "windows", "claims", "health", "training", "seconds"),
+    *("against_unfiltered", "against_blind", "seeds", "oracles", "windows", "claims", "health"),
+    *("training", "seconds"),
     *("warnings", "losses", "run", "settings", "methods", "versions", "log", "masks", "tables"),
     *("files", "digest"),
 )
@@ -26,7 +27,8 @@ OPTIONAL: Final = frozenset({"curves", "seeds", "methods", "masks", "tables", "f
 """Parts that not every summary has: a recording has no files, and most runs train with one seed,
 have no network, and all masks in the log."""
 RESULTS: Final = (
-    *("verdict", "frames", "totals", "beyond", "curves", "difference", "against_blind", "seeds"),
+    *("verdict", "frames", "totals", "beyond", "curves", "difference"),
+    *("against_unfiltered", "against_blind", "seeds"),
     *("oracles", "windows", "claims", "health", "warnings", "losses", "settings", "methods"),
 )
 """Parts that tell what came out and by which method, of which ``digest`` holds a checksum. Whoever
@@ -35,7 +37,8 @@ ALTERED: Final = "its content is not what was written"
 _LEVELS: Final = {
     **dict.fromkeys(("drive", "frames", "training", "run", "versions", "log"), 1),
     **dict.fromkeys(("beyond", "claims", "health", "seconds", "settings", "tables"), 2),
-    **dict.fromkeys(("totals", "difference", "against_blind", "seeds", "oracles"), 3),
+    **dict.fromkeys(("totals", "difference", "against_unfiltered"), 3),
+    **dict.fromkeys(("against_blind", "seeds", "oracles"), 3),
 }
 """Parts that are mappings, and how many levels of mappings they are at least."""
 

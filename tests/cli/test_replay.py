@@ -18,6 +18,7 @@ SUMMARY = {
     "frames": {"in_log": 3, "read": 3, "evaluated": 0, "labelled": 0, "skipped": {"unlabelled": 3}},
     "totals": {},
     "difference": {},
+    "against_unfiltered": {},
     "against_blind": {},
     "claims": {},
     "windows": 0,
@@ -195,7 +196,7 @@ def test_the_result_goes_to_stdout_and_progress_to_stderr(asked, capsys):
 def test_json_is_the_summary_and_nothing_else(asked, capsys):
     main(["replay", "drive.mcap", "--json"])
     printed = json.loads(capsys.readouterr().out)
-    assert printed.pop("format") == {"name": "roadeval-summary", "version": 3}
+    assert printed.pop("format") == {"name": "roadeval-summary", "version": 4}
     assert printed.pop("digest")["parts"]
     assert printed == SUMMARY
 

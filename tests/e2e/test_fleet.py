@@ -399,9 +399,9 @@ def test_copies_of_a_log_count_as_one_drive_and_are_told(tmp_path):
     (effect,) = (
         each
         for each in outcome.summary["effects"]
-        if each["metric"] == "ERR" and each["kind"] == "filter"
+        if each["metric"] == "ERR" and each["base"] == "unfiltered"
     )
-    assert (effect["drives"], effect["clusters"]) == (7, 1)
+    assert (effect["units"], effect["groups"]) == (7, 1)
     assert "in 1 group " in outcome.summary["verdict"]
     assert re.search(
         "copy0-.* is a copy of a-.*, byte for byte, and 5 more are", outcome.summary["warnings"][0]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +25,10 @@ from roadeval.data import (
 from roadeval.data.arrays import Bits
 from roadeval.data.packed import Packed
 from roadeval.evaluation import metrics
+from roadeval.evaluation.comparison import Change, ComparedResult, Comparison
+from roadeval.evaluation.pairing import Side
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.stats import Difference
 
 
 def pixels(*rows: str) -> npt.NDArray[np.uint8]:
@@ -91,7 +97,7 @@ def a_table(errors: Mapping[tuple[str, str], Sequence[int]], hertz: float = 10) 
 
 def rows_of(table: pd.DataFrame) -> Rows:
     """The rows of a table as `roadeval.results.tables.read_rows` gives them."""
-    texts = {"variant", "stage", "region"}
+    texts = {"variant", "stage", "region", "from_variant", "to_variant"}
     return Rows({n: np.array(table[n].tolist(), str if n in texts else None) for n in table})
 
 
@@ -100,3 +106,85 @@ def autoregression(rng: np.random.Generator, frames: int, rho: float) -> npt.NDA
     noise = rng.standard_normal(frames + 500)
     series: npt.NDArray[np.float64] = signal.lfilter([1], [1, -rho], noise)[500:]
     return series * np.sqrt(1 - rho**2)
+
+
+@dataclass(frozen=True)
+class APart:
+    """A drive of a result that is compared."""
+
+    tables: Mapping[str, Rows]
+    drive: str = "street"
+    digest: str | None = "d1"
+    group: str | None = None
+    tags: Mapping[str, str] = field(default_factory=dict)
+    asked: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        return self.drive
+
+    @property
+    def scored(self) -> bool:
+        return "frames" in self.tables and len(self.tables["frames"]) > 0
+
+    def rows(self, table: str) -> Rows:
+        return self.tables[table] if table in self.tables else _NOTHING[table]
+
+
+_NOTHING = {
+    "regions": rows_of(pd.DataFrame({"variant": [], "stage": [], "region": [], "frame": []})),
+    "disagreements": rows_of(
+        pd.DataFrame({"from_variant": [], "to_variant": [], "frame": [], "N": []})
+    ),
+}
+
+
+def a_part(errors: Mapping[tuple[str, str], Sequence[int]], **more: Any) -> APart:
+    """A drive whose frames have so many wrong pixels of 100 by variant and stage, at 10 Hz."""
+    return APart({"frames": rows_of(a_table(errors))}, **more)
+
+
+def a_side(label: str, errors: Sequence[int], **more: Any) -> Side:
+    """A result of one drive with a variant ``filtered``, which has so many wrong pixels of 100."""
+    return Side(label, [a_part({("filtered", "post"): errors}, **more)])
+
+
+def a_difference(
+    mean: float, low: float | None = None, high: float | None = None, p: float = 0.001, **known: Any
+) -> Difference:
+    """A difference over 12 frames, in percentage points; without ``low`` they are too few."""
+    ends = [None if end is None else end / 100 for end in (low, high)]
+    given = {"units": 0 if np.isnan(mean) else 12, "needed": 20 if low is None else None}
+    chance = None if low is None else p
+    return Difference(mean / 100, *ends, chance, 0.95, "frames", **given | known)
+
+
+def a_change(
+    difference: Difference,
+    variant: str = "filtered",
+    result: str = "new",
+    *,
+    stage: str = "post",
+    final: bool = True,
+    drives: int = 1,
+) -> Change:
+    """A mask whose every rate was 10 % and changed so much."""
+    rates = ("ERR", "FPR", "FNR", "IoU")
+    base, new = (dict.fromkeys(rates, rate) for rate in (0.1, 0.1 + difference.mean))
+    differences = dict.fromkeys(rates[:3], difference)
+    return Change(result, variant, stage, final, drives, 12, base, new, differences)
+
+
+def a_comparison(*changes: Change, **more: Any) -> Comparison:
+    """A comparison with these changes, of one drive."""
+    labels = ["base", *dict.fromkeys(change.result for change in changes)]
+    parts = ("changed_settings", "drives", "strata", "regions", "moved", "disagreements", "notes")
+    known: dict[str, Any] = {
+        "paired": True,
+        "results": tuple(ComparedResult(label, 1, 1, "street", "d", 12, None) for label in labels),
+        "changes": changes,
+        "levels": changes,
+        **dict.fromkeys(parts, ()),
+        "settings": EvaluationSettings(),
+    }
+    return Comparison(**known | more)

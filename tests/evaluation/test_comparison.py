@@ -7,28 +7,41 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from roadeval.evaluation.comparison import ComparisonError, Side, compare, variants_as_sides
-from roadeval.evaluation.comparison_result import (
+from roadeval.evaluation.comparison import (
+    ComparisonError,
     DrivesDiffer,
     EndMissing,
     FramesLeftOut,
     LogUnknown,
     Note,
+    SameLogs,
     SettingsDiffer,
     TruthDiffers,
     VariantLeftOut,
+    compare,
+    variants_as_sides,
 )
 from roadeval.evaluation.conditions import Condition, ConditionError, judge
+from roadeval.evaluation.pairing import LeftOut, Side
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.comparison import note
-from tests.evaluation.making import a_table, rows_of
+from roadeval.evaluation.stats import within_drive
+from tests.evaluation.making import APart, a_part, a_side, a_table, rows_of
 
 SETTINGS = EvaluationSettings()
 POST = ("filtered", "post")
 
 
-def a_side(label, errors, *, digest="d1", asked=None, **table):
-    return Side(label, "street", digest, rows_of(a_table({POST: errors}, **table)), asked or {})
+def altered(side, **columns):
+    """The result with columns of its frames replaced by what these functions make of them."""
+    (part,) = side.parts
+    frames = part.tables["frames"]
+    frames = frames.replace(**{name: make(frames[name]) for name, make in columns.items()})
+    return replace(side, parts=[replace(part, tables={"frames": frames})])
+
+
+def a_street(**errors):
+    """A result of one drive with these variants."""
+    return Side("street", [a_part({(name, "post"): own for name, own in errors.items()})])
 
 
 def test_a_result_against_itself_differs_by_nothing_for_sure():
@@ -56,25 +69,22 @@ def test_a_variant_that_both_have_on_no_frame_both_is_told():
     rows = rows_of(a_table({POST: [10] * 4, ("net", "post"): [20] * 4}))
     net, frame = rows["variant"] == "net", rows["frame"]
     sides = [
-        Side(name, "street", "d1", rows.take(~net | mine))
+        Side(name, [APart({"frames": rows.take(~net | mine)})])
         for name, mine in (("a", frame < 2), ("b", frame >= 2))
     ]
-    found = compare(sides, SETTINGS)
-    assert found.notes == (VariantLeftOut("a", "b", "net"),)
-    assert note(found.notes[0]) == "net is left out: a and b have it on no frame both"
+    assert compare(sides, SETTINGS).notes == (VariantLeftOut("a", "b", "net"),)
 
 
 def test_frames_are_matched_by_their_stamps_not_by_their_numbers():
     base, new = a_side("base", [10, 20, 30]), a_side("new", [10, 20, 30])
-    shifted = new.frames.replace(frame=new.frames["frame"] + 5)
-    found = compare([base, Side("new", "street", "d1", shifted)], SETTINGS)
+    found = compare([base, altered(new, frame=lambda numbers: numbers + 5)], SETTINGS)
     assert found.changes[0].difference["ERR"].mean == 0
 
 
 def test_frames_with_the_same_stamp_are_matched_in_their_order():
-    base, new = (a_side(name, [10, 20, 30]) for name in ("base", "new"))
-    frozen = [each.frames.replace(stamp_ns=np.zeros(3, int)) for each in (base, new)]
-    sides = [Side(name, "street", "d1", table) for name, table in zip("ab", frozen, strict=True)]
+    sides = [
+        altered(a_side(name, [10, 20, 30]), stamp_ns=np.zeros_like) for name in ("base", "new")
+    ]
     (change,) = compare(sides, SETTINGS).changes
     assert change.frames == 3
     assert change.difference["ERR"].mean == 0
@@ -83,7 +93,7 @@ def test_frames_with_the_same_stamp_are_matched_in_their_order():
 def test_different_drives_stand_side_by_side_without_differences():
     sides = [a_side("a", [10] * 20), a_side("b", [30] * 20, digest="d2")]
     found = compare(sides, SETTINGS)
-    assert not found.same_drive
+    assert not found.paired
     assert [change.new["ERR"] for change in found.changes] == pytest.approx([0.1, 0.3])
     assert all(change.difference == {} for change in found.changes)
     assert found.notes == (DrivesDiffer("a", "b"),)
@@ -97,23 +107,33 @@ def test_a_result_that_does_not_know_its_log_is_not_subtracted():
 
 def test_another_truth_is_told():
     base, new = a_side("base", [10, 20]), a_side("new", [10, 20])
-    relabelled = new.frames.replace(N=new.frames["N"] - 1)
-    found = compare([base, Side("new", "street", "d1", relabelled)], SETTINGS)
+    found = compare([base, altered(new, N=lambda pixels: pixels - 1)], SETTINGS)
     assert found.notes == (TruthDiffers("base", "new", 2, settings_differ=False),)
 
 
 def test_settings_that_differ_are_named_with_both_values():
-    asked = {"frames.scale": 1.0, "frames.every": 1, "labels.road": [], "topics.truth": "/a"}
-    other = asked | {"frames.scale": 0.5, "labels.road": [3]}
+    asked = {"frames.scale": 1.0, "svm.c": 1, "labels.road": [], "topics.truth": "/a"}
+    other = asked | {"frames.scale": 0.5, "labels.road": [3], "svm.c": 2}
     base, new = a_side("base", [10, 20], asked=asked), a_side("new", [10, 20], asked=other)
-    relabelled = replace(new, frames=new.frames.replace(N=new.frames["N"] - 1))
-    assert compare([base, relabelled], SETTINGS).notes == (
-        SettingsDiffer("base", "new", {"frames.scale": (1.0, 0.5), "labels.road": ([], [3])}),
+    found = compare([base, altered(new, N=lambda pixels: pixels - 1)], SETTINGS)
+    of_the_log = {"frames.scale": (1.0, 0.5), "labels.road": ([], [3])}
+    assert found.changed_settings == (
+        SettingsDiffer("base", "new", of_the_log | {"svm.c": (1, 2)}),
+    )
+    assert found.notes == (
+        SettingsDiffer("base", "new", of_the_log),
         TruthDiffers("base", "new", 2, settings_differ=True),
     )
 
 
-@pytest.mark.parametrize("asked", [None, {"frames.scale": 1.0}])
+def test_another_method_is_named_and_no_reason_for_doubt():
+    sides = [a_side(name, [10] * 12, asked={"svm.c": c}) for name, c in (("a", 1), ("b", 2))]
+    found = compare(sides, SETTINGS)
+    assert found.changed_settings == (SettingsDiffer("a", "b", {"svm.c": (1, 2)}),)
+    assert found.notes == ()
+
+
+@pytest.mark.parametrize("asked", [{}, {"frames.scale": 1.0}])
 def test_a_result_that_does_not_know_its_settings_is_compared_without_a_word(asked):
     sides = [a_side("base", [10] * 12, asked=asked), a_side("new", [12] * 12)]
     found = compare(sides, SETTINGS)
@@ -132,38 +152,187 @@ def test_a_change_between_scales_is_not_judged_but_a_level_is():
 
 
 def test_nothing_in_common_is_an_error():
-    late = a_side("new", [10, 20])
-    late = Side("new", "street", "d1", late.frames.replace(stamp_ns=late.frames["stamp_ns"] + 5))
+    late = altered(a_side("new", [10, 20]), stamp_ns=lambda stamps: stamps + 5)
     with pytest.raises(ComparisonError, match="no evaluated frame and stage in common"):
         compare([a_side("base", [10, 20]), late], SETTINGS)
 
 
 def test_frames_that_changed_most_are_named_in_both_directions():
-    base, new = a_side("base", [10] * 4, hertz=1), a_side("new", [10, 30, 10, 5], hertz=1)
+    base, new = a_side("base", [10] * 4), a_side("new", [10, 30, 10, 5])
     moved = compare([base, new], SETTINGS).moved
     assert [(row.frame, round(row.change, 2)) for row in moved] == [(1, 0.2), (3, -0.05)]
 
 
 def test_variants_of_one_result_are_compared_with_unfiltered():
     names = ("filtered", "unfiltered", "other", "blind")
-    frames = rows_of(
-        a_table({(name, "post"): [10 + place] * 12 for place, name in enumerate(names)})
-    )
-    sides = variants_as_sides(Side("street", "street", "d1", frames))
+    street = a_street(**{name: [10 + place] * 12 for place, name in enumerate(names)})
+    sides = variants_as_sides(street, names)
     assert [side.label for side in sides] == ["unfiltered", "filtered", "other"]
     found = compare(sides, SETTINGS, across_variants=True)
     told = {row.variant: row.difference["ERR"].mean for row in found.changes}
     assert told == pytest.approx({"filtered": -0.01, "other": 0.01})
 
 
+def test_variants_of_a_result_that_does_not_know_its_log_are_compared_all_the_same():
+    rows = rows_of(a_table({POST: [10] * 12, ("unfiltered", "post"): [12] * 12}))
+    street = Side("street", [APart({"frames": rows}, digest=None)])
+    sides = variants_as_sides(street, ["filtered", "unfiltered"])
+    found = compare(sides, SETTINGS, across_variants=True)
+    assert found.changes[0].difference["ERR"].mean == pytest.approx(-0.02)
+
+
 def test_chosen_variants_keep_their_order_and_must_be_there():
-    frames = rows_of(a_table({("filtered", "post"): [1], ("unfiltered", "post"): [2]}))
-    sides = variants_as_sides(Side("street", "street", "d1", frames), ["filtered", "unfiltered"])
-    assert [side.label for side in sides] == ["filtered", "unfiltered"]
+    street, there = a_street(filtered=[1], unfiltered=[2]), ["filtered", "unfiltered"]
+    assert [side.label for side in variants_as_sides(street, there, there)] == there
     with pytest.raises(ComparisonError, match="no variant net; there are filtered, unfiltered"):
-        variants_as_sides(Side("street", "street", "d1", frames), ["net", "filtered"])
-    with pytest.raises(ComparisonError, match="two are needed"):
-        variants_as_sides(Side("street", "street", "d1", frames), ["filtered"])
+        variants_as_sides(street, there, ["net", "filtered"])
+    with pytest.raises(
+        ComparisonError,
+        match=r"^street: filtered alone cannot be compared; name two of its variants with "
+        r"--variant \(filtered, unfiltered\), or a second result$",
+    ):
+        variants_as_sides(street, there, ["filtered"])
+
+
+def test_final_masks_of_all_results_are_one_family_and_the_baseline_is_not_of_it():
+    rng = np.random.default_rng(3)
+
+    def a_result(label):
+        masks = {
+            POST: 12,
+            ("filtered", "svm"): 20,
+            ("unfiltered", "post"): 14,
+            ("blind", "post"): 9,
+        }
+        own = {mask: (level + rng.integers(0, 5, 40)).tolist() for mask, level in masks.items()}
+        return Side(label, [a_part(own)])
+
+    found = compare([a_result(name) for name in ("base", "new", "newer")], SETTINGS)
+    sizes = {(c.variant, c.stage): c.difference["ERR"].comparisons for c in found.changes}
+    assert sizes == {
+        ("filtered", "post"): 4,
+        ("filtered", "svm"): None,
+        ("unfiltered", "post"): 4,
+        ("blind", "post"): None,
+    }
+
+
+# --- Several drives -------------------------------------------------------------------------------
+
+
+def a_fleet(label, errors, *, groups=None, tags=None, digests=None):
+    """A result of drives ``0``, ``1`` ..., each with so many wrong pixels frame by frame."""
+    parts = []
+    for place, own in enumerate(errors):
+        about = {
+            "digest": digests[place] if digests else f"d{place}",
+            "group": groups[place] if groups else None,
+            "tags": tags[place] if tags else {},
+        }
+        parts.append(a_part({POST: list(own)}, drive=str(place), **about))
+    return Side(label, parts)
+
+
+def noisy(drives, mean=10, seed=5):
+    return mean + np.random.default_rng(seed).integers(-3, 4, (drives, 40))
+
+
+def test_over_drives_the_drive_is_the_unit():
+    found = compare([a_fleet("a", noisy(8)), a_fleet("b", noisy(8, 12, 6))], SETTINGS)
+    (change,) = found.changes
+    told = change.difference["ERR"]
+    assert (told.unit, told.units, change.drives, change.frames) == ("drives", 8, 8, 320)
+    assert change.new["ERR"] - change.base["ERR"] == pytest.approx(told.mean)
+    assert (found.moved, found.disagreements) == ((), ())
+
+
+def test_a_drive_of_a_fleet_has_the_numbers_of_the_comparison_of_its_two_results():
+    base, new = a_fleet("a", noisy(8)), a_fleet("b", noisy(8, 12, 6))
+    row = next(row for row in compare([base, new], SETTINGS).drives if row.drive == "3")
+    alone = [replace(side, parts=side.parts[3:4]) for side in (base, new)]
+    (change,) = compare(alone, SETTINGS).changes
+    assert replace(change.difference["ERR"], p_holm=None, comparisons=None) == row.difference
+    assert (row.base, row.new) == (change.base["ERR"], change.new["ERR"])
+    assert row.difference == within_drive(noisy(8, 12, 6)[3] / 100, noisy(8)[3] / 100, SETTINGS)
+
+
+def test_a_drive_is_compared_with_a_fleet_that_has_it():
+    fleet = a_fleet("fleet", noisy(5))
+    alone = Side("alone", [a_part({POST: [20] * 40}, drive="other name", digest="d2")])
+    found = compare([fleet, alone], SETTINGS)
+    (change,) = found.changes
+    assert (change.drives, change.difference["ERR"].unit) == (1, "frames")
+    assert change.base["ERR"] == pytest.approx(noisy(5)[2].mean() / 100)
+    assert {type(note) for note in found.notes} == {LeftOut}
+
+
+def test_a_group_and_copies_of_a_log_count_as_one():
+    errors = [[10, 10], [10, 10], [40, 40], [10, 10]]
+    new = [[20, 20], [30, 30], [40, 40], [10, 10]]
+    about = {"groups": ["day", "day", None, None], "digests": ["1", "2", "3", "3"]}
+    found = compare([a_fleet("a", errors, **about), a_fleet("b", new, **about)], SETTINGS)
+    (change,) = found.changes
+    told = change.difference["ERR"]
+    assert (told.units, told.groups, told.worse, told.equal) == (4, 2, 2, 2)
+    assert told.mean == pytest.approx((0.15 + 0) / 2)
+    assert change.new["ERR"] - change.base["ERR"] == pytest.approx(told.mean)
+    assert change.base["pooled_ERR"] == pytest.approx(0.175)
+
+
+def test_drives_are_ranked_and_few_of_those_called_changed_are_not():
+    new = noisy(20)
+    new[19] += 15
+    found = compare([a_fleet("a", [[10] * 40] * 20), a_fleet("b", new)], SETTINGS)
+    first, *others = found.drives
+    assert (first.drive, first.changed) == ("19", True)
+    assert first.q == pytest.approx(20 * first.difference.p)
+    assert any(each.difference.p < 0.05 for each in others)
+    assert not any(each.changed for each in others)
+
+
+def test_changes_are_parted_by_the_tags_of_the_new_result():
+    tags = [{"weather": "rain" if place % 2 else "sun"} for place in range(12)]
+    sides = [a_fleet("a", noisy(12)), a_fleet("b", noisy(12, 12, 6), tags=tags)]
+    found = compare(sides, SETTINGS).strata
+    assert [(each.stratum.value, each.stratum.difference.units) for each in found] == [
+        ("rain", 6),
+        ("sun", 6),
+    ]
+
+
+def test_drives_that_are_left_out_or_have_moved_are_told():
+    base, new = a_fleet("a", noisy(3)), a_fleet("b", noisy(4))
+    moved = [replace(part, drive=f"new/{part.drive}") for part in new.parts]
+    notes = compare([base, replace(new, parts=moved)], SETTINGS).notes
+    assert notes[0] == SameLogs("a", "b", 3)
+    assert [(each.drive, each.result) for each in notes[1:]] == [("new/3", "b")]
+
+
+def test_results_without_a_drive_in_common_stand_side_by_side():
+    other = a_fleet("b", noisy(3), digests=["x", "y", "z"])
+    found = compare([a_fleet("a", noisy(2)), other], SETTINGS)
+    assert not found.paired
+    assert [(row.result, row.drives) for row in found.changes] == [("a", 2), ("b", 3)]
+
+
+def test_half_of_the_drives_must_be_in_common_for_a_condition_on_a_change():
+    base, new = a_fleet("a", noisy(9)), a_fleet("b", noisy(9, 12, 6))
+    few = replace(new, parts=[*new.parts[:4], *a_fleet("", noisy(5), digests="vwxyz").parts])
+    renamed = [replace(p, drive=f"{i}") for i, p in enumerate(few.parts)]
+    found = compare([base, replace(few, parts=renamed)], SETTINGS)
+    with pytest.raises(ConditionError, match="have 4 drives in common, fewer than half of the 9"):
+        judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
+    assert judge(found, [Condition.parse("post.filtered.ERR > 5%")], SETTINGS)[0].drives == 9
+
+
+def test_certainty_over_five_drives_is_not_judged_and_the_reason_is_told():
+    found = compare([a_fleet("a", noisy(5)), a_fleet("b", noisy(5, 14))], SETTINGS)
+    with pytest.raises(ConditionError, match=r"5 drives are too few for an interval \(6 are"):
+        judge(found, [Condition.parse("post.filtered.ERR > 1pp surely")], SETTINGS)
+    assert judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)[0].holds
+
+
+# --- Conditions -----------------------------------------------------------------------------------
 
 
 def test_a_condition_is_judged_on_every_new_result():
@@ -201,17 +370,15 @@ def test_a_level_is_that_of_all_frames_of_the_new_result_whatever_the_base_has()
 
 def test_a_condition_is_not_judged_where_two_ranges_hardly_overlap():
     base, new = a_side("base", [10] * 50), a_side("new", [90] * 40)
-    late = new.frames.replace(stamp_ns=new.frames["stamp_ns"] + 31 * 10**8)
-    found = compare([base, Side("new", "street", "d1", late)], SETTINGS)
+    found = compare([base, altered(new, stamp_ns=lambda s: s + 31 * 10**8)], SETTINGS)
     assert found.changes[0].frames == 19
-    with pytest.raises(ConditionError, match="fewer than half of the 40 of the shorter one"):
+    with pytest.raises(ConditionError, match="fewer than half of the 40 of the smaller one"):
         judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)
 
 
 def test_a_condition_is_judged_where_half_of_the_shorter_range_is_common():
     base, new = a_side("base", [10] * 50), a_side("new", [90] * 40)
-    later = new.frames.replace(stamp_ns=new.frames["stamp_ns"] + 30 * 10**8)
-    found = compare([base, Side("new", "street", "d1", later)], SETTINGS)
+    found = compare([base, altered(new, stamp_ns=lambda s: s + 30 * 10**8)], SETTINGS)
     assert found.changes[0].frames == 20
     assert judge(found, [Condition.parse("post.filtered.ERR > 1pp")], SETTINGS)[0].holds
 
@@ -259,14 +426,15 @@ def strings(value):
 
 def test_a_comparison_is_made_of_names_and_numbers_and_says_nothing():
     base = a_side("base", [10] * 40, asked={"frames.every": 1})
-    new = a_side("new", [12] * 30, asked={"frames.every": 2})
-    new = replace(new, frames=new.frames.replace(N=new.frames["N"] - 1))
+    new = altered(a_side("new", [12] * 30, asked={"frames.every": 2}), N=lambda pixels: pixels - 1)
     found = compare([base, new], SETTINGS)
     apart = compare([base, a_side("other", [10] * 12, digest="d2")], SETTINGS)
     unknown = compare([base, a_side("other", [10] * 12, digest=None)], SETTINGS)
-    notes = [*found.notes, *apart.notes, *unknown.notes]
-    # Whether a run reached its end is not in its tables, and a variant left out is tested above.
-    assert {type(each) for each in notes} == {*get_args(Note)} - {EndMissing, VariantLeftOut}
+    several = compare([a_fleet("a", noisy(3)), a_fleet("b", noisy(4))], SETTINGS)
+    notes = [*found.notes, *apart.notes, *unknown.notes, *several.notes]
+    # Whether a run reached its end is not in its tables, and the others are tested above.
+    elsewhere = {EndMissing, VariantLeftOut, SameLogs}
+    assert {type(each) for each in notes} == {*get_args(Note)} - elsewhere
     (judgement,) = judge(found, [Condition.parse("post.filtered.ERR>1pp")], SETTINGS)
-    for result in (found, apart, unknown, judgement):
+    for result in (found, apart, unknown, several, judgement):
         assert not [text for text in strings(astuple(result)) if " " in text]

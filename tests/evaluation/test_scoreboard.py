@@ -102,36 +102,6 @@ def test_totals_and_windows_follow_the_order_of_the_variants() -> None:
     assert board.summary()["windows"] == 2
 
 
-def test_the_difference_is_filtered_minus_unfiltered_by_stage() -> None:
-    differences = a_drive(12, a_board()).differences().filter
-    assert list(differences) == ["svm", "post"]
-    assert list(differences["post"]) == ["ACC", "ERR", "FNR", "FPR"]
-    assert differences["post"]["ERR"].mean == pytest.approx(1 / 7)
-    assert differences["post"]["FNR"].mean == pytest.approx(0.25)
-    assert differences["post"]["FPR"].mean == 0
-
-
-def test_only_frames_that_both_variants_have_are_compared() -> None:
-    board = a_board()
-    for number, variants in enumerate([(FILTERED, UNFILTERED), (FILTERED,), (UNFILTERED,)]):
-        board.add(board.score(a_frame(TRUTH, number), Role.EVALUATED, variants))
-    assert board.differences().filter["post"]["ERR"].frames == 1
-
-
-def test_without_the_pair_there_is_no_difference() -> None:
-    board = a_board()
-    board.add(board.score(a_frame(TRUTH), Role.EVALUATED, (FILTERED,)))
-    assert board.differences().filter == board.differences().blind == {}
-
-
-def test_every_final_mask_is_compared_with_the_baseline() -> None:
-    prior = BlindPrior.of_truths([1 - TRUTH])
-    differences = a_drive(12, a_board(prior)).differences().blind
-    assert list(differences) == ["filtered", "unfiltered"]
-    assert differences["unfiltered"]["ERR"].mean == pytest.approx(-1)
-    assert differences["filtered"]["ERR"].mean == pytest.approx(1 / 7 - 1)
-
-
 def test_a_variant_may_not_be_called_blind() -> None:
     with pytest.raises(ValueError, match="blind"):
         Scoreboard(EvaluationSettings(), ["blind"], None)

@@ -4,18 +4,29 @@ import numpy as np
 import pytest
 
 from roadeval.data import Rows
-from roadeval.evaluation.comparison import Side, compare, variants_as_sides
+from roadeval.evaluation.comparison import (
+    compare,
+    disagreements,
+    region_counts,
+    variants_as_sides,
+)
+from roadeval.evaluation.pairing import Side
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.where import disagreements, region_counts
-from tests.evaluation.making import a_table, rows_of
+from tests.evaluation.making import APart, a_table, rows_of
 
 SETTINGS = EvaluationSettings()
+
+
+def counted(wrong, pixels=100):
+    """TP, TN, FP, FN and N of a region half of which is road; without a pixel for -1 wrong."""
+    road = pixels // 2
+    return (road, pixels - road - wrong, wrong, 0, pixels) if wrong >= 0 else (0,) * 5
 
 
 def regions(wrong):
     """Rows of regions of 100 pixels: wrong pixels by variant and region, frame by frame."""
     cells = [
-        (frame, variant, "post", region, 50, 50 - errors, errors, 0, 100 if errors >= 0 else 0)
+        (frame, variant, "post", region, *counted(errors))
         for (variant, region), own in wrong.items()
         for frame, errors in enumerate(own)
     ]
@@ -40,19 +51,19 @@ def pairs(rows):
 
 def test_errors_are_of_the_frames_asked_for_in_their_order():
     rows = regions({("a", "lit"): [1, 2, 3], ("a", "shadow"): [4, -1, 6], ("b", "lit"): [7, 8, 9]})
-    found = region_counts(rows, "a", "post", np.array([2, 0]))
-    assert found["lit"].err.tolist() == [0.03, 0.01]
-    assert found["shadow"].err.tolist() == [0.06, 0.04]
+    found = region_counts(rows, "a", "post", Rows({"frame": np.array([2, 0])}))
+    assert found["lit"].tolist() == [[50, 47, 3, 0], [50, 49, 1, 0]]
+    assert found["shadow"][:, 2].tolist() == [6, 4]
 
 
-def test_a_frame_without_a_labelled_pixel_in_a_region_has_no_error_there():
-    found = region_counts(regions({("a", "lit"): [1, -1]}), "a", "post", np.array([0, 1]))
-    assert np.isnan(found["lit"].err).tolist() == [False, True]
+def test_a_frame_that_the_table_lacks_has_no_pixels_there():
+    found = region_counts(regions({("a", "lit"): [1]}), "a", "post", Rows({"frame": np.arange(2)}))
+    assert found["lit"].sum(axis=1).tolist() == [100, 0]
 
 
 def a_run(first, second, **more):
     table = a_table({("first", "post"): first, ("second", "post"): second})
-    return Side("street", "street", "d1", rows_of(table), **more)
+    return Side("street", [APart({"frames": rows_of(table), **more})])
 
 
 def test_a_mask_may_be_better_in_one_region_and_worse_in_another():
@@ -88,17 +99,19 @@ def test_of_two_results_the_same_variant_is_compared():
 
 def test_a_region_of_other_pixels_is_left_out():
     base = regions({("first", "lit"): [10] * 20, ("first", "shadow"): [10] * 20})
-    fewer = np.where(base["region"] == "shadow", 60, base["N"])
-    other = base.replace(N=fewer)
+    more = base["TN"] + (base["region"] == "shadow")
+    other = base.replace(TN=more, N=base["N"] + (base["region"] == "shadow"))
     run = a_run([10] * 20, [20] * 20, regions=base)
     found = compare([run, a_run([10] * 20, [20] * 20, regions=other)], SETTINGS)
     assert [row.region for row in found.regions] == ["lit"]
 
 
-def shaded(name, shares, wrong=10):
-    """Rows of a region whose pixels are these shares of 100, and of one that is the rest."""
-    rows = regions({("first", name): [wrong] * len(shares)})
-    return rows.replace(N=np.array(shares), TP=np.array(shares) // 2)
+def shaded(name, shares):
+    """Rows of a region whose pixels are these shares of 100, none of them wrong."""
+    rows = regions({("first", name): [0] * len(shares)})
+    cells = zip(*(counted(0, share) for share in shares), strict=True)
+    names = ("TP", "TN", "FP", "FN", "N")
+    return rows.replace(**{n: np.array(own) for n, own in zip(names, cells, strict=True)})
 
 
 @pytest.mark.parametrize("name", ["shadow", "true_shadow"])
@@ -126,7 +139,7 @@ def test_true_shadow_counts_before_what_was_detected():
 
 
 def test_without_shadow_no_frames_are_told_apart():
-    run = a_run([10] * 30, [20] * 30, regions=shaded("shadow", [0] * 30, 0))
+    run = a_run([10] * 30, [20] * 30, regions=shaded("shadow", [0] * 30))
     assert not compare([run, run], SETTINGS).regions
 
 

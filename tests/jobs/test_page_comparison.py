@@ -1,13 +1,14 @@
 """The frames of compared results on a page."""
 
-from roadeval.evaluation.comparison import Side, compare
+from roadeval.evaluation.comparison import compare
+from roadeval.evaluation.pairing import Side
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.jobs.page_comparison import browsed
-from tests.evaluation.making import a_table, rows_of
+from tests.evaluation.making import a_part
 
 
 def a_side(label, masks):
-    return Side(label, "street", "digest", rows_of(a_table(masks)))
+    return Side(label, [a_part(masks)])
 
 
 def page_of(base, new):

@@ -129,7 +129,7 @@ def test_every_drive_has_every_replay_with_every_seed():
 
 def test_of_a_summary_the_final_masks_are_kept():
     change = {"mean": 0.1, "low": 0.0, "high": 0.2, "p": 0.04, "p_holm": 0.08, "comparisons": 2}
-    changes = {rate: change | {"frames": 20} for rate in ("ERR", "FPR", "FNR")}
+    changes = {rate: change | {"units": 20} for rate in ("ERR", "FPR", "FNR")}
     errs = {rate: [0.3, 0.4] for rate in ("ERR", "FPR", "FNR")}
     wrong = {"post": dict.fromkeys(("ERR", "FPR", "FNR"), 0.2)}
     found = kept(

@@ -2,10 +2,12 @@
 
 import io
 import re
+from dataclasses import asdict
 
 import pandas as pd
 from pypdf import PdfReader
 
+from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import Cell, Document
 from roadeval.report.figures import FigureData
 from roadeval.report.findings import Commands, Findings, PairedComparison
@@ -54,8 +56,12 @@ def a_total(err, fpr=0.25, fnr=0.5):
 
 def a_difference(mean, low=None, high=None):
     """A paired difference, as ``summary.json`` has it."""
-    told = {"mean": mean, "low": low, "high": high, "confidence": 0.95, "frames": 1200}
-    return told | {"effective_frames": 40.0, "p_holm": 0.01, "comparisons": 3}
+    p = None if low is None else 0.003
+    known = {"effective": 40.0, "p_holm": p and 0.01, "comparisons": p and 3}
+    needed = 2000 if low is None else None
+    units = 0 if mean is None else 1200
+    difference = Difference(mean, low, high, p, 0.95, "frames", units, needed=needed, **known)
+    return asdict(difference)
 
 
 def a_pair(changes, wrong, pixels=(30, 10, 1000), control="unfiltered"):

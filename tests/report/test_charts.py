@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from roadeval.data import colours
-from roadeval.evaluation.comparison_result import MaskComparison
+from roadeval.evaluation.comparison import Change
 from roadeval.evaluation.metrics import METRICS, SHORT
-from roadeval.evaluation.uncertainty import Difference
+from roadeval.evaluation.stats import Difference
 from roadeval.report import charts as folder
 from roadeval.report.chart import ChartKind, Look, legend, looks, looks_of_results
 from roadeval.report.charts import differences, rates
@@ -20,7 +20,7 @@ from roadeval.report.findings import ErrorHeatmap
 from tests.evaluation.making import a_table, rows_of
 
 FILTERED, UNFILTERED = (colours.hex_of(c) for c in (colours.FILTERED, colours.UNFILTERED))
-CHANGE = Difference(0.01, -0.02, 0.04, 0.95, 0.5, 12, None)
+CHANGE = Difference(0.01, -0.02, 0.04, 0.5, 0.95, "frames", 12)
 
 
 def numbers(series):
@@ -146,7 +146,7 @@ def test_a_frame_that_got_worse_has_the_colour_of_the_other_variant():
 def test_a_comparison_shows_changes_with_their_intervals():
     unsure = replace(CHANGE, low=None, high=None)
     changes = {"ERR": CHANGE, "FPR": unsure, "FNR": CHANGE}
-    row = MaskComparison("new", "filtered", "post", True, 12, {}, {}, changes)
+    row = Change("new", "filtered", "post", True, 1, 12, {}, {}, changes)
     first, second, _ = differences.changes([row])
     (own,) = first.series
     assert (own.y, own.low, own.high) == ([1], [-2], [4])
@@ -155,7 +155,7 @@ def test_a_comparison_shows_changes_with_their_intervals():
 
 def test_each_result_of_another_drive_has_a_row():
     own = {"ERR": 0.1, "FPR": 0.2, "FNR": 0.3}
-    rows = [MaskComparison(n, "filtered", "post", True, 12, {}, own, {}) for n in ("old", "new")]
+    rows = [Change(n, "filtered", "post", True, 1, 12, {}, own, {}) for n in ("old", "new")]
     made = differences.levels(rows)
     assert [chart.names for chart in made] == [["old", "new"]] * 3
     assert [chart.series[0].y for chart in made] == [[10, 10], [20, 20], [30, 30]]

@@ -1,87 +1,77 @@
 """What is said of a comparison, and what its JSON file holds."""
 
-import math
+from dataclasses import replace
 
 import pytest
 
-from roadeval.evaluation.comparison_result import (
-    ComparedResult,
-    Comparison,
+from roadeval.evaluation.comparison import (
+    DriveChange,
     DrivesDiffer,
     FramesLeftOut,
     LogUnknown,
-    MaskComparison,
+    SameLogs,
     SettingsDiffer,
     TruthDiffers,
+    VariantLeftOut,
 )
 from roadeval.evaluation.conditions import Condition
-from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.uncertainty import Difference
-from roadeval.results.comparison import as_dict, judged, verdict, warnings
+from roadeval.evaluation.pairing import Because, LeftOut
+from roadeval.results.comparison import as_dict, changed_settings, judged, verdict, warnings, where
+from roadeval.results.sentences import sentence
+from tests.evaluation.making import a_change, a_comparison, a_difference
+
+WORSE = a_difference(1.2, 0.5, 2)
 
 
-def a_change(
-    mean, low=None, high=None, p=0.001, *, variant="filtered", result="new", final=True, **known
-):
-    """The change of a mask's ERR, in percentage points."""
-    ends = [None if end is None else end / 100 for end in (low, high)]
-    known = {"frames": 0 if math.isnan(mean) else 12, "effective_frames": None} | known
-    change = Difference(mean / 100, *ends, 0.95, p, **known)
-    rates = {"ERR": 0.1}, {"ERR": 0.1 + mean / 100}
-    return MaskComparison(result, variant, "post", final, 12, *rates, {"ERR": change})
-
-
-def a_comparison(*changes, notes=(), same_drive=True):
-    results = tuple(ComparedResult(name, "street", "d", 12, None) for name in ("base", "new"))
-    return Comparison(same_drive, results, changes, changes, (), notes, EvaluationSettings())
-
-
-@pytest.mark.parametrize(
-    ("change", "told"),
-    [
-        (a_change(1.2, 0.5, 2), "filtered of new is worse, ERR +1.20 pp [+0.50, +2.00]"),
-        (a_change(-1.2, -2, -0.5), "filtered of new is better, ERR -1.20 pp [-2.00, -0.50]"),
-        (
-            a_change(1.2, 0.5, 2, p_holm=0.1, comparisons=9),
-            "filtered of new is probably worse, ERR +1.20 pp [+0.50, +2.00]",
-        ),
-        (
-            a_change(-1.2, -3, 0.5, p=0.1),
-            "filtered of new is probably better, ERR -1.20 pp [-3.00, +0.50]",
-        ),
-        (
-            a_change(1.2, -0.5, 3, p=0.4),
-            "filtered of new: cannot tell, ERR +1.20 pp [-0.50, +3.00]",
-        ),
-        (
-            a_change(0.1, -0.5, 0.6, p=0.4),
-            "filtered of new is neither better nor worse by more than 0.60 pp, ERR +0.10 pp "
-            "[-0.50, +0.60]",
-        ),
-        (a_change(1.2), "filtered of new: 12 frames are too few for an interval, ERR +1.20 pp"),
-        (a_change(0, 0, 0), "filtered of new has the same ERR on every frame"),
-        (a_change(math.nan), "filtered of new: ERR is undefined on every frame"),
-        (a_change(1, 0.5, 2, result="filtered"), "filtered is worse, ERR +1.00 pp [+0.50, +2.00]"),
-    ],
-)
-def test_the_verdict_says_better_or_worse_and_how_sure(change, told):
-    assert verdict(a_comparison(change)) == f"Against base: {told} (95 % intervals)."
-
-
-def test_the_verdict_is_on_final_masks_and_leaves_the_baseline_out():
+def test_the_verdict_is_the_sentence_on_the_final_mask_and_leaves_the_baseline_out():
     rows = (
-        a_change(9, 8, 10, final=False),
-        a_change(1, 0.5, 2),
-        a_change(0, 0, 0, variant="blind"),
+        a_change(a_difference(9, 8, 10), final=False),
+        a_change(WORSE),
+        a_change(a_difference(0, 0, 0), "blind"),
     )
-    told = verdict(a_comparison(*rows))
-    assert told.count("ERR") == 1
-    assert "is worse, ERR +1.00 pp" in told
+    found = a_comparison(*rows)
+    told = sentence(WORSE, "new instead of base", "ERR of post", found.settings)
+    assert verdict(found) == told
+
+
+def test_of_several_variants_each_is_named():
+    found = a_comparison(a_change(WORSE), a_change(WORSE, "net"))
+    assert verdict(found).startswith("filtered: on these 12 frames new instead of base raises")
+    assert " net: on these 12 frames" in verdict(found)
+    variants = a_comparison(a_change(WORSE, "net", "net"), a_change(WORSE, "robust", "robust"))
+    assert verdict(variants).startswith("On these 12 frames net instead of base raises")
 
 
 def test_of_different_drives_there_is_no_difference_to_tell():
-    told = verdict(a_comparison(same_drive=False))
+    told = verdict(a_comparison(paired=False))
     assert told == "Different drives, side by side: no difference is given."
+
+
+def test_changed_settings_are_told_of_each_result_and_some_of_many():
+    chains = ["svm"], ["trees", "post"]
+    settings = {"preset": ("paper", "gated"), "chain": chains, "svm.c": (1, 2)}
+    changed = (SettingsDiffer("base", "new", settings),)
+    found = a_comparison(a_change(WORSE), changed_settings=changed)
+    assert changed_settings(found) == [
+        "Changed settings: `preset` paper to gated, `chain` svm to trees, post, `svm.c` 1 to 2."
+    ]
+    rows = a_change(WORSE), a_change(WORSE, result="newer")
+    several = a_comparison(*rows, changed_settings=changed)
+    assert changed_settings(several, 1) == [
+        "Changed settings in new: `preset` paper to gated and 2 more."
+    ]
+
+
+def test_drives_that_changed_are_counted_by_direction():
+    def a_drive(mean, q):
+        about = ("new", "filtered", "post", "street", 40)
+        return DriveChange(*about, 0.1, 0.1 + mean, a_difference(100 * mean, 0, 1), q)
+
+    rows = (a_drive(0.02, 0.01), a_drive(-0.02, 0.02), a_drive(0.01, 0.3), a_drive(0.01, None))
+    assert where(a_comparison(a_change(WORSE), drives=rows)) == [
+        "filtered of new: ERR changed on 2 of 3 drives (worse on 1, better on 1; false discovery "
+        "rate 5 %)"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -94,7 +84,7 @@ def test_of_different_drives_there_is_no_difference_to_tell():
         (
             SettingsDiffer("a", "b", {"frames.scale": (1.0, 0.5), "labels.road": ([], [3])}),
             "a and b were replayed with different settings (`frames.scale` 1 and 0.5, "
-            "`labels.road` not given and [3]): part of the change may be theirs",
+            "`labels.road` not given and 3): part of the change may be theirs",
         ),
         (
             TruthDiffers("a", "b", 2, settings_differ=False),
@@ -104,6 +94,16 @@ def test_of_different_drives_there_is_no_difference_to_tell():
         (
             TruthDiffers("a", "b", 2, settings_differ=True),
             "the truth differs on 2 frames between a and b: part of the change may be the truth's",
+        ),
+        (VariantLeftOut("a", "b", "net"), "net is left out: a and b share no frame of it"),
+        (
+            SameLogs("a", "b", 3),
+            "3 drives have other names in a and b, and are taken for the same by the SHA-256 of "
+            "their logs",
+        ),
+        (
+            LeftOut("street", "a", "b", Because.ABSENT),
+            "1 drive is left out of a (not in b): street",
         ),
         (LogUnknown("a"), "a does not say which log it is of: nothing is subtracted"),
         (
@@ -115,6 +115,16 @@ def test_of_different_drives_there_is_no_difference_to_tell():
 )
 def test_each_note_is_told(note, told):
     assert warnings(a_comparison(notes=(note,))) == [told]
+
+
+def test_drives_left_out_for_one_reason_are_told_together_and_five_are_named():
+    notes = [LeftOut(f"d{place}", "a", "b", Because.UNSCORED) for place in range(7)]
+    notes.append(LeftOut("other", "a", "b", Because.OTHER_LOG))
+    assert warnings(a_comparison(notes=(*notes, LogUnknown("a")))) == [
+        "7 drives are left out of a (not scored in both): d0, d1, d2, d3, d4 and 2 more",
+        "1 drive is left out of a (of another log in b): other",
+        "a does not say which log it is of: nothing is subtracted",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -130,12 +140,13 @@ def test_each_note_is_told(note, told):
     ],
 )
 def test_a_judged_condition_is_told_with_the_numbers_that_it_rests_on(text, told):
-    judgement = Condition.parse(text).judge(a_change(1.2, 0.5, 2))
+    judgement = Condition.parse(text).judge(a_change(WORSE))
     assert judged(judgement) == f"post.filtered.ERR of new {told.format(text)}"
+    assert " over 8 drives" in judged(replace(judgement, drives=8))
 
 
 def test_the_file_holds_the_facts_beside_the_sentences():
-    change = a_change(1.2, 0.5, 2)
+    change = a_change(WORSE)
     found = a_comparison(change, notes=(FramesLeftOut("base", "new", 2),))
     judgements = [Condition.parse("post.filtered.ERR > 1pp surely").judge(change)]
     content = as_dict(found, judgements)
@@ -147,6 +158,7 @@ def test_the_file_holds_the_facts_beside_the_sentences():
     (condition,) = content["conditions"]
     assert condition.pop("sentence") == judged(judgements[0])
     assert condition.pop("after") == pytest.approx(0.112)
+    assert condition.pop("value") == pytest.approx(0.012)
     assert condition == {
         "text": "post.filtered.ERR > 1pp surely",
         "stage": "post",
@@ -157,6 +169,7 @@ def test_the_file_holds_the_facts_beside_the_sentences():
         "is_change": True,
         "surely": True,
         "result": "new",
+        "drives": 1,
         "before": 0.1,
         "low": 0.005,
         "high": 0.02,

@@ -378,7 +378,7 @@ def test_the_summary_writes_undefined_as_null_and_keeps_its_order() -> None:
     document = json.loads(summary_text(the_rest(a_board()) | {"totals": {"ERR": math.nan}}))
     assert tuple(document) == tuple(part for part in PARTS if part not in OPTIONAL)
     assert document["totals"] == {"ERR": None}
-    assert document["format"] == {"name": "roadeval-summary", "version": 3}
+    assert document["format"] == {"name": "roadeval-summary", "version": 4}
 
 
 def test_a_summary_with_a_part_too_few_or_too_many_is_refused() -> None:

@@ -36,7 +36,7 @@ from roadeval.results.tables import ResultsError
             {"format": FORMAT, "versions": ["0.2.0"]},
             "made by an earlier version of roadeval, whose",
         ),
-        ({"format": {**FORMAT, "version": 4}}, "made by a later version: update roadeval"),
+        ({"format": {**FORMAT, "version": 5}}, "made by a later version: update roadeval"),
         (
             {"format": {**FORMAT, "version": 9}, "versions": {"roadeval": "9.\n"}},
             r"made by roadeval 9.\n, a later version: update",
@@ -109,7 +109,7 @@ def test_a_damaged_digest_is_damage_and_another_format_is_told_as_such():
     for digest in ("x", {}, {"parts": 5, "sha256": ""}, {"parts": [[]], "sha256": ""}):
         with pytest.raises(ResultsError, match="here: damaged"):
             parse_summary(json.dumps(WRITTEN | {"digest": digest}), "here")
-        later = {"format": {**FORMAT, "version": 4}, "digest": digest}
+        later = {"format": {**FORMAT, "version": 5}, "digest": digest}
         with pytest.raises(ResultsError, match="made by a later version"):
             parse_summary(json.dumps(later), "here")
 

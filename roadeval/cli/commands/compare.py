@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Final
 
 import typer
 
 from roadeval.cli import arguments, console, messages
 from roadeval.cli.commands.report import inspect_command
 from roadeval.cli.exit_codes import ExitCode
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from roadeval.report.pdf.typeset import Paper
 
 
 def _ending(paths: list[Path] | None) -> list[Path] | None:
@@ -31,8 +24,7 @@ Results = Annotated[
     typer.Argument(
         metavar="BASE NEW...",
         show_default=False,
-        help="Recordings or results folders; of a single one its variants are compared. Or two "
-        "fleets.",
+        help="Recordings, results folders or fleets; of a single one its variants are compared.",
         readable=False,
     ),
 ]
@@ -41,8 +33,8 @@ Variants = Annotated[
     typer.Option(
         "--variant",
         metavar="NAME|BASE'S=NEW'S",
-        help="Only this one; of a single result the first is the base. Of two results, one may be "
-        "held against another: a=b. Repeatable.",
+        help="Only this one; of a single result the first is the base. Of several, a variant of "
+        "the base may be held against another: a=b. Repeatable.",
     ),
 ]
 Outputs = Annotated[
@@ -68,72 +60,32 @@ def compare(
     json: arguments.Json = False,
     quiet: arguments.Quiet = False,
 ) -> int:
-    """Compare results of one drive, a result's variants, or two fleets.
+    """Compare results with the first, or the variants of one.
 
-    Frame by frame; those that either trained on are left out. Results of different drives are put
-    side by side without differences. Exit code 4 if a --fail-if condition holds; 1 if one cannot be
-    judged, as where two results have fewer than ten frames in common, or fewer than half of those
-    of the shorter one. Fleets are paired by drive, and judged over drives.
+    Drives are paired by name or log, and frames by stamp; frames that either trained on are left
+    out. One drive is judged over its frames, several over drives. Results of different drives are
+    put side by side without differences. Exit code 4 if a --fail-if condition holds; 1 if one
+    cannot be judged, as where two results share fewer than ten frames, or fewer than half of those
+    of the smaller one.
     """
-    from roadeval.jobs.outputs import holding
-    from roadeval.results.fleet.kind import are_fleets
-
-    size = arguments.paper_of(paper)
-    told = _fleets if are_fleets(results) else _results
-    with holding(*(output or ()), inputs=results):
-        shown = told(results, variant, fail_if or [], output or [], size)
-    if json:
-        console.emit(shown.json().rstrip())
-    elif not quiet:
-        shown.show(shown.content, console.results())
-    for warning in shown.content["warnings"]:
-        messages.warning(warning)
-    for sentence in shown.held:
-        messages.error(sentence)
-    return ExitCode.CONDITION_HELD if shown.held else ExitCode.DONE
-
-
-@dataclass(frozen=True, slots=True)
-class _Shown:
-    """A comparison, whatever of: its content, conditions that hold, and how it is shown."""
-
-    content: Mapping[str, Any]
-    held: Sequence[str]
-    json: Callable[[], str]
-    show: Callable[[Mapping[str, Any], Console], None]
-
-
-def _results(
-    results: list[Path],
-    variants: list[str] | None,
-    conditions: list[str],
-    outputs: list[Path],
-    paper: Paper,
-) -> _Shown:
     from roadeval.cli.screens import compare as screen
     from roadeval.jobs import compare as comparing
+    from roadeval.jobs.outputs import holding
 
-    compared = comparing.compare(results, variants=variants, fail_if=conditions)
-    for path in outputs:
-        comparing.write(compared, path, paper=paper, inspect=inspect_command)
-    return _Shown(compared.content, compared.held, lambda: comparing.as_json(compared), screen.show)
-
-
-def _fleets(
-    results: list[Path],
-    variants: list[str] | None,
-    conditions: list[str],
-    outputs: list[Path],
-    paper: Paper,
-) -> _Shown:
-    from roadeval.cli.screens import compare_fleets as screen
-    from roadeval.jobs import compare_fleets as comparing
-
-    base, new = results
-    compared = comparing.compare_fleets(base, new, variants=variants, fail_if=conditions)
-    for path in outputs:
-        comparing.write(compared, path, paper=paper)
-    return _Shown(compared.content, compared.held, lambda: comparing.as_json(compared), screen.show)
+    size = arguments.paper_of(paper)
+    with holding(*(output or ()), inputs=results):
+        compared = comparing.compare(results, variants=variant, fail_if=fail_if or [])
+        for path in output or []:
+            comparing.write(compared, path, paper=size, inspect=inspect_command)
+    if json:
+        console.emit(comparing.as_json(compared).rstrip())
+    elif not quiet:
+        screen.show(compared.comparison, compared.judgements, console.results())
+    for warning in compared.warnings:
+        messages.warning(warning)
+    for sentence in compared.held:
+        messages.error(sentence)
+    return ExitCode.CONDITION_HELD if compared.held else ExitCode.DONE
 
 
 COMMAND: Final = compare

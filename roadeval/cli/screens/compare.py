@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Final
 
 from roadeval.cli.screens import tables
-from roadeval.cli.screens.tables import Row, marked, percent, points
-from roadeval.data.words import defined
+from roadeval.cli.screens.tables import Row, interval, marked, percent, points
+from roadeval.evaluation.comparison import Change, Comparison, DriveChange
+from roadeval.evaluation.conditions import Judgement
+from roadeval.evaluation.effects import TESTED
 from roadeval.evaluation.metrics import SHORT
-from roadeval.results.certainty import correction, too_few
+from roadeval.results.comparison import NAMED, changed_settings, judged, verdict, where
+from roadeval.results.sentences import correction
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,62 +21,64 @@ if TYPE_CHECKING:
 CHANGE: Final = ("base %", "new %", "change pp", "interval pp")
 LEVEL: Final = ("frames", *(f"{name} %" for name in SHORT))
 """The titles of numbers where results are subtracted, and where they stand side by side."""
-Change = Mapping[str, Any]
-"""A row of a comparison's ``changes``."""
+DRIVES: Final = 10
+"""Drives that changed, which are named for each mask."""
 
 
-def show(content: Mapping[str, Any], out: Console) -> None:
+def show(comparison: Comparison, judgements: Sequence[Judgement], out: Console) -> None:
     """Print what changed, what that means, and the conditions that were kept."""
-    base = content["results"][0]["label"]
-    for title, rows in _groups(content["changes"]):
-        if content["same_drive"]:
-            out.print(f"{title} against {base}" if title else f"against {base}", soft_wrap=True)
-            tables.show(("variant", "stage", "rate"), CHANGE, list(_changes(rows)), out)
-        else:
+    for line in changed_settings(comparison, NAMED):
+        out.print(line, soft_wrap=True)
+    base, *_ = comparison.results
+    for title, rows in _groups(comparison.changes):
+        if not comparison.paired:
             out.print(title, soft_wrap=True)
             tables.show(("variant", "stage"), LEVEL, list(_levels(rows)), out)
-        if legend := correction(change["difference"].get("ERR", {}) for change in rows):
+            out.print()
+            continue
+        drives = max(row.drives for row in rows)
+        over = f": {drives} drives in common" if drives > 1 else ""
+        against = f"{title} against {base.label}" if title else f"against {base.label}"
+        out.print(f"{against}{over}", soft_wrap=True)
+        tables.show(("variant", "stage", "rate"), CHANGE, list(_changes(rows)), out)
+        if legend := correction(change.difference[TESTED] for change in rows):
             out.print(legend)
-        for change in rows:
-            told = change["difference"].get("ERR")
-            if change["final"] and told and told["low"] is None:
-                out.print(f"{change['variant']}: {_unsure(told)}", soft_wrap=True)
         out.print()
-    out.print(content["verdict"])
-    for sentence in content["where"]:
+    _show_drives(comparison, out)
+    out.print(verdict(comparison))
+    for sentence in where(comparison):
         out.print(sentence)
-    for condition in content["conditions"]:
-        if not condition["holds"]:
-            out.print(condition["sentence"], soft_wrap=True)
+    for judgement in judgements:
+        if not judgement.holds:
+            out.print(judged(judgement), soft_wrap=True)
 
 
 def _groups(changes: Sequence[Change]) -> list[tuple[str, list[Change]]]:
     """Part the rows by result; the variants of a single one stay together."""
-    if all(change["result"] == change["variant"] for change in changes):
+    if all(change.result == change.variant for change in changes):
         return [("", list(changes))]
-    labels = dict.fromkeys(change["result"] for change in changes)
-    return [(label, [c for c in changes if c["result"] == label]) for label in labels]
+    labels = dict.fromkeys(change.result for change in changes)
+    return [(label, [c for c in changes if c.result == label]) for label in labels]
 
 
 def _changes(changes: Sequence[Change]) -> Iterator[Row]:
     """Yield a row for each change of ERR, and of final masks for the other rates, too."""
     for change, above in zip(changes, (None, *changes), strict=False):
-        told = change["difference"]
-        rates = [*SHORT] if change["final"] else ["ERR"]
+        rates = [*SHORT] if change.final else [TESTED]
         for rate in rates:
-            first = rate == rates[0]
+            first, told = rate == rates[0], change.difference[rate]
             yield Row(
                 [
-                    change["variant"] if first and _begins(change, above) else "",
-                    change["stage"] if first else "",
+                    change.variant if first and _begins(change, above) else "",
+                    change.stage if first else "",
                     rate,
-                    percent(change["base"][rate]),
-                    percent(change["new"][rate]),
-                    points(told[rate]["mean"]),
-                    marked(told[rate]),
+                    percent(change.base[rate]),
+                    percent(change.new[rate]),
+                    points(told.mean),
+                    marked(told),
                 ],
-                bold=change["final"] and first,
-                ends=change["final"] and rate == rates[-1],
+                bold=change.final and first,
+                ends=change.final and rate == rates[-1],
             )
 
 
@@ -81,21 +86,41 @@ def _levels(changes: Sequence[Change]) -> Iterator[Row]:
     for change, above in zip(changes, (None, *changes), strict=False):
         yield Row(
             [
-                change["variant"] if _begins(change, above) else "",
-                change["stage"],
-                str(change["frames"]),
-                *(percent(change["new"][rate]) for rate in SHORT),
+                change.variant if _begins(change, above) else "",
+                change.stage,
+                str(change.frames),
+                *(percent(change.new[rate]) for rate in SHORT),
             ],
-            ends=change["final"],
+            ends=change.final,
         )
 
 
 def _begins(change: Change, above: Change | None) -> bool:
-    return above is None or above["variant"] != change["variant"]
+    return above is None or above.variant != change.variant
 
 
-def _unsure(told: Mapping[str, Any]) -> str:
-    """Return why there is no interval."""
-    if not defined(told["mean"]):
-        return "ERR is undefined on every frame"
-    return f"no interval: {too_few(told['frames'])}"
+def _show_drives(comparison: Comparison, out: Console) -> None:
+    """Print the drives that changed, the surest first."""
+    changed = [row for row in comparison.drives if row.changed]
+    for mask in dict.fromkeys((row.result, row.variant) for row in changed):
+        rows = [row for row in changed if (row.result, row.variant) == mask]
+        out.print(f"Drives on which {mask[1]} of {mask[0]} changed", soft_wrap=True)
+        tables.show(("drive",), (*CHANGE, "q"), [_drive(row) for row in rows[:DRIVES]], out)
+        if len(rows) > DRIVES:
+            out.print(f"and {len(rows) - DRIVES} more; --json and -o name them all")
+        out.print()
+
+
+def _drive(row: DriveChange) -> Row:
+    told = row.difference
+    assert row.q is not None
+    return Row(
+        [
+            row.drive,
+            percent(row.base),
+            percent(row.new),
+            points(told.mean),
+            interval(told.low, told.high),
+            "<0.001" if row.q < 0.001 else f"{row.q:.3f}",
+        ]
+    )

@@ -73,8 +73,7 @@ def show_effects(effects: Sequence[Mapping[str, Any]], out: Console) -> None:
                 f"{each['variant']} - {each['base']}",
                 points(each["mean"]),
                 interval(each["low"], each["high"]),
-                str(each["worse"]),
-                str(each["better"]),
+                *("-" if each[name] is None else str(each[name]) for name in ("worse", "better")),
                 points(each["pooled"]),
             ]
         )

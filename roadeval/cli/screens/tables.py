@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data import words
-from roadeval.results.certainty import MARK, stands
+from roadeval.evaluation.stats import Difference
+from roadeval.results.sentences import MARK, stands
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -73,10 +74,11 @@ def interval(low: float | None, high: float | None) -> str:
     return _ascii(words.interval(low, high))
 
 
-def marked(difference: Mapping[str, Any]) -> str:
+def marked(difference: Difference | Mapping[str, Any]) -> str:
     """Return the interval of a difference, with a mark where it stands after correction."""
-    stands_out = stands(difference["p_holm"], difference["confidence"])
-    return f"{interval(difference['low'], difference['high'])} {MARK if stands_out else ' '}"
+    told = asdict(difference) if isinstance(difference, Difference) else difference
+    stands_out = stands(told["p_holm"], told["confidence"])
+    return f"{interval(told['low'], told['high'])} {MARK if stands_out else ' '}"
 
 
 def _ascii(text: str) -> str:

@@ -26,7 +26,7 @@ from roadeval.report.chart import (
 from roadeval.report.charts.rates import series
 
 if TYPE_CHECKING:
-    from roadeval.evaluation.comparison_result import MaskComparison
+    from roadeval.evaluation.comparison import Change
 
 MEAN: Final = "mean over drives"
 NAMED: Final = 60
@@ -69,7 +69,7 @@ def difference(
     )
 
 
-def changes(finals: Sequence[MaskComparison]) -> list[Chart]:
+def changes(finals: Sequence[Change]) -> list[Chart]:
     """Return each result's changes of rates against the base, a chart a rate."""
     return [
         Chart(
@@ -88,7 +88,7 @@ def changes(finals: Sequence[MaskComparison]) -> list[Chart]:
     ]
 
 
-def levels(finals: Sequence[MaskComparison]) -> list[Chart]:
+def levels(finals: Sequence[Change]) -> list[Chart]:
     """Return the rates of several results' final masks, a chart a rate."""
     results = list(dict.fromkeys(row.result for row in finals))
     variants = list(dict.fromkeys(row.variant for row in finals))

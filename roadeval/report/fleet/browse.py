@@ -6,15 +6,14 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from roadeval.data.words import DASH, number, percent, points
+from roadeval.evaluation.effects import BASES
 from roadeval.report.blocks import Block, Cell, Heading, Table, Text
 from roadeval.report.browse import LongTable
-from roadeval.report.fleet.drives import by_kind, tags_in_words
+from roadeval.report.fleet.drives import against, tags_in_words
 from roadeval.report.fleet.findings import FleetFindings, Row
 
 _WORDS: Final = ("drive", "state", "tags", "group")
 _LIGHT: Final = ("luminance", "contrast", "shadow", "sun")
-_KINDS: Final = {"filter": "filter, pp", "blind": "against blind, pp"}
-"""Differences of the first variant that have a column, with its title."""
 
 
 def section(findings: FleetFindings) -> Iterator[Block]:
@@ -31,11 +30,11 @@ def section(findings: FleetFindings) -> Iterator[Block]:
 def drives_table(findings: FleetFindings) -> Table:
     """Tabulate every drive with its state, its rates, its light and its tags."""
     scores = {row["drive"]: row for row in findings.scores}
-    changes = {kind: {r["drive"]: r["mean"] for r in by_kind(findings, kind)} for kind in _KINDS}
-    shown = {kind: values for kind, values in changes.items() if values}
+    changes = {base: {r["drive"]: r["mean"] for r in against(findings, base)} for base in BASES}
+    shown = {base: values for base, values in changes.items() if values}
     tags = {each["drive"]: tags_in_words(each["tags"]) for each in findings.summary["drives"]}
     pages = findings.pages()
-    differences = [_KINDS[kind] for kind in shown]
+    differences = [f"against {base}, pp" for base in shown]
     return Table(
         [*_WORDS, "frames", "ERR", "FPR", "FNR", *differences, *_LIGHT],
         [

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from roadeval.data.words import interval, number, points
-from roadeval.evaluation.drives import Stratum
+from roadeval.evaluation.stats import Stratum
 from roadeval.report.blocks import Block, Cell, Table, Text
-from roadeval.results.certainty import MARK, stands
 from roadeval.results.schema import LIGHT, TAG
+from roadeval.results.sentences import MARK, stands
 
 STRATA: Final = 30
 """Parts of a fleet that a table has, at most."""
@@ -35,11 +35,11 @@ class MarkedRow:
     @classmethod
     def of_stratum(cls, stratum: Stratum) -> MarkedRow:
         """Return the row of a part of a comparison."""
-        over = stratum.across
+        over = stratum.difference
         return cls(
-            *(stratum.by, str(stratum.value), over.drives, over.mean, over.low, over.high),
-            *(over.worse, over.better, stands(stratum.p_holm, over.confidence)),
-            stratum.comparisons,
+            *(stratum.by, str(stratum.value), over.units, over.mean, over.low, over.high),
+            *(over.worse or 0, over.better or 0, stands(over.p_holm, over.confidence)),
+            over.comparisons,
         )
 
     @classmethod
@@ -50,7 +50,7 @@ class MarkedRow:
             value = f"{value} ({_number(told['least'])} to {_number(told['most'])})"
         return cls(
             *(told["by"].removeprefix(TAG), value),
-            *(told["drives"], told["mean"], told["low"], told["high"]),
+            *(told["units"], told["mean"], told["low"], told["high"]),
             *(told["worse"], told["better"], stands(told["p_holm"], told["confidence"])),
             told["comparisons"],
         )

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
+from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import number, percent, points
+from roadeval.evaluation.effects import BASES
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.charts.differences import MEAN, ForestRow, caption, forest
 from roadeval.report.fleet.findings import FleetFindings, Row
@@ -33,11 +35,11 @@ def section(findings: FleetFindings) -> Iterator[Block]:
 def plotted(findings: FleetFindings) -> Iterator[tuple[Mapping[str, Any], str]]:
     """Yield the differences that have a plot: of the filter, and of the best against blind."""
     tested = [each for each in findings.summary["effects"] if each["metric"] == "ERR"]
-    told = [each for each in tested if each["drives"]]
+    told = [each for each in tested if each["units"]]
     for each in told:
-        if each["kind"] == "filter":
+        if (each["base"], each["variant"]) == (UNFILTERED, FILTERED):
             yield each, "What the filter changes"
-    blind = [each for each in told if each["kind"] == "blind"]
+    blind = [each for each in told if each["base"] == BASELINE]
     if blind:
         best = min(blind, key=lambda each: float(each["mean"]))
         which = "" if len(blind) == 1 else ", the best variant,"
@@ -53,7 +55,7 @@ def _plot(findings: FleetFindings, told: Mapping[str, Any]) -> Iterator[Block]:
             row["low"],
             row["high"],
         )
-        for row in findings.effects.get((told["kind"], told["variant"]), ())
+        for row in findings.effects.get((told["base"], told["variant"]), ())
     ]
     if not rows:
         return
@@ -65,12 +67,11 @@ def _plot(findings: FleetFindings, told: Mapping[str, Any]) -> Iterator[Block]:
 def worst_table(findings: FleetFindings) -> Table:
     """Tabulate the drives on which the first variant has the highest ERR."""
     filters, blinds = (
-        {row["drive"]: row["mean"] for row in by_kind(findings, kind)}
-        for kind in ("filter", "blind")
+        {row["drive"]: row["mean"] for row in against(findings, base)} for base in BASES
     )
     known = [row for row in findings.scores if row["ERR"] is not None]
     rows = sorted(known, key=lambda row: (-row["ERR"], row["drive"]))[:NAMED]
-    columns = {"filter": filters, "against blind": blinds}
+    columns = {"against unfiltered": filters, "against blind": blinds}
     shown = {title: values for title, values in columns.items() if values}
     tags = {each["drive"]: tags_in_words(each["tags"]) for each in findings.summary["drives"]}
     tagged = any(tags.values())
@@ -94,12 +95,12 @@ def worst_table(findings: FleetFindings) -> Table:
     )
 
 
-def by_kind(findings: FleetFindings, kind: str) -> Iterator[Row]:
-    """Yield the differences of the first variant, or for the filter of the one that has it."""
-    variants = [variant for other, variant in findings.effects if other == kind]
+def against(findings: FleetFindings, base: str) -> Iterator[Row]:
+    """Yield the differences from a base of the first variant, or of the first that has any."""
+    variants = [variant for other, variant in findings.effects if other == base]
     first = findings.scores[0]["variant"]
     chosen = first if first in variants else next(iter(variants), None)
-    yield from findings.effects.get((kind, chosen), ()) if chosen else ()
+    yield from findings.effects.get((base, chosen), ()) if chosen else ()
 
 
 def tags_in_words(tags: Mapping[str, str]) -> str:

@@ -43,7 +43,7 @@ class FleetFindings:
     names
         The drives' names for people, by their identity; no two are equal.
     effects
-        Rows of ``effects`` of the final masks' ERR, by kind and variant.
+        Rows of ``effects`` of the final masks' ERR, by base and variant.
     scores
         Rows of ``scores`` of the first variant's final mask, over all labelled pixels.
     worst

@@ -17,7 +17,7 @@ def section(findings: FleetFindings) -> Iterator[Block]:
         rows = [
             MarkedRow.of_dict(each)
             for each in findings.summary["strata"]
-            if (each["kind"], each["variant"]) == (told["kind"], told["variant"])
+            if (each["base"], each["variant"]) == (told["base"], told["variant"])
         ]
         if rows:
             tables.append((title, rows))

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from roadeval.data import BASELINE
-from roadeval.data.words import defined, interval, listing, number, percent, points
+from roadeval.data.words import DASH, defined, interval, listing, number, percent, points
 from roadeval.evaluation.metrics import FULL, SHORT
+from roadeval.evaluation.stats import STUDENT_FROM
 from roadeval.report.blocks import (
     Block,
     BulletList,
@@ -87,12 +88,12 @@ def _best(values: list[float | None], higher: bool) -> float | None:
 def effects_table(findings: FleetFindings) -> Table:
     """Tabulate the differences over drives: the filter's, and each variant's against blind."""
     told = [each for each in findings.summary["effects"] if each["metric"] in SHORT]
-    keys = list(dict.fromkeys((each["kind"], each["variant"]) for each in told))[:ROWS]
+    keys = list(dict.fromkeys((each["base"], each["variant"]) for each in told))[:ROWS]
     rows: list[list[Cell | str]] = []
     breaks = []
     for key in keys:
         breaks.append(len(rows))
-        own = {each["metric"]: each for each in told if (each["kind"], each["variant"]) == key}
+        own = {each["metric"]: each for each in told if (each["base"], each["variant"]) == key}
         there = [name for name in SHORT if name in own]
         rows += [_effect_cells(own[name], first=name == there[0]) for name in there]
     return Table(
@@ -111,8 +112,7 @@ def _effect_cells(each: Mapping[str, Any], *, first: bool) -> list[Cell | str]:
         each["metric"],
         Cell(points(each["mean"]), bold=first),
         interval(each["low"], each["high"]),
-        number(each["worse"]),
-        number(each["better"]),
+        *(DASH if each[name] is None else number(each[name]) for name in ("worse", "better")),
         points(each["pooled"]),
     ]
 
@@ -125,22 +125,26 @@ def _effects_note() -> str:
 
 
 def _how_sure(told: Mapping[str, Any]) -> str:
-    effects = [each for each in told["effects"] if each["metric"] == "ERR" and each["drives"]]
+    effects = [each for each in told["effects"] if each["metric"] == "ERR" and each["units"]]
     if not effects:
         return ""
     first = effects[0]
+    if first["unit"] == "frames":
+        return "One drive: intervals are those of its frames."
     groups = (
-        f" The {first['drives']} drives count as {first['clusters']}: those of a group are one, "
+        f" The {first['units']} drives count as {first['groups']}: those of a group are one, "
         "and so are copies of a log."
-        if first["clusters"] < first["drives"]
+        if first["groups"] < first["units"]
         else ""
     )
     if first["low"] is None:
-        return f"No interval: it takes {first['clusters_needed']} drives or groups.{groups}"
-    method = {"t": "Student's t over drives", "sign flip": "the exact sign-flip test"}
+        return f"No interval: it takes {first['needed']} drives or groups.{groups}"
+    method = (
+        "the exact sign-flip test" if first["groups"] < STUDENT_FROM else "Student's t over drives"
+    )
     return (
-        f"Intervals of {percent(first['confidence'], 0)} %, by "
-        f"{method.get(first['method'], first['method'])}; the drive is the unit.{groups}"
+        f"Intervals of {percent(first['confidence'], 0)} %, by {method}; the drive is the "
+        f"unit.{groups}"
     )
 
 

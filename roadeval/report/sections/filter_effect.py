@@ -7,11 +7,12 @@ from typing import Any
 
 from roadeval.data import BASELINE
 from roadeval.data.words import DASH, defined, interval, listing, number, percent, points
+from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.charts.differences import difference
 from roadeval.report.findings import Findings, PairedComparison
 from roadeval.report.sections.common import sampled_frames, variant_cell
-from roadeval.results.certainty import MARK, correction, stands, too_few
+from roadeval.results.sentences import MARK, correction, stands
 
 
 def section(findings: Findings) -> Iterator[Block]:
@@ -62,8 +63,8 @@ def _differences(findings: Findings, pair: PairedComparison) -> Table:
                 *(percent(findings.total(name)[rate]) for name in names),
                 Cell(points(change["mean"]), bold=True),
                 _interval(change),
-                number(change["frames"]),
-                DASH if (worth := change["effective_frames"]) is None else f"{worth:.0f}",
+                number(change["units"]),
+                DASH if (worth := change["effective"]) is None else f"{worth:.0f}",
             ]
             for rate, change in pair.differences.items()
         ],
@@ -82,7 +83,7 @@ def _interval(change: Mapping[str, Any]) -> str:
 
 def _method(change: Mapping[str, Any]) -> str:
     if change["low"] is None:
-        return f"No interval for ERR: {too_few(change['frames'])}."
+        return f"No interval for ERR: {Difference(**change).none_because}."
     return (
         f"{percent(change['confidence'], 0)} % intervals. Neighbouring frames resemble each other, "
         "and the intervals are the wider for it; effective says how many independent frames would "

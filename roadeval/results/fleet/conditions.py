@@ -11,7 +11,7 @@ from typing import Any
 from roadeval.data import Counts
 from roadeval.data.counts import OUTCOMES
 from roadeval.evaluation import metrics
-from roadeval.evaluation.comparison_result import MaskComparison
+from roadeval.evaluation.comparison import Change
 from roadeval.evaluation.conditions import Condition, ConditionError
 from roadeval.evaluation.metrics import METRICS
 from roadeval.results.comparison import judged
@@ -98,8 +98,16 @@ def _judged(condition: Condition, row: Mapping[str, Any], least: int) -> DriveJu
     names = (*METRICS, *(f"pooled_{name}" for name in METRICS))
     rates = {name: math.nan if row[name] is None else row[name] for name in names}
     rates |= metrics.overlap(Counts(*(row[name] for name in OUTCOMES)))
-    mask = MaskComparison(
-        drive, row["variant"], row["stage"], row["final"], row["frames"], {}, rates, {}
+    mask = Change(
+        result=drive,
+        variant=row["variant"],
+        stage=row["stage"],
+        final=row["final"],
+        drives=1,
+        frames=row["frames"],
+        base={},
+        new=rates,
+        difference={},
     )
     try:
         judgement = condition.judge(mask)

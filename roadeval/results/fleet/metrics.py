@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 from xml.etree import ElementTree
 
+from roadeval.data import FILTERED, UNFILTERED
 from roadeval.evaluation.metrics import METRICS
 from roadeval.results.fleet.conditions import DriveJudgement
 from roadeval.results.fleet.record import DAMAGED, FAILED, UNSCORED
@@ -30,8 +31,9 @@ def flat_metrics(summary: Mapping[str, Any]) -> dict[str, float]:
         for name in (*METRICS, *(f"pooled_{name}" for name in METRICS)):
             flat[f"{row['variant']}.{row['stage']}.{name}"] = row[name]
     for each in summary["effects"]:
-        whose = each["stage"] if each["kind"] == "filter" else each["variant"]
-        begin = f"effect.{each['kind']}.{whose}.{each['metric']}"
+        of_filter = (each["base"], each["variant"]) == (UNFILTERED, FILTERED)
+        whose = f"filter.{each['stage']}" if of_filter else f"{each['base']}.{each['variant']}"
+        begin = f"effect.{whose}.{each['metric']}"
         flat |= {f"{begin}.{name}": each[name] for name in ("mean", "low", "high", "p", "pooled")}
     return {name: value for name, value in flat.items() if value is not None and _finite(value)}
 

@@ -6,31 +6,24 @@ import math
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
 
 from roadeval.data import Counts
 from roadeval.data.counts import OUTCOMES
 from roadeval.evaluation import metrics
-from roadeval.evaluation.drives import (
-    AcrossSettings,
-    DriveEffect,
-    Stratum,
-    across_drives,
-    strata,
-)
+from roadeval.evaluation.effects import TESTED, Effect, corrected
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.stats import Difference, DriveMean, Stratum, over_drives, strata
 from roadeval.results.fleet.record import FAILED
 from roadeval.results.fleet.tables import Member
-from roadeval.results.fleet.verdict import verdict_of
 from roadeval.results.schema import ALL, LIGHT, TAG
+from roadeval.results.sentences import verdict
 from roadeval.results.tables import read_parquet
 from roadeval.version import VERSION
 
-TESTED: Final = "ERR"
-"""The rate whose differences are findings, as on a drive."""
 WARNINGS: Final = 5
 """Kinds of warnings of single drives that the summary has."""
 Rows = list[dict[str, Any]]
@@ -44,23 +37,32 @@ def summarise(
     columns += [column.name for column in LIGHT]
     drives: Rows = read_parquet(folder / "drives.parquet", "drives", columns).to_pylist()
     known = {member.drive: member for member in members}
-    across = AcrossSettings(confidence=settings.confidence)
-    effects = _final_effects(folder)
+    rows = _final_effects(folder)
     copies = _copies(drives)
     groups = {drive: member.group or copies.get(drive, drive) for drive, member in known.items()}
-    found = [_across(key, rows, groups, across) for key, rows in effects.items()]
+    effects = _effects(rows, groups, settings)
+    rates = _rates(folder)
+    totals: dict[str, dict[str, Any]] = {}
+    for each in rates:
+        totals.setdefault(each["variant"], {})[each["stage"]] = each
     summary: dict[str, Any] = {
         "version": VERSION,
         "drives": [_member(member) for member in members],
         "counts": dict(Counter(drive["status"] for drive in drives)),
         "frames": sum(drive["evaluated"] or 0 for drive in drives),
         "failed": {d["drive"]: d["reason"] for d in drives if d["status"] == FAILED},
-        "rates": _rates(folder),
-        "effects": found,
-        "strata": _strata(effects, drives, known, groups, across),
+        "rates": rates,
+        "effects": [
+            _named(each.base, each.variant, each.stage, rate)
+            | asdict(difference)
+            | _pooled(rows[each.base, each.variant, rate])
+            for each in effects
+            for rate, difference in each.rates.items()
+        ],
+        "strata": _strata(rows, drives, known, groups, settings.confidence),
         "warnings": [*_of_copies(copies), *_of_drives(drives)],
     }
-    return {"verdict": verdict_of(summary, settings)} | summary
+    return {"verdict": verdict(totals, effects, settings)} | summary
 
 
 def _copies(drives: Rows) -> dict[str, str]:
@@ -99,44 +101,67 @@ def _of_drives(drives: Rows) -> Iterator[str]:
         yield f"{len(ranked) - WARNINGS} other warnings of drives: see drives.parquet"
 
 
-def drive_effect(row: Mapping[str, Any], group: str | None, *, counted: bool) -> DriveEffect:
-    """Return a drive's difference from its row of ``effects``.
-
-    With ``counted`` the pixels are given, for the difference of pooled rates: of ERR alone.
-    """
-    counts = counted and row["metric"] == TESTED and row["N"] and row["base_N"]
-    return DriveEffect(
-        row["drive"],
-        group or row["drive"],
-        math.nan if row["mean"] is None else row["mean"],
-        row["frames"],
-        (row["base_wrong"], row["base_N"]) if counts else None,
-        (row["wrong"], row["N"]) if counts else None,
-    )
-
-
-Key = tuple[str, str, str, str, str]
-"""Kind, variant, stage, base and metric of a difference."""
+Key = tuple[str, str, str]
+"""Base, variant and metric of a difference of final masks."""
 
 
 def _final_effects(folder: Path) -> dict[Key, Rows]:
     """Return the rows of the final masks' differences by what they are of."""
     found: defaultdict[Key, Rows] = defaultdict(list)
     for row in final_rows(folder / "effects.parquet"):
-        key = tuple(row[name] for name in ("kind", "variant", "stage", "base", "metric"))
-        found[key].append(row)
+        found[row["base"], row["variant"], row["metric"]].append(row)
     return dict(found)
 
 
-def _across(
-    key: Key, rows: Rows, groups: Mapping[str, str], settings: AcrossSettings
-) -> dict[str, Any]:
-    kind, variant, stage, base, metric = key
-    effects = [drive_effect(row, groups[row["drive"]], counted=True) for row in rows]
-    better = METRICS[metric].higher_is_better
-    across = across_drives(effects, settings, higher_is_better=better)
-    named = {"kind": kind, "variant": variant, "stage": stage, "base": base, "metric": metric}
-    return named | asdict(across)
+def _effects(
+    effects: Mapping[Key, Rows], groups: Mapping[str, str], settings: EvaluationSettings
+) -> list[Effect]:
+    """Return the differences of final masks by their base: within the drive, or over drives."""
+    found: defaultdict[str, dict[str, Effect]] = defaultdict(dict)
+    several = len({row["drive"] for rows in effects.values() for row in rows}) > 1
+    for (base, variant, metric), rows in effects.items():
+        first = rows[0]
+        made = Effect(base, first["stage"], variant, first["stage"], True, {})
+        each = found[base].setdefault(variant, made)
+        difference = _over(rows, groups, settings) if several else _within(rows[0], settings)
+        found[base][variant] = replace(each, rates={**each.rates, metric: difference})
+    return [each for own in found.values() for each in corrected([*own.values()])]
+
+
+def _over(rows: Rows, groups: Mapping[str, str], settings: EvaluationSettings) -> Difference:
+    means = [_mean(row, groups) for row in rows]
+    better = METRICS[rows[0]["metric"]].higher_is_better
+    return over_drives(means, settings.confidence, higher_is_better=better)
+
+
+def _within(row: Mapping[str, Any], settings: EvaluationSettings) -> Difference:
+    """Return the difference of a fleet's only drive, which is the fleet's."""
+    return Difference(
+        mean=math.nan if row["mean"] is None else row["mean"],
+        **{name: row[name] for name in ("low", "high", "p", "standard_error")},
+        confidence=settings.confidence,
+        unit="frames",
+        units=row["frames"],
+        effective=row["effective_frames"],
+        needed=settings.least_frames if row["low"] is None else None,
+    )
+
+
+def _mean(row: Mapping[str, Any], groups: Mapping[str, str]) -> DriveMean:
+    mean = math.nan if row["mean"] is None else row["mean"]
+    return DriveMean(row["drive"], groups[row["drive"]], mean)
+
+
+def _pooled(rows: Rows) -> dict[str, float | None]:
+    """Return the difference of the rates of all pixels together."""
+    names = ("wrong", "N", "base_wrong", "base_N")
+    wrong, n, base_wrong, base_n = (sum(row[name] or 0 for row in rows) for name in names)
+    known = rows[0]["metric"] == TESTED and n and base_n
+    return {"pooled": wrong / n - base_wrong / base_n if known else None}
+
+
+def _named(base: str, variant: str, stage: str, metric: str) -> dict[str, Any]:
+    return {"base": base, "variant": variant, "stage": stage, "metric": metric}
 
 
 def _strata(
@@ -144,20 +169,20 @@ def _strata(
     drives: Rows,
     known: Mapping[str, Member],
     groups: Mapping[str, str],
-    settings: AcrossSettings,
+    confidence: float,
 ) -> Rows:
     """Divide the drives by each tag and by the measured light, for each difference of ERR."""
     light = {drive["drive"]: drive for drive in drives}
     keys = sorted({key for member in known.values() for key in member.tags})
     found = []
-    for (kind, variant, stage, base, metric), rows in effects.items():
+    for (base, variant, metric), rows in effects.items():
         if metric != TESTED:
             continue
-        own = [drive_effect(row, groups[row["drive"]], counted=False) for row in rows]
+        own = [_mean(row, groups) for row in rows]
         tags = {key: [known[e.drive].tags.get(key) for e in own] for key in keys}
         conditions = {c.name: [light[e.drive][c.name] for e in own] for c in LIGHT}
-        named = {"kind": kind, "variant": variant, "stage": stage, "base": base, "metric": metric}
-        divided = strata(own, tags, conditions, settings)
+        named = _named(base, variant, rows[0]["stage"], metric)
+        divided = strata(own, tags, conditions, confidence)
         found += [named | _stratum(each, is_tag=each.by in tags) for each in divided]
     return found
 
@@ -168,9 +193,7 @@ def _stratum(each: Stratum, *, is_tag: bool) -> dict[str, Any]:
         "value": str(each.value),
         "least": each.least,
         "most": each.most,
-        "p_holm": each.p_holm,
-        "comparisons": each.comparisons,
-        **asdict(each.across),
+        **asdict(each.difference),
     }
 
 

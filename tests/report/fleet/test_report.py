@@ -67,7 +67,7 @@ def test_two_plots_and_the_worst_drives(findings):
     assert table.rows[0][0] == findings.names[worst["drive"]]
     (effect,) = (
         row["mean"]
-        for row in findings.effects["filter", "filtered"]
+        for row in findings.effects["unfiltered", "filtered"]
         if row["drive"] == worst["drive"]
     )
     assert float(table.rows[0][5].replace("\N{MINUS SIGN}", "-")) == pytest.approx(
@@ -168,7 +168,7 @@ def test_a_fleet_in_which_every_drive_failed_has_a_report(tmp_path, monkeypatch)
     )
     told = text(write_report(fleet_of(tmp_path / "f", 2, frames=0)).read_bytes())
     assert "Drives that failed: 2" in told
-    assert "no drive of the fleet was scored" in told
+    assert "Nothing to score: no frame with truth was evaluated." in told
 
 
 def test_two_drives_of_one_name_are_told_apart(folder, tmp_path):

@@ -57,7 +57,7 @@ def test_where_there_is_no_interval_the_reason_is_given():
 
 def test_where_err_is_undefined_nothing_is_said_about_frames():
     pair = a_pair([math.nan], [0])
-    pair.differences["ERR"]["mean"] = None
+    pair.differences["ERR"].update(a_difference(None))
     text, *_ = texts(some_findings(paired=[pair]))
     assert text.startswith("ERR is undefined on every frame")
 
@@ -80,7 +80,7 @@ def test_flicker_stands_beside_the_truths_own():
 
 def test_an_unknown_number_of_effective_frames_is_a_dash():
     pair = a_pair([-0.1], [-1])
-    pair.differences["ERR"]["effective_frames"] = None
+    pair.differences["ERR"]["effective"] = None
     table, *_ = (b for b in section(some_findings(paired=[pair])) if isinstance(b, Table))
     assert plain_rows(table)[0][-1] == DASH
 

@@ -148,9 +148,9 @@ def _scores(drive, masks):
 
 
 def _effects(drive, masks):
-    pairs = [("filter", "filtered", s, "unfiltered", s) for s in STAGES]
-    pairs += [("blind", v, "post", "blind", "post") for v in ("filtered", "unfiltered")]
-    for kind, variant, stage, base, of_base in pairs:
+    pairs = [("filtered", s, "unfiltered", s) for s in STAGES]
+    pairs += [(v, "post", "blind", "post") for v in ("filtered", "unfiltered")]
+    for variant, stage, base, of_base in pairs:
         mine, theirs = masks[variant, stage], masks[base, of_base]
         differences = metrics.table(mine) - metrics.table(theirs)
         means = differences.mean(axis=0).tolist()
@@ -160,11 +160,10 @@ def _effects(drive, masks):
                 mean, error = means[place], errors[place]
                 yield {
                     "drive": drive,
-                    "kind": kind,
+                    "base": base,
                     "variant": variant,
                     "stage": stage,
                     "final": stage == "post",
-                    "base": base,
                     "metric": metric,
                     "mean": mean,
                     "standard_error": error,

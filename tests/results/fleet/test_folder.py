@@ -8,7 +8,6 @@ import pytest
 from pyarrow import parquet
 
 from roadeval import Fleet
-from roadeval.results.fleet.masks import read_masks
 from roadeval.results.tables import ResultsError
 from tests.results.fleet.making import fleet_of
 
@@ -82,8 +81,8 @@ def test_a_damaged_table_of_frames_says_what_makes_it_anew(folder):
         Fleet(folder).frames(drive)
     words = pa.table({name: ["x"] for name in parquet.read_schema(path).names})
     parquet.write_table(words, path)
-    with pytest.raises(ResultsError, match="column stamp_ns is not of type int64"):
-        read_masks(folder, drive)
+    with pytest.raises(ResultsError, match="column frame is not of type int64"):
+        Fleet(folder).frames(drive)
 
 
 def test_a_footer_that_arrow_does_not_understand_is_damage(folder, monkeypatch):

@@ -1,4 +1,4 @@
-"""Corrections of p-values for how many there are."""
+"""Multiple-comparison corrections of p-values."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from itertools import accumulate
 def holm_p_values(values: Sequence[float | None]) -> list[float | None]:
     """Correct p-values so that a false finding among them is rare.
 
-    Of a family of which nothing is true, a share ``a`` at most have a value that is below ``a``
-    after it, however the comparisons depend on each other [1]_.
+    If nothing is true in a family, the probability that any corrected value is below ``a`` is at
+    most ``a``, however the comparisons depend on each other [1]_.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def holm_p_values(values: Sequence[float | None]) -> list[float | None]:
 def benjamini_hochberg(values: Sequence[float | None]) -> list[float | None]:
     """Correct p-values so that few of the findings are false.
 
-    Of those whose value is at most ``q`` after it, a share ``q`` at most is false on average:
+    Of those whose corrected value is at most ``q``, a share of at most ``q`` is false on average:
     ``min over j >= i of p_(j) m / j``, for the i-th smallest of m [1]_. That holds where the tests
     are independent, as those of different drives are, or depend on each other positively.
 

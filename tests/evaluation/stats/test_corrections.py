@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from statsmodels.stats.multitest import multipletests
 
-from roadeval.evaluation.corrections import benjamini_hochberg, holm_p_values
+from roadeval.evaluation.stats.corrections import benjamini_hochberg, holm_p_values
 
 VALUES = [0.03, 0.001, 0.2, 0.04, 0.011, 0.04, 0.9]
 

@@ -1,10 +1,10 @@
-"""Mean differences between masks, the intervals around them, and what is left of many findings.
+"""A mean of paired differences with its interval and p-value, within one drive.
 
 Both masks are of the same frames, so their rates are subtracted frame by frame and the differences
-averaged. How far the mean of a longer drive of this kind may lie from that is computed by
-`roadeval.evaluation.autocorrelation`; the p-value of no difference comes from the same
-distribution, so that an interval leaves out 0 exactly where the p-value is below one minus the
-confidence.
+averaged. `roadeval.evaluation.stats.autocorrelation` computes how far the mean of a longer drive of
+this kind may lie from that; the p-value of no difference comes from the same distribution, so that
+an interval excludes 0 exactly where the p-value is below one minus the confidence. Over several
+drives `roadeval.evaluation.stats.drives` makes the same `Difference`.
 
 How often an interval that claims 95 % holds the true mean, in percent of made-up drives, and what
 it finds: how often it leaves out 0 if the true mean is one and two standard deviations of a frame's
@@ -54,10 +54,9 @@ bursts, reversed       91     34    77    66/84    88    36/58   2.13
 bursts, reversed      190     37    87    77/97    95    38/68   1.69
 =================  ======  =====  ====  =======  ====  =======  =====
 
-What cannot be seen is not allowed for: a drift that noise hides on a short drive, or one that takes
-longer than the drive. There three or four of five intervals hold rather than nineteen of twenty.
-The model's settings were chosen with drives of these kinds in sight, so that others may hold a
-little less often.
+Drift is not allowed for where noise hides it on a short drive, or where it takes longer than the
+drive: there three or four of five intervals hold rather than nineteen of twenty. The model's
+settings were chosen with drives of these kinds in sight, so others may hold a little less often.
 """
 
 from __future__ import annotations
@@ -65,55 +64,77 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from roadeval.evaluation.autocorrelation import Series, mean_distribution
-from roadeval.evaluation.corrections import holm_p_values
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.stats.autocorrelation import Series, mean_distribution
+from roadeval.evaluation.stats.corrections import holm_p_values
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A mean of paired differences over a drive's frames, with its interval. Fractions.
-
-    Parameters
-    ----------
-    mean
-        NaN if no frame has a difference.
-    low, high
-        The interval around it, within what the difference can be if the base's rate is as it was
-        measured. None below `EvaluationSettings.least_frames`.
-    confidence
-        What the interval claims.
-    p
-        Two-sided p-value of no difference; None without an interval.
-    p_holm
-        The same after Holm's correction, see `holm`; None where none was applied.
-    comparisons
-        How many were corrected for; None where none was applied.
-    standard_error
-        Of the mean, without its skewness; None without an interval.
-    frames
-        Frames with a difference.
-    effective_frames
-        Independent frames that would determine the mean as well; None without an interval.
-    """
+    """A mean of paired differences, new minus base, with its interval. Fractions."""
 
     mean: float
+    """NaN if no unit has a difference."""
     low: float | None
     high: float | None
-    confidence: float
+    """The interval; within a drive not beyond what the base's rate leaves room for. None together
+    with `p`."""
     p: float | None
-    frames: int
-    effective_frames: float | None
-    p_holm: float | None = None
-    comparisons: int | None = None
+    """Two-sided p-value of no difference."""
+    confidence: float
+    """Of the interval."""
+    unit: Literal["frames", "drives"]
+    """What is averaged: the frames of one drive, or the means of drives."""
+    units: int
+    """How many have a difference."""
+    effective: float | None = None
+    """Independent frames that would determine the mean as well; None without an interval, and over
+    drives."""
     standard_error: float | None = None
+    """Of the mean, without its skewness; None where `effective` is."""
+    groups: int | None = None
+    """Over drives: groups of drives, each of which counts as one."""
+    worse: int | None = None
+    better: int | None = None
+    equal: int | None = None
+    """Over drives: how many are worse, better and exactly the same."""
+    needed: int | None = None
+    """Units, or groups, that an interval needs; None where there is one."""
+    p_holm: float | None = None
+    """The p-value after Holm's correction; None where none was applied, see `holm`."""
+    comparisons: int | None = None
+    """How many differences were corrected for."""
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether it is 0 on every unit."""
+        return self.low == self.high == 0
+
+    @property
+    def none_because(self) -> str:
+        """Why there is no interval, as a clause; empty where there is one.
+
+        >>> Difference(0.1, None, None, None, 0.95, "drives", 1, groups=1, needed=6).none_because
+        '1 drive is too few for an interval (6 are needed)'
+        """
+        if self.low is not None:
+            return ""
+        if not self.units:
+            return f"undefined on every {self.unit[:-1]}"
+        count = self.units if self.groups is None else self.groups
+        noun = self.unit[:-1] if count == self.units else "group of drives"
+        if count != 1:
+            noun = noun.replace("group", "groups") if " " in noun else f"{noun}s"
+        verb = "is" if count == 1 else "are"
+        return f"{count} {noun} {verb} too few for an interval ({self.needed} are needed)"
 
 
-def mean_difference(rates: Series, base: Series, settings: EvaluationSettings) -> Difference:
-    """Average paired differences, ``rates - base``, with an interval.
+def within_drive(rates: Series, base: Series, settings: EvaluationSettings) -> Difference:
+    """Average paired differences of a drive's frames, ``rates - base``, with an interval.
 
     Parameters
     ----------
@@ -128,25 +149,27 @@ def mean_difference(rates: Series, base: Series, settings: EvaluationSettings) -
     series, n = differences[known], int(known.sum())
     mean, confidence = float(series.mean()) if n else math.nan, settings.confidence
     if n < settings.least_frames:
-        return Difference(mean, None, None, confidence, None, n, None)
+        needed = settings.least_frames
+        return Difference(mean, None, None, None, confidence, "frames", n, needed=needed)
     if np.ptp(series) == 0:
         same = float(mean == 0)
-        return Difference(mean, mean, mean, confidence, same, n, float(n), standard_error=0.0)
+        return Difference(mean, mean, mean, same, confidence, "frames", n, float(n), 0.0)
     found = mean_distribution(series)
     low, high = found.interval(confidence)
     level = float(base[known].mean())
     low, high = max(low, -level), min(high, 1 - level)
-    told = found.p_value(), n, found.frames
-    return Difference(mean, low, high, confidence, *told, standard_error=found.scale)
+    return Difference(
+        *(mean, low, high, found.p_value(), confidence, "frames", n, found.frames, found.scale)
+    )
 
 
 def holm(family: Sequence[Difference]) -> list[Difference]:
-    """Correct p-values for the number of comparisons, so that few findings are false.
+    """Return differences with their p-values corrected for how many they are.
 
-    By `roadeval.evaluation.corrections.holm_p_values`. One without a p-value is left out; so is one
-    whose difference is 0 on every frame, where nothing can be found.
+    One without a p-value is not counted, nor is one that is 0 on every unit: nothing can be found
+    there.
     """
-    values = [None if each.low == each.high == 0 else each.p for each in family]
+    values = [None if each.is_zero else each.p for each in family]
     comparisons = sum(p is not None for p in values)
     return [
         each if p is None else replace(each, p_holm=p, comparisons=comparisons)

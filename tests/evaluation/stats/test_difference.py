@@ -7,9 +7,9 @@ import pytest
 from scipy import stats
 from statsmodels.stats.multitest import multipletests
 
-from roadeval.evaluation.autocorrelation import mean_distribution
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.uncertainty import Difference, holm, mean_difference
+from roadeval.evaluation.stats import Difference, holm, within_drive
+from roadeval.evaluation.stats.autocorrelation import mean_distribution
 from tests.evaluation.making import autoregression
 
 SETTINGS = EvaluationSettings()
@@ -19,12 +19,12 @@ INDEPENDENT = np.random.default_rng(3).normal(0.01, 0.02, 200)
 def of(differences: np.ndarray, settings: EvaluationSettings = SETTINGS) -> Difference:
     """The mean of differences from a rate of 30 %."""
     base = np.full(len(differences), 0.3)
-    return mean_difference(base + differences, base, settings)
+    return within_drive(base + differences, base, settings)
 
 
 def test_the_mean_is_that_of_the_frames_that_have_a_difference() -> None:
-    found = mean_difference(np.array([0.25, np.nan, 0.75]), np.array([0.0, 0.5, 0.0]), SETTINGS)
-    assert (found.mean, found.frames) == (0.5, 2)
+    found = within_drive(np.array([0.25, np.nan, 0.75]), np.array([0.0, 0.5, 0.0]), SETTINGS)
+    assert (found.mean, found.units) == (0.5, 2)
 
 
 def test_independent_frames_give_about_students_interval() -> None:
@@ -42,7 +42,7 @@ def test_an_interval_and_its_p_value_are_those_of_the_mean_s_distribution() -> N
     found, known = of(INDEPENDENT), mean_distribution(INDEPENDENT)
     assert (found.low, found.high) == pytest.approx(known.interval(0.95), rel=1e-6)
     assert found.p == pytest.approx(known.p_value(), rel=1e-6)
-    assert found.effective_frames == pytest.approx(known.frames)
+    assert found.effective == pytest.approx(known.frames)
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.002, 0.005, 0.02])
@@ -53,7 +53,8 @@ def test_an_interval_leaves_out_zero_where_the_p_value_is_small(shift: float) ->
 
 def test_a_handful_of_frames_gives_no_interval() -> None:
     found = of(INDEPENDENT[:9])
-    assert found.low is found.high is found.p is found.effective_frames is None
+    assert found.low is found.high is found.p is found.effective is None
+    assert found.none_because == "9 frames are too few for an interval (10 are needed)"
     assert of(INDEPENDENT[:10]).low is not None
     assert of(INDEPENDENT[:10], EvaluationSettings(least_frames=11)).low is None
 
@@ -62,14 +63,13 @@ def test_frames_that_are_all_alike_have_an_interval_of_everything_that_can_be() 
     found = of(0.1 * np.random.default_rng(5).standard_normal(91).cumsum())
     assert (found.low, found.high) == (-0.3, 0.7)
     assert found.p > 0.05
-    assert found.effective_frames < 3
+    assert found.effective < 3
 
 
 def test_no_frame_at_all_has_no_mean() -> None:
     found = of(np.array([np.nan, np.nan]))
     assert math.isnan(found.mean)
-    assert found.frames == 0
-    assert found.low is None
+    assert (found.units, found.low, found.none_because) == (0, None, "undefined on every frame")
 
 
 @pytest.mark.parametrize(("everywhere", "p"), [(0.0, 1.0), (0.25, 0.0)])
@@ -77,7 +77,7 @@ def test_the_same_difference_on_ten_frames_has_an_interval_without_width(
     everywhere: float, p: float
 ) -> None:
     base = np.full(10, 0.5)
-    found = mean_difference(base + everywhere, base, SETTINGS)
+    found = within_drive(base + everywhere, base, SETTINGS)
     assert (found.mean, found.low, found.high, found.p) == (everywhere,) * 3 + (p,)
 
 
@@ -95,7 +95,7 @@ def test_intervals_hold_about_as_often_as_they_claim(rho: float, frames: int) ->
 
 
 def with_p(p: float | None) -> Difference:
-    return Difference(0.1, 0.0, 0.2, 0.95, p, 91, 20.0)
+    return Difference(0.1, 0.0, 0.2, p, 0.95, "frames", 91)
 
 
 def test_holm_s_correction_is_that_of_statsmodels() -> None:
@@ -109,7 +109,7 @@ def test_holm_s_correction_is_that_of_statsmodels() -> None:
 
 
 def test_what_was_not_tested_is_not_counted() -> None:
-    same = Difference(0.0, 0.0, 0.0, 0.95, 1.0, 91, 91.0)
+    same = Difference(0.0, 0.0, 0.0, 1.0, 0.95, "frames", 91)
     found = holm([with_p(0.01), with_p(None), same, with_p(0.02)])
     assert [each.p_holm for each in found] == [0.02, None, None, 0.02]
     assert [each.comparisons for each in found] == [2, None, None, 2]

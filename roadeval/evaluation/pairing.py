@@ -1,0 +1,268 @@
+"""Pairs: the drives that two results have in common, and the frames of their masks."""
+
+from __future__ import annotations
+
+from collections import defaultdict, deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import Rows
+from roadeval.evaluation import metrics, scored
+from roadeval.evaluation.frame_counts import FourCounts
+
+Places = npt.NDArray[np.intp]
+Rates = npt.NDArray[np.float64]
+
+
+class Part(Protocol):
+    """A drive's part of a result. Its tables are read when they are asked for."""
+
+    @property
+    def drive(self) -> str:
+        """Its identity in the result."""
+
+    @property
+    def name(self) -> str:
+        """Its name for people."""
+
+    @property
+    def digest(self) -> str | None:
+        """The log's SHA-256, None where the result does not know it."""
+
+    @property
+    def group(self) -> str | None:
+        """What it shares with other drives of the result."""
+
+    @property
+    def tags(self) -> Mapping[str, str]:
+        """Values by the tags' keys."""
+
+    @property
+    def scored(self) -> bool:
+        """Whether any frame of it was."""
+
+    @property
+    def asked(self) -> Mapping[str, Any]:
+        """Settings that may change its numbers, by names as ``frames.scale``, where known."""
+
+    def rows(self, table: str) -> Rows:
+        """Return its rows of ``frames``, ``regions`` or ``disagreements``."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Side:
+    """One of the results that are compared."""
+
+    label: str
+    """What it is called in tables; its own among all."""
+    parts: Sequence[Part]
+    """Its drives."""
+    variants: Mapping[str, str] | None = None
+    """What the variants to compare are called here, by their own names; None: all as they are."""
+
+    def rows(self, part: Part, table: str) -> Rows:
+        """Return a part's rows of the variants to compare, under the names of the comparison."""
+        rows = part.rows(table)
+        if self.variants is None:
+            return rows
+        own = rows.take(np.isin(rows["variant"], [*self.variants]))
+        names = [self.variants[name] for name in own["variant"].tolist()]
+        return own.replace(variant=np.array(names, str))
+
+    def own_name(self, variant: str) -> str:
+        """Return what the result itself calls a variant."""
+        named = {name: own for own, name in (self.variants or {}).items()}
+        return named.get(variant, variant)
+
+    @property
+    def scored(self) -> list[Part]:
+        """The drives of which any frame was scored."""
+        return [part for part in self.parts if part.scored]
+
+
+# --- Drives ---------------------------------------------------------------------------------------
+
+
+class Because(StrEnum):
+    """Why a drive of one result is not compared with another result."""
+
+    ABSENT = "absent"
+    """The other has no such drive."""
+    UNSCORED = "unscored"
+    """It is not scored in both."""
+    OTHER_LOG = "other_log"
+    """The drive of this name is of another log there."""
+    LOG_UNKNOWN = "log_unknown"
+    """A result does not say which log it is of."""
+    NO_FRAME = "no_frame"
+    """Both have evaluated it, but no frame both."""
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """A drive that is not compared with another result."""
+
+    drive: str
+    result: str
+    other: str
+    because: Because
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Match:
+    """The drives of two results."""
+
+    pairs: Sequence[tuple[Part, Part]]
+    """Those that both have scored, in the base's order."""
+    by_log: int
+    """How many of them have other names, and are the same by their log."""
+    left_out: Sequence[LeftOut]
+
+
+def match_drives(base: Side, new: Side) -> Match:
+    """Match the drives of two results, each by its name, else by its log.
+
+    One name with two different logs is no match: the difference would be the scene's.
+    """
+    there = {part.drive: part for part in new.parts}
+    names = {part.drive for part in base.parts}
+    # A log may be in a result twice.
+    logs: defaultdict[str | None, deque[Part]] = defaultdict(deque)
+    for part in new.parts:
+        if part.drive not in names:
+            logs[part.digest].append(part)
+    pairs, left, taken = [], [], set()
+    for part in base.parts:
+        other = there.get(part.drive)
+        if other is None and part.digest and logs[part.digest]:
+            other = logs[part.digest].popleft()
+        if other is None:
+            left.append(LeftOut(part.name, base.label, new.label, Because.ABSENT))
+            continue
+        taken.add(other.drive)
+        if reason := _why_not(part, other):
+            left.append(LeftOut(part.name, base.label, new.label, reason))
+        else:
+            pairs.append((part, other))
+    left += (
+        LeftOut(part.name, new.label, base.label, Because.ABSENT)
+        for part in new.parts
+        if part.drive not in taken
+    )
+    return Match(pairs, sum(one.drive != other.drive for one, other in pairs), left)
+
+
+def one_drive(sides: Sequence[Side]) -> list[Side] | None:
+    """Return the results with the one drive that is compared; None where several are, or none."""
+    base, *others = sides
+    pairs = [match_drives(base, new).pairs for new in others]
+    firsts = {id(own[0][0]) for own in pairs if own}
+    if len(firsts) != 1 or any(len(own) != 1 for own in pairs):
+        return None
+    parts = [pairs[0][0][0], *(own[0][1] for own in pairs)]
+    return [replace(side, parts=[part]) for side, part in zip(sides, parts, strict=True)]
+
+
+def _why_not(base: Part, new: Part) -> Because | None:
+    if not (base.scored and new.scored):
+        return Because.UNSCORED
+    if base.digest is None or new.digest is None:
+        return Because.LOG_UNKNOWN
+    return Because.OTHER_LOG if base.digest != new.digest else None
+
+
+# --- Frames ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MaskPair:
+    """A mask's rows in two results of a drive: frames that both have, in the base's order."""
+
+    variant: str
+    stage: str
+    """What the new result calls the mask."""
+    base_stage: str
+    final: bool
+    """Whether both are the variant's final masks."""
+    before: Rows
+    after: Rows
+
+    def __len__(self) -> int:
+        return len(self.before)
+
+    @property
+    def counts(self) -> tuple[FourCounts, FourCounts]:
+        """``(n, 4)`` each: TP, TN, FP, FN of the base and of the new result."""
+        return scored.counts(self.before), scored.counts(self.after)
+
+    @property
+    def rates(self) -> tuple[Rates, Rates]:
+        """``(n, m)`` each, in the order of `roadeval.evaluation.metrics.METRICS`."""
+        before, after = self.counts
+        return metrics.table(before), metrics.table(after)
+
+    @property
+    def truth_differs(self) -> npt.NDArray[np.bool_]:
+        """Where the truth's road or labelled pixels differ, ``(n,)``."""
+        before, after = self.before, self.after
+        road = before["TP"] + before["FN"] != after["TP"] + after["FN"]
+        return np.asarray(road | (before["N"] != after["N"]))
+
+
+def common_masks(base: Rows, new: Rows, variant: str | None = None) -> list[MaskPair]:
+    """Match the masks of two results of a drive, and their frames by stamp; in the base's order.
+
+    Final masks are matched with final masks, whatever their stage is called, others by their stage.
+    With ``variant`` the base's masks are taken for this variant's.
+    """
+    last, last_new = scored.final_stages(base), scored.final_stages(new)
+    others = {(name, stage): places for name, stage, places in new.masks()}
+    found = []
+    for name, stage, places in base.masks():
+        called, final = variant or name, stage == last[name]
+        if called not in last_new:
+            continue
+        theirs = last_new[called] if final else stage
+        if (called, theirs) not in others or (theirs == last_new[called] and not final):
+            continue
+        own, new_own = base.take(places), new.take(others[called, theirs])
+        mine, matching = matched(own["stamp_ns"], new_own["stamp_ns"])
+        if len(mine):
+            rows = own.take(mine), new_own.take(matching)
+            found.append(MaskPair(called, theirs, stage, final, *rows))
+    return found
+
+
+def matched(base: npt.NDArray[np.int64], new: npt.NDArray[np.int64]) -> tuple[Places, Places]:
+    """Return the places of the stamps that both have, in the base's order.
+
+    Equal stamps are told apart by their order.
+
+    >>> [places.tolist() for places in matched(np.array([5, 7, 7, 9]), np.array([7, 4, 7, 5]))]
+    [[0, 1, 2], [3, 0, 2]]
+    """
+    if np.array_equal(base, new):
+        every = np.arange(len(base))
+        return every, every
+    _, codes = np.unique(np.concatenate([base, new]), return_inverse=True)
+    before, after = (
+        codes[part] * (len(codes) + 1) + _occurrences(codes[part])
+        for part in (slice(len(base)), slice(len(base), None))
+    )
+    _, mine, theirs = np.intersect1d(before, after, return_indices=True)
+    order = np.argsort(mine)
+    return mine[order], theirs[order]
+
+
+def _occurrences(codes: Places) -> Places:
+    """Return how often each value has come before: 0 at its first place."""
+    order = np.argsort(codes, kind="stable")
+    ordered = codes[order]
+    before = np.empty(len(codes), np.intp)
+    before[order] = np.arange(len(codes)) - np.searchsorted(ordered, ordered)
+    return before

@@ -1,0 +1,217 @@
+"""What a difference tells, in words: how sure it is, and the sentence that says so."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from enum import Enum, auto
+from typing import Any, Final
+
+from roadeval.data import BASELINE, FILTERED, UNFILTERED
+from roadeval.data.words import in_percent, plain_points
+from roadeval.evaluation.effects import TESTED, Effect, final_stages
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.stats import Difference
+
+PROBABLY: Final = 0.2
+"""The greatest p-value of a difference that is called probable: where there is none, one drive in
+ten shows so large a one in that direction."""
+MARK: Final = "*"
+"""On a difference that stands when all that are told together are corrected for."""
+NOTHING_SCORED: Final = "Nothing to score: no frame with truth was evaluated."
+BLIND: Final = f"{BASELINE}, which never looks at the image"
+
+
+class Degree(Enum):
+    """How sure a difference is."""
+
+    UNDEFINED = auto()
+    """No frame, or drive, has it."""
+    FEW = auto()
+    """Too few have it for an interval."""
+    SAME = auto()
+    """It is 0 on every one."""
+    SURE = auto()
+    """It is there, and its direction is known."""
+    LITTLE = auto()
+    """If it is there, it is negligible."""
+    PROBABLE = auto()
+    """It is probably there, in its direction."""
+    UNKNOWN = auto()
+    """It may be there or not, in either direction."""
+
+
+def degree(found: Difference, settings: EvaluationSettings) -> Degree:
+    """Return what is known of a difference, by its corrected p-value where it has one."""
+    p = found.p if found.p_holm is None else found.p_holm
+    if not found.units:
+        return Degree.UNDEFINED
+    if found.low is None or found.high is None or p is None:
+        return Degree.FEW
+    if found.is_zero:
+        return Degree.SAME
+    if p < 1 - found.confidence:
+        return Degree.SURE
+    if max(-found.low, found.high) <= settings.negligible:
+        return Degree.LITTLE
+    return Degree.PROBABLE if p <= PROBABLY else Degree.UNKNOWN
+
+
+def sentence(found: Difference, what: str, rate: str, settings: EvaluationSettings) -> str:
+    """Return what a difference says of these frames or drives, and then of others like them.
+
+    Parameters
+    ----------
+    found
+        With ``what`` minus without.
+    what
+        Brings it about, as ``the filter``, or ``net instead of blind``.
+    rate
+        What changes, as ``ERR of post``.
+    settings
+        What is negligible.
+
+    Examples
+    --------
+    >>> found = Difference(-0.02, -0.03, -0.01, 0.001, 0.95, "frames", 91)
+    >>> sentence(found, "the filter", "ERR", EvaluationSettings())
+    'On these 91 frames the filter lowers ERR by 2.0 pp; on frames like these by 1.0 to 3.0 pp.'
+    """
+    unit = found.unit[:-1]
+    if not found.units:
+        return f"Nothing to compare: {rate} is undefined on every {unit}."
+    here, like = _here(found), f"on {found.unit} like these"
+    told = degree(found, settings)
+    if told is Degree.SAME:
+        return f"{here} {what} leaves {rate} of every {unit} as it is."
+    low, high = found.low or 0.0, found.high or 0.0
+    digits = 1 if max(abs(found.mean), -low, high) >= 0.01 else 2
+
+    def size(fraction: float) -> str:
+        return f"{in_percent(fraction):.{digits}f}"
+
+    fact = f"{here} {what} {'raises' if found.mean > 0 else 'lowers'} {rate} by "
+    fact += f"{size(abs(found.mean))} pp{_counted(found)}"
+    ends = f"between {plain_points(low, digits)} and {plain_points(high, digits)} pp"
+    least, most = (low, high) if found.mean > 0 else (-high, -low)
+    doubt = {
+        Degree.FEW: found.none_because,
+        Degree.SURE: f"{like} by {size(least)} to {size(most)} pp",
+        Degree.LITTLE: f"{like} by no more than {size(max(-low, high))} pp either way",
+        Degree.PROBABLE: f"{like} it probably does, too: {ends}",
+        Degree.UNKNOWN: f"whether it does {like}, one cannot tell: {ends}",
+    }[told]
+    return f"{fact}; {doubt}{_family(found)}."
+
+
+def _here(found: Difference) -> str:
+    if found.unit == "frames":
+        return "On this frame" if found.units == 1 else f"On these {found.units} frames"
+    groups = "" if found.groups in (None, found.units) else f" in {_count(found.groups, 'group')}"
+    return f"Over {_count(found.units, 'drive')}{groups}"
+
+
+def _counted(found: Difference) -> str:
+    if found.worse is None:
+        return ""
+    return f" (worse on {found.worse}, better on {found.better})"
+
+
+def _family(found: Difference) -> str:
+    """Return how many differences a p-value was corrected for, where they were several."""
+    more = (found.comparisons or 1) > 1
+    return f" (corrected for {found.comparisons} comparisons)" if more else ""
+
+
+def _count(count: int | None, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+# --- Marks in tables ------------------------------------------------------------------------------
+
+
+def stands(p_holm: float | None, confidence: float) -> bool:
+    """Return whether a difference stands after Holm's correction."""
+    return p_holm is not None and p_holm < 1 - confidence
+
+
+def correction(differences: Iterable[Difference | Mapping[str, Any]]) -> str:
+    """Return what a mark on differences of ERR means; empty where none was corrected.
+
+    Parameters
+    ----------
+    differences
+        As such, or as in ``summary.json``.
+    """
+    given = (
+        each.comparisons if isinstance(each, Difference) else each.get("comparisons")
+        for each in differences
+    )
+    counts = sorted({count for count in given if count})
+    if not counts:
+        return ""
+    if counts == [1]:
+        return f"{MARK} excludes 0; it is the only one, so nothing is corrected."
+    families = " and ".join(map(str, counts))
+    return (
+        f"{MARK} stands after Holm's correction for the {families} differences of ERR of final "
+        "masks; others are not corrected."
+    )
+
+
+# --- The verdict on a result ----------------------------------------------------------------------
+
+
+def verdict(
+    totals: Mapping[str, Mapping[str, Any]],
+    effects: Sequence[Effect],
+    settings: EvaluationSettings,
+) -> str:
+    """Return the verdict on a drive or a fleet.
+
+    Of a filter: what it changes, and whether the filtered variant beats the baseline. Where there
+    is no pair to tell that from: whether the variant with the lowest error rate does.
+
+    Parameters
+    ----------
+    totals
+        Rates by variant and stage; empty where nothing was scored.
+    effects
+        Of final masks at least.
+    settings
+        What is negligible.
+    """
+    if not totals:
+        return NOTHING_SCORED
+    finals = [each for each in effects if each.final]
+    blind = {each.variant: each for each in finals if each.base == BASELINE}
+    filters = [each for each in finals if (each.base, each.variant) == (UNFILTERED, FILTERED)]
+    told = [(each, "the filter") for each in filters]
+    if blind:
+        best = blind[FILTERED] if told and FILTERED in blind else _lowest(blind.values())
+        told.append((best, f"{best.variant} instead of {BLIND},"))
+    return " ".join(
+        sentence(each.rates[TESTED], what, f"{TESTED} of {each.stage}", settings)
+        for each, what in told
+    ) or _alone(totals)
+
+
+def _lowest(effects: Iterable[Effect]) -> Effect:
+    """Return the variant with the lowest error rate; one that is undefined comes last.
+
+    A variant that has no masks of some frames is not held against those that have.
+    """
+    found = {each.variant: (each, each.rates[TESTED]) for each in effects}
+    most = max(difference.units for _, difference in found.values())
+    full = [(each, d.mean) for each, d in found.values() if d.units == most]
+    return min(full, key=lambda own: (math.isnan(own[1]), own[1]))[0]
+
+
+def _alone(totals: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the error rates where nothing is there to compare them with."""
+    stages = final_stages((variant, stage) for variant, own in totals.items() for stage in own)
+    rates = ", ".join(
+        f"{in_percent(totals[variant][stage][TESTED]):.1f} % with {variant}"
+        for variant, stage in stages.items()
+    )
+    return f"{TESTED} is {rates}; no frame with truth was trained on, so {BASELINE} is unknown."

@@ -1,0 +1,302 @@
+"""Differences over drives: the exact sign-flip test, Student's, groups of drives and parts."""
+
+import math
+import time
+from itertools import combinations, product
+
+import numpy as np
+import pytest
+from scipy import stats
+from statsmodels.stats.multitest import multipletests
+
+from roadeval.evaluation.stats import DriveMean, holm, over_drives, strata
+from roadeval.evaluation.stats.drives import (
+    sign_flip_can_tell,
+    sign_flip_interval,
+    sign_flip_p,
+)
+
+
+def drives(means, groups=None):
+    """Drives ``000``, ``001`` ... with these means."""
+    names = [f"{place:03}" for place in range(len(means))]
+    return [DriveMean(*own) for own in zip(names, groups or names, means, strict=True)]
+
+
+def normal(count, mean=0.01):
+    return np.random.default_rng(count).normal(mean, 0.02, count).tolist()
+
+
+def test_thirty_clusters_have_student_s_interval_and_p_value():
+    found, expected = over_drives(drives(normal(30)), 0.95), stats.ttest_1samp(normal(30), 0)
+    assert (found.low, found.high) == pytest.approx(tuple(expected.confidence_interval()))
+    assert found.p == pytest.approx(expected.pvalue)
+    assert found.none_because == ""
+
+
+def test_fewer_have_those_of_the_sign_flip_test():
+    found, of = over_drives(drives(normal(29)), 0.95), np.array(normal(29))
+    assert (found.low, found.high) == sign_flip_interval(of, 0.95)
+    assert found.p == sign_flip_p(of)
+
+
+def test_five_clusters_have_a_mean_alone_and_the_reason_is_told():
+    found = over_drives(drives(normal(5)), 0.95)
+    assert found.mean == pytest.approx(np.mean(normal(5)))
+    assert found.low is found.high is found.p is None
+    assert found.none_because == "5 drives are too few for an interval (6 are needed)"
+
+
+@pytest.mark.parametrize(
+    ("count", "groups", "said"),
+    [
+        (1, None, "1 drive is too few"),
+        (3, ["a", "a", "b"], "2 groups of drives are too few"),
+        (2, ["a", "a"], "1 group of drives is too few"),
+    ],
+)
+def test_what_is_too_few_is_told_in_english(count, groups, said):
+    found = over_drives(drives(normal(count), groups), 0.95)
+    assert found.none_because == f"{said} for an interval (6 are needed)"
+
+
+@pytest.mark.parametrize(("confidence", "needed"), [(0.9, 6), (0.95, 6), (0.99, 8), (0.999, 11)])
+def test_more_confidence_needs_more_clusters(confidence, needed):
+    too_few = over_drives(drives(normal(needed - 1)), confidence)
+    assert (too_few.needed, too_few.p) == (needed, None)
+    assert over_drives(drives(normal(needed)), confidence).p is not None
+
+
+@pytest.mark.parametrize("means", [[], [math.nan, math.nan]])
+def test_no_drive_at_all_has_no_mean(means):
+    found = over_drives(drives(means), 0.95)
+    assert math.isnan(found.mean)
+    assert (found.none_because, found.units, found.groups) == ("undefined on every drive", 0, 0)
+
+
+def test_a_drive_without_a_mean_is_left_out():
+    assert over_drives(drives([math.nan, *normal(8)]), 0.95) == over_drives(
+        drives([*normal(8), math.nan]), 0.95
+    )
+    assert over_drives(drives([*normal(8), math.nan]), 0.95).units == 8
+
+
+def test_a_group_s_drives_are_averaged_first():
+    groups = ["a", "a", "a", "b", "c", "d", "e", "f"]
+    found = over_drives(drives([0.1, 0.2, 0.6, 0.1, 0.2, 0.3, 0.4, 0.5], groups=groups), 0.95)
+    alone = over_drives(drives([0.3, 0.1, 0.2, 0.3, 0.4, 0.5]), 0.95)
+    assert (found.mean, found.low, found.high, found.p) == pytest.approx(
+        (alone.mean, alone.low, alone.high, alone.p)
+    )
+    assert (found.units, found.groups, alone.groups) == (8, 6, 6)
+
+
+def test_the_order_in_which_drives_come_changes_nothing():
+    groups = [f"{place % 8}" for place in range(24)]
+    fleet = drives(normal(24), groups)
+    assert over_drives(fleet, 0.95) == over_drives(fleet[::-1], 0.95)
+
+
+def test_drives_are_counted_by_the_direction_in_which_they_changed():
+    fleet = drives([0.1, 0.2, 0.3, -0.1, 0.0, 0.0])
+    found = over_drives(fleet, 0.95)
+    assert (found.worse, found.better, found.equal) == (3, 1, 2)
+    other = over_drives(fleet, 0.95, higher_is_better=True)
+    assert (other.worse, other.better, other.equal) == (1, 3, 2)
+
+
+@pytest.mark.parametrize("count", [8, 12, 29, 30, 60])
+def test_the_interval_leaves_out_0_exactly_where_the_p_value_is_small(count):
+    apart = 0
+    for shift in np.linspace(0, 0.08, 15):
+        found = over_drives(drives([each + shift for each in normal(count, -0.01)]), 0.95)
+        assert (found.low > 0 or found.high < 0) == (found.p < 0.05)
+        apart += found.low > 0
+    assert 0 < apart < 15
+
+
+@pytest.mark.parametrize(("everywhere", "p"), [(0.0, 1.0), (0.25, 0.0)])
+def test_forty_drives_that_are_all_alike_have_an_interval_without_width(everywhere, p: float):
+    found = over_drives(drives([everywhere] * 40), 0.95)
+    assert (found.mean, found.low, found.high, found.p) == (everywhere,) * 3 + (p,)
+
+
+def test_five_thousand_drives_take_about_a_second_at_most():
+    fleet = drives(normal(5000))
+    over_drives(fleet[:50], 0.95)
+    start = time.process_time()
+    over_drives(fleet, 0.95)
+    assert time.process_time() - start < 1.5
+
+
+@pytest.mark.parametrize(("kind", "count"), [("normal", 8), ("t3", 8), ("normal", 40)])
+def test_intervals_hold_about_as_often_as_they_claim(kind, count):
+    rng = np.random.default_rng(7)
+    held = []
+    for _ in range(150):
+        effects = rng.standard_normal(count) if kind == "normal" else rng.standard_t(3, count)
+        found = over_drives(drives(effects.tolist()), 0.95)
+        held.append(found.low <= 0 <= found.high)
+    assert 0.9 <= np.mean(held) <= 0.99
+
+
+# --- The exact sign-flip test
+
+TIES = [0.1, 0.2, -0.3, 0.3, 0.0, 0.1, 0.2, -0.1]
+NORMAL = np.random.default_rng(4).normal(0.4, 1.0, 24)
+
+
+def values(count) -> np.ndarray:
+    return np.random.default_rng(count).normal(0.3, 1.0, count)
+
+
+@pytest.mark.parametrize("of", [values(6), values(9), values(12), np.array(TIES)])
+def test_the_p_value_is_that_of_scipy_s_permutation_test(of):
+    expected = stats.permutation_test(
+        (of,), np.mean, permutation_type="samples", n_resamples=np.inf
+    )
+    assert sign_flip_p(of) == expected.pvalue
+
+
+@pytest.mark.parametrize("mean", [-0.2, 0.0, 0.1, 0.45])
+def test_the_p_value_is_the_share_of_sign_patterns_at_least_as_far_off(mean):
+    away = values(7) - mean
+    sums = [abs(np.dot(signs, away)) for signs in product([1, -1], repeat=7)]
+    expected = np.mean([each >= abs(away.sum()) - 1e-12 for each in sums])
+    assert sign_flip_p(values(7), mean) == expected
+
+
+def test_the_p_value_of_many_values_is_that_of_very_many_random_signs():
+    rng = np.random.default_rng(5)
+    sums = rng.choice([-1.0, 1.0], (50_000, 24)) @ NORMAL
+    expected = np.mean(np.abs(sums) >= abs(NORMAL.sum()))
+    assert sign_flip_p(NORMAL) == pytest.approx(expected, abs=4 * (expected / 50_000) ** 0.5)
+
+
+@pytest.mark.parametrize("count", [6, 9, 11])
+def test_the_interval_ends_at_ordered_means_of_subsets(count):
+    of = values(count)
+    means = sorted(
+        np.mean(subset) for size in range(1, count + 1) for subset in combinations(of, size)
+    )
+    # The empty set is the other one that counts.
+    place = int(np.ceil(0.025 * 2**count)) - 1
+    expected = means[place - 1], means[-place]
+    assert sign_flip_interval(of, 0.95) == pytest.approx(expected, abs=1e-7)
+
+
+def test_the_interval_of_six_values_reaches_from_the_least_to_the_greatest():
+    of = values(6)
+    assert sign_flip_interval(of, 0.95) == (of.min(), of.max())
+
+
+@pytest.mark.parametrize("confidence", [0.9, 0.95, 0.99])
+def test_the_sign_flip_interval_leaves_out_0_exactly_where_the_p_value_is_small(confidence):
+    rng, apart = np.random.default_rng(6), 0
+    for _ in range(40):
+        of = rng.integers(-4, 8, rng.integers(8, 12)) / 10
+        low, high = sign_flip_interval(of, confidence)
+        assert (low > 0 or high < 0) == (sign_flip_p(of) < 1 - confidence)
+        apart += low > 0
+    assert 0 < apart < 40
+
+
+def test_every_mean_in_the_interval_is_accepted_and_none_outside():
+    low, high = sign_flip_interval(NORMAL, 0.95)
+    width = high - low
+    assert all(sign_flip_p(NORMAL, end) >= 0.05 for end in (low + 1e-6, high - 1e-6))
+    assert all(sign_flip_p(NORMAL, end) < 0.05 for end in (low - width / 50, high + width / 50))
+
+
+@pytest.mark.parametrize(("everywhere", "p"), [(0.25, 2**-7), (-0.25, 2**-7), (0.0, 1.0)])
+def test_eight_equal_values_have_an_interval_without_width(everywhere, p):
+    of = np.full(8, everywhere)
+    assert sign_flip_interval(of, 0.95) == (everywhere, everywhere)
+    assert sign_flip_p(of) == p
+
+
+def test_five_values_cannot_tell_at_95_percent():
+    assert not sign_flip_can_tell(5, 0.95)
+    assert sign_flip_can_tell(6, 0.95)
+    assert sign_flip_interval(values(5), 0.95) == (-np.inf, np.inf)
+    assert not sign_flip_can_tell(7, 0.99)
+    assert sign_flip_can_tell(8, 0.99)
+
+
+# --- Parts of a fleet
+
+FLEET = drives(np.random.default_rng(3).normal(0.01, 0.02, 24).tolist())
+LIGHT = ["dusk", "day", "night"] * 8
+LUMINANCE = [float(place) for place in range(24)]
+
+
+def parts(tags=None, conditions=None, fleet=FLEET):
+    return strata(fleet, tags or {}, conditions or {}, 0.95)
+
+
+def test_each_value_of_a_tag_is_summed_up_by_itself():
+    found = parts({"light": LIGHT})
+    assert [(each.by, each.value, each.least) for each in found] == [
+        ("light", "day", None),
+        ("light", "dusk", None),
+        ("light", "night", None),
+    ]
+    assert [each.difference for each in found] == holm(
+        [over_drives(FLEET[start::3], 0.95) for start in (1, 0, 2)]
+    )
+
+
+def test_a_condition_is_cut_at_the_fleet_s_thirds():
+    found = parts(None, {"luminance": LUMINANCE[::-1]})
+    assert [(each.value, each.least, each.most) for each in found] == [
+        ("low", 0.0, 7.0),
+        ("middle", 8.0, 15.0),
+        ("high", 16.0, 23.0),
+    ]
+    assert [each.difference for each in found] == holm(
+        [over_drives(FLEET[start : start + 8], 0.95) for start in (16, 8, 0)]
+    )
+
+
+def test_drives_of_one_value_stay_together():
+    found = parts(None, {"luminance": [1.0] * 20 + [2.0] * 4})
+    assert [(each.value, each.difference.units) for each in found] == [("low", 20), ("high", 4)]
+
+
+def test_a_drive_without_a_value_is_left_out_of_that_division_alone():
+    found = parts({"light": [None, *LIGHT[1:]]}, {"luminance": [*LUMINANCE[:22], None, math.nan]})
+    drives_in = {
+        name: sum(each.difference.units for each in found if each.by == name)
+        for name in ("light", "luminance")
+    }
+    assert drives_in == {"light": 23, "luminance": 22}
+
+
+def test_what_does_not_divide_the_drives_makes_no_parts():
+    assert parts({"light": ["day"] * 24}, {"luminance": [3.0] * 24}) == []
+    assert parts({"light": [None] * 24}, {"luminance": [None] * 24}) == []
+    assert [each.value for each in parts({"light": ["day"] * 23 + [None]})] == ["day"]
+    assert parts({"light": []}, {"luminance": []}, fleet=[]) == []
+
+
+def test_a_drive_without_a_mean_counts_nowhere():
+    fleet = [*FLEET, *drives([math.nan])]
+    found = strata(fleet, {"light": [*LIGHT, "fog"]}, {"sun": [*LUMINANCE, 1000.0]}, 0.95)
+    assert "fog" not in [each.value for each in found]
+    assert found[-1].most == 23.0
+
+
+def test_p_values_are_corrected_for_all_parts_together():
+    found = parts({"light": LIGHT}, {"luminance": LUMINANCE})
+    expected = multipletests([each.difference.p for each in found], method="holm")[1]
+    assert [each.difference.p_holm for each in found] == pytest.approx(expected.tolist())
+    assert {each.difference.comparisons for each in found} == {6}
+
+
+def test_parts_in_which_nothing_can_be_found_are_not_counted():
+    weather = ["fog"] * 2 + ["rain"] * 10 + ["sun"] * 12
+    fleet = FLEET[:12] + drives([0.0] * 12)
+    fog, rain, sun = parts({"weather": weather}, fleet=fleet)
+    fog, rain, sun = fog.difference, rain.difference, sun.difference
+    assert fog.p is fog.p_holm is sun.p_holm is sun.comparisons is None
+    assert (rain.p_holm, rain.comparisons) == (rain.p, 1)

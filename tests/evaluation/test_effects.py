@@ -1,0 +1,86 @@
+"""The differences of a drive: which there are, and which are corrected together."""
+
+import numpy as np
+import pytest
+
+from roadeval.evaluation.effects import as_parts, drive_effects, final_stages
+from roadeval.evaluation.frame_counts import FrameCounts
+from roadeval.evaluation.settings import EvaluationSettings
+
+SETTINGS = EvaluationSettings()
+
+
+def a_mask(variant, stage, errors, positions=None):
+    """A mask's frames of 100 pixels, so many of which are wrong: all of them FP."""
+    wrong = np.array(errors)
+    counts = np.stack([np.full(len(wrong), 50), 50 - wrong, wrong, np.zeros_like(wrong)], axis=1)
+    places = range(len(wrong)) if positions is None else positions
+    return FrameCounts(variant, stage, np.array(places), counts)
+
+
+def of(*masks):
+    """What is subtracted from what: base, variant, stage, and whether both are final."""
+    effects = drive_effects([a_mask(*mask, [3] * 12) for mask in masks], SETTINGS)
+    return [(each.base, each.variant, each.stage, each.final) for each in effects]
+
+
+def test_the_filter_is_told_stage_by_stage_and_other_variants_by_their_final_mask():
+    stages = ("svm", "post")
+    pair = [(variant, stage) for variant in ("filtered", "unfiltered") for stage in stages]
+    assert of(*pair, ("net", "svm"), ("net", "post"), ("blind", "post")) == [
+        ("unfiltered", "filtered", "svm", False),
+        ("unfiltered", "filtered", "post", True),
+        ("unfiltered", "net", "post", True),
+        ("blind", "filtered", "post", True),
+        ("blind", "unfiltered", "post", True),
+        ("blind", "net", "post", True),
+    ]
+
+
+def test_final_masks_are_subtracted_whatever_their_stages_are_called():
+    assert of(("net", "scores"), ("unfiltered", "svm"), ("unfiltered", "post")) == [
+        ("unfiltered", "net", "scores", True)
+    ]
+
+
+def test_without_a_base_there_is_no_difference():
+    assert of(("filtered", "post"), ("net", "post")) == []
+
+
+def test_a_difference_is_the_variant_minus_the_base_on_the_frames_that_both_have():
+    pair = a_mask("filtered", "post", [10, 10, 90]), a_mask("unfiltered", "post", [7, 9], [0, 1])
+    (effect,) = drive_effects(pair, SETTINGS)
+    found = effect.rates["ERR"]
+    assert (found.units, found.mean) == (2, pytest.approx(0.02))
+    assert [*effect.rates] == ["ACC", "ERR", "FNR", "FPR"]
+
+
+def test_final_masks_against_one_base_are_corrected_together():
+    rng = np.random.default_rng(2)
+    names = [("filtered", "svm"), ("filtered", "post"), ("unfiltered", "svm")]
+    names += [("unfiltered", "post"), ("net", "post"), ("blind", "post")]
+    masks = [a_mask(*name, rng.integers(5, 20, 40)) for name in names]
+    effects = drive_effects(masks, SETTINGS)
+    sizes = [(each.base, each.final, each.rates["ERR"].comparisons) for each in effects]
+    assert sizes == [
+        ("unfiltered", False, None),
+        *[("unfiltered", True, 2)] * 2,
+        *[("blind", True, 3)] * 3,
+    ]
+    assert {each.rates["FPR"].comparisons for each in effects} == {None}
+
+
+def test_the_summary_has_them_by_base():
+    names = ("filtered", "unfiltered", "net", "blind")
+    parts = as_parts(drive_effects([a_mask(name, "post", [3] * 12) for name in names], SETTINGS))
+    assert {name: [*part] for name, part in parts.items()} == {
+        "difference": ["post"],
+        "against_unfiltered": ["net"],
+        "against_blind": ["filtered", "unfiltered", "net"],
+    }
+    assert parts["difference"]["post"]["ERR"]["mean"] == 0
+
+
+def test_the_final_stage_is_post_or_the_last_one():
+    masks = [("a", "svm"), ("a", "post"), ("a", "oddity"), ("b", "svm"), ("b", "smooth")]
+    assert final_stages(masks) == {"a": "post", "b": "smooth"}

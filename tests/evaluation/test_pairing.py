@@ -1,0 +1,115 @@
+"""Which drives of two results are the same, and which of their masks and frames."""
+
+import numpy as np
+
+from roadeval.evaluation.pairing import (
+    Because,
+    Side,
+    common_masks,
+    match_drives,
+    matched,
+    one_drive,
+)
+from tests.evaluation.making import APart, a_part, a_table, rows_of
+
+SCORED = a_part({("filtered", "post"): [1]}).tables
+
+
+def a_result(label, *drives, scored=True):
+    """A result of drives, each with its digest."""
+    tables = SCORED if scored else {}
+    return Side(label, [APart(tables, drive, digest) for drive, digest in drives])
+
+
+def pairs_of(found):
+    return [(one.drive, other.drive) for one, other in found.pairs]
+
+
+def why(found):
+    return [(each.drive, each.result, each.because) for each in found.left_out]
+
+
+def test_drives_of_one_name_are_one_and_those_of_one_log_too():
+    found = match_drives(
+        a_result("base", ("a", "1"), ("b", "2"), ("c", "3")),
+        a_result("new", ("moved", "2"), ("a", "1"), ("other", "9")),
+    )
+    assert (pairs_of(found), found.by_log) == ([("a", "a"), ("b", "moved")], 1)
+    assert why(found) == [("c", "base", Because.ABSENT), ("other", "new", Because.ABSENT)]
+
+
+def test_a_log_that_is_in_a_result_twice_is_matched_twice_and_no_more():
+    base = a_result("base", ("a", "f"), ("b", "f"), ("c", "f"))
+    found = match_drives(base, a_result("new", ("x", "f"), ("y", "f")))
+    assert pairs_of(found) == [("a", "x"), ("b", "y")]
+    assert why(found) == [("c", "base", Because.ABSENT)]
+
+
+def test_one_name_with_another_log_is_no_match():
+    found = match_drives(a_result("base", ("a", "1")), a_result("new", ("a", "2")))
+    assert not found.pairs
+    assert why(found) == [("a", "base", Because.OTHER_LOG)]
+
+
+def test_drives_without_a_digest_or_a_score_are_no_match():
+    one, other = a_result("base", ("a", None)), a_result("new", ("b", None))
+    assert not match_drives(one, other).pairs
+    assert why(match_drives(one, a_result("new", ("a", "1")))) == [
+        ("a", "base", Because.LOG_UNKNOWN)
+    ]
+    failed = a_result("base", ("a", "1"), scored=False)
+    assert why(match_drives(failed, a_result("new", ("a", "1")))) == [
+        ("a", "base", Because.UNSCORED)
+    ]
+
+
+def test_one_drive_of_several_is_found_where_only_that_is_compared():
+    fleet, alone = a_result("fleet", ("a", "1"), ("b", "2")), a_result("alone", ("b", "2"))
+    found = one_drive([fleet, alone])
+    assert [side.parts[0].drive for side in found] == ["b", "b"]
+    assert one_drive([fleet, fleet]) is None
+    assert one_drive([fleet, a_result("other", ("c", "3"))]) is None
+
+
+def test_frames_are_matched_by_stamp_in_the_bases_order_and_equal_stamps_by_theirs():
+    mine, theirs = matched(np.array([9, 5, 7, 7, 1]), np.array([7, 9, 7, 7, 2]))
+    assert (mine.tolist(), theirs.tolist()) == ([0, 2, 3], [1, 0, 2])
+
+
+def masks_of(base, new, **more):
+    found = common_masks(rows_of(a_table(base)), rows_of(a_table(new)), **more)
+    return [(mask.variant, mask.base_stage, mask.stage, mask.final) for mask in found]
+
+
+def test_masks_are_matched_by_variant_and_stage():
+    own = {("a", "svm"): [1], ("a", "post"): [1], ("b", "post"): [1]}
+    assert masks_of(own, own | {("c", "post"): [1]}) == [
+        ("a", "svm", "svm", False),
+        ("a", "post", "post", True),
+        ("b", "post", "post", True),
+    ]
+
+
+def test_final_masks_are_matched_whatever_their_stages_are_called():
+    longer = {("a", "svm"): [1], ("a", "smooth"): [1]}
+    assert masks_of({("a", "svm"): [1]}, longer) == [("a", "svm", "smooth", True)]
+    assert masks_of(longer, {("a", "svm"): [1]}) == [("a", "smooth", "svm", True)]
+
+
+def test_a_variant_may_be_matched_with_another_one():
+    base, new = {("a", "trees"): [1], ("a", "post"): [1]}, {("b", "svm"): [1], ("b", "post"): [1]}
+    assert masks_of(base, new) == []
+    assert masks_of(base, new, variant="b") == [("b", "post", "post", True)]
+
+
+def test_another_truth_is_noticed_whatever_the_masks_made_of_it():
+    def rows(tp, tn, fp, fn):
+        cells = {"TP": tp, "TN": tn, "FP": fp, "FN": fn, "N": tp + tn + fp + fn}
+        one = rows_of(a_table({("a", "post"): [0]}))
+        return one.replace(**{name: np.array([count]) for name, count in cells.items()})
+
+    mine = rows(50, 40, 10, 0)
+    missed, relabelled = rows(45, 40, 10, 5), rows(50, 35, 10, 5)
+    for new, differs in ((missed, False), (relabelled, True)):
+        (mask,) = common_masks(mine, new)
+        assert mask.truth_differs.tolist() == [differs]

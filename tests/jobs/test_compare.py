@@ -1,0 +1,137 @@
+"""Results compared: from fleets' folders and from what single drives left."""
+
+import json
+import shutil
+
+import pytest
+
+from roadeval import compare
+from roadeval.errors import RoadevalError
+from roadeval.jobs.compare import as_json, asked
+from roadeval.results.fleet.folder import Fleet
+from roadeval.results.fleet.record import frames_path
+from tests.results.fleet.making import RUN, fleet_of
+
+
+@pytest.fixture(scope="module")
+def fleets(tmp_path_factory):
+    """A fleet of eight scored drives among ten, and one whose every third drive is worse."""
+    folder = tmp_path_factory.mktemp("fleets")
+    return fleet_of(folder / "base", 10), fleet_of(folder / "new", 10, change=0.03)
+
+
+@pytest.fixture(scope="module")
+def compared(fleets):
+    return compare(fleets)
+
+
+def test_the_drives_that_are_worse_are_found_and_no_others(compared):
+    found = compared.comparison
+    assert {change.drives for change in found.changes} == {8}
+    changed = {(row.variant, row.drive) for row in found.drives if row.changed}
+    assert changed == {("filtered", f"drive_000{place}") for place in (0, 3, 6)}
+    assert compared.warnings == [
+        "2 drives are left out of base (not scored in both): drive_0007, drive_0009"
+    ]
+    assert compared.sides == ()
+
+
+def test_any_number_of_fleets_is_compared_with_the_first(fleets):
+    found = compare([*fleets, fleets[0]]).comparison
+    assert [result.label for result in found.results] == [str(fleets[0]), "new", f"{fleets[0]} (2)"]
+    finals = [change for change in found.changes if change.final and change.variant == "filtered"]
+    assert [change.difference["ERR"].mean == 0 for change in finals] == [False, True]
+
+
+def test_the_variants_of_one_fleet_are_compared_over_its_drives(fleets):
+    found = compare(fleets[0], fail_if=["post.filtered.ERR > +50pp"]).comparison
+    (final,) = (change for change in found.changes if change.final)
+    assert (final.variant, final.drives, final.difference["ERR"].unit) == ("filtered", 8, "drives")
+    effects = Fleet(fleets[0]).summary["effects"]
+    told = next(e for e in effects if (e["base"], e["metric"]) == ("unfiltered", "ERR"))
+    own = final.difference["ERR"]
+    assert (own.mean, own.low, own.high, own.p) == pytest.approx(
+        (told["mean"], told["low"], told["high"], told["p"])
+    )
+
+
+def test_drives_that_have_moved_are_known_by_their_logs(fleets, tmp_path):
+    base, new = fleets
+    moved = shutil.copytree(new, tmp_path / "moved")
+    for path in moved.rglob("*-0000000*"):
+        if path.exists():
+            path.rename(path.with_name(path.name.replace("-0", "-f")))
+    content = json.loads((moved / "fleet.json").read_text().replace("-0000000", "-f000000"))
+    (moved / "fleet.json").write_text(json.dumps(content))
+    _rename_drives(moved / "drives.parquet")
+    found = compare([base, moved])
+    assert {change.drives for change in found.comparison.changes} == {8}
+    assert any("8 drives have other names in base and moved" in w for w in found.warnings)
+
+
+def _rename_drives(path):
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    table = parquet.ParquetFile(path).read()
+    names = [name.replace("-0", "-f") for name in table["drive"].to_pylist()]
+    place = table.column_names.index("drive")
+    parquet.write_table(table.set_column(place, "drive", pa.array(names)), path)
+
+
+def test_conditions_are_judged_over_drives(fleets):
+    (why,) = compare(fleets, fail_if=["post.filtered.ERR > +0.5pp"]).held
+    assert "over 8 drives" in why
+    assert compare(fleets, fail_if=["post.filtered.ERR > 20%"]).held == []
+
+
+def test_settings_that_differ_are_told(fleets, tmp_path):
+    run = RUN | {"frames": {"scale": 1.0, "every": 2}, "preset": "gated"}
+    other = fleet_of(tmp_path / "other", 3, run=run)
+    found = compare([fleets[0], other])
+    assert found.content["changed"] == [
+        "Changed settings: `preset` paper to gated, `frames.every` 1 to 2."
+    ]
+    (warning,) = (each for each in found.warnings if "every" in each)
+    assert "`frames.every` 1 and 2" in warning
+    assert "preset" not in warning
+
+
+def test_settings_that_change_no_number_are_left_aside():
+    run = {"preset": "paper", "svm": {"c": 1}, "output": {"save": "a"}, "fleet": {"folds": 2}}
+    assert asked({"run": run}) == {"preset": "paper", "svm.c": 1}
+    assert asked({}) == {}
+
+
+def test_only_chosen_variants_are_compared(fleets):
+    found = compare(fleets, variants=["unfiltered"]).comparison
+    assert {change.variant for change in found.changes} == {"unfiltered"}
+    with pytest.raises(RoadevalError, match=r"base: no variant net; there are filtered"):
+        compare(fleets, variants=["net"])
+
+
+def test_a_variant_of_one_fleet_is_held_against_another_of_the_other(fleets):
+    found = compare([fleets[0], fleets[0]], variants=["unfiltered=filtered"]).comparison
+    alone = compare(fleets[0], variants=["unfiltered", "filtered"]).comparison
+    told, same = ([c.difference["ERR"].mean for c in each.changes] for each in (found, alone))
+    assert told == same
+
+
+def test_equal_fleets_give_equal_json_without_nan(fleets):
+    first, second = (as_json(compare([fleets[0], fleets[0]])) for _ in range(2))
+    assert first == second
+    content = json.loads(first, parse_constant=pytest.fail)
+    assert content["format"] == {"name": "roadeval-comparison", "version": 2}
+    assert {row["difference"]["mean"] for row in content["drives"]} == {0}
+
+
+def test_a_drive_whose_frames_have_gone_is_named(fleets, tmp_path):
+    cut = shutil.copytree(fleets[1], tmp_path / "cut")
+    drive = Fleet(cut).summary["drives"][0]["drive"]
+    path = frames_path(cut, drive)
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(RoadevalError, match=r"frames\.parquet: damaged"):
+        compare([fleets[0], cut])
+    path.unlink()
+    with pytest.raises(RoadevalError, match=r"frames\.parquet: is not there"):
+        compare([fleets[0], cut])
