@@ -1,7 +1,7 @@
 """How often a fleet's intervals hold, and what they find: ``python -m benchmarks.fleet_intervals``.
 
 Fleets are made up, so that the truth is known, and given to the function that `roadeval` uses. The
-table is the one that `roadeval.evaluation.drives.across` quotes and explains.
+table is the one that `roadeval.evaluation.stats.drives` quotes and explains.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from roadeval.evaluation.drives import AcrossSettings, DriveEffect, across_drives
-from roadeval.evaluation.drives.effect import Clusters
 from scipy import special
+
+from roadeval.evaluation.stats import DriveMean, group_means, over_drives
 
 Values = npt.NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Values]
 """Draws so many effects of mean 0 and variance 1."""
 
-SETTINGS: Final = AcrossSettings()
-TAIL: Final = (1 - SETTINGS.confidence) / 2
-CLUSTERS: Final = (6, 10, 30, 200)
+CONFIDENCE: Final = 0.95
+TAIL: Final = (1 - CONFIDENCE) / 2
+GROUPS: Final = (6, 10, 30, 200)
 POWER: Final = (0.5, 1)
 """True means that are to be found, in standard deviations of a drive's effect."""
 SCALE: Final = 0.02
@@ -62,14 +62,14 @@ LAYOUTS: Final = (
 )
 
 
-def fleet(rng: np.random.Generator, draw: Draw, layout: Layout, groups: int) -> list[DriveEffect]:
+def fleet(rng: np.random.Generator, draw: Draw, layout: Layout, groups: int) -> list[DriveMean]:
     """Make up a fleet whose mean is 0 and whose drives differ by 1, in `SCALE`."""
     sizes = rng.integers(1, layout.drives + 1, groups)
     group = np.repeat(np.arange(groups), sizes)
     errors = np.exp(rng.uniform(math.log(layout.least), math.log(layout.most), len(group)))
     measured = _effects(rng, draw, layout, group) + errors * rng.standard_normal(len(group))
     return [
-        DriveEffect(f"{place:05}", f"{group[place]:05}", SCALE * measured[place], 100)
+        DriveMean(f"{place:05}", f"{group[place]:05}", SCALE * measured[place])
         for place in range(len(group))
     ]
 
@@ -86,9 +86,8 @@ def _effects(
 # --- Another interval, for comparison -------------------------------------------------------------
 
 
-def student(clusters: Clusters) -> tuple[float, float]:
-    """Return Student's interval of the mean."""
-    means = clusters.group_means()
+def student(means: Values) -> tuple[float, float]:
+    """Return Student's interval of the mean of groups' means."""
     half = special.stdtrit(len(means) - 1, 1 - TAIL) * means.std(ddof=1) / math.sqrt(len(means))
     return means.mean() - half, means.mean() + half
 
@@ -103,10 +102,10 @@ but for the width, how often an interval holds, all in percent."""
 def judged(rng: np.random.Generator, draw: Draw, layout: Layout, groups: int) -> list[float]:
     """Make a fleet, and return what the columns are the averages of."""
     effects = fleet(rng, draw, layout, groups)
-    clusters, found = Clusters.of(effects), across_drives(effects, SETTINGS)
+    found = over_drives(effects, CONFIDENCE)
     low, high = found.low / SCALE, found.high / SCALE
     shares = [
-        _holds(student(clusters), 0),
+        _holds(student(group_means(effects)), 0),
         _holds((low, high), 0),
         # An effect that is there moves the fleet; here 0 moves instead.
         *(1 - _holds((low, high), -effect) for effect in POWER),
@@ -127,7 +126,7 @@ def rows(repetitions: int) -> Iterator[str]:
     yield rule
     for kind, (name, draw) in enumerate(EFFECTS.items()):
         for place, layout in enumerate(LAYOUTS):
-            for groups in CLUSTERS:
+            for groups in GROUPS:
                 rng = np.random.default_rng([kind, place, groups])
                 results = [judged(rng, draw, layout, groups) for _ in range(repetitions)]
                 yield f"{name:6}  {layout.name:16}  {groups:3}{_cells(np.array(results))}"

@@ -1,7 +1,7 @@
 """How often intervals hold, and what they find: ``python -m benchmarks.intervals``.
 
 Drives are made up, so that the truth is known, and given to the functions that `roadeval` uses. The
-table is the one that `roadeval.evaluation.uncertainty` quotes. Below it stands a null run: five
+table is the one that `roadeval.evaluation.stats.difference` quotes. Below it is a null run: five
 variants that are as good as the base, and how many drives have a false finding among them.
 """
 
@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from roadeval.evaluation.autocorrelation import mean_distribution
-from roadeval.evaluation.uncertainty import holm, mean_difference
 from scipy import signal, special, stats
 
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.stats import holm, within_drive
+from roadeval.evaluation.stats.autocorrelation import mean_distribution
 
 Drives = npt.NDArray[np.float64]
 """``(drives, frames)`` differences of mean 0 and variance 1."""
@@ -184,7 +184,7 @@ def false_findings(drives: int, variants: int, rho: float = 0.8, frames: int = 9
     plain = corrected = 0
     for _ in range(drives):
         rates = base + 0.01 * autoregression(rho)(rng, variants, frames)
-        family = holm([mean_difference(each, base, settings) for each in rates])
+        family = holm([within_drive(each, base, settings) for each in rates])
         plain += any(each.p < 1 - settings.confidence for each in family)
         corrected += any(each.p_holm < 1 - settings.confidence for each in family)
     return (

@@ -9,6 +9,7 @@ import pytest
 
 from tests.e2e.commands import DEMO, Replayed, here, replay, roadeval
 from tests.report.making import text
+from tests.results.fleet.making import fleet_of
 
 LIMIT = ("--fail-if", "post.filtered.ERR > +0.5pp")
 
@@ -40,7 +41,7 @@ def test_a_recording_against_itself_differs_by_nothing(demo):
     run = roadeval("compare", demo.recording, demo.recording, *LIMIT, "--json")
     assert run.returncode == 0, run.stderr
     content = json.loads(run.stdout)
-    assert content["same_drive"]
+    assert content["paired"]
     for change in content["changes"]:
         assert change["base"] == change["new"]
         assert {told["mean"] for told in change["difference"].values()} == {0}
@@ -94,6 +95,9 @@ def test_the_variants_of_one_recording_are_compared_with_each_other(demo):
     final = next(change for change in content["changes"] if change["final"])
     difference = demo.summary["difference"]["post"]["ERR"]["mean"]
     assert final["difference"]["ERR"]["mean"] == pytest.approx(difference)
+    # The same difference, the same family: the same sentence but for what brings it about.
+    told = content["verdict"].replace("filtered instead of unfiltered", "the filter")
+    assert demo.summary["verdict"].startswith(told)
 
 
 @pytest.mark.parametrize("kept", [0, 0.5])
@@ -130,6 +134,53 @@ def test_where_err_is_undefined_on_every_frame_it_is_said(ignored, tmp_path):
     words = [word for name in names for word in ("-o", name)]
     run = here("compare", ignored.reports, *words)
     assert run.returncode == 0, run.stderr
-    assert "filtered: ERR is undefined on every frame\n" in run.stdout
+    said = "Nothing to compare: ERR of post is undefined on every frame."
+    assert said in run.stdout
     assert "no interval" not in run.stdout
-    assert "filtered: ERR is undefined on every frame" in text(names[0].read_bytes())
+    assert said in text(names[0].read_bytes())
+
+
+# --- Fleets ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def fleets(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fleets")
+    return fleet_of(folder / "base", 10), fleet_of(folder / "new", 10, change=0.03)
+
+
+def test_a_worse_fleet_ends_with_4_and_the_sentence_that_says_why(fleets):
+    run = here("compare", *fleets, *LIMIT)
+    assert run.returncode == 4
+    assert "new against base: 8 drives in common" in run.stdout
+    told = " ".join(run.stdout.split())
+    assert "filtered of new: ERR changed on 3 of 8 drives (worse on 3, better on 0" in told
+    assert "drive_0003" in run.stdout
+    assert max(map(len, run.stdout.splitlines())) <= 80
+    assert "post.filtered.ERR of new changed by" in run.stderr
+    assert "warning: 2 drives are left out of base" in run.stderr
+
+
+def test_fleets_are_written_as_files_too(fleets, tmp_path):
+    names = [tmp_path / f"change.{ending}" for ending in ("pdf", "md", "json", "html")]
+    run = here("compare", *fleets, *(word for name in names for word in ("-o", name)), "-q", *LIMIT)
+    assert (run.returncode, run.stdout) == (4, "")
+    document, markdown, content, _ = (name.read_bytes() for name in names)
+    told = json.loads(content)
+    assert told["verdict"] == json.loads(here("compare", *fleets, "--json").stdout)["verdict"]
+    assert "**FAIL**" in markdown.decode()
+    assert "Which drives changed" in text(document)
+
+
+@pytest.mark.parametrize("words", [["post.net.ERR > 1pp"], ["post.filtered.ERR > 99pp surely"]])
+def test_what_cannot_be_judged_over_drives_is_one_line(words, fleets, tmp_path):
+    few = fleet_of(tmp_path / "few", 2)
+    run = here("compare", few, few, "--fail-if", *words)
+    assert run.returncode == 1
+    assert len(run.stderr.splitlines()) == 1
+
+
+def test_a_fleets_report_is_named(fleets, tmp_path):
+    run = here("report", fleets[0], "-o", tmp_path / "fleet.pdf")
+    assert (run.returncode, run.stdout) == (0, f"{tmp_path / 'fleet.pdf'}\n")
+    assert "What the filter changes" in text((tmp_path / "fleet.pdf").read_bytes())
