@@ -66,10 +66,10 @@ def changed_settings(comparison: Comparison, most: int | None = None) -> list[st
     """
     lines = []
     for each in comparison.changed_settings:
-        named = [f"`{name}` {_value(a)} to {_value(b)}" for name, (a, b) in each.settings.items()]
-        more = f" and {len(named) - most} more" if most and len(named) > most else ""
+        named = [f"{name} {_value(a)} to {_value(b)}" for name, (a, b) in each.settings.items()]
+        more = f"; and {len(named) - most} more" if most and len(named) > most else ""
         of = f" in {each.new}" if len(comparison.results) > 2 else ""
-        lines.append(f"Changed settings{of}: {', '.join(named[:most])}{more}.")
+        lines.append(f"Changed settings{of}: {'; '.join(named[:most])}{more}.")
     return lines
 
 
@@ -237,6 +237,8 @@ def _value(value: Any) -> str:
     """Write a setting's value for a person."""
     if value is None or value in ({}, [], ()):
         return "not given"
+    if isinstance(value, dict):
+        return ", ".join(f"{name}={each}" for name, each in value.items())
     if isinstance(value, list | tuple):
         return ", ".join(map(str, value))
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -152,10 +152,11 @@ def correction(differences: Iterable[Difference | Mapping[str, Any]]) -> str:
         return ""
     if counts == [1]:
         return f"{MARK} excludes 0; it is the only one, so nothing is corrected."
-    families = " and ".join(map(str, counts))
+    many = f"{counts[0]} differences" if len(counts) == 1 else "differences"
+    families = "" if len(counts) == 1 else f" against one base ({' and '.join(map(str, counts))})"
     return (
-        f"{MARK} stands after Holm's correction for the {families} differences of ERR of final "
-        "masks; others are not corrected."
+        f"{MARK} stands after Holm's correction for the {many} of ERR of final masks{families}; "
+        "others are not corrected."
     )
 
 

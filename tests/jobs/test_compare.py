@@ -90,7 +90,7 @@ def test_settings_that_differ_are_told(fleets, tmp_path):
     other = fleet_of(tmp_path / "other", 3, run=run)
     found = compare([fleets[0], other])
     assert found.content["changed"] == [
-        "Changed settings: `preset` paper to gated, `frames.every` 1 to 2."
+        "Changed settings: preset paper to gated; frames.every 1 to 2."
     ]
     (warning,) = (each for each in found.warnings if "every" in each)
     assert "`frames.every` 1 and 2" in warning

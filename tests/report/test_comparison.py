@@ -91,7 +91,7 @@ def test_it_opens_with_the_changed_settings():
     changed = (SettingsDiffer("base", "new|er", {"preset": ("paper", "gated")}),)
     comparison = a_comparison(changed_settings=changed)
     first, second = (note.text for note in blocks(Text, comparison)[:2])
-    assert first == "Changed settings: `preset` paper to gated."
+    assert first == "Changed settings: preset paper to gated."
     assert second.startswith("On these 12 frames new|er instead of base raises ERR of post")
     assert markdown(comparison, ()).splitlines()[2].startswith("Changed settings:")
 

@@ -53,12 +53,12 @@ def test_changed_settings_are_told_of_each_result_and_some_of_many():
     changed = (SettingsDiffer("base", "new", settings),)
     found = a_comparison(a_change(WORSE), changed_settings=changed)
     assert changed_settings(found) == [
-        "Changed settings: `preset` paper to gated, `chain` svm to trees, post, `svm.c` 1 to 2."
+        "Changed settings: preset paper to gated; chain svm to trees, post; svm.c 1 to 2."
     ]
     rows = a_change(WORSE), a_change(WORSE, result="newer")
     several = a_comparison(*rows, changed_settings=changed)
     assert changed_settings(several, 1) == [
-        "Changed settings in new: `preset` paper to gated and 2 more."
+        "Changed settings in new: preset paper to gated; and 2 more."
     ]
 
 

@@ -34,7 +34,7 @@ def test_the_variants_of_a_single_result_stand_together():
 def test_the_screen_begins_with_the_changed_settings_and_ends_with_the_verdict():
     changed = (SettingsDiffer("base", "new", {"preset": ("paper", "gated")}),)
     told = shown(a_change(SURE), changed_settings=changed)
-    assert told.startswith("Changed settings: `preset` paper to gated.\nnew against base\n")
+    assert told.startswith("Changed settings: preset paper to gated.\nnew against base\n")
     assert told.endswith("on frames \nlike these by 1.0 to 2.0 pp.\n")
 
 
