@@ -120,8 +120,8 @@ def test_what_is_negligible_is_a_setting():
         ([1], "* excludes 0; it is the only one, so nothing is corrected."),
         (
             [3, None, 3, 4],
-            "* stands after Holm's correction for the differences of ERR of final masks against one "
-            "base (3 and 4); others are not corrected.",
+            "* stands after Holm's correction for the differences of ERR of final masks against "
+            "one base (3 and 4); others are not corrected.",
         ),
     ],
 )
