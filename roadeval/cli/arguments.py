@@ -37,6 +37,14 @@ Quiet = Annotated[
     bool, typer.Option("-q", "--quiet", help="No progress and no table; warnings stay.")
 ]
 
+TrustSources = Annotated[
+    bool,
+    typer.Option(
+        "--trust-sources",
+        help="Of a fleet: read logs, masks, networks and recordings wherever its folder says that "
+        "they lie, files and URLs alike. Without it nothing outside the folder is read.",
+    ),
+]
 PaperSize = Annotated[
     str, typer.Option("--paper", metavar="a4|letter", show_default=False, help="Default: a4.")
 ]

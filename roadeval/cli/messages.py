@@ -11,7 +11,7 @@ from roadeval import kernels
 from roadeval.cli import console
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import with_flags
-from roadeval.runtime.text import visible, visible_lines
+from roadeval.runtime.text import visible, visible_lines, without_secrets
 
 PROGRAM: Final = "roadeval"
 LONGEST: Final = 5_000
@@ -80,7 +80,7 @@ def _shortened(sentence: str) -> str:
 
 
 def _write(kind: str, style: str, sentence: object) -> None:
-    said = _shortened(visible(str(sentence)))
+    said = _shortened(visible(without_secrets(str(sentence))))
     try:
         from rich.text import Text
 

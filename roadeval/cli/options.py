@@ -233,7 +233,9 @@ OPTIONS: Final = (
 )
 """In the order of the help."""
 
-FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS}
+FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS} | {
+    "trust_sources": "--trust-sources"
+}
 _MARKED: Final = re.compile(r"`(\w+(?:\.\w+)?)`")
 
 Given = Mapping[str, Any]

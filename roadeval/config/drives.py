@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from roadeval.config.errors import ConfigError
 from roadeval.config.variants import check_tables
+from roadeval.runtime.text import public_url
 
 OF_A_LOG: Final = ("topics", "labels", "frames", "masks")
 """The tables that may differ from drive to drive."""
@@ -41,14 +42,15 @@ class DriveSettings:
         if not isinstance(path, str) or not path or "\0" in path:
             raise ConfigError(f"{where}: path must name a log, or several as *.mcap")
         rest = {key: value for key, value in tables.items() if key != "path"}
+        path = public_url(path)
         check_tables(rest, OF_A_LOG, f"{where} {path}")
         return cls(path, rest, f"{where} {path}")
 
     def holds_for(self, drive: str | os.PathLike[str]) -> bool:
         """Whether a drive is one of these."""
-        typed, real = Path(drive), Path(drive).resolve()
-        is_it = real == Path(self.path).resolve()
-        return is_it or typed.match(self.path) or real.match(self.path)
+        wanted, typed = public_url(self.path), Path(public_url(os.fspath(drive)))
+        real = typed.resolve()
+        return real == Path(wanted).resolve() or typed.match(wanted) or real.match(wanted)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``[[drives]]``."""

@@ -22,7 +22,8 @@ RESERVED: Final = frozenset(
 )
 """Names that no variant may bear: the tables or the recording use them for something else."""
 
-_PLAIN: Final = re.compile(r"[A-Za-z0-9_-]+")
+_PLAIN: Final = re.compile(r"[A-Za-z0-9_-]{1,200}")
+"""No longer than the name of a file can be, with an ending."""
 
 
 def is_plain(name: str) -> bool:

@@ -9,7 +9,7 @@ from urllib.parse import unquote, urlsplit
 from urllib.request import url2pathname
 
 from roadeval.fleet.errors import FleetError
-from roadeval.runtime.text import visible
+from roadeval.runtime.text import public_url, visible, without_secrets
 
 BUCKETS: Final = ("s3", "gs")
 """Schemes of stores that keep objects in buckets, and can list them."""
@@ -30,7 +30,20 @@ def scheme_of(url: str) -> str:
     if scheme not in SCHEMES:
         known = ", ".join(f"{each}://" for each in SCHEMES)
         raise FleetError(f"{shown(url)}: no scheme that is known; choose {known}")
+    if scheme not in (*BUCKETS, "file") and not _has_host(url):
+        raise FleetError(
+            f"{shown(url)}: no host in it; in a user's name or password write / ? # @ as "
+            "%2F %3F %23 %40"
+        )
     return scheme
+
+
+def _has_host(url: str) -> bool:
+    try:
+        parts = urlsplit(url)
+        return bool(parts.hostname) and (parts.port is None or parts.port > 0)
+    except ValueError:
+        return False
 
 
 def shown(source: str) -> str:
@@ -41,11 +54,7 @@ def shown(source: str) -> str:
     >>> shown("https://me:secret@host/a.mcap?X-Amz-Signature=5d1c")
     'https://host/a.mcap'
     """
-    match = _URL.match(source)
-    if match is None:
-        return visible(source)
-    host, slash, path = re.split(r"[?#]", source[match.end() :], maxsplit=1)[0].partition("/")
-    return visible(f"{match[0]}{host.rpartition('@')[2]}{slash}{path}")
+    return visible(public_url(source) if is_url(source) else without_secrets(source))
 
 
 def file_of(url: str) -> Path:

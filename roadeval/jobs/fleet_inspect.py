@@ -11,12 +11,12 @@ from typing import Any, Final
 from roadeval.config import OutputSettings, RunConfig, load_config
 from roadeval.errors import RoadevalError
 from roadeval.fleet.remote import staged
-from roadeval.fleet.urls import is_url
+from roadeval.fleet.urls import is_url, shown
 from roadeval.jobs.fleet_models import model_path
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.replay import Outcome, replay
 from roadeval.results.fleet.folder import Fleet
-from roadeval.results.fleet.record import RESULTS, recording_path
+from roadeval.results.fleet.record import PICTURES, recording_path
 from roadeval.results.folder import RUN
 
 FEWEST: Final = "worst:10"
@@ -85,7 +85,7 @@ def _frame(fleet: Fleet, row: dict[str, Any]) -> FleetFrame:
         **{name: row[name] for name in names},
         rates={name: row[name] for name in ("ERR", "FPR", "FNR")},
         light={name: row[name] for name in ("luminance", "contrast", "shadow", "sun")},
-        picture=fleet.path / row["picture"],
+        picture=fleet.path / PICTURES / row["drive"] / f"{row['frame']}.jpg",
         recording=recording if recording.exists() else None,
     )
 
@@ -129,23 +129,28 @@ def recording_of(
     Raises
     ------
     RoadevalError
-        If there is no such drive, its log has gone, or it cannot be replayed.
+        If there is no such drive, its log has gone or may not be read, or it cannot be replayed.
     """
     row = _row(fleet, drive)
-    recording = recording_path(fleet.path, drive)
-    if recording.exists():
+    if (recording := fleet.recording(drive)).exists():
         return recording, ()
-    source = str(row["source"])
+    recording = fleet.recording(drive, new=True)
+    named, source = str(row["source"]), shown(str(row["source"]))
     if row["status"] == "failed":
         raise RoadevalError(f"{source}: has no recording, for it failed: {row['reason']}")
-    if not is_url(source) and not Path(source).exists():
+    if not fleet.trust_sources:
+        raise RoadevalError(
+            f"{drive}: no recording was kept; `trust_sources` replays it from {source}, with the "
+            f"masks, networks and model of {fleet.results(drive) / RUN}"
+        )
+    if not is_url(named) and not Path(named).exists():
         raise RoadevalError(
             f"{source}: has gone, and no recording of it was kept; bring the log back, or see "
             f"{fleet.path / 'pictures' / drive}"
         )
     config = _configuration(fleet, drive, row["fold"])
     on_replay(f"{drive}: no recording was kept, so it is replayed from {source}")
-    outcome = _replayed(source, config, recording, on_progress)
+    outcome = _replayed(named, config, recording, on_progress)
     changed = outcome.summary["log"]["sha256"] != row["sha256"]
     warning = f"{source}: has changed since the fleet was run, and its results may have, too"
     return recording, (warning,) if changed else ()
@@ -165,7 +170,7 @@ def _row(fleet: Fleet, drive: str) -> dict[str, Any]:
 
 def _configuration(fleet: Fleet, drive: str, fold: int | None) -> RunConfig:
     """Return what a drive was replayed with; the model of its fold as it lies in the folder now."""
-    path = fleet.path / RESULTS / drive / RUN
+    path = fleet.results(drive) / RUN
     if not path.exists():
         raise RoadevalError(f"{path}: is not there; run the fleet's command again")
     config = load_config(path, trusted=False)

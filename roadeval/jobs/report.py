@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
+from roadeval.errors import RoadevalError
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.page_frames import browsed, strips_of
 from roadeval.jobs.report_findings import collect
@@ -21,6 +22,7 @@ from roadeval.report.page.render import page
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.fleet.folder import Fleet
 from roadeval.results.fleet.kind import is_fleet
+from roadeval.runtime.files import leads_outside
 
 PAGES: Final = (".html", ".htm")
 """Endings of files that are written as a page."""
@@ -82,14 +84,21 @@ def write_report(
     if not isinstance(result, Result) and is_fleet(result):
         return _write_fleet(Fleet(result), output, paper, commands, as_page)
     opened = result if isinstance(result, Result) else Result(result)
-    beside = opened.path / "report.pdf"
-    usual = beside if opened.recording is None else Path("reports", f"{opened.path.stem}.pdf")
-    path = Path(output or usual)
+    usual = Path("reports", f"{opened.path.stem}.pdf") if opened.recording else None
+    path = Path(output or usual or _beside(opened.path))
     with holding(path, inputs=[opened.path]):
         if is_page(path):
             kept = Beside.ALL if as_page.assets else Beside.NOTHING
             return write_page(path, drive_page(opened, commands, as_page.pictures), kept)
         return write_file(path, pdf(document(collect(opened, commands)), paper))
+
+
+def _beside(folder: Path) -> Path:
+    """Return where the report of a folder lies; its other files may be somebody else's."""
+    path = folder / "report.pdf"
+    if leads_outside(path, folder):
+        raise RoadevalError(f"{path}: a link leads out of the folder; name the file to write")
+    return path
 
 
 def is_page(path: Path) -> bool:
@@ -126,7 +135,7 @@ def _write_fleet(
     commands: Commands | None,
     as_page: PageSettings,
 ) -> Path:
-    path = Path(output or fleet.path / "report.pdf")
+    path = Path(output or _beside(fleet.path))
     with holding(path, inputs=[fleet.path]):
         inspect = commands.inspect if commands else None
         if is_page(path):

@@ -77,7 +77,8 @@ class Result:
             return self.path if self.pictured else None
         written = self.summary.get("run", {}).get("output", {}).get("save")
         path = Path(written or Path("recordings", f"{self.name}.rrd"))
-        if not path.is_file():
+        # A summary from elsewhere may name a share of somebody's server, which Windows would ask.
+        if str(path).startswith(("//", "\\\\")) or not path.is_file():
             return None
         try:
             other = Result(path).summary.get("log", {}).get("sha256")

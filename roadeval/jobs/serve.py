@@ -33,6 +33,7 @@ def serve(
     results: Paths,
     on_address: Callable[[str], None],
     *,
+    trust_sources: bool = False,
     commands: MakeCommands | None = None,
 ) -> None:
     """Serve results as pages on 127.0.0.1 until the process is told to end, as by Ctrl-C.
@@ -44,6 +45,8 @@ def serve(
     on_address
         Called with the address to open, before anything is answered. It holds a token without which
         nothing is answered.
+    trust_sources
+        Whether a fleet's drives may be replayed from where its folder says that their logs lie.
     commands
         Makes the commands that pages name; none by default.
 
@@ -52,13 +55,15 @@ def serve(
     RoadevalError
         If a result cannot be read.
     """
-    with serving(results, commands) as server:
+    with serving(results, trust_sources=trust_sources, commands=commands) as server:
         on_address(server.address)
         server.serve()
 
 
 @contextmanager
-def serving(results: Paths, commands: MakeCommands | None = None) -> Iterator[LocalServer]:
+def serving(
+    results: Paths, *, trust_sources: bool = False, commands: MakeCommands | None = None
+) -> Iterator[LocalServer]:
     """Have a server of results, as `serve`; when the block ends, all that it started ends with it.
 
     Yields
@@ -68,7 +73,10 @@ def serving(results: Paths, commands: MakeCommands | None = None) -> Iterator[Lo
     """
     with ExitStack() as stack:
         replayer = Replayer()
-        opened = [_opened(Path(path), commands, replayer) for path in listed(results)]
+        opened = [
+            _opened(Path(path), commands, replayer, trust_sources=trust_sources)
+            for path in listed(results)
+        ]
         viewer = WindowViewer()
         stack.callback(viewer.close)
         stack.callback(replayer.cancel)
@@ -77,10 +85,12 @@ def serving(results: Paths, commands: MakeCommands | None = None) -> Iterator[Lo
         yield server
 
 
-def _opened(path: Path, commands: MakeCommands | None, replayer: Replayer) -> Served:
+def _opened(
+    path: Path, commands: MakeCommands | None, replayer: Replayer, *, trust_sources: bool
+) -> Served:
     if is_fleet(path):
         inspect = commands(path).inspect if commands else None
-        return ServedFleet(path, inspect, commands, replayer)
+        return ServedFleet(path, inspect, commands, replayer, trust_sources=trust_sources)
     return ServedDrive(path, commands)
 
 

@@ -23,7 +23,6 @@ from roadeval.report.findings import Commands
 from roadeval.report.fleet.document import page_document
 from roadeval.report.page.render import Place, page
 from roadeval.results.fleet.folder import Fleet
-from roadeval.results.fleet.record import RESULTS, recording_path
 from roadeval.runtime.files import own_names
 from roadeval.runtime.local_server import NOT_FOUND, PAGE, Request, Response, told
 
@@ -45,6 +44,8 @@ class ServedFleet:
         Makes the commands that its drives' pages name.
     replayer
         Replays drives of which no recording was kept.
+    trust_sources
+        See `Fleet`.
 
     Raises
     ------
@@ -58,9 +59,11 @@ class ServedFleet:
         inspect: Callable[[int], str] | None,
         commands: Callable[[Result], Commands] | None,
         replayer: Replayer,
+        *,
+        trust_sources: bool = False,
     ) -> None:
         self.path: Path = path
-        self._fleet: Final = Fleet(path)
+        self._fleet: Final = Fleet(path, trust_sources=trust_sources)
         self._inspect: Final = inspect
         self._commands: Final = commands
         self._replayer: Final = replayer
@@ -124,8 +127,8 @@ class ServedFleet:
 
     def _served(self, drive: str) -> ServedDrive:
         """Return a drive as it lies in the folder now: its recording, or else its tables."""
-        recording = recording_path(self.path, drive)
-        path = recording if recording.exists() else self.path / RESULTS / drive
+        recording = self._fleet.recording(drive)
+        path = recording if recording.exists() else self._fleet.results(drive)
         with self._lock:
             if path not in self._drives:
                 above = ("../../", self.title)
@@ -134,9 +137,9 @@ class ServedFleet:
 
     def _view(self, frame: FleetFrame, viewer: WindowViewer) -> Response:
         """Show one of the worst frames; its drive is replayed where no recording was kept."""
-        recording, drive = recording_path(self.path, frame.drive), frame.drive
-
+        drive = frame.drive
         try:
+            recording = self._fleet.recording(drive)
             state = self._replayer.want(recording, drive, partial(self._replay, drive))
             if state:
                 return told(HTTPStatus.ACCEPTED, state)
@@ -149,10 +152,10 @@ class ServedFleet:
         try:
             recording_of(self._fleet, drive, on_progress)
         except CancelledReplayError:
-            for left in own_names(recording_path(self.path, drive), hidden=False):
+            for left in own_names(self._fleet.recording(drive), hidden=False):
                 left.unlink(missing_ok=True)
             raise
 
     def _cancel(self, frame: FleetFrame) -> Response:
-        self._replayer.cancel(recording_path(self.path, frame.drive))
+        self._replayer.cancel(self._fleet.recording(frame.drive))
         return Response(b"")

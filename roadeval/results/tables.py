@@ -336,7 +336,18 @@ def read_parquet(
             raise ResultsError(
                 f"{path}: damaged (column {column.name} is not of type {column.type}); {remedy}"
             )
+        elif column.name == "drive":
+            _check_drives(path, table["drive"])
     return table
+
+
+def _check_drives(path: Path, drives: pa.ChunkedArray) -> None:
+    """Refuse drives of a fleet whose names are more than names: files are called after them."""
+    for name in drives.unique().to_pylist():
+        if name is None or not is_plain(name):
+            raise ResultsError(
+                f"{path}: damaged (a drive is called {str(name)[:NAMED]!r}, which is no name)"
+            )
 
 
 def parquet_rows(table: pa.Table, name: str) -> Rows:

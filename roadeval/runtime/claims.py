@@ -93,12 +93,14 @@ def _is_at(file: int, name: Path) -> bool:
 
 
 def _open(name: Path) -> int:
+    # A folder from elsewhere may have a link there: what it leads to would be overwritten.
+    here = getattr(os, "O_NOFOLLOW", 0)
     try:
-        return os.open(name, os.O_RDWR | os.O_CREAT, 0o666)
+        return os.open(name, os.O_RDWR | os.O_CREAT | here, 0o666)
     except PermissionError:
         if not name.exists():
             raise
-        return os.open(name, os.O_RDONLY)  # a dead run's of another user
+        return os.open(name, os.O_RDONLY | here)  # a dead run's of another user
 
 
 def _sign(lock: int) -> None:

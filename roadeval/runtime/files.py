@@ -129,6 +129,11 @@ class NewFile:
             self.partial.unlink(missing_ok=True)
 
 
+def leads_outside(path: Path, folder: Path) -> bool:
+    """Return whether a path in a folder leads out of it, by links or by its name."""
+    return not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
+
+
 def target_of(path: Path) -> Path:
     """Return where a link leads; any other path as it is."""
     return Path(os.path.realpath(path)) if os.path.islink(path) else path  # noqa: PTH114

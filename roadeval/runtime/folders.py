@@ -234,7 +234,7 @@ def _settle(complete: Path, content: Content) -> None:
     if complete.name.endswith(_COMPLETE):
         (target / content.seal).unlink(missing_ok=True)
         for name in json.loads((complete / _REPLACED).read_text()):
-            if not (target / name).is_dir():
+            if name == Path(name).name and not (target / name).is_dir():
                 (target / name).unlink(missing_ok=True)
         complete = complete.rename(
             complete.with_name(complete.name.removesuffix(_COMPLETE) + _MOVING)

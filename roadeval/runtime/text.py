@@ -9,12 +9,17 @@ from __future__ import annotations
 
 import codecs
 import json
+import re
 from typing import Final
 from unicodedata import category
 
 _JOINERS: Final = "\N{ZERO WIDTH NON-JOINER}\N{ZERO WIDTH JOINER}"
 """Parts of words in some scripts, and of some emoji."""
 _MARKUP: Final = frozenset("\\`*_[]<>|#&~$@")
+_URL: Final = re.compile(
+    r"((?:[A-Za-z][A-Za-z0-9+.-]+:/(?:/|(?=[^\s/@]*@))|(?:https?|gs|s3):/))(\S*)"
+)
+"""A URL in a text; also one that passed for a path and lost a slash."""
 
 UNENCODABLE: Final = "roadeval.visible"
 """An error handler for streams: what their encoding lacks is written as `visible` writes it."""
@@ -47,6 +52,32 @@ def elided(name: str, letters: int) -> str:
         return name
     half = (letters - 1) // 2
     return f"{name[: letters - 1 - half]}\N{HORIZONTAL ELLIPSIS}{name[len(name) - half :]}"
+
+
+def without_secrets(text: str) -> str:
+    """Return text whose URLs have no user, password, query and fragment.
+
+    The query of a signed URL is as good as a password.
+
+    >>> without_secrets("https://me:secret@host/a.mcap?X-Amz-Signature=5d1c cannot be read")
+    'https://host/a.mcap cannot be read'
+    """
+    return _URL.sub(lambda url: public_url(url[0]), text)
+
+
+def public_url(url: str) -> str:
+    """Return a URL without user, password, query and fragment; text that is none as it is."""
+    match = _URL.match(url)
+    return url if match is None else f"{match[1]}{_public(url[match.end(1) :])}"
+
+
+def _public(rest: str) -> str:
+    """Return what follows a URL's scheme without the parts that may be secret."""
+    host = re.split("[/?#]", rest, maxsplit=1)[0]
+    if "@" not in host and re.search(r"^[^\[]*:(?!\d*$)", host):
+        # No port: a password with one of those letters in it, or the beginning of one.
+        return _public(rest.rpartition("@")[2]) if "@" in rest else ""
+    return re.split("[?#]", host.rpartition("@")[2] + rest[len(host) :], maxsplit=1)[0]
 
 
 def is_utf8(text: str) -> bool:

@@ -279,7 +279,7 @@ def test_a_folder_with_folds_that_has_moved_is_looked_at_with_its_own_models(tmp
         write(tmp_path / "logs" / f"{name}.mcap", 100 * number)
     run(tmp_path / "logs", tmp_path / "before", executor=ThreadTasks(), folds=2)
     (tmp_path / "before").rename(tmp_path / "after")
-    moved = roadeval.Fleet(tmp_path / "after")
+    moved = roadeval.Fleet(tmp_path / "after", trust_sources=True)
     recording, warnings = recording_of(moved, worst_frames(moved)[0].drive)
     assert recording.is_relative_to(moved.path)
     assert recording.exists()

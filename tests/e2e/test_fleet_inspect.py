@@ -57,7 +57,7 @@ def test_the_list_is_of_all_drives_the_worst_first(made, fleet):
     assert len({each["drive"] for each in listed}) == 3
     read = here("inspect", fleet, "--list").stdout
     assert max(map(len, read.splitlines())) <= 80
-    assert "Where no recording was kept, --worst K replays the drive first." in read
+    assert "Where no recording was kept, --worst K replays the drive first,\n" in read
 
 
 def test_by_default_the_worst_frame_of_all_opens(made, monkeypatch):
@@ -73,14 +73,14 @@ def test_a_drive_that_was_not_kept_is_replayed_and_its_results_stay(fleet, drawn
     recording = fleet / "recordings" / f"{first.drive}.rrd"
     before = {path: path.stat().st_mtime_ns for path in fleet.rglob("*") if path.is_file()}
     recording.unlink()
-    done = drawn(fleet, "--worst", 1)
+    done = drawn(fleet, "--worst", 1, "--trust-sources")
     assert done.returncode == 0, done.stderr
     assert f"note: {first.drive}: no recording was kept, so it is replayed from " in done.stderr
     assert done.stdout.endswith(f"it.png: {first.drive}, frame {first.frame}\n")
     after = {path: path.stat().st_mtime_ns for path in fleet.rglob("*") if path.is_file()}
     assert {path for path in before if before[path] != after.get(path)} == {recording}
     assert after.keys() == before.keys()
-    again = drawn(fleet, "--worst", 1)
+    again = drawn(fleet, "--worst", 1, "--trust-sources")
     assert "replayed" not in again.stderr
     table = roadeval.Recording(recording).frames.query("variant == 'filtered' and stage == 'post'")
     assert table.set_index("frame").ERR[first.frame] == first.ERR
@@ -92,7 +92,8 @@ def test_a_log_that_has_changed_is_warned_of(tmp_path, drawn):
     roadeval.replay_fleet([log], tmp_path / "f", config, executor=Here())
     write(log, 7)
     assert (
-        "a.mcap: has changed since the fleet was run" in drawn(tmp_path / "f", "--worst", 1).stderr
+        "a.mcap: has changed since the fleet was run"
+        in drawn(tmp_path / "f", "--worst", 1, "--trust-sources").stderr
     )
 
 
@@ -101,7 +102,7 @@ def test_a_log_that_has_gone_is_one_line(tmp_path, drawn):
     config = roadeval.configure(OPTIONS)
     roadeval.replay_fleet([log], tmp_path / "f", config, executor=Here())
     log.unlink()
-    done = drawn(tmp_path / "f", "--worst", 1)
+    done = drawn(tmp_path / "f", "--worst", 1, "--trust-sources")
     assert done.returncode == 1
     assert f"{log}: has gone, and no recording of it was kept" in done.stderr
     assert done.stderr.count("\n") == 1
@@ -129,7 +130,7 @@ def test_a_fleet_from_elsewhere_loads_no_code(fleet, drawn):
     (fleet / "recordings" / f"{first.drive}.rrd").unlink()
     run = fleet / "results" / first.drive / "run.toml"
     run.write_text(f'{run.read_text()}\n[variants.theirs]\nchain = ["antigravity:fly", "post"]\n')
-    done = drawn(fleet, "--worst", 1)
+    done = drawn(fleet, "--worst", 1, "--trust-sources")
     assert done.returncode == 1
     assert "run.toml: its chain names code, antigravity:fly, which is loaded only" in done.stderr
     assert done.stderr.count("\n") == 1

@@ -7,7 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roadeval.runtime.text import UNENCODABLE, as_markdown, visible, visible_lines
+from roadeval.cli import messages
+from roadeval.errors import RoadevalError
+from roadeval.runtime.text import (
+    UNENCODABLE,
+    as_markdown,
+    visible,
+    visible_lines,
+    without_secrets,
+)
 
 ANYTHING = st.text(st.characters(codec=None))
 
@@ -70,3 +78,25 @@ def test_markdown_shows_the_text_itself():
     assert as_markdown("[a](http://b) *c* `d` <e> | $f$ &g; @h #i_\x1b") == (
         r"\[a\](http://b) \*c\* \`d\` \<e\> \| \$f\$ \&g; \@h \#i\_\\u001b"
     )
+
+
+@pytest.mark.parametrize(
+    ("text", "left"),
+    [
+        ("no http://u:geheim@host:80/a?sig=geheim here", "no http://host:80/a here"),
+        ("(s3://u:geheim@bucket/a) http:/u:geheim@h/b", "(s3://bucket/a) http://h/b"),
+        ("http://u:geheim/x@host/a", "http://host/a"),
+        ("http://u:ge heim@host", "http:// heim@host"),
+        ("http://[::1]:80/a@b tcp://host:8786", "http://[::1]:80/a@b tcp://host:8786"),
+        ("net.mcap:/mask, C:/a@b, 10:30", "net.mcap:/mask, C:/a@b, 10:30"),
+    ],
+)
+def test_urls_lose_what_is_secret(text, left):
+    assert without_secrets(text) == left.replace("http://h/b", "http:/h/b")
+
+
+def test_no_error_and_no_message_tells_a_password(capsys):
+    text = "http://u:geheim@host/a: is not there"
+    assert str(RoadevalError(text)) == "http://host/a: is not there"
+    messages.warning(text)
+    assert "geheim" not in capsys.readouterr().err

@@ -58,13 +58,14 @@ def inspect(
     variant: Variant = None,
     drive: Drive = None,
     screenshot: Screenshot = None,
+    trust_sources: arguments.TrustSources = False,
     json: arguments.Json = False,
 ) -> int:
     """Open the viewer at a frame, or list the frames worth opening.
 
     The viewer works offline and listens on 127.0.0.1 alone. Of neighbouring frames only the worst
     is listed. Of a fleet the frames of all drives are ranked together, and the worst of all opens
-    by default; a drive that was not kept is replayed from its log.
+    by default; a drive that was not kept is replayed from its log, if --trust-sources allows it.
     """
     if frame is not None and worst is not None:
         raise typer.BadParameter("give --frame or --worst, not both")
@@ -80,9 +81,11 @@ def inspect(
                 "--variant does not go with a fleet: its worst are the first's"
             )
         asked = Asked(listed, drive, frame, worst, screenshot, json)
-        return fleet_inspect.inspect(Fleet(recording), asked)
+        return fleet_inspect.inspect(Fleet(recording, trust_sources=trust_sources), asked)
     if drive is not None:
         raise typer.BadParameter("--drive goes with a fleet's folder alone")
+    if trust_sources:
+        raise typer.BadParameter("--trust-sources goes with a fleet's folder alone")
     from roadeval.jobs.result import Result
 
     opened = Result(recording)

@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 import typer
 
-from roadeval.cli import console, messages
+from roadeval.cli import arguments, console, messages
 from roadeval.cli.commands.report import commands_of
 from roadeval.cli.exit_codes import ExitCode
 
@@ -22,6 +22,8 @@ def serve(
             readable=False,
         ),
     ],
+    *,
+    trust_sources: arguments.TrustSources = False,
 ) -> int:
     """Serve results as pages to browse, on 127.0.0.1 alone.
 
@@ -30,7 +32,7 @@ def serve(
     """
     from roadeval.jobs import serve as job
 
-    job.serve(results, _tell, commands=commands_of)
+    job.serve(results, _tell, trust_sources=trust_sources, commands=commands_of)
     return ExitCode.DONE
 
 

@@ -10,19 +10,26 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from roadeval.data import is_plain
 from roadeval.evaluation.conditions import Condition
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.fleet.conditions import DriveJudgement, judge_drives
 from roadeval.results.fleet.kind import FLEET, JUNIT, METRICS, RUN, is_fleet
 from roadeval.results.fleet.metrics import flat_metrics, junit_xml
-from roadeval.results.fleet.record import RECORDS, Record, read_record
+from roadeval.results.fleet.record import (
+    RECORDS,
+    Record,
+    read_record,
+    recording_path,
+    results_path,
+)
 from roadeval.results.fleet.summary import summarise
 from roadeval.results.fleet.tables import Member, read_frames, write_tables
 from roadeval.results.schema import TABLES
 from roadeval.results.summary import ALTERED, digest_of, is_as_written, json_text, plain
 from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, read_parquet
 from roadeval.runtime.claims import claimed
-from roadeval.runtime.files import check_folder, put
+from roadeval.runtime.files import check_folder, leads_outside, put
 from roadeval.runtime.text import is_utf8
 
 if TYPE_CHECKING:
@@ -73,6 +80,13 @@ class FleetWriter:
                     f"{self.folder}: holds other files and is no fleet's folder; name a new one"
                 )
             (self.folder / RECORDS).mkdir(parents=True, exist_ok=True)
+            self._check_links()
+
+    def _check_links(self) -> None:
+        """Refuse a folder that would be written elsewhere: it may come from anybody."""
+        for each in self.folder.iterdir():
+            if leads_outside(each, self.folder):
+                raise ResultsError(f"{each}: a link leads out of the fleet's folder; remove it")
 
     def finish(
         self,
@@ -186,7 +200,10 @@ class Fleet:
     Parameters
     ----------
     folder
-        As ``roadeval fleet`` left it.
+        As ``roadeval fleet`` left it; perhaps on another machine, by anybody.
+    trust_sources
+        Whether logs, masks, models and recordings may be read that lie elsewhere, where the folder
+        names them.
 
     Raises
     ------
@@ -204,14 +221,33 @@ class Fleet:
     ['blind', 'filtered', 'unfiltered']
     """
 
-    def __init__(self, folder: str | Path) -> None:
+    def __init__(self, folder: str | Path, *, trust_sources: bool = False) -> None:
         self.path: Final = Path(folder)
+        self.trust_sources: Final = trust_sources
         self.summary: Final[dict[str, Any]] = _read(self.path)
 
     @property
     def name(self) -> str:
         """The folder's name."""
         return self.path.resolve().name
+
+    def recording(self, drive: str, *, new: bool = False) -> Path:
+        """Return where the recording of a drive lies, or where a ``new`` one is to be written.
+
+        A `ResultsError` if a link there leads out of the folder: nothing is written through it, and
+        it is read only with `trust_sources`.
+        """
+        return self._inside(recording_path(self.path, drive), new=new)
+
+    def results(self, drive: str) -> Path:
+        """Return where the results folder of a drive lies, as of `recording`."""
+        return self._inside(results_path(self.path, drive))
+
+    def _inside(self, path: Path, *, new: bool = False) -> Path:
+        if not leads_outside(path, self.path) or (self.trust_sources and not new):
+            return path
+        what = "nothing is written there; remove it" if new else "`trust_sources` reads it there"
+        raise ResultsError(f"{path}: a link leads out of the fleet's folder; {what}")
 
     @cached_property
     def drives(self) -> pd.DataFrame:
@@ -287,4 +323,6 @@ def _damage(content: Mapping[str, Any]) -> str:
         rows = content.get(part)
         if not (isinstance(rows, list) and all(isinstance(row, dict) for row in rows)):
             return f"`{part}` is not what it must be"
+    if not all(is_plain(str(row.get("drive"))) for row in content["drives"]):
+        return "a drive's name is not made of letters, digits, '-' and '_' alone"
     return "" if is_as_written(content) else ALTERED

@@ -152,6 +152,11 @@ def frames_path(folder: Path, drive: str) -> Path:
     return folder / FRAMES / f"drive={drive}" / "frames.parquet"
 
 
+def results_path(folder: Path, drive: str) -> Path:
+    """Return where the results folder of a drive lies."""
+    return folder / RESULTS / drive
+
+
 def recording_path(folder: Path, drive: str) -> Path:
     """Return where the recording of a drive stands, if it was kept."""
     return folder / RECORDINGS / f"{drive}.rrd"
