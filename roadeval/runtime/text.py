@@ -74,7 +74,7 @@ def public_url(url: str) -> str:
 def _public(rest: str) -> str:
     """Return what follows a URL's scheme without the parts that may be secret."""
     host = re.split("[/?#]", rest, maxsplit=1)[0]
-    if "@" not in host and re.search(r"^[^\[]*:(?!\d*$)", host):
+    if "@" not in host and re.search(r"^[^\[]*:(?!\d*\W*$)", host):
         # No port: a password with one of those letters in it, or the beginning of one.
         return _public(rest.rpartition("@")[2]) if "@" in rest else ""
     return re.split("[?#]", host.rpartition("@")[2] + rest[len(host) :], maxsplit=1)[0]

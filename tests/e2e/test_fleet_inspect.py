@@ -57,7 +57,7 @@ def test_the_list_is_of_all_drives_the_worst_first(made, fleet):
     assert len({each["drive"] for each in listed}) == 3
     read = here("inspect", fleet, "--list").stdout
     assert max(map(len, read.splitlines())) <= 80
-    assert "Where no recording was kept, --worst K replays the drive first,\n" in read
+    assert "Where no recording was kept, --worst K --trust-sources replays" in read
 
 
 def test_by_default_the_worst_frame_of_all_opens(made, monkeypatch):

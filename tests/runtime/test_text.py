@@ -87,7 +87,7 @@ def test_markdown_shows_the_text_itself():
         ("(s3://u:geheim@bucket/a) http:/u:geheim@h/b", "(s3://bucket/a) http://h/b"),
         ("http://u:geheim/x@host/a", "http://host/a"),
         ("http://u:ge heim@host", "http:// heim@host"),
-        ("http://[::1]:80/a@b tcp://host:8786", "http://[::1]:80/a@b tcp://host:8786"),
+        ("http://[::1]:80/a@b tcp://host:8786: no", "http://[::1]:80/a@b tcp://host:8786: no"),
         ("net.mcap:/mask, C:/a@b, 10:30", "net.mcap:/mask, C:/a@b, 10:30"),
     ],
 )

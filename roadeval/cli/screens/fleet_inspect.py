@@ -38,10 +38,7 @@ def show(fleet: str, found: Sequence[FleetFrame], out: Console) -> None:
     out.print(table)
     if not all(each.recording for each in found):
         out.print()
-        out.print(
-            "Where no recording was kept, --worst K replays the drive first,\n"
-            "if --trust-sources allows it."
-        )
+        out.print("Where no recording was kept, --worst K --trust-sources replays the drive first.")
 
 
 def _sun(measured: float | None) -> str:
