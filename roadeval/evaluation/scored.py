@@ -58,6 +58,20 @@ def totals(rows: Rows) -> dict[str, dict[str, dict[str, Any]]]:
     return sums
 
 
+def region_totals(regions: Rows) -> dict[tuple[str, str, str], dict[str, Any]]:
+    """Sum up the rows of ``regions`` by variant, stage and region, frames that have it alone."""
+    names = zip(*(regions[name].tolist() for name in ("variant", "stage", "region")), strict=True)
+    places: dict[tuple[str, str, str], list[int]] = {}
+    for place, name in enumerate(names):
+        places.setdefault(name, []).append(place)
+    table = counts(regions)
+    found = {}
+    for name, own in places.items():
+        known = table[own]
+        found[name] = sum_up(known[known.any(axis=1)])
+    return found
+
+
 def overlap(total: Mapping[str, Any]) -> dict[str, float]:
     """Compute IoU, F1 and precision of a total's pooled counts."""
     return metrics.overlap(Counts(*(total[name] for name in OUTCOMES)))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,10 +19,9 @@ from roadeval.evaluation.conditions import Condition, Judgement, judge
 from roadeval.evaluation.frame_counts import Window
 from roadeval.evaluation.pairing import Side, one_drive
 from roadeval.evaluation.settings import settings_of
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import Results
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.comparison import as_dict, judged, warnings
-from roadeval.results.fleet.kind import is_fleet
 from roadeval.results.rows import as_arrays, window_rows
 from roadeval.results.summary import json_text, plain
 from roadeval.runtime.paths import Paths, listed
@@ -32,10 +30,7 @@ from roadeval.runtime.text import visible
 if TYPE_CHECKING:
     from roadeval.report.blocks import Document
     from roadeval.report.sections.browse import BrowsedFrames
-    from roadeval.results.fleet.folder import Fleet
 
-NO_NUMBER: Final = ("output", "run", "fleet")
-"""Tables of a run's settings that change no number."""
 Inspect = Callable[[Path, int], str]
 """Returns the command that opens a frame of a recording."""
 Writer = Callable[["Compared", Paper, Inspect | None], bytes]
@@ -105,7 +100,7 @@ def compare(
     conditions = [Condition.parse(text) for text in fail_if]
     paths = [Path(path) for path in listed(results)]
     across = len(paths) == 1
-    opened = [_opened(path) for path in paths]
+    opened = [Results(path) for path in paths]
     if across:
         whole = Side(opened[0].name, opened[0].parts)
         sides = comparison.variants_as_sides(whole, opened[0].variants, variants)
@@ -122,104 +117,11 @@ def compare(
     return Compared(found, judge(found, conditions, settings), tuple(alone or ()), recordings)
 
 
-# --- Opening results ------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Part:
-    """A drive of an opened result, as `roadeval.evaluation.pairing.Part`."""
-
-    drive: str
-    name: str
-    digest: str | None
-    scored: bool
-    asked: Mapping[str, Any]
-    rows: Callable[[str], Rows]
-    group: str | None = None
-    tags: Mapping[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Opened:
-    """A result that was opened."""
-
-    name: str
-    summary: Mapping[str, Any]
-    parts: Sequence[_Part]
-    variants: Sequence[str]
-    complete: bool = True
-    recording: Path | None = None
-
-
-def _opened(path: Path) -> _Opened:
-    if is_fleet(path):
-        from roadeval.results.fleet.folder import Fleet
-
-        fleet = Fleet(path)
-        there = [*dict.fromkeys(row["variant"] for row in fleet.summary["rates"])]
-        return _Opened(fleet.name, fleet.summary, list(_drives(fleet)), there)
-    result = Result(path)
-    rows, digest = result.rows, result.summary.get("log", {}).get("sha256")
-    part = _Part(
-        *(result.name, result.name, str(digest) if digest else None),
-        *(len(rows) > 0, asked(result.summary), cache(result.table)),
-    )
-    recording = result.path if result.recording is not None else None
-    variants = rows.distinct("variant")
-    return _Opened(result.name, result.summary, [part], variants, result.complete, recording)
-
-
-def _drives(fleet: Fleet) -> Iterator[_Part]:
-    columns = ["drive", "sha256", "evaluated"]
-    about = {row["drive"]: row for row in fleet.table("drives", columns).to_pylist()}
-    members = fleet.summary["drives"]
-    counted = Counter(member["name"] for member in members)
-    settings = asked(fleet.summary)
-    for member in members:
-        drive, row = member["drive"], about[member["drive"]]
-
-        def rows(table: str, drive: str = drive) -> Rows:
-            # A fleet keeps its drives' frames alone.
-            return _frames(fleet, drive) if table == "frames" else as_arrays(table, ())
-
-        yield _Part(
-            drive=drive,
-            # Two drives of a fleet may have one name.
-            name=member["name" if counted[member["name"]] == 1 else "drive"],
-            digest=row["sha256"] or None,
-            scored=bool(row["evaluated"]),
-            asked=settings,
-            rows=rows,
-            group=member["group"],
-            tags=member["tags"],
-        )
-
-
-def _frames(fleet: Fleet, drive: str) -> Rows:
-    from roadeval.results.fleet.record import frames_path
-    from roadeval.results.fleet.tables import read_frames
-    from roadeval.results.tables import AGAIN, ResultsError, parquet_rows
-
-    try:
-        return parquet_rows(read_frames(fleet.path, drive), "frames")
-    except FileNotFoundError:
-        path = frames_path(fleet.path, drive)
-        raise ResultsError(f"{path}: is not there; {AGAIN}") from None
-
-
-def asked(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of a run that may change its numbers, by names as ``frames.scale``."""
-    found: dict[str, Any] = {}
-    for table, own in summary.get("run", {}).items():
-        if table in NO_NUMBER:
-            continue
-        nested = own.items() if isinstance(own, dict) else [("", own)]
-        found |= {f"{table}.{key}".rstrip("."): value for key, value in nested}
-    return found
+# --- Sides ----------------------------------------------------------------------------------------
 
 
 def _sides(
-    opened: Sequence[_Opened], labels: Sequence[str], variants: Sequence[str] | None
+    opened: Sequence[Results], labels: Sequence[str], variants: Sequence[str] | None
 ) -> list[Side]:
     """Return several results, each with those of its variants that are compared."""
     pairs = [name.partition("=")[::2] for name in variants or ()]

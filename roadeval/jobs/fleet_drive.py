@@ -17,17 +17,17 @@ from roadeval.fleet.entry import DriveEntry
 from roadeval.fleet.errors import FleetError
 from roadeval.fleet.remote import staged, stamp
 from roadeval.jobs.fleet_frames import FrameGatherer
-from roadeval.jobs.fleet_rows import drive_row, failed_row
 from roadeval.jobs.identity import asked
 from roadeval.jobs.replay import replay
 from roadeval.results.fleet.record import (
+    FAILED,
     RESULTS,
     Record,
     read_record,
     record_path,
     recording_path,
 )
-from roadeval.results.rows import Key, cells
+from roadeval.results.rows import Key, cells, drive_row
 from roadeval.results.schema import ALL, TABLES
 from roadeval.runtime import memory
 from roadeval.runtime.claims import claimed
@@ -169,7 +169,13 @@ def done(record: Record, *, repeated: bool = False) -> Done:
 
 def failed(task: DriveTask, reason: str, exit_code: int = 1) -> Record:
     """Return the record of a drive that could not be used."""
-    row = failed_row(task.entry, reason, exit_code, _begun(task)) | {
+    row = {
+        "name": task.entry.name,
+        "source": task.entry.shown,
+        "status": FAILED,
+        "exit_code": exit_code,
+        "reason": reason,
+        "attempts": _begun(task),
         "fold": task.fold,
         "model": task.model or None,
     }
@@ -258,7 +264,7 @@ def _replayed(task: DriveTask) -> Record:
         gatherer.finish()
     key = Key(drive, outcome.summary["drive"]["camera"])
     row = (
-        drive_row(outcome, task.entry)
+        drive_row(outcome.summary, task.entry.name, task.entry.shown)
         | gatherer.facts()
         | {
             "fold": task.fold,

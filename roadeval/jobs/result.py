@@ -1,11 +1,14 @@
-"""The result of a replay: a recording, whole or partial, or a results folder."""
+"""Results that are opened: of one drive, whole or partial, and of any number of drives."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sized
-from functools import cached_property
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
+from dataclasses import dataclass, field
+from functools import cache, cached_property, partial
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -15,14 +18,24 @@ from roadeval.evaluation import scored
 from roadeval.evaluation.effects import as_parts, drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.recording.layout import DamagedError, RecordingError
+from roadeval.results.fleet.folder import Fleet
+from roadeval.results.fleet.kind import is_fleet
+from roadeval.results.fleet.record import RESULTS, frames_path
+from roadeval.results.fleet.tables import read_frames
 from roadeval.results.folder import RUN, ResultsFolder
+from roadeval.results.rows import Key, cells, drive_row, effect_rows, score_rows
+from roadeval.results.schema import TABLES
 from roadeval.results.sentences import verdict
+from roadeval.results.tables import AGAIN, ResultsError, parquet_rows
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import pandas as pd
 
     from roadeval.recording import Recording
+
+NO_NUMBER: Final = ("output", "run", "fleet")
+"""Tables of a run's settings that change no number."""
 
 
 class Result:
@@ -204,6 +217,204 @@ class Result:
             "verdict": verdict(totals, effects, settings),
             **as_parts(effects),
         }
+
+
+# --- Any number of drives -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """A drive's part of results. Its tables are read when they are asked for."""
+
+    drive: str
+    """Its identity in the result."""
+    name: str
+    """Its name for people."""
+    digest: str | None
+    """The log's SHA-256, None where the result does not know it."""
+    scored: bool
+    """Whether any frame of it was."""
+    asked: Mapping[str, Any]
+    """Settings that may change its numbers, by names as ``frames.scale``, where known."""
+    rows: Callable[[str], Rows]
+    """Returns its rows of a table, without pandas."""
+    group: str | None = None
+    """What it shares with other drives, as a day or a route."""
+    tags: Mapping[str, str] = field(default_factory=dict)
+
+
+class Results:
+    """The results of any number of drives, with one table of each kind for all of them.
+
+    Parameters
+    ----------
+    paths
+        Recordings, results folders and fleets' folders.
+
+    Raises
+    ------
+    RoadevalError
+        If one is none of these, or was made by another program or format.
+
+    Examples
+    --------
+    >>> import roadeval
+    >>> for path in ("out.rrd", "monday"):
+    ...     result = roadeval.Result(path)
+    ...     final = result.scores.query("final and region == 'all'")
+    ...     print(len(result.drives), *sorted(final.groupby("variant").ERR.mean().index))
+    1 blind filtered unfiltered
+    1 blind filtered unfiltered
+    """
+
+    def __init__(self, *paths: str | Path) -> None:
+        self.paths: Final = tuple(map(Path, paths))
+        self._opened: Final = [
+            Fleet(path) if is_fleet(path) else Result(path) for path in self.paths
+        ]
+
+    @property
+    def name(self) -> str:
+        """The drive's or the fleet's name; of several results all of them."""
+        return ", ".join(each.name for each in self._opened)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The content of the first result's ``summary.json`` or ``fleet.json``."""
+        return self._opened[0].summary
+
+    @property
+    def complete(self) -> bool:
+        """Whether every run reached its end."""
+        return all(isinstance(each, Fleet) or each.complete for each in self._opened)
+
+    @property
+    def recording(self) -> Path | None:
+        """The recording, where that was opened alone."""
+        (first, *more) = self._opened
+        return None if more or isinstance(first, Fleet) or not first.recording else first.path
+
+    @cached_property
+    def variants(self) -> list[str]:
+        """The variants that were scored, in order."""
+        found = (
+            (row["variant"] for row in each.summary["rates"])
+            if isinstance(each, Fleet)
+            else each.rows.distinct("variant")
+            for each in self._opened
+        )
+        return [*dict.fromkeys(chain(*found))]
+
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """The drives."""
+        return tuple(
+            part
+            for each in self._opened
+            for part in (_members(each) if isinstance(each, Fleet) else [_alone(each)])
+        )
+
+    @cached_property
+    def drives(self) -> pd.DataFrame:
+        """A row per drive and camera, scored or not."""
+        return self._of_drives("drives")
+
+    @cached_property
+    def scores(self) -> pd.DataFrame:
+        """A row per drive, camera, variant, stage and region."""
+        return self._of_drives("scores")
+
+    @cached_property
+    def effects(self) -> pd.DataFrame:
+        """A row per drive, camera, difference between two masks, and rate."""
+        return self._of_drives("effects")
+
+    @cached_property
+    def frames(self) -> pd.DataFrame:
+        """A row per evaluated frame, variant and stage of every drive."""
+        return _together(
+            each.frames if isinstance(each, Result) else each.frames(member["drive"])
+            for each in self._opened
+            for member in (each.summary["drives"] if isinstance(each, Fleet) else [{}])
+        )
+
+    def _of_drives(self, name: str) -> pd.DataFrame:
+        return _together(
+            getattr(each, name) if isinstance(each, Fleet) else _own(each, name)
+            for each in self._opened
+        )
+
+
+def _together(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
+    import pandas as pd
+
+    return pd.concat([*tables], ignore_index=True)
+
+
+def _own(result: Result, name: str) -> pd.DataFrame:
+    """Return a table of drives of a single drive, by what makes a fleet's."""
+    import pandas as pd
+
+    facts = result.summary
+    key = Key(result.name, facts["drive"].get("camera", ""))
+    if name == "drives":
+        rows = [drive_row(facts, result.name, str(result.path))]
+    elif name == "scores":
+        rows = [*score_rows(facts, scored.region_totals(result.table("regions")))]
+    else:
+        rows = [*effect_rows(facts)]
+    return pd.DataFrame(cells(name, key, rows), columns=TABLES[name].names)
+
+
+def _alone(result: Result) -> Part:
+    digest = result.summary.get("log", {}).get("sha256")
+    return Part(
+        *(result.name, result.name, str(digest) if digest else None),
+        *(len(result.rows) > 0, asked(result.summary), cache(result.table)),
+    )
+
+
+def _members(fleet: Fleet) -> Iterator[Part]:
+    columns = ["drive", "sha256", "evaluated"]
+    about = {row["drive"]: row for row in fleet.table("drives", columns).to_pylist()}
+    members = fleet.summary["drives"]
+    counted = Counter(member["name"] for member in members)
+    settings = asked(fleet.summary)
+    for member in members:
+        drive, row = member["drive"], about[member["drive"]]
+        yield Part(
+            drive=drive,
+            # Two drives of a fleet may have one name.
+            name=member["name" if counted[member["name"]] == 1 else "drive"],
+            digest=row["sha256"] or None,
+            scored=bool(row["evaluated"]),
+            asked=settings,
+            rows=partial(_rows_of_member, fleet, drive),
+            group=member["group"],
+            tags=member["tags"],
+        )
+
+
+def _rows_of_member(fleet: Fleet, drive: str, table: str) -> Rows:
+    """Return the rows of a fleet's drive; its frames from their Parquet file, which is smaller."""
+    if table != "frames":
+        return Result(fleet.path / RESULTS / drive).table(table)
+    try:
+        return parquet_rows(read_frames(fleet.path, drive), table)
+    except FileNotFoundError:
+        path = frames_path(fleet.path, drive)
+        raise ResultsError(f"{path}: is not there; {AGAIN}") from None
+
+
+def asked(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings of a run that may change its numbers, by names as ``frames.scale``."""
+    found: dict[str, Any] = {}
+    for table, own in summary.get("run", {}).items():
+        if table in NO_NUMBER:
+            continue
+        nested = own.items() if isinstance(own, dict) else [("", own)]
+        found |= {f"{table}.{key}".rstrip("."): value for key, value in nested}
+    return found
 
 
 def _recording(path: Path) -> Recording:

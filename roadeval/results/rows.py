@@ -26,6 +26,7 @@ from roadeval.evaluation.frame_counts import Window
 from roadeval.evaluation.maps import HeatMap, Name
 from roadeval.evaluation.scoreboard import DriveSums
 from roadeval.evaluation.thresholds import Sums, at_levels
+from roadeval.results.fleet.record import DAMAGED, SCORED, UNSCORED
 from roadeval.results.schema import ALL, KEY, TABLES, Kind
 from roadeval.runtime.text import visible
 
@@ -38,6 +39,11 @@ ARRAYS: Final = {
     Kind.FLAG: "bool",
 }
 """The NumPy type of each kind of column."""
+
+
+LOST: Final = 3
+"""Exit code of a replay that has lost a part of its log."""
+_ACCOUNT: Final = ("in_log", "read", "decoded", "labelled", "trained_on", "evaluated")
 
 
 class Key(NamedTuple):
@@ -185,6 +191,33 @@ def as_arrays(name: str, rows: Iterable[Row]) -> Rows:
 
 
 # --- Rows of the tables of drives -----------------------------------------------------------------
+
+
+def drive_row(facts: Mapping[str, Any], name: str, source: str) -> dict[str, Any]:
+    """Return the row of ``drives`` of a drive that was replayed.
+
+    Parameters
+    ----------
+    facts
+        Of the drive, as in ``summary.json``.
+    name, source
+        See the columns.
+    """
+    losses, warnings, is_scored = facts["losses"], facts["warnings"], bool(facts["totals"])
+    status = (DAMAGED if losses else SCORED) if is_scored else UNSCORED
+    return {
+        "name": name,
+        "source": source,
+        "status": status,
+        "exit_code": LOST if losses else 0,
+        "reason": None if is_scored else next(iter(warnings), None),
+        "sha256": facts.get("log", {}).get("sha256"),
+        **{column: facts["drive"].get(column) for column in ("rate_hz", "width", "height")},
+        **{column: facts["frames"].get(column) for column in _ACCOUNT},
+        "losses": "\n".join(losses) or None,
+        "warnings": "\n".join(warnings) or None,
+        "verdict": facts["verdict"],
+    }
 
 
 def score_rows(
