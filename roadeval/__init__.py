@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from roadeval.jobs.progress import Progress
     from roadeval.jobs.replay import Outcome, replay
     from roadeval.jobs.report import write_report
+    from roadeval.jobs.result import Result
     from roadeval.jobs.serve import serve
     from roadeval.jobs.train import train
     from roadeval.recording import Recording
@@ -51,6 +52,7 @@ __all__ = [
     "Outcome",
     "Progress",
     "Recording",
+    "Result",
     "RoadevalError",
     "RunConfig",
     "compare",
@@ -81,6 +83,7 @@ _HOMES: Final = {
     "Outcome": "jobs.replay",
     "Progress": "jobs.progress",
     "Recording": "recording",
+    "Result": "jobs.result",
     "RoadevalError": "errors",
     "config_toml": "jobs.config",
     "replay_fleet": "jobs.fleet",

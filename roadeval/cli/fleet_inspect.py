@@ -60,7 +60,7 @@ def _open(fleet: Fleet, asked: Asked) -> None:
     """Open the viewer at a frame, or draw it into a file; the drive is replayed if need be."""
     from roadeval.jobs import fleet_inspect as inspecting
     from roadeval.jobs import inspect as of_a_drive
-    from roadeval.jobs.result import Result
+    from roadeval.jobs.result import DriveResult
 
     drive, frame = asked.drive, asked.frame
     if drive is None:
@@ -68,7 +68,7 @@ def _open(fleet: Fleet, asked: Asked) -> None:
         drive, frame = found.drive, found.frame
     with progress.watched() as watch:
         recording, warnings = inspecting.recording_of(fleet, drive, watch, messages.note)
-    opened = Result(recording)
+    opened = DriveResult(recording)
     if frame is not None and (said := of_a_drive.without_pictures(opened, frame)):
         messages.warning(said)
     shown = of_a_drive.view(opened, frame, asked.screenshot)

@@ -1,4 +1,4 @@
-"""Results side by side: from recordings, results folders and fleets to a comparison."""
+"""Result side by side: from recordings, results folders and fleets to a comparison."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from roadeval.evaluation.conditions import Condition, Judgement, judge
 from roadeval.evaluation.frame_counts import Window
 from roadeval.evaluation.pairing import Side, one_drive
 from roadeval.evaluation.settings import settings_of
-from roadeval.jobs.result import Results
+from roadeval.jobs.result import Result
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.comparison import as_dict, judged, warnings
 from roadeval.results.rows import as_arrays, window_rows
@@ -100,7 +100,7 @@ def compare(
     conditions = [Condition.parse(text) for text in fail_if]
     paths = [Path(path) for path in listed(results)]
     across = len(paths) == 1
-    opened = [Results(path) for path in paths]
+    opened = [Result(path) for path in paths]
     if across:
         whole = Side(opened[0].name, opened[0].parts)
         sides = comparison.variants_as_sides(whole, opened[0].variants, variants)
@@ -121,7 +121,7 @@ def compare(
 
 
 def _sides(
-    opened: Sequence[Results], labels: Sequence[str], variants: Sequence[str] | None
+    opened: Sequence[Result], labels: Sequence[str], variants: Sequence[str] | None
 ) -> list[Side]:
     """Return several results, each with those of its variants that are compared."""
     pairs = [name.partition("=")[::2] for name in variants or ()]

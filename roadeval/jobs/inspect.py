@@ -14,7 +14,7 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation import scored
 from roadeval.evaluation.metrics import SHORT
 from roadeval.jobs.outputs import holding
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import DriveResult
 
 LISTED: Final = 10
 """Frames that are listed when nobody says how many."""
@@ -51,7 +51,7 @@ class WorstFrame:
 
 
 def worst_frames(
-    result: Result,
+    result: DriveResult,
     count: int = LISTED,
     variant: str | None = None,
     *,
@@ -99,7 +99,7 @@ def worst_frames(
     ]
 
 
-def worst(result: Result, variant: str | None = None) -> WorstFrame | None:
+def worst(result: DriveResult, variant: str | None = None) -> WorstFrame | None:
     """Return the worst frame that has pictures, of a variant or else of the first one.
 
     A recording may hold the pictures of few frames: the others do not count. None if no frame with
@@ -115,7 +115,7 @@ def worst(result: Result, variant: str | None = None) -> WorstFrame | None:
     return next(iter(worst_frames(result, 1, variant, among=result.pictured)), None)
 
 
-def without_pictures(result: Result, frame: int) -> str:
+def without_pictures(result: DriveResult, frame: int) -> str:
     """Return a sentence on a frame that was scored and whose pictures were not kept.
 
     Empty for every other frame.
@@ -127,12 +127,12 @@ def without_pictures(result: Result, frame: int) -> str:
     return f"the recording has no pictures of frame {frame}, so the views of them are empty"
 
 
-def _scored(result: Result) -> list[str]:
+def _scored(result: DriveResult) -> list[str]:
     """Name the variants that were scored, without the baseline."""
     return [name for name in result.rows.distinct("variant") if name != BASELINE]
 
 
-def view(result: Result, frame: int | None, picture: Path | None = None) -> int | None:
+def view(result: DriveResult, frame: int | None, picture: Path | None = None) -> int | None:
     """Open the viewer at a frame, or draw it into a PNG file; return the frame that it drew.
 
     Without a frame it opens at the first evaluated one that has pictures.
@@ -162,7 +162,7 @@ def view(result: Result, frame: int | None, picture: Path | None = None) -> int 
         return viewer.screenshot(recording.path, picture, frame)
 
 
-def _first(result: Result, begin: int | None) -> int | None:
+def _first(result: DriveResult, begin: int | None) -> int | None:
     """Choose the frame to open at: the first with pictures that was evaluated.
 
     Where none was it is the first with pictures of those that could be, from ``begin`` on, or

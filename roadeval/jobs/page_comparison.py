@@ -17,7 +17,7 @@ from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.pairing import Side
 from roadeval.jobs.page_frames import BYTES, PICTURED, fitting
 from roadeval.jobs.report_frames import rates_by_frame
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import DriveResult
 from roadeval.recording import Recording
 from roadeval.report.browse import Strip
 from roadeval.report.chart import looks_of_results
@@ -158,7 +158,7 @@ class _Album:
         self._paths: Final = recordings
         self._facts: Final = {each.frame: each for each in facts}
         self._inspect: Final = inspect
-        opened = {path: Result(path) for path in dict.fromkeys(recordings.values())}
+        opened = {path: DriveResult(path) for path in dict.fromkeys(recordings.values())}
         self._opened: Final = {label: opened[path] for label, path in recordings.items()}
         self.newest: Final = recordings.get(masks[-1].result) if masks else None
 

@@ -13,7 +13,7 @@ from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.score import judge
 from roadeval.evaluation.settings import EvaluationSettings, settings_of
 from roadeval.jobs.report_frames import LAYERS, FramePicker, evenly, rates_by_frame
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import DriveResult
 from roadeval.report.browse import Strip
 from roadeval.report.charts.rates import over_frames
 from roadeval.report.sections.browse import SMALL, BrowsedFrames, FrameFacts, strip
@@ -30,7 +30,7 @@ SHADOW: Final = 1 / 3
 
 
 def browsed(
-    result: Result, inspect: Callable[[int], str] | None, strips: Sequence[Strip] = ()
+    result: DriveResult, inspect: Callable[[int], str] | None, strips: Sequence[Strip] = ()
 ) -> BrowsedFrames:
     """Collect what a page tells of a result's frames."""
     frames = result.rows
@@ -46,13 +46,13 @@ def browsed(
     )
 
 
-def _final_masks(result: Result) -> list[str]:
+def _final_masks(result: DriveResult) -> list[str]:
     """Name the pictures of the variants' final masks, as `StripMaker` does."""
     known = result.recording.variants if result.recording else ()
     return [f"{variant.name}: {variant.stages[-1]}" for variant in known]
 
 
-def facts_of(result: Result) -> Iterator[FrameFacts]:
+def facts_of(result: DriveResult) -> Iterator[FrameFacts]:
     """Yield every frame of the table: those evaluated, or without truth those with pictures."""
     frames = result.rows
     if not len(frames):
@@ -97,7 +97,7 @@ def _conditions(
         yield f"{first} worse than {BASELINE}"
 
 
-def _much_shadow(result: Result) -> set[int]:
+def _much_shadow(result: DriveResult) -> set[int]:
     """Return the frames with the most pixels in shadow, as the filter saw them."""
     regions = result.regions
     if not len(regions) or "shadow" not in set(regions["region"]):
@@ -114,7 +114,7 @@ def _much_shadow(result: Result) -> set[int]:
 
 
 def strips_of(
-    result: Result,
+    result: DriveResult,
     inspect: Callable[[int], str] | None,
     count: int | None = None,
     taken: int = 0,
@@ -179,7 +179,7 @@ class StripMaker:
 
     def __init__(
         self,
-        result: Result,
+        result: DriveResult,
         inspect: Callable[[int], str] | None,
         layers: int = SMALL,
         layered: int | None = None,
@@ -198,7 +198,7 @@ class StripMaker:
         return strip(found, self._variants, command, self._layers)
 
 
-def _chosen(result: Result, count: int) -> list[int]:
+def _chosen(result: DriveResult, count: int) -> list[int]:
     """Return frames to picture, the most telling first: bad, good and evenly spread in turn."""
     rows = result.rows
     scored_frames = set(rows["frame"].tolist())

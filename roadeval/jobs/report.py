@@ -11,7 +11,7 @@ from roadeval.jobs.outputs import holding
 from roadeval.jobs.page_frames import browsed, strips_of
 from roadeval.jobs.report_findings import collect
 from roadeval.jobs.report_fleet import collect_fleet
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import DriveResult
 from roadeval.report.blocks import Document
 from roadeval.report.drive import document, page_document, with_frames
 from roadeval.report.findings import Commands
@@ -47,7 +47,7 @@ class PageSettings:
 
 
 def write_report(
-    result: str | Path | Result,
+    result: str | Path | DriveResult,
     output: str | Path | None = None,
     *,
     paper: Paper = Paper.A4,
@@ -81,9 +81,9 @@ def write_report(
     RoadevalError
         If there is nothing to read there, or the file cannot be written.
     """
-    if not isinstance(result, Result) and is_fleet(result):
+    if not isinstance(result, DriveResult) and is_fleet(result):
         return _write_fleet(Fleet(result), output, paper, commands, as_page)
-    opened = result if isinstance(result, Result) else Result(result)
+    opened = result if isinstance(result, DriveResult) else DriveResult(result)
     usual = Path("reports", f"{opened.path.stem}.pdf") if opened.recording else None
     path = Path(output or usual or _beside(opened.path))
     with holding(path, inputs=[opened.path]):
@@ -107,7 +107,7 @@ def is_page(path: Path) -> bool:
 
 
 def drive_page(
-    opened: Result, commands: Commands | None = None, pictures: int | None = None
+    opened: DriveResult, commands: Commands | None = None, pictures: int | None = None
 ) -> Document:
     """Return the page of a drive as a document.
 

@@ -12,7 +12,7 @@ from roadeval.data.packed import Packed
 from roadeval.evaluation import analysis, counts, maps, scored
 from roadeval.evaluation.settings import settings_of
 from roadeval.jobs.report_frames import FramePicker, evenly, variants_but_baseline
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import DriveResult
 from roadeval.report.findings import Commands, ErrorHeatmap, Findings, PairedComparison
 from roadeval.results.rows import as_arrays, change_rows, heat_rows, window_rows
 
@@ -28,7 +28,7 @@ THUMBNAILS: Final = 8
 """Frames in figure 2 and on the first page."""
 
 
-def collect(result: Result, commands: Commands | None = None) -> Findings:
+def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
     """Collect everything that the report of a result shows."""
     frames, summary = result.frames, result.summary
     pictured = _pictured(result)
@@ -73,7 +73,7 @@ def collect(result: Result, commands: Commands | None = None) -> Findings:
     )
 
 
-def _pictured(result: Result) -> list[int]:
+def _pictured(result: DriveResult) -> list[int]:
     """Return the evaluated frames that have pictures, or without truth all that have."""
     evaluated = set(result.frames["frame"]) or set(result.pictured)
     return [number for number in result.pictured if number in evaluated]
@@ -82,7 +82,7 @@ def _pictured(result: Result) -> list[int]:
 # --- Tables ---------------------------------------------------------------------------------------
 
 
-def _windows(result: Result) -> tuple[Rows, int]:
+def _windows(result: DriveResult) -> tuple[Rows, int]:
     """Return the drive's windows and their size; longer ones where the drive is long."""
     size = settings_of(result.summary).window
     count = -(-result.frames["frame"].nunique() // size)
@@ -92,7 +92,7 @@ def _windows(result: Result) -> tuple[Rows, int]:
     return as_arrays("windows", window_rows(scored.windows(result.rows, size))), size
 
 
-def _paired(result: Result, changes: pd.DataFrame) -> Iterator[PairedComparison]:
+def _paired(result: DriveResult, changes: pd.DataFrame) -> Iterator[PairedComparison]:
     """Compare filtered against unfiltered, then every variant with the baseline."""
     frames, summary = result.frames, result.summary
     finals = scored.final_stages(result.rows)
@@ -143,7 +143,9 @@ def _stage_changes(changes: pd.DataFrame) -> pd.DataFrame:
 # --- Masks ----------------------------------------------------------------------------------------
 
 
-def _mask_sums(result: Result, numbers: Sequence[int]) -> tuple[pd.DataFrame, pd.DataFrame, int]:
+def _mask_sums(
+    result: DriveResult, numbers: Sequence[int]
+) -> tuple[pd.DataFrame, pd.DataFrame, int]:
     """Return the tables ``changes`` and ``heat``, and the number of frames that they sum up.
 
     A run that was killed did not get to write them: they are made of the masks of evenly spread
@@ -160,7 +162,7 @@ def _mask_sums(result: Result, numbers: Sequence[int]) -> tuple[pd.DataFrame, pd
     return changes, heat, sample.frames
 
 
-def _sample(result: Result, numbers: Sequence[int]) -> maps.Maps:
+def _sample(result: DriveResult, numbers: Sequence[int]) -> maps.Maps:
     """Sum up the masks of evenly spread frames."""
     sums, recording = maps.Maps(), result.recording
     if recording is None or not len(result.frames):
@@ -191,7 +193,7 @@ def _heatmap(variant: str, cells: pd.DataFrame) -> ErrorHeatmap:
     return ErrorHeatmap(variant, shares[0], shares[1])
 
 
-def _coverage(result: Result, numbers: Sequence[int]) -> pd.DataFrame:
+def _coverage(result: DriveResult, numbers: Sequence[int]) -> pd.DataFrame:
     """Return without truth how much of the image each final mask covers."""
     import pandas as pd
 

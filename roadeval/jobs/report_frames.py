@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from roadeval.data import BASELINE, ERRORS, FILTERED, TRUTH, UNFILTERED, LayerKind, Rows
 from roadeval.evaluation import analysis, scored
 from roadeval.evaluation.metrics import SHORT
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import DriveResult
 from roadeval.recording import Recording
 from roadeval.report.findings import NotableFrame, PairedComparison
 from roadeval.report.images import ExampleFrame, LayerImage, faded
@@ -75,7 +75,7 @@ class FramePicker:
     """
 
     def __init__(
-        self, result: Result, outcomes: int | None = OUTCOMES, layered: int | None = LAYERS
+        self, result: DriveResult, outcomes: int | None = OUTCOMES, layered: int | None = LAYERS
     ) -> None:
         self._result = result
         self._outcomes, self._layered = slice(outcomes), slice(layered)

@@ -38,7 +38,7 @@ NO_NUMBER: Final = ("output", "run", "fleet")
 """Tables of a run's settings that change no number."""
 
 
-class Result:
+class DriveResult:
     """The result of a replay, from an ``.rrd`` or a results folder.
 
     Parameters
@@ -94,7 +94,7 @@ class Result:
         if str(path).startswith(("//", "\\\\")) or not path.is_file():
             return None
         try:
-            other = Result(path).summary.get("log", {}).get("sha256")
+            other = DriveResult(path).summary.get("log", {}).get("sha256")
         except RoadevalError:
             return None
         return path if other == self.summary["log"]["sha256"] else None
@@ -243,7 +243,7 @@ class Part:
     tags: Mapping[str, str] = field(default_factory=dict)
 
 
-class Results:
+class Result:
     """The results of any number of drives, with one table of each kind for all of them.
 
     Parameters
@@ -270,7 +270,7 @@ class Results:
     def __init__(self, *paths: str | Path) -> None:
         self.paths: Final = tuple(map(Path, paths))
         self._opened: Final = [
-            Fleet(path) if is_fleet(path) else Result(path) for path in self.paths
+            Fleet(path) if is_fleet(path) else DriveResult(path) for path in self.paths
         ]
 
     @property
@@ -333,7 +333,7 @@ class Results:
     def frames(self) -> pd.DataFrame:
         """A row per evaluated frame, variant and stage of every drive."""
         return _together(
-            each.frames if isinstance(each, Result) else each.frames(member["drive"])
+            each.frames if isinstance(each, DriveResult) else each.frames(member["drive"])
             for each in self._opened
             for member in (each.summary["drives"] if isinstance(each, Fleet) else [{}])
         )
@@ -351,7 +351,7 @@ def _together(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
     return pd.concat([*tables], ignore_index=True)
 
 
-def _own(result: Result, name: str) -> pd.DataFrame:
+def _own(result: DriveResult, name: str) -> pd.DataFrame:
     """Return a table of drives of a single drive, by what makes a fleet's."""
     import pandas as pd
 
@@ -366,7 +366,7 @@ def _own(result: Result, name: str) -> pd.DataFrame:
     return pd.DataFrame(cells(name, key, rows), columns=TABLES[name].names)
 
 
-def _alone(result: Result) -> Part:
+def _alone(result: DriveResult) -> Part:
     digest = result.summary.get("log", {}).get("sha256")
     return Part(
         *(result.name, result.name, str(digest) if digest else None),
@@ -398,7 +398,7 @@ def _members(fleet: Fleet) -> Iterator[Part]:
 def _rows_of_member(fleet: Fleet, drive: str, table: str) -> Rows:
     """Return the rows of a fleet's drive; its frames from their Parquet file, which is smaller."""
     if table != "frames":
-        return Result(fleet.path / RESULTS / drive).table(table)
+        return DriveResult(fleet.path / RESULTS / drive).table(table)
     try:
         return parquet_rows(read_frames(fleet.path, drive), table)
     except FileNotFoundError:

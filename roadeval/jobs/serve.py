@@ -11,7 +11,7 @@ from typing import Final
 
 from roadeval.errors import RoadevalError
 from roadeval.jobs.replayed import Replayer
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import DriveResult
 from roadeval.jobs.served import Served, ServedDrive, moved, policy
 from roadeval.jobs.served_fleet import ServedFleet
 from roadeval.recording.screen.viewer import WindowViewer
@@ -23,7 +23,7 @@ from roadeval.results.fleet.kind import is_fleet
 from roadeval.runtime.local_server import NOT_FOUND, PAGE, LocalServer, Request, Response, told
 from roadeval.runtime.paths import Paths, listed
 
-MakeCommands = Callable[[Result | Path], Commands]
+MakeCommands = Callable[[DriveResult | Path], Commands]
 """Returns the commands that a page names, of a drive's result or of a fleet's folder."""
 _CODE: Final = {STYLE: "text/css; charset=utf-8", SCRIPT: "text/javascript; charset=utf-8"}
 _PLACE: Final = Place("", "", "{}")

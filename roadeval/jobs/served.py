@@ -13,7 +13,7 @@ from typing import Final, Protocol
 from roadeval.errors import RoadevalError
 from roadeval.jobs.page_frames import StripMaker, browsed
 from roadeval.jobs.report_findings import collect
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import DriveResult
 from roadeval.recording.screen.viewer import WindowViewer
 from roadeval.report.blocks import Document, Heading
 from roadeval.report.browse import Strip
@@ -64,12 +64,12 @@ class ServedDrive:
     def __init__(
         self,
         path: Path,
-        commands: Callable[[Result], Commands] | None,
+        commands: Callable[[DriveResult], Commands] | None,
         site: str = "../",
         above: tuple[str, str] = ("../", "All results"),
     ) -> None:
         self.path: Path = path
-        self._result: Final = Result(path)
+        self._result: Final = DriveResult(path)
         self._commands: Final = commands(self._result) if commands else None
         self._lock: Final = Lock()
         self._strips: Final[OrderedDict[int, Strip]] = OrderedDict()

@@ -15,7 +15,7 @@ from roadeval.jobs.progress import OnProgress
 from roadeval.jobs.replayed import CancelledReplayError, Replayer
 from roadeval.jobs.report import PICTURED
 from roadeval.jobs.report_fleet import collect_fleet
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import DriveResult
 from roadeval.jobs.served import ServedDrive, image, policy, viewed
 from roadeval.recording.screen.viewer import WindowViewer
 from roadeval.report.blocks import Document
@@ -57,7 +57,7 @@ class ServedFleet:
         self,
         path: Path,
         inspect: Callable[[int], str] | None,
-        commands: Callable[[Result], Commands] | None,
+        commands: Callable[[DriveResult], Commands] | None,
         replayer: Replayer,
         *,
         trust_sources: bool = False,

@@ -10,7 +10,7 @@ from roadeval import Recording
 from roadeval.cli.app import main
 from roadeval.errors import RoadevalError
 from roadeval.jobs import inspect as inspecting
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import DriveResult
 from roadeval.recording.screen import viewer
 from tests.e2e.commands import CLASSES, here, replay, roadeval
 from tests.fixtures.make import make
@@ -80,7 +80,7 @@ def test_without_a_frame_the_worst_is_drawn_and_named(demo, told):
 
 
 def test_the_frame_that_is_drawn_is_the_worst_of_those_that_have_pictures(sparse, told):
-    pictured = Result(sparse.recording).pictured
+    pictured = DriveResult(sparse.recording).pictured
     assert worst(sparse) not in pictured
     rows = [
         (float(row["ERR"]), int(row["frame"]))
@@ -103,7 +103,7 @@ def test_the_window_opens_at_the_first_evaluated_frame_that_has_pictures(
         drive = make("drives/street.mcap", tmp_path)
         sparse = replay(tmp_path, drive, *CLASSES, "--record", "worst:3")
     assert main(["inspect", str(sparse.recording)]) == 0
-    opened = Result(sparse.recording)
+    opened = DriveResult(sparse.recording)
     assert opened.recording.layout.first_frame not in opened.pictured
     assert shown == [min(set(opened.pictured) & {int(r["frame"]) for r in sparse.table("frames")})]
 
@@ -150,7 +150,7 @@ def test_a_frame_without_pictures_is_drawn_with_a_warning(
 
 
 def test_the_worst_of_nothing_is_none_unless_a_variant_is_asked_for(unlabelled):
-    opened = Result(unlabelled.recording)
+    opened = DriveResult(unlabelled.recording)
     assert inspecting.worst(opened) is None
     with pytest.raises(RoadevalError, match="nothing was scored"):
         inspecting.worst(opened, "filtered")

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from pypdf import PdfReader
 
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import DriveResult
 from roadeval.logs import LogWriter
 from tests.e2e.commands import here, roadeval
 from tests.report.making import text
@@ -121,7 +121,7 @@ def test_a_killed_run_gives_a_report_of_its_readable_part_marked_on_page_1(kille
 
 
 def test_a_killed_run_of_sparse_truth_shows_no_scored_frame_whose_truth_is_missing(killed):
-    opened = Result(killed)
+    opened = DriveResult(killed)
     seen = set(opened.pictured)
     scored = set(opened.frames["frame"])
     assert len(seen & scored) > 1

@@ -14,7 +14,7 @@ from roadeval.config import OutputSettings
 from roadeval.jobs import inspect
 from roadeval.jobs.outputs import Outputs, holding
 from roadeval.jobs.report import write_report
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import DriveResult
 from roadeval.logs import Log
 from tests.faults import making
 from tests.jobs.making import write_log
@@ -160,7 +160,7 @@ COMMANDS = {
     "report": lambda drive, made, taken: write_report(made / "reports", taken),
     "pack": lambda drive, made, taken: roadeval.pack(made, taken),
     "demo": lambda drive, made, taken: roadeval.demo(taken),
-    "screenshot": lambda drive, made, taken: inspect.view(Result(made / "out.rrd"), 1, taken),
+    "screenshot": lambda drive, made, taken: inspect.view(DriveResult(made / "out.rrd"), 1, taken),
 }
 
 

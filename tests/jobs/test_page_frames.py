@@ -8,7 +8,7 @@ import roadeval
 from roadeval.jobs import compare, page_comparison, page_frames
 from roadeval.jobs.page_frames import FEWEST, bytes_of, strips_of
 from roadeval.jobs.report import drive_page
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import DriveResult
 from roadeval.report.browse import FrameBrowser
 from tests.jobs.making import settings, write_log
 
@@ -37,7 +37,7 @@ def layered(strip):
 
 
 def test_every_variants_errors_and_layers_are_shown(recording):
-    shown = browser(drive_page(Result(recording)))
+    shown = browser(drive_page(DriveResult(recording)))
     for strip in shown.strips:
         assert layered(strip) == ["filtered", "unfiltered", "third", "fourth"]
         names = [picture.name for picture in strip.rows[0].pictures]
@@ -48,7 +48,7 @@ def test_every_variants_errors_and_layers_are_shown(recording):
 def test_where_layers_have_no_room_some_variants_have_none_and_the_page_says_so(
     recording, monkeypatch
 ):
-    result = Result(recording)
+    result = DriveResult(recording)
     (strip,), _ = strips_of(result, None, 1)
     monkeypatch.setattr(page_frames, "BYTES", FEWEST * bytes_of(strip) - 1)
     strips, left_out = strips_of(result, None)
@@ -63,7 +63,7 @@ def test_where_layers_have_no_room_some_variants_have_none_and_the_page_says_so(
 
 def test_who_asks_for_a_number_gets_it_with_all_layers(recording, monkeypatch):
     monkeypatch.setattr(page_frames, "BYTES", 0)
-    strips, left_out = strips_of(Result(recording), None, 5)
+    strips, left_out = strips_of(DriveResult(recording), None, 5)
     assert len(strips) == 5
     assert left_out == []
     assert len(layered(strips[0])) == 4

@@ -13,7 +13,7 @@ from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.fleet_inspect import Asked
 
 if TYPE_CHECKING:
-    from roadeval.jobs.result import Result
+    from roadeval.jobs.result import DriveResult
 
 Listed = Annotated[bool, typer.Option("--list", help="Print the worst frames with reasons.")]
 Frame = Annotated[int | None, typer.Option("--frame", metavar="N", min=0, help="Open at frame N.")]
@@ -86,9 +86,9 @@ def inspect(
         raise typer.BadParameter("--drive goes with a fleet's folder alone")
     if trust_sources:
         raise typer.BadParameter("--trust-sources goes with a fleet's folder alone")
-    from roadeval.jobs.result import Result
+    from roadeval.jobs.result import DriveResult
 
-    opened = Result(recording)
+    opened = DriveResult(recording)
     if listed:
         _list(opened, worst, variant, as_json=json)
     elif screenshot is not None:
@@ -100,7 +100,7 @@ def inspect(
     return ExitCode.DONE
 
 
-def _list(opened: Result, count: int | None, variant: str | None, *, as_json: bool) -> None:
+def _list(opened: DriveResult, count: int | None, variant: str | None, *, as_json: bool) -> None:
     """Print the worst frames, for people or as JSON."""
     from roadeval.cli.screens import inspect as screen
     from roadeval.jobs import inspect as inspecting
@@ -114,7 +114,7 @@ def _list(opened: Result, count: int | None, variant: str | None, *, as_json: bo
 
 
 def _asked_for(
-    opened: Result, frame: int | None, worst: int | None, variant: str | None
+    opened: DriveResult, frame: int | None, worst: int | None, variant: str | None
 ) -> int | None:
     """Return the number of the frame that was asked for, by itself or by its rank."""
     from roadeval.jobs.inspect import worst_frames
@@ -122,7 +122,7 @@ def _asked_for(
     return frame if worst is None else worst_frames(opened, worst, variant)[-1].frame
 
 
-def _draw(opened: Result, frame: int | None, variant: str | None, file: Path) -> None:
+def _draw(opened: DriveResult, frame: int | None, variant: str | None, file: Path) -> None:
     """Draw a frame into a file, the worst that has pictures if none was asked for."""
     from roadeval.jobs import inspect as inspecting
 
@@ -134,7 +134,7 @@ def _draw(opened: Result, frame: int | None, variant: str | None, file: Path) ->
     console.emit(f"{file}: frame {_open(opened, frame, file)}{why}")
 
 
-def _open(opened: Result, frame: int | None, file: Path | None = None) -> int | None:
+def _open(opened: DriveResult, frame: int | None, file: Path | None = None) -> int | None:
     """Open the viewer at a frame, or draw it into a file; return the frame that it shows."""
     from roadeval.jobs import inspect as inspecting
 

@@ -13,7 +13,7 @@ from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
 
 if TYPE_CHECKING:
-    from roadeval.jobs.result import Result
+    from roadeval.jobs.result import DriveResult
     from roadeval.report.findings import Commands
 
 
@@ -63,7 +63,7 @@ def report(
     that needs no network and no server; of a fleet its pictures lie in a folder beside it.
     """
     from roadeval.jobs.report import PageSettings, is_page, write_report
-    from roadeval.jobs.result import Result
+    from roadeval.jobs.result import DriveResult
     from roadeval.results.fleet.kind import is_fleet
 
     size = arguments.paper_of(paper)
@@ -75,7 +75,7 @@ def report(
         told = commands_of(result)
         path = write_report(result, output, paper=size, commands=told, as_page=page)
     else:
-        read = Result(result)
+        read = DriveResult(result)
         path = write_report(read, output, paper=size, commands=commands_of(read), as_page=page)
         warnings = read.warnings
     if not quiet:
@@ -85,7 +85,7 @@ def report(
     return ExitCode.DONE
 
 
-def commands_of(result: Result | Path) -> Commands:
+def commands_of(result: DriveResult | Path) -> Commands:
     """Return what to type for more about a drive's result, or about a fleet's folder."""
     return _of_fleet(result) if isinstance(result, Path) else _of_drive(result)
 
@@ -95,7 +95,7 @@ def inspect_command(path: Path, frame: int) -> str:
     return shlex.join(["roadeval", "inspect", str(path), "--frame", str(frame)])
 
 
-def _of_drive(result: Result) -> Commands:
+def _of_drive(result: DriveResult) -> Commands:
     from roadeval.report.findings import Commands
 
     config = result.configuration

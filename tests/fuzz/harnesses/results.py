@@ -11,7 +11,7 @@ from typing import Any
 from roadeval.config import load_config
 from roadeval.errors import RoadevalError
 from roadeval.jobs.report_findings import collect
-from roadeval.jobs.result import Result
+from roadeval.jobs.result import DriveResult
 from roadeval.recording import Recording
 from tests.compatibility.make import RECORDING, RESULTS, unpack, versions
 from tests.fuzz.harness import Harness, scratch
@@ -23,12 +23,12 @@ def check(data: bytes) -> None:
     sound = file.read_bytes()
     file.write_bytes(data[1:])
     try:
-        read(Result(file if file.name == RECORDING else file.parent))
+        read(DriveResult(file if file.name == RECORDING else file.parent))
     finally:
         file.write_bytes(sound)
 
 
-def read(result: Result) -> None:
+def read(result: DriveResult) -> None:
     """Read all that a result holds: what a report needs, its configuration, its pictures."""
     readers: list[Callable[[], Any]] = [
         lambda: result.regions,
