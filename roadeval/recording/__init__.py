@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Final
 from roadeval.runtime.on_demand import on_demand
 
 if TYPE_CHECKING:
-    from roadeval.recording.layout import DamagedError, Layout, RecordingError
+    from roadeval.recording.layout import DamagedError, Layout, RecordingError, RecordRule
     from roadeval.recording.read.recording import Recording
-    from roadeval.recording.rule import RecordRule
     from roadeval.recording.write.encoding import EncodedFrame
     from roadeval.recording.write.recorder import NullRecorder, Recorder
     from roadeval.recording.write.selective import SelectiveRecorder, recorder_for
@@ -33,7 +32,7 @@ _MODULES: Final = {
     "EncodedFrame": "write.encoding",
     "Layout": "layout",
     "NullRecorder": "write.recorder",
-    "RecordRule": "rule",
+    "RecordRule": "layout",
     "Recorder": "write.recorder",
     "Recording": "read.recording",
     "RecordingError": "layout",

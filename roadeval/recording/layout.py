@@ -1,10 +1,12 @@
-"""The layout of a recording: what it will hold, and under which entity path each thing lies."""
+"""The layout of a recording: what it holds, and the entity path of each thing in it."""
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields
+from enum import StrEnum
 from typing import Any, Final
 
 from roadeval.data import (
@@ -25,14 +27,13 @@ from roadeval.data.layer import IGNORED_CLASS
 from roadeval.errors import RoadevalError
 
 APPLICATION: Final = "roadeval"
-"""Name under which the viewer knows the files, and by which ours are recognised."""
+"""Name of this program in its recordings."""
 FORMAT: Final = 3
-"""Version of the arrangement inside the file, which alone is read; raised with every change of it
-that a reader must know of."""
+"""Version of the format. Only this one is read; a change that a reader must know of raises it."""
 
 FRAME: Final = "frame"
 STAMP: Final = "stamp"
-"""The two timelines: the frame's number, and its header stamp in nanoseconds."""
+"""Names of the timelines: the frame's number, and its header stamp in nanoseconds."""
 
 CAMERA: Final = "/camera"
 TRUTH_PATH: Final = "/truth"
@@ -42,26 +43,26 @@ GUIDE: Final = "/results/guide"
 LAYOUT: Final = "/results/layout"
 SUMMARY: Final = "summary"
 OVERVIEW: Final = "overview"
-"""Names of two results: the content of ``summary.json``, and the same for people."""
+"""Names of two results: the content of ``summary.json``, and the same in Markdown."""
 SUMS: Final = "/timing/sums"
-"""Check sums of all that was written before; they are of bytes, which differ from run to run."""
+"""Checksums of everything written before. They differ from run to run, as the bytes do."""
 SECONDS: Final = "/timing/summary"
-"""The seconds of the summary: like all timing, they differ from run to run."""
+"""The summary's seconds, which differ from run to run, as all timing does."""
 PROPERTIES: Final = "/__properties/roadeval"
-"""Where the viewer and `rerun.RecordingStream.send_property` keep a recording's properties."""
+"""Where Rerun keeps a recording's properties."""
 ROLE: Final = "/state/frame"
 COUNTS: Final = (*OUTCOMES, "N")
-"""The order of the five numbers under ``/counts``."""
+"""The order of the numbers under ``/counts``."""
 MOST_WAITING: Final = 128
-"""Frames whose images and text may wait to be written, at most: a killed run loses them."""
+"""Most frames whose images and text wait to be written. A killed run loses them."""
 
 
 class RecordingError(RoadevalError):
-    """A recording cannot be written or read: one line that says why."""
+    """A recording cannot be written or read."""
 
 
 class DamagedError(RecordingError):
-    """A recording that is damaged inside, so that a part of it is not what was written."""
+    """A part of a recording is not what was written."""
 
     def __init__(self, path: object, part: str) -> None:
         super().__init__(
@@ -72,44 +73,30 @@ class DamagedError(RecordingError):
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """What is known about a recording before its first frame.
-
-    Parameters
-    ----------
-    drive
-        Name of the log, for titles.
-    width, height
-        Size of every image in pixels.
-    variants
-        The variants in the order in which they are shown, without the baseline.
-    rates
-        Names of the rates under ``/metrics``.
-    baseline
-        Whether tallies of the baseline come, too.
-    has_truth, has_shadow_truth
-        Whether any frame has a truth of the road, of shadow.
-    first_frame
-        The first frame that can be evaluated, if known.
-    rate_hz
-        Frames a second, if known: the speed at which the viewer plays them.
-    tables
-        Header line of each table whose lines come with the frames, by the table's name.
-    properties
-        Provenance: versions, settings, hashes.
-    """
+    """What is known about a recording before its first frame."""
 
     drive: str
+    """Name of the log, for titles."""
     width: int
+    """Of every image, in pixels."""
     height: int
     variants: tuple[VariantLayout, ...]
+    """The variants in the order in which they are shown, without the baseline."""
     rates: tuple[str, ...]
+    """Names of the rates under ``/metrics``."""
     baseline: bool = True
+    """Whether the baseline is counted, too."""
     has_truth: bool = True
+    """Whether any frame has a truth of the road."""
     has_shadow_truth: bool = False
     first_frame: int | None = None
+    """The first frame that can be evaluated, if known."""
     rate_hz: float | None = None
+    """Frames a second, if known: the speed at which the viewer plays."""
     tables: Mapping[str, str] = field(default_factory=dict)
+    """Header line of each table that grows with the frames, by the table's name."""
     properties: Mapping[str, str | int | float] = field(default_factory=dict)
+    """Provenance: versions, settings, hashes."""
 
     def __post_init__(self) -> None:
         for variant in self.variants:
@@ -120,7 +107,7 @@ class Layout:
                 )
 
     def images(self) -> Iterator[tuple[str, LayerSpec]]:
-        """Yield the entity path and description of every layer, the truths and errors included."""
+        """Yield the entity path and description of every layer, truths and errors included."""
         if self.has_truth:
             yield TRUTH_PATH, TRUTH
         if self.has_shadow_truth:
@@ -132,7 +119,7 @@ class Layout:
                 yield layer_path(variant.name, ERRORS.name), ERRORS
 
     def scored(self) -> Iterator[tuple[str, str]]:
-        """Yield the variant and stage of everything that is counted, the baseline last."""
+        """Yield the variant and stage of every counted mask, the baseline last."""
         if self.has_truth:
             yield from ((v.name, stage) for v in self.variants for stage in v.stages)
         if self.has_truth and self.baseline:
@@ -144,7 +131,7 @@ class Layout:
 
     @classmethod
     def from_json(cls, text: str) -> Layout:
-        """Return the layout that `to_json` wrote; what only other versions know is passed over."""
+        """Return the layout that `to_json` wrote; unknown fields are ignored."""
         known = {each.name for each in fields(cls)}
         raw = {name: value for name, value in json.loads(text).items() if name in known}
         raw["variants"] = tuple(_variant(v) for v in raw["variants"])
@@ -170,7 +157,7 @@ def layer_path(variant: str, layer: str) -> str:
 
 
 def guide_path(variant: str) -> str:
-    """Return the entity path of the text that introduces a variant."""
+    """Return the entity path of a variant's introduction."""
     return f"{GUIDE}/{variant}"
 
 
@@ -183,7 +170,7 @@ def scalar_path(kind: str, variant: str, stage: str, name: str = "") -> str:
 
 
 def state_path(variant: str) -> str:
-    """Return the entity path of a variant's lane of health."""
+    """Return the entity path of a variant's health."""
     return f"/state/{variant}"
 
 
@@ -202,3 +189,55 @@ def _spec(raw: dict[str, Any]) -> LayerSpec:
     low, high = raw["value_range"]
     kind = LayerKind(raw["kind"])
     return LayerSpec(raw["name"], kind, raw["title"], classes, (low, high), raw["exact"])
+
+
+class RuleKind(StrEnum):
+    """Which images a recording keeps."""
+
+    ALL = "all"
+    MASKS = "masks"
+    """Masks and labels of every frame, with the camera's image."""
+    WORST = "worst"
+    """All images of the frames with the highest ERR."""
+    EVERY = "every"
+    """All images of every N-th frame."""
+    NONE = "none"
+    """No recording at all."""
+
+
+_RULE: Final = re.compile(r"(all|masks|none)|(worst|every):([1-9][0-9]{0,8})")
+
+
+@dataclass(frozen=True, slots=True)
+class RecordRule:
+    """The setting ``output.record``. Numbers, notes and tables of all frames are always recorded.
+
+    >>> RecordRule.parse("worst:20")
+    RecordRule(kind=<RuleKind.WORST: 'worst'>, number=20)
+    """
+
+    kind: RuleKind = RuleKind.ALL
+    number: int = 0
+    """K of ``worst:K``, N of ``every:N``."""
+
+    @property
+    def recorded(self) -> bool:
+        """Whether there is a recording."""
+        return self.kind is not RuleKind.NONE
+
+    @classmethod
+    def parse(cls, text: str) -> RecordRule:
+        """Read a rule from the text of a setting.
+
+        Raises
+        ------
+        RecordingError
+            If it is not a rule.
+        """
+        match = _RULE.fullmatch(text)
+        if match is None:
+            raise RecordingError(
+                f"`output.record` {text}: choose all, masks, worst:K, every:N or none (as worst:20)"
+            )
+        plain, counted, number = match.groups()
+        return cls(RuleKind(plain or counted), int(number or 0))

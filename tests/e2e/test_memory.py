@@ -17,7 +17,7 @@ MEASURE = f"""
 import json, os, sys
 from roadeval import replay
 from roadeval.recording.write import recorder
-from roadeval.recording.write.batching import WaitLimits
+from roadeval.recording.write.rows import WaitLimits
 
 # Rows wait in memory for more frames the longer the recording, up to a limit at 1,024 frames and
 # more. Here that limit is reached before the first measurement.

@@ -1,42 +1,39 @@
-"""A recording read back: tables, arrays and notes, whole or partial, without the log."""
+"""A recording read back: tables, images and notes, without the log."""
 
 from __future__ import annotations
 
 import json
+from collections import deque
+from collections.abc import Iterable
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import pyarrow as pa
 
 from roadeval.data import ERRORS, Rows, VariantLayout
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout, RecordingError
-from roadeval.recording.read.payloads import PayloadCache
-from roadeval.recording.read.rrd_file import RrdFile, whole
+from roadeval.recording.read.rrd_file import RrdFile, flat, whole
 from roadeval.results.summary import another_format, parse_summary
 from roadeval.results.tables import read_rows, read_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from roadeval.recording.codecs.codec import Codec
+    from roadeval.recording.codecs import Codec
 
 _CAMERA: Final = "EncodedImage:blob"
 
 
 class Recording:
-    """A recording on disk.
+    """A recording on disk, the ``.rrd`` file that a replay wrote.
 
     A partial one, of a run that was interrupted or killed, is read as far as it goes: then
     ``complete`` is False, and ``summary`` and ``windows`` may be empty.
-
-    Parameters
-    ----------
-    path
-        An ``.rrd`` file that `Recorder` wrote.
 
     Raises
     ------
@@ -99,15 +96,14 @@ class Recording:
 
     @property
     def unsure(self) -> tuple[int, ...]:
-        """The last frames of a partial recording, of which a killed run may lack some layers."""
+        """The last frames of a partial recording, which may lack some layers."""
         return () if self.complete else self.frame_numbers[-at.MOST_WAITING :]
 
     @cached_property
     def roles(self) -> dict[int, str]:
         """The role of each frame, see `roadeval.data.Role`.
 
-        A killed run may not have written what it knew of its last frames: those have the role of
-        the frame before.
+        The last frames of a partial recording may have the role of the frame before them.
         """
         changes = dict(self._file.rows(at.ROLE, "StateChange:state"))
         roles, role = {}, ""
@@ -231,3 +227,77 @@ class Recording:
             if payload is None:
                 raise RecordingError(f"{self.path}: {path} has nothing on frame {frame}")
             return codec.decode(payload)
+
+
+READ_AHEAD: Final = 8 << 20
+"""Bytes of an entity's images that are kept. Rerun reads a whole entity to give any frame of it, so
+each pass keeps what lies around the frame: reading frames in order, forwards or backwards, takes
+one pass for as many frames as fit."""
+
+
+class Page(NamedTuple):
+    """Frames of a chunk, and the bytes of each."""
+
+    frames: list[int]
+    payloads: pa.ListArray
+
+
+class PayloadCache:
+    """Encoded images of a file's entities by frame; ``component`` is the one that holds them."""
+
+    def __init__(self, file: RrdFile) -> None:
+        self._file = file
+        self._frames: dict[str, frozenset[int]] = {}
+        self._payloads: dict[str, dict[int, pa.ListScalar]] = {}
+
+    def holds(self, path: str, component: str, frame: int) -> bool:
+        """Return whether the file has an image of the entity on a frame."""
+        if path not in self._frames:
+            self._read_around(path, component, frame)
+        return frame in self._frames[path]
+
+    def get(self, path: str, component: str, frame: int) -> bytes | None:
+        """Return the encoded image of the entity on a frame; None if there is none."""
+        if not self.holds(path, component, frame):
+            return None
+        if frame not in self._payloads[path]:
+            self._read_around(path, component, frame)
+        blob = self._payloads[path][frame]
+        return bytes(np.from_dlpack(blob.values))
+
+    def _read_around(self, path: str, component: str, frame: int) -> None:
+        self._payloads.pop(path, None)
+        pages = (
+            Page(batch.column(at.FRAME).to_pylist(), flat(batch.column(component)))
+            for batch in self._file.batches(path, component, static=False)
+        )
+        self._frames[path], self._payloads[path] = around(frame, pages)
+
+
+def around(frame: int, pages: Iterable[Page]) -> tuple[frozenset[int], dict[int, pa.ListScalar]]:
+    """Return all frames of the pages, and by frame the bytes of those around one frame.
+
+    The page with the frame is kept whatever its size, then those after it as far as they fit in
+    `READ_AHEAD`, then the nearest before it. No more are held at any time.
+    """
+    frames: set[int] = set()
+    before: deque[Page] = deque()
+    after: list[Page] = []
+    for page in pages:
+        frames.update(page.frames)
+        if not after and frame not in page.frames:
+            before.append(page)
+        elif not after or _size(after) + page.payloads.nbytes <= READ_AHEAD:
+            after.append(page)
+        while before and _size(before) + _size(after) > READ_AHEAD:
+            before.popleft()
+    payloads = {
+        number: payload
+        for page in (*before, *after)
+        for number, payload in zip(page.frames, page.payloads, strict=True)
+    }
+    return frozenset(frames), payloads
+
+
+def _size(pages: Iterable[Page]) -> int:
+    return sum(page.payloads.nbytes for page in pages)

@@ -1,17 +1,31 @@
 """A recording's file: opened whole, or, of a run that was killed, as far as it was written.
 
-Rerun's compiled part reads it. The package around that takes a third of a second to import, and
-has, for reading, but a thin wrapper; nor has it a public name for a file's index. The versions
-allowed are of one minor version.
+A Rerun file is a sequence of messages, each with a header; its index is the last one::
+
+    RRF2  [header|message] [header|message] ...  [header|sums] [header|mark] [header|index]
+
+Rerun has a checksum for the index alone. Of 400 random damages to messages two were read as other
+numbers and three aborted the process, as Rerun's library does where it meets what it never expects.
+So each message has a checksum, which is verified before it is read. The checksums are a document of
+their own; its place and checksum are in the path of an entity (the *mark*), as the index lists
+paths. In a file that another program has rewritten they no longer match, and are not used.
+
+Rerun's compiled module reads the file: the package around it takes a third of a second to import,
+and gives no access to the index.
 """
 
 from __future__ import annotations
 
+import json
+import struct
+import subprocess
+import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
+from zlib import crc32
 
 import numpy as np
 import pyarrow as pa
@@ -24,23 +38,37 @@ from rerun_bindings import (
 )
 
 from roadeval.errors import RoadevalError
-from roadeval.recording import checks
-from roadeval.recording import layout as at
-from roadeval.recording.checks import Place
-from roadeval.recording.layout import APPLICATION, FRAME, DamagedError, RecordingError
+from roadeval.recording.layout import APPLICATION, FRAME, SUMS, DamagedError, RecordingError
 from roadeval.runtime.files import check_input
 from roadeval.runtime.text import is_utf8
 
 _TEXT: Final = "TextDocument:text"
+_BEGIN: Final = 12
+"""Bytes before the first header."""
+_HEADER: Final = struct.Struct("<QQ")
+"""The kind of a message, and its length in bytes."""
+_PROBE: Final = """
+import sys
+from rerun.chunk import RrdReader
+try:
+    reader = RrdReader(sys.argv[1])
+    for entry in reader.recordings():
+        for chunk in reader.stream(store=entry):
+            chunk.to_record_batch()
+except Exception:
+    pass
+"""
+
+
+class Place(NamedTuple):
+    """Where a message lies in the file, without its header, in bytes."""
+
+    offset: int
+    size: int
 
 
 class RrdFile:
     """An ``.rrd`` file by this program.
-
-    Parameters
-    ----------
-    path
-        Of the file.
 
     Raises
     ------
@@ -53,7 +81,7 @@ class RrdFile:
         self._reader, self._entry = _open(path)
         self._store = _store(self._reader, self._entry)
         with whole(path, "its index"):
-            self._places = {} if self._store is None else _places(self._store)
+            self._unchecked = {} if self._store is None else _places(self._store)
         self._sums = self._read_sums()
 
     @property
@@ -68,7 +96,7 @@ class RrdFile:
         return self._reader.stream(store=self._entry)
 
     def batches(self, path: str, component: str, *, static: bool) -> Iterator[pa.RecordBatch]:
-        """Yield the rows of an entity that have a value, in as many batches as there are chunks.
+        """Yield the rows of an entity that have a value, a batch a chunk.
 
         Raises
         ------
@@ -108,26 +136,27 @@ class RrdFile:
         return None
 
     def _read_sums(self) -> dict[int, int]:
-        """Return the sums of the file's messages by their offsets.
+        """Return the checksums of the messages by their offsets.
 
-        Without any the file is tried out first: it may hold what would end this process.
+        A file without any, as that of a killed run, is read once by another process first: it may
+        hold what would abort this one.
         """
         with whole(self.path, "its index"):
-            self._sums = checks.marked(self._places)
+            self._sums = marked(self._unchecked)
         if not self._sums:
-            if not checks.can_be_read(self.path):
+            if not can_be_read(self.path):
                 raise DamagedError(self.path, "a place beyond which Rerun cannot read")
-            self._places.clear()
+            self._unchecked.clear()
             return {}
-        with whole(self.path, at.SUMS):
-            return checks.sums_of(self.document(at.SUMS) or "")
+        with whole(self.path, SUMS):
+            return sums_of(self.document(SUMS) or "")
 
     def _check(self, path: str) -> None:
-        """Check the messages of an entity, once."""
-        for place in self._places.get(path, ()):
-            if self._sums.get(place.offset) != checks.sum_at(self.path, place):
+        """Verify the messages of an entity, once."""
+        for place in self._unchecked.get(path, ()):
+            if self._sums.get(place.offset) != sum_at(self.path, place):
                 raise DamagedError(self.path, path)
-        self._places.pop(path, None)
+        self._unchecked.pop(path, None)
 
     def _all(self, chunks: LazyChunkStreamInternal, path: str) -> Iterator[ChunkInternal]:
         """Yield chunks; a `DamagedError` where one cannot be unpacked."""
@@ -143,7 +172,7 @@ class RrdFile:
 
 @contextmanager
 def whole(path: Path, part: str) -> Iterator[None]:
-    """Explain, as a `DamagedError`, whatever goes wrong where a part of a file is unpacked.
+    """Turn any exception while a part of a file is unpacked into a `DamagedError`.
 
     Rerun, Arrow, JSON and the decoders of images each have exceptions of their own.
     """
@@ -234,3 +263,66 @@ def _reason(path: Path) -> str:
         f"{path}: the recording is torn; "
         f"'rerun rrd optimize --continue-on-error {path} -o repaired.rrd' keeps what is whole"
     )
+
+
+# --- Checksums ------------------------------------------------------------------------------------
+
+
+class MessageSums:
+    """The checksums of the messages of a file that is being written."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._next = _BEGIN
+        self._sums: list[tuple[int, int]] = []
+
+    def read_on(self) -> None:
+        """Take in what was written to the file since the last call."""
+        with self._path.open("rb") as file:
+            file.seek(self._next)
+            while len(header := file.read(_HEADER.size)) == _HEADER.size:
+                _, size = _HEADER.unpack(header)
+                message = file.read(size)
+                if len(message) < size:
+                    return
+                self._sums.append((self._next + _HEADER.size, crc32(message)))
+                self._next += _HEADER.size + size
+
+    def document(self) -> str:
+        """Return all checksums by the messages' offsets, from which `sums_of` reads them."""
+        return json.dumps(self._sums)
+
+    def mark(self) -> str:
+        """Return the path of the entity that says where the last message lies, and its checksum."""
+        offset, total = self._sums[-1]
+        return f"{SUMS}/{offset}_{total:08x}"
+
+
+def sums_of(document: str) -> dict[int, int]:
+    """Return the checksums of a file's messages by their offsets; a ValueError if it has none."""
+    return {int(offset): int(total) for offset, total in json.loads(document)}
+
+
+def marked(places: Mapping[str, Sequence[Place]]) -> dict[int, int]:
+    """Return the checksum of the document of checksums by its offset, from a recording's paths.
+
+    Empty for a file that a killed run has left, or that another program has rewritten.
+    """
+    own = [place.offset for place in places.get(SUMS, ())]
+    marks = [path.rpartition("/")[2] for path in places if path.startswith(f"{SUMS}/")]
+    found = {int(place): int(total, 16) for place, _, total in (m.partition("_") for m in marks)}
+    return found if own == [*found] else {}
+
+
+def sum_at(path: Path, place: Place) -> int:
+    """Return the checksum of a message."""
+    with path.open("rb") as file:
+        file.seek(place.offset)
+        return crc32(file.read(place.size))
+
+
+def can_be_read(path: Path) -> bool:
+    """Return whether Rerun reads a whole file without aborting, which another process tries."""
+    # -P: a rerun.py that lies beside the recordings must not be imported.
+    probe = [sys.executable, "-P", "-c", _PROBE, str(path)]
+    return subprocess.run(probe, check=False, capture_output=True).returncode == 0

@@ -1,16 +1,40 @@
-"""The viewer's blueprint: the overview, and tabs with all the rest."""
+"""The viewer's blueprint: which views there are, and how they are arranged.
+
+The first tab is an overview that fits a screen of 1920x1080. From top to bottom: what the camera
+saw and what went wrong; a row a variant with its phases from left to right, equal phases below each
+other; the rates over time. Further tabs hold every layer and every number.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any, Final
+
 import rerun.blueprint as rrb
 
-from roadeval.data import VariantLayout
+from roadeval.data import BASELINE, ERRORS, FINAL_STAGE, LayerKind, LayerSpec, VariantLayout
 from roadeval.evaluation.metrics import SHORT
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout
-from roadeval.recording.screen import views
-from roadeval.recording.screen.overview import overview
-from roadeval.recording.screen.views import BlueprintPart
+
+BlueprintPart = Any
+"""A view or a container of views."""
+# All sizes are points; the viewer takes them as shares of the room that it has.
+_WIDTH: Final = 1920
+_HEIGHT: Final = 990
+_TITLE: Final = 26
+_HEADER: Final = 120
+_LEAST_WORDS: Final = 400
+_LEAST_CURVES: Final = 250
+_LEAST_PICTURE: Final = 200
+
+_ROWS: Final = 2
+"""Most variants that have a row: more would leave every picture too small to read."""
+_OUTCOMES: Final = 3
+"""Most variants whose errors stand on top."""
+
+Cell = tuple[LayerSpec, ...]
+"""Layers that share a picture."""
 
 
 def arrange(layout: Layout) -> rrb.Blueprint:
@@ -31,20 +55,20 @@ def arrange(layout: Layout) -> rrb.Blueprint:
 
 def _every_layer(layout: Layout, variant: VariantLayout) -> BlueprintPart:
     pictures = [
-        views.camera(),
-        *(views.layers(spec.title, variant.name, (spec,)) for spec in variant.layers),
+        camera(),
+        *(layers(spec.title, variant.name, (spec,)) for spec in variant.layers),
     ]
     if layout.has_shadow_truth:
-        pictures.append(views.picture("Truth: shadow", [at.CAMERA, at.TRUE_SHADOW]))
+        pictures.append(picture("Truth: shadow", [at.CAMERA, at.TRUE_SHADOW]))
     if layout.has_truth:
-        pictures += [views.truth(), views.outcome(layout, variant)]
+        pictures += [truth(), outcome(layout, variant)]
     return rrb.Grid(*pictures, grid_columns=4, name=f"{variant.name}: every layer")
 
 
 def _rates(layout: Layout) -> BlueprintPart:
     """Return graphs, a row a stage and a column a rate."""
     plots = [
-        views.plot(
+        plot(
             f"{rate} of {stage}",
             [
                 at.scalar_path("metrics", variant, other, rate)
@@ -62,7 +86,7 @@ def _rates(layout: Layout) -> BlueprintPart:
 def _counts(layout: Layout) -> BlueprintPart:
     """Return graphs, a row a variant and a column a stage."""
     plots = [
-        views.plot(f"{variant}: pixels of {stage}", [at.scalar_path("counts", variant, stage)])
+        plot(f"{variant}: pixels of {stage}", [at.scalar_path("counts", variant, stage)])
         for variant, stage in layout.scored()
     ]
     columns = max(len(variant.stages) for variant in layout.variants)
@@ -70,14 +94,14 @@ def _counts(layout: Layout) -> BlueprintPart:
 
 
 def _timing(layout: Layout) -> BlueprintPart:
-    return rrb.Vertical(*map(views.stage_times, layout.variants), name="Timing")
+    return rrb.Vertical(*map(stage_times, layout.variants), name="Timing")
 
 
 def _results() -> BlueprintPart:
     return rrb.Horizontal(
-        views.document(at.result_path(at.OVERVIEW), "Results"),
-        views.document(at.result_path("windows"), "Windows (CSV)"),
-        views.document(at.result_path(at.SUMMARY), "Summary (JSON)"),
+        document(at.result_path(at.OVERVIEW), "Results"),
+        document(at.result_path("windows"), "Windows (CSV)"),
+        document(at.result_path(at.SUMMARY), "Summary (JSON)"),
         name="Results",
     )
 
@@ -94,3 +118,161 @@ def _time_panel(layout: Layout) -> rrb.TimePanel:
         play_state="following",
         fps=layout.rate_hz,
     )
+
+
+def overview(layout: Layout) -> BlueprintPart:
+    """Return the first tab."""
+    rows = {variant.name: _cells(variant) for variant in layout.variants[:_ROWS]}
+    columns = max(len(cells) for cells in rows.values())
+    shortest = min(rows, key=lambda name: len(rows[name]))
+    free = columns - len(rows[shortest])
+    aside = {shortest: events(wide=free > 2)} if free > 1 else {}
+
+    ratio = layout.height / layout.width
+    row = min((_WIDTH - _HEADER) / columns * ratio, _HEIGHT / 3) + _TITLE
+    pictures = _pictures(layout)
+    height = _HEIGHT - row * len(rows) - _LEAST_CURVES - _TITLE
+    width = max(min(height / ratio, (_WIDTH - _LEAST_WORDS) / len(pictures)), _LEAST_PICTURE)
+    top = width * ratio + _TITLE
+    return rrb.Vertical(
+        _top(pictures, width),
+        *(_row(name, cells, columns, aside.get(name)) for name, cells in rows.items()),
+        _bottom(layout, None if aside else events(wide=False)),
+        row_shares=[top, *[row] * len(rows), max(_HEIGHT - top - row * len(rows), _LEAST_CURVES)],
+        name="Overview",
+    )
+
+
+def _pictures(layout: Layout) -> list[BlueprintPart]:
+    """Return views of the camera, the truth, and what each variant made of it."""
+    return [
+        camera(),
+        *([truth()] if layout.has_truth else []),
+        *(outcome(layout, variant) for variant in layout.variants[:_OUTCOMES]),
+    ]
+
+
+def _top(pictures: Sequence[BlueprintPart], width: float) -> BlueprintPart:
+    words = document(at.GUIDE, "What you see")
+    shares = [*[width] * len(pictures), _WIDTH - width * len(pictures)]
+    return rrb.Horizontal(*pictures, words, column_shares=shares)
+
+
+def _cells(variant: VariantLayout) -> list[Cell]:
+    """Return the layers, grouped into pictures.
+
+    An overlay joins the overlay before it, as rings join their shadow, unless it is a stage's
+    mask: each of those begins a picture of its own.
+    """
+    cells: list[Cell] = []
+    for spec in variant.layers:
+        joins = is_overlay(spec) and spec.name not in variant.stages
+        if joins and cells and is_overlay(cells[-1][0]):
+            cells[-1] = (*cells[-1], spec)
+        else:
+            cells.append((spec,))
+    return cells
+
+
+def _row(
+    variant: str, cells: Sequence[Cell], columns: int, aside: BlueprintPart | None
+) -> BlueprintPart:
+    """Return a variant's row, filled from the right: equal phases stand below each other."""
+    width = (_WIDTH - _HEADER) / columns
+    space = (columns - len(cells)) * width
+    # Titles must be short here: the layers' names.
+    titles = (" + ".join(spec.name for spec in cell) for cell in cells)
+    pictures = [layers(t, variant, c) for t, c in zip(titles, cells, strict=True)]
+    header = document(at.guide_path(variant))
+    start, shares = ([header, aside], [_HEADER, space]) if aside else ([header], [_HEADER + space])
+    return rrb.Horizontal(*start, *pictures, column_shares=[*shares, *[width] * len(cells)])
+
+
+def _bottom(layout: Layout, aside: BlueprintPart | None) -> BlueprintPart:
+    plots = (
+        [_rate(layout, rate) for rate in SHORT if rate in layout.rates]
+        if layout.has_truth
+        else [stage_times(variant) for variant in layout.variants[:_ROWS]]
+    )
+    return rrb.Horizontal(*plots, *([aside] if aside else []))
+
+
+def _rate(layout: Layout, rate: str) -> BlueprintPart:
+    """Return a graph that compares a rate of the final masks."""
+    finals = [(variant.name, variant.stages[-1]) for variant in layout.variants]
+    finals += [(BASELINE, FINAL_STAGE)] * layout.baseline
+    paths = [at.scalar_path("metrics", *final, rate) for final in finals]
+    return plot(f"{rate}: {SHORT[rate].in_words}", paths)
+
+
+# --- Single views ---------------------------------------------------------------------------------
+
+
+def picture(title: str, paths: Sequence[str]) -> BlueprintPart:
+    """Return a view of images drawn over each other."""
+    return rrb.Spatial2DView(origin="/", contents=list(paths), name=title)
+
+
+def camera() -> BlueprintPart:
+    """Return a view of the image as logged."""
+    return picture("Camera", [at.CAMERA])
+
+
+def truth() -> BlueprintPart:
+    """Return a view of the truth: which pixels are road."""
+    return picture("Truth: road", [at.CAMERA, at.TRUTH_PATH])
+
+
+def outcome(layout: Layout, variant: VariantLayout) -> BlueprintPart:
+    """Return a view of the variant's errors, or without truth of what it calls road."""
+    name = ERRORS.name if layout.has_truth else variant.stages[-1]
+    title = f"{variant.name}: {'errors' if layout.has_truth else 'road'}"
+    return picture(title, [at.CAMERA, at.layer_path(variant.name, name)])
+
+
+def is_overlay(spec: LayerSpec) -> bool:
+    """Return whether a layer is drawn over the camera's image; others stand alone."""
+    return spec.kind in (LayerKind.MASK, LayerKind.LABELS)
+
+
+def layers(title: str, variant: str, specs: Sequence[LayerSpec]) -> BlueprintPart:
+    """Return one view of layers of a variant."""
+    below = [at.CAMERA] if is_overlay(specs[0]) else []
+    return picture(title, [*below, *(at.layer_path(variant, spec.name) for spec in specs)])
+
+
+def plot(title: str, paths: Sequence[str]) -> BlueprintPart:
+    """Return a graph of numbers over time."""
+    return rrb.TimeSeriesView(
+        origin="/",
+        contents=list(paths),
+        name=title,
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop),
+    )
+
+
+def stage_times(variant: VariantLayout) -> BlueprintPart:
+    """Return a graph of how long each stage of a variant took."""
+    return plot(f"{variant.name}: milliseconds a stage", [f"/timing/{variant.name}/**"])
+
+
+def document(path: str, title: str | None = None) -> BlueprintPart:
+    """Return a view of a text; without a title it has no title bar either."""
+    return rrb.TextDocumentView(
+        origin=path, contents=[path], name=title, titlebar=title is not None
+    )
+
+
+def events(*, wide: bool) -> BlueprintPart:
+    """Return views of how frames were used, of each variant's health, and of the notes."""
+    state = rrb.StateTimelineView(origin="/state", name="How it went")
+    notes = rrb.TextLogView(
+        origin=at.NOTES,
+        contents=[at.NOTES],
+        name="Notes",
+        columns=rrb.TextLogColumns(timeline_columns=[at.FRAME], text_log_columns=["body"]),
+        format_options=rrb.TextLogFormat(monospace_body=False),
+    )
+    if wide:
+        return rrb.Horizontal(state, notes, column_shares=[1, 2])
+    return rrb.Vertical(state, notes)

@@ -9,12 +9,14 @@ from typing import Any, Final
 
 import rerun as rr
 
-from roadeval.data import BASELINE, FILTERED, UNFILTERED, Health, Role, colours
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, Health, Role, VariantLayout, colours
 from roadeval.data.colours import Colour
+from roadeval.data.words import percent
+from roadeval.evaluation.metrics import SHORT
 from roadeval.recording import layout as at
-from roadeval.recording.codecs.codec import Codec
+from roadeval.recording.codecs import Codec
 from roadeval.recording.layout import Layout
-from roadeval.recording.screen import guide
+from roadeval.runtime.text import as_markdown
 
 StaticData = Iterator[tuple[str, list[Any]]]
 """Entity paths, and the archetypes to log there."""
@@ -42,6 +44,27 @@ _COUNTS: Final[Mapping[str, Colour]] = {
     "FN": colours.FN,
     "N": colours.GREY,
 }
+_ERRORS: Final = """\
+**Errors:** *green* road found, *orange* non-road called road (FP), *purple* road missed (FN),
+*grey* ignored.
+"""
+_ROWS: Final = """\
+**Rows:** a variant each, its phases from left to right; *green* is what a phase calls road.
+"""
+_CURVES: Final = """\
+**Curves:** rates of the final masks; *blind*, the training frames' mean truth, never looks at the
+image.
+"""
+_NO_TRUTH: Final = """\
+The log has no truth for the road: there is nothing to score, only what was computed.
+"""
+_RATES: Final = "In percent: means of the frames' rates; *pooled*: of all pixels."
+_SHOWN: Final = {name: name for name in SHORT} | {"pooled_ERR": "pooled ERR"}
+_OF_CURVES: Final = {name: name for name in ("AP", "AUC", "MaxF", "threshold", "ECE")}
+_QUOTED: Final = "In percent, of all pixels; the threshold is the one of MaxF."
+_HANDLING: Final = """\
+**Space** plays. The tabs above hold every layer, every number and the results.
+"""
 
 
 def _colours(layout: Layout) -> dict[str, Colour]:
@@ -56,9 +79,9 @@ def before_the_first_frame(layout: Layout, codecs: Mapping[str, Codec]) -> Stati
     for path, codec in codecs.items():
         yield path, list(codec.style())
     yield at.LAYOUT, [rr.TextDocument(layout.to_json())]
-    yield at.GUIDE, [_markdown(guide.text(layout))]
+    yield at.GUIDE, [_markdown(guide(layout))]
     for variant in layout.variants:
-        yield at.guide_path(variant.name), [_markdown(guide.variant(variant))]
+        yield at.guide_path(variant.name), [_markdown(introduction(variant))]
     yield at.PROPERTIES, [rr.AnyValues(format=at.FORMAT, **layout.properties)]
     for name, header in layout.tables.items():
         yield at.result_path(name), [rr.AnyValues(header=header.rstrip())]
@@ -84,8 +107,8 @@ def after_the_last_frame(layout: Layout, texts: Mapping[str, str]) -> StaticData
     """
     summary = json.loads(texts.get(at.SUMMARY, "{}"))
     verdict = str(summary.get("verdict", ""))
-    yield at.GUIDE, [_markdown(guide.text(layout, verdict))]
-    yield at.result_path(at.OVERVIEW), [_markdown(guide.overview(layout, summary))]
+    yield at.GUIDE, [_markdown(guide(layout, verdict))]
+    yield at.result_path(at.OVERVIEW), [_markdown(overview(layout, summary))]
     yield at.SECONDS, [rr.TextDocument(json.dumps(summary.pop("seconds", {})))]
     kept = {at.SUMMARY: json.dumps(summary, indent=2)} if summary else {}
     for name, text in {**texts, **kept}.items():
@@ -116,3 +139,64 @@ def _lines(layout: Layout) -> StaticData:
 
 def _line(name: str, colour: Colour) -> rr.SeriesLines:
     return rr.SeriesLines(names=name, colors=colour, widths=2.0)
+
+
+# --- Texts ----------------------------------------------------------------------------------------
+
+
+def guide(layout: Layout, verdict: str = "") -> str:
+    """Return the guide to the first tab, after the verdict on the drive if there is one yet."""
+    parts = [_ERRORS, _ROWS, _CURVES] if layout.has_truth else [_NO_TRUTH, _ROWS]
+    return "\n".join(
+        [f"### {as_markdown(layout.drive)}", "", as_markdown(verdict), "", *parts, _HANDLING]
+    )
+
+
+def introduction(layout: VariantLayout) -> str:
+    """Return the introduction of a variant."""
+    # A heading would break the name in a column as narrow as this one.
+    return f"**{as_markdown(layout.name)}**\n\n{as_markdown(layout.title)}\n"
+
+
+def overview(layout: Layout, summary: Mapping[str, Any]) -> str:
+    """Return the results for people, from the content of ``summary.json``."""
+    return "\n".join(
+        [
+            f"# {as_markdown(layout.drive)}",
+            *("", as_markdown(str(summary.get("verdict", "")))),
+            *_list("Warnings", summary.get("warnings", ())),
+            *_list("Lost", summary.get("losses", ())),
+            *_table("Rates", _RATES, _SHOWN, summary.get("totals", {})),
+            *_table("Over thresholds", _QUOTED, _OF_CURVES, summary.get("curves", {})),
+            *_list("Frames", _accounts(summary.get("frames", {}))),
+            *_list("Provenance", (f"{k}: {v}" for k, v in layout.properties.items())),
+            "",
+        ]
+    )
+
+
+def _table(
+    title: str, note: str, columns: Mapping[str, str], found: Mapping[str, Any]
+) -> Iterator[str]:
+    """Yield a table in percent, a row a variant and stage; nothing where there is none."""
+    rows = [(variant, stage, own) for variant, by in found.items() for stage, own in by.items()]
+    if rows:
+        yield from ("", f"## {title}", "", note, "")
+        yield f"| {' | '.join(['variant', 'stage', *columns.values()])} |"
+        yield f"|---|---|{'---|' * len(columns)}"
+    for variant, stage, own in rows:
+        cells = (percent(own.get(name)) for name in columns)
+        yield f"| {' | '.join([as_markdown(variant), stage, *cells])} |"
+
+
+def _accounts(frames: Mapping[str, Any]) -> Iterator[str]:
+    for name, count in frames.items():
+        if isinstance(count, Mapping):
+            yield from (f"{name}, {reason}: {n}" for reason, n in count.items())
+        else:
+            yield f"{name}: {count}".replace("_", " ")
+
+
+def _list(title: str, items: Any) -> list[str]:
+    lines = [f"- {as_markdown(item)}" for item in items]
+    return ["", f"## {title}", "", *lines] if lines else []

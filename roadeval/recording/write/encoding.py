@@ -1,4 +1,4 @@
-"""A frame's result encoded for the recording: pure, heavy, safe in any thread."""
+"""A frame's result encoded for the recording: the slow part, which any thread may do."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from roadeval.recording.codecs import codecs_of
 from roadeval.recording.layout import Layout
 
 FLAT: Final = (LayerKind.MASK, LayerKind.LABELS)
-"""What `Images.MASKS` keeps of the layers: small, and without loss."""
+"""The kinds of layers that `Images.MASKS` keeps."""
 
 
 class Images(StrEnum):
-    """Which of a frame's images are recorded; its numbers always are."""
+    """Which of a frame's images are recorded."""
 
     ALL = "all"
     MASKS = "masks"
@@ -36,22 +36,22 @@ class Images(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EncodedFrame:
-    """A frame ready to be written.
-
-    Every mapping is by entity path, but ``tables`` by name. ``states`` holds the state of every
-    lane, empty for none; ``notes`` pairs of a sentence and its level. ``worst_error`` is what
-    `worst_error` computes.
-    """
+    """A frame ready to be written. Mappings are by entity path, ``tables`` by name."""
 
     number: int
     stamp_ns: int
     payloads: Mapping[str, bytes]
+    """Image files."""
     scalars: Mapping[str, float] = field(default_factory=dict)
     counts: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     states: Mapping[str, str] = field(default_factory=dict)
+    """Every state, empty where there is none."""
     notes: tuple[tuple[str, str], ...] = ()
+    """Sentences, each with its level."""
     tables: Mapping[str, str] = field(default_factory=dict)
+    """Lines of CSV."""
     worst_error: float = -1.0
+    """See `worst_error`."""
 
 
 class FrameEncoder:
@@ -98,7 +98,7 @@ class FrameEncoder:
             yield path, self.codecs[path].encode(layer.array)
 
     def _camera_file(self, frame: Frame) -> bytes:
-        """Return the camera's own file where the log holds one, so that nothing is lost twice."""
+        """Return the log's own JPEG or PNG file, or a new one for other encodings."""
         if frame.media_type in ("image/jpeg", "image/png"):
             return bytes(frame.payload)
         return self.codecs[at.CAMERA].encode(frame.image)

@@ -1,4 +1,4 @@
-"""Writes a recording while frames arrive: it opens offline, in whatever state a run left it."""
+"""Writes a recording while frames arrive. It can be opened in whatever state a run leaves it."""
 
 from __future__ import annotations
 
@@ -14,22 +14,20 @@ import rerun as rr
 
 from roadeval.data import FrameResult
 from roadeval.recording import layout as at
-from roadeval.recording.checks import MessageSums
 from roadeval.recording.layout import Layout, RecordingError
-from roadeval.recording.read.rrd_file import indexed_chunks
+from roadeval.recording.read.rrd_file import MessageSums, indexed_chunks
 from roadeval.recording.screen import blueprint, static
-from roadeval.recording.write import columns
-from roadeval.recording.write.batching import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key
+from roadeval.recording.write import rows as columns
 from roadeval.recording.write.encoding import EncodedFrame, FrameEncoder, Images
+from roadeval.recording.write.rows import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key
 from roadeval.runtime.files import NewFile
 
 UNWRITTEN: Final = 4 << 20
-"""Bytes that may wait for Rerun's own thread to write them; it would let any number wait."""
+"""Bytes that may wait for Rerun's own thread to write them, which has no limit itself."""
 
 LEAST_FREE: Final = 64 << 20
-"""Bytes that must stay free on the disk beside what waits. Checked before each chunk but the last,
-for which it is meant: the partial recording then ends whole, while Rerun, should a write fail, may
-wait for it forever."""
+"""Bytes that must stay free on the disk, so that the end of a recording can still be written: Rerun
+may wait forever where a write fails."""
 
 
 class Recorder:
@@ -78,8 +76,8 @@ class Recorder:
         return self
 
     def _open(self) -> None:
-        # The same input gives the same recording: its identity is its layout's, and properties
-        # of the run, which Rerun would add, stay out.
+        # The same input gives the same bytes: the identity is that of the layout, and Rerun's own
+        # properties of the run are left out.
         identity = hashlib.blake2b(self._layout.to_json().encode(), digest_size=16).hexdigest()
         stream = rr.RecordingStream(at.APPLICATION, recording_id=identity, send_properties=False)
         stream.save(self.partial, default_blueprint=blueprint.arrange(self._layout))
@@ -90,7 +88,7 @@ class Recorder:
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         if error is not None:
             self._tell(error)
-            with suppress(RecordingError):  # what went wrong first is what the user must hear
+            with suppress(RecordingError):  # the first error is the one to report
                 self._close()
             return
         try:
@@ -105,7 +103,7 @@ class Recorder:
     def encode(
         self, result: FrameResult, lines: Mapping[str, str], images: Images = Images.ALL
     ) -> EncodedFrame:
-        """Encode a frame, with its lines of the tables; the heavy part, in any thread."""
+        """Encode a frame, with its lines of the tables, in any thread."""
         return self._encoder.encode(result, lines, images)
 
     def write(self, encoded: EncodedFrame) -> None:
@@ -132,8 +130,8 @@ class Recorder:
     def write_images(self, frames: Iterable[EncodedFrame]) -> None:
         """Append the images of frames whose numbers are written already, in order.
 
-        They are cleared right after their frame, so that no later one seems to show them. After an
-        interrupt it may be called again with the frames that are left.
+        They are cleared right after their frame, so that no later frame shows them. After an
+        interrupt it may be called again with the remaining frames.
         """
         for encoded in frames:
             if self._blank is not None and self._blank.number != encoded.number:
@@ -147,7 +145,7 @@ class Recorder:
             self._blank = None
 
     def flush(self) -> None:
-        """Write all that waits, once the last frame is written: its memory is needed for results.
+        """Write everything that waits, after the last frame, to free its memory.
 
         Raises
         ------
@@ -165,13 +163,12 @@ class Recorder:
         Parameters
         ----------
         results
-            Texts to keep under ``/results``, by name: ``summary`` (JSON) and ``windows`` (CSV
-            with its header).
+            Texts to keep under ``/results`` by name, as ``summary`` (JSON) and ``windows`` (CSV).
 
         Raises
         ------
         RecordingError
-            If the file did not become what was written to it, as on a full disk.
+            If the file lacks what was written to it, as on a full disk.
         """
         self._log_static(static.after_the_last_frame(self._layout, results))
         self.flush()
@@ -186,7 +183,7 @@ class Recorder:
     def check_disk_space(self) -> None:
         """Raise a `RecordingError` if the disk is full, or as good as full."""
         disk = shutil.disk_usage(self.partial.parent)
-        # A place that is no disk, as /proc, has no size.
+        # What is not a disk, as /proc, has no size.
         if disk.total and disk.free < LEAST_FREE + self._rows.size:
             raise RecordingError(f"{self.path}: cannot be written: the disk is full")
 
@@ -194,7 +191,7 @@ class Recorder:
         when = encoded.number, encoded.stamp_ns
         for path, payload in encoded.payloads.items():
             self._rows.add(path, self._encoder.codecs[path].columns, *when, payload)
-        # The viewer goes on showing what it has; an image that this frame lacks must not stay.
+        # The viewer goes on showing an image until another comes, so a missing one is cleared.
         for path in sorted(self._shown - encoded.payloads.keys()):
             self._rows.add(path, self._encoder.codecs[path].columns, *when, NOTHING)
         self._shown = set(encoded.payloads)
@@ -227,7 +224,7 @@ class Recorder:
     def _send(self, batcher: Batcher, key: Key) -> None:
         rows = batcher[key]
         self._open_stream().send_chunks(rows.chunk())
-        # Only now: if the run is interrupted above, the end of the recording still sends them.
+        # Not before: if the run is interrupted above, the rows are still sent at the end.
         del batcher[key]
         self._chunks += 1
         self._unwritten += rows.size
@@ -253,7 +250,7 @@ class Recorder:
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
 
     def _tell(self, error: BaseException) -> None:
-        """Note on an error where the partial recording lies."""
+        """Add to an error where the partial recording is."""
         if self.partial.exists():
             error.add_note(f"the partial recording is {self.partial}")
 
@@ -279,7 +276,7 @@ class Recorder:
 
 
 class NullRecorder:
-    """Does nothing, for a run without a recording."""
+    """A recorder of a run without a recording: it does nothing."""
 
     def __enter__(self) -> Self:
         return self

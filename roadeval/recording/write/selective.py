@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import heapq
+import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Final, Self
 
 from roadeval.data import FrameResult
-from roadeval.recording.layout import Layout, RecordingError
-from roadeval.recording.rule import RecordRule, RuleKind
+from roadeval.recording.layout import Layout, RecordingError, RecordRule, RuleKind
 from roadeval.recording.write.encoding import EncodedFrame, Images, worst_error
-from roadeval.recording.write.picture_store import PictureStore
 from roadeval.recording.write.recorder import NullRecorder, Recorder
 
 
 class SelectiveRecorder:
-    """A recorder that keeps images by a rule; a context manager like the `Recorder` it feeds.
+    """A recorder that keeps images by a rule; a context manager, as `Recorder`.
 
-    The images of ``worst:K`` wait in a `PictureStore` beside the recording: which they are is known
-    only at the end, and memory need not hold them, however large K is.
+    The images of ``worst:K`` wait in a `PictureStore` beside the recording until the end, when it
+    is known which they are.
 
     Parameters
     ----------
@@ -85,7 +84,7 @@ class SelectiveRecorder:
                 self._store.drop(-heapq.heappop(self._worst)[1])
 
     def flush(self) -> None:
-        """Write all that waits, the images put aside too, once the last frame is written."""
+        """Write everything that waits, images put aside included, after the last frame."""
         self._write_worst()
         self._recorder.flush()
 
@@ -95,7 +94,7 @@ class SelectiveRecorder:
         self._recorder.finish(results)
 
     def _rescue(self) -> None:
-        """Keep the worst frames so far of a run that is stopped, if there is room for them."""
+        """Write the worst frames so far of a run that is stopped, if the disk has room."""
         with suppress(RecordingError):
             self._write_worst()
 
@@ -105,7 +104,7 @@ class SelectiveRecorder:
         self._recorder.write_images(self._put_aside())
 
     def _put_aside(self) -> Iterator[EncodedFrame]:
-        """Take out the frames put aside, in order: after an interrupt one can take the rest."""
+        """Yield the frames put aside, in order, and forget each: it can be called again."""
         while self._worst:
             encoded = self._store.get(-self._worst[-1][1])
             self._worst.pop()
@@ -123,7 +122,7 @@ class SelectiveRecorder:
                 return Images.ALL
 
     def _least(self) -> float:
-        """Return the least ERR that can still be among the worst; it only ever rises."""
+        """Return the least ERR that can still be among the worst."""
         worst = self._worst
         return worst[0][0] if len(worst) == self._rule.number else 0.0
 
@@ -131,5 +130,63 @@ class SelectiveRecorder:
 def recorder_for(
     path: Path | None, layout: Layout, rule: RecordRule
 ) -> SelectiveRecorder | NullRecorder:
-    """Return the recorder that a rule asks for; for no path, one that does nothing."""
+    """Return a recorder that keeps images by a rule; without a path one that does nothing."""
     return NullRecorder() if path is None else SelectiveRecorder(path, layout, rule)
+
+
+class PictureStore:
+    """Frames' images on disk by frame number, one file a frame, in a folder of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder: Final = folder
+        self._sizes: Final[dict[int, tuple[EncodedFrame, dict[str, int]]]] = {}
+        """Each frame without its images, and their sizes in bytes by path."""
+
+    def put(self, encoded: EncodedFrame) -> None:
+        """Keep a frame's images; its numbers and texts are left out.
+
+        Raises
+        ------
+        RecordingError
+            If they cannot be written.
+        """
+        with self._explained():
+            self._folder.mkdir(exist_ok=True)
+            self._file(encoded.number).write_bytes(b"".join(encoded.payloads.values()))
+        sizes = {path: len(payload) for path, payload in encoded.payloads.items()}
+        self._sizes[encoded.number] = EncodedFrame(encoded.number, encoded.stamp_ns, {}), sizes
+
+    def drop(self, number: int) -> None:
+        """Remove a frame."""
+        with self._explained():
+            self._file(number).unlink()
+        del self._sizes[number]
+
+    def get(self, number: int) -> EncodedFrame:
+        """Return a frame, with its images alone.
+
+        Raises
+        ------
+        RecordingError
+            If they cannot be read.
+        """
+        bare, sizes = self._sizes[number]
+        with self._explained(), self._file(number).open("rb") as file:
+            return replace(bare, payloads={path: file.read(size) for path, size in sizes.items()})
+
+    def clear(self) -> None:
+        """Remove the folder, as far as that is possible."""
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _file(self, number: int) -> Path:
+        return self._folder / str(number)
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise RecordingError(
+                f"{self._folder}: the images put aside cannot be written or read ({error}); "
+                "is the disk full?"
+            ) from error

@@ -16,8 +16,8 @@ import pytest
 from roadeval.recording import NullRecorder, Recorder, Recording, RecordingError
 from roadeval.recording.read.rrd_file import RrdFile
 from roadeval.recording.screen import blueprint, static
-from roadeval.recording.write.batching import CHUNK_BYTES, PendingRows
 from roadeval.recording.write.recorder import LEAST_FREE, UNWRITTEN
+from roadeval.recording.write.rows import CHUNK_BYTES, PendingRows
 from tests.recording.making import (
     RESULTS,
     SUMMARY,
@@ -29,6 +29,8 @@ from tests.recording.making import (
     rows_of,
 )
 from tests.results.making import lines
+
+pytestmark = pytest.mark.usefixtures("untried")
 
 
 def test_nothing_stands_under_the_final_name_before_the_end(drive, tmp_path):
@@ -164,7 +166,7 @@ KILLED = """
 @pytest.mark.parametrize(("frames", "images", "numbers"), [(20, 16, 0), (100, 94, 64)])
 def test_a_killed_run_leaves_all_but_the_frames_that_wait(frames, images, numbers, tmp_path):
     written = [sys.executable, "-c", textwrap.dedent(KILLED), tmp_path / "out.rrd", str(frames)]
-    root = Path(__file__).resolve().parents[3]
+    root = Path(__file__).resolve().parents[2]
     assert subprocess.run(written, cwd=root, check=False).returncode == -signal.SIGKILL
     (left,) = tmp_path.iterdir()
     assert re.fullmatch(r"out\.[0-9a-f]{8}\.partial\.rrd", left.name)
@@ -265,7 +267,7 @@ def test_a_file_whose_index_could_not_be_written_does_not_get_its_name(recording
     # In a process of its own, for the limit on the size of files holds for all of it.
     limit = recording.path.stat().st_size * 9 // 10
     command = [sys.executable, "-c", TOO_LARGE, str(tmp_path / "out.rrd"), str(limit)]
-    root = Path(__file__).resolve().parents[3]
+    root = Path(__file__).resolve().parents[2]
     done = subprocess.run(
         command, cwd=root, check=False, capture_output=True, text=True, timeout=60
     )

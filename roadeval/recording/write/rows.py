@@ -1,12 +1,11 @@
-"""Rows of one entity, gathered over frames and sent as one chunk.
+"""Rows of an entity, gathered over frames and sent as one chunk.
 
-A chunk costs about 1.1 kB in the file, 0.1 ms, and 1.5 to 3 kB of memory until the end: Rerun's
-index of the file has a place for every component of the recording in every chunk's row. A chunk a
-frame and entity would cost more than most of what it holds, and more with every minute.
+A chunk costs about 1.1 kB in the file, 0.1 ms, and 1.5 to 3 kB of memory until the end, because
+Rerun's index has a cell for every component of the recording in every chunk's row. A chunk a frame
+and entity would cost more than most of what it holds.
 
-Rerun can batch by itself (`rerun.ChunkBatcherConfig`). On the demo that makes 31 chunks where this
-makes 661, but it takes 2.7 ms a frame more, for each row then crosses into Rerun alone, and it
-neither bounds what a killed run loses nor the memory of what waits.
+Rerun can batch by itself (`rerun.ChunkBatcherConfig`), but takes 2.7 ms a frame more on the demo,
+and bounds neither what a killed run loses nor the memory of what waits.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ import numpy as np
 import rerun as rr
 from rerun.chunk import Chunk
 
-from roadeval.recording.layout import FRAME, MOST_WAITING, STAMP
+from roadeval.recording.layout import COUNTS, FRAME, MOST_WAITING, STAMP
 
 Columns = Callable[[list[Any]], Any]
 """Makes the viewer's component columns of one value a row."""
@@ -27,39 +26,38 @@ Key = tuple[str, Columns]
 """An entity's path, and the kind of its rows."""
 
 NOTHING: Final = None
-"""Stands for a row without a value: from there on the viewer shows nothing of the entity.
+"""A row without a value: from there on the viewer shows nothing of the entity.
 
-Rerun has `rerun.Clear` for that, which its viewer overlooks on encoded images:
-https://github.com/rerun-io/rerun/issues/12793.
+`rerun.Clear` has no effect on encoded images: https://github.com/rerun-io/rerun/issues/12793.
 """
 
 CHUNK_BYTES: Final = 2 << 20
-"""Of images and text at which a chunk is full, however few its frames: the viewer reads chunks
-whole, and memory holds one several times while it is packed and written."""
+"""Bytes of images and text at which a chunk is full: the viewer reads chunks whole, and a chunk is
+held in memory several times while it is packed and written."""
 
 SHARE: Final = 8
-"""One frame in so many may wait, within `WaitLimits`: of a short recording few do."""
+"""One frame in this many may wait, within `WaitLimits`."""
 
 
 @dataclass(frozen=True, slots=True)
 class WaitLimits:
-    """For how many frames rows wait: a share of those so far, but from ``least`` to ``most``.
+    """For how many frames rows wait: a share of the frames so far, from ``least`` to ``most``.
 
-    A killed run loses what waits.
+    A killed run loses the rows that wait.
     """
 
     least: int
     most: int
 
     def after(self, frames: int) -> int:
-        """Return for how many frames rows wait when the recording has this many."""
+        """Return for how many frames rows wait when the recording has ``frames``."""
         return min(max(frames // SHARE, self.least), self.most)
 
 
 IMAGES_AND_TEXT: Final = WaitLimits(8, MOST_WAITING)
-"""Of what is read frame by frame: images, notes, states, table lines."""
+"""Of images, notes, states and table lines."""
 NUMBERS: Final = WaitLimits(64, 1024)
-"""Of the graphs' numbers: many entities of a few bytes a frame."""
+"""Of the graphs' numbers: many entities, a few bytes a frame each."""
 
 
 class PendingRows:
@@ -94,7 +92,7 @@ class PendingRows:
 
 
 class Batcher:
-    """The pending rows of entities that wait alike: all are due together, or one once full."""
+    """The rows of entities with the same `WaitLimits`: due together, or one entity's when full."""
 
     def __init__(self, limits: WaitLimits) -> None:
         self._limits = limits
@@ -114,7 +112,7 @@ class Batcher:
         return sum(rows.size for rows in self._pending.values())
 
     def end_frame(self) -> list[Key]:
-        """Count a frame; return the keys whose rows have waited long enough, or are full."""
+        """Count a frame; return the keys of rows that are due."""
         self._frames += 1
         if self._frames - self._due >= self._limits.after(self._frames):
             self._due = self._frames
@@ -136,3 +134,33 @@ def _size(value: Any) -> int:
     if isinstance(value, tuple):
         return sum(map(_size, value))
     return len(value) if isinstance(value, bytes | str) else 0
+
+
+# --- Columns: one row a value ---------------------------------------------------------------------
+
+
+def scalars(values: list[float]) -> Any:
+    """Return columns of one number a row."""
+    return rr.Scalars.columns(scalars=values)
+
+
+def counts(values: list[tuple[int, ...]]) -> Any:
+    """Return columns of the numbers of `layout.COUNTS` a row."""
+    flat = np.array(values, np.float64).ravel()
+    return rr.Scalars.columns(scalars=flat).partition([len(COUNTS)] * len(values))
+
+
+def states(values: list[str]) -> Any:
+    """Return columns that begin a state a row, or end one with an empty text."""
+    return rr.StateChange.columns(state=values)
+
+
+def texts(values: list[str]) -> Any:
+    """Return columns of one document a row."""
+    return rr.TextDocument.columns(text=values)
+
+
+def notes(values: list[tuple[str, str]]) -> Any:
+    """Return columns of one sentence and its level a row."""
+    sentences, levels = zip(*values, strict=True)
+    return rr.TextLog.columns(text=list(sentences), level=list(levels))

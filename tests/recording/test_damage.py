@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from roadeval.errors import RoadevalError
-from roadeval.recording import DamagedError, Recording, RecordingError, checks
+from roadeval.recording import DamagedError, Recording, RecordingError
 from roadeval.recording import layout as at
+from roadeval.recording.read import rrd_file
 from roadeval.recording.read.rrd_file import RrdFile, _places
 
 MUTATIONS = 120
@@ -118,7 +119,7 @@ def test_each_part_is_checked_when_it_is_read(path, read, spoilt):
 
 def test_a_part_is_checked_once(recording, monkeypatch):
     opened, checked = Recording(recording.path), []
-    monkeypatch.setattr(checks, "sum_at", lambda path, place: checked.append(place) or 0)
+    monkeypatch.setattr(rrd_file, "sum_at", lambda path, place: checked.append(place) or 0)
     monkeypatch.setattr(opened._file, "_sums", dict.fromkeys(opened._file._sums, 0))
     for frame in (4, 5, 18):
         opened.truth(frame)
@@ -131,7 +132,7 @@ def test_without_check_sums_another_process_tries_the_file_first(recording, tmp_
     cut.write_bytes(whole[: place_of(at.SUMS, recording).offset - HEADER])
     assert not Recording(cut).complete
     assert Recording(cut).frame_numbers == recording.frame_numbers
-    monkeypatch.setattr(checks, "_PROBE", "import os; os.abort()")
+    monkeypatch.setattr(rrd_file, "_PROBE", "import os; os.abort()")
     with pytest.raises(DamagedError, match="at a place beyond which Rerun cannot read"):
         Recording(cut)
     assert Recording(recording.path).truth(4).shape == recording.truth(4).shape
@@ -140,7 +141,7 @@ def test_without_check_sums_another_process_tries_the_file_first(recording, tmp_
 def test_a_module_beside_a_recording_is_not_run(recording, tmp_path, monkeypatch):
     (tmp_path / "rerun.py").write_text("import os; os.abort()")
     monkeypatch.chdir(tmp_path)
-    assert checks.can_be_read(recording.path)
+    assert rrd_file.can_be_read(recording.path)
 
 
 def test_a_name_that_is_not_utf8_is_refused(recording, tmp_path):
@@ -153,4 +154,4 @@ def test_a_name_that_is_not_utf8_is_refused(recording, tmp_path):
 @pytest.mark.parametrize("document", ["", "{", "3", "[1]", '[["a", 2]]'])
 def test_check_sums_that_are_none_are_refused(document):
     with pytest.raises((ValueError, TypeError)):
-        checks.sums_of(document)
+        rrd_file.sums_of(document)

@@ -2,14 +2,17 @@
 
 import pytest
 
-from roadeval.recording.write.batching import (
+from roadeval.recording.write.rows import (
     CHUNK_BYTES,
     IMAGES_AND_TEXT,
     NUMBERS,
     Batcher,
     WaitLimits,
+    notes,
+    scalars,
+    states,
+    texts,
 )
-from roadeval.recording.write.columns import notes, scalars, states, texts
 
 WAIT = WaitLimits(8, 64)
 

@@ -6,10 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from roadeval.recording import Recorder, Recording, RecordingError, RecordRule, SelectiveRecorder
-from roadeval.recording.write.picture_store import PictureStore
+from roadeval.recording import (
+    EncodedFrame,
+    Recorder,
+    Recording,
+    RecordingError,
+    RecordRule,
+    SelectiveRecorder,
+)
+from roadeval.recording.write.selective import PictureStore
 from tests.recording.making import RESULTS, layout, result, rows_of
 from tests.results.making import lines
+
+pytestmark = pytest.mark.usefixtures("untried")
 
 ERRORS = [0.1, 0.5, 0.3, 0.5, 0.2, 0.4, 0.0]
 
@@ -156,3 +165,43 @@ def test_a_disk_that_fills_up_ends_the_run_with_one_line_and_a_readable_part(tmp
     with pytest.raises(RecordingError, match="the disk is full"):
         fill(recorder)
     assert Recording(recorder.partial).frame_numbers == (0,)
+
+
+PAYLOADS = {"/camera": b"jpeg", "/filtered/post": b""}
+ONE_LINE = r"^.*/images: the images put aside cannot be written or read \(.*\); is the disk full\?$"
+
+
+@pytest.fixture
+def store(tmp_path):
+    return PictureStore(tmp_path / "images")
+
+
+def test_a_frame_comes_back_with_its_images_alone(store):
+    store.put(EncodedFrame(7, 70, PAYLOADS, scalars={"/metrics": 0.5}))
+    back = store.get(7)
+    assert (back.number, back.stamp_ns, back.payloads) == (7, 70, PAYLOADS)
+    assert list(back.payloads) == list(PAYLOADS)
+    assert not back.scalars
+
+
+def test_nothing_is_left_when_it_is_cleared(store, tmp_path):
+    store.clear()
+    for number in (1, 2):
+        store.put(EncodedFrame(number, number, PAYLOADS))
+    store.drop(1)
+    assert [path.name for path in (tmp_path / "images").iterdir()] == ["2"]
+    store.clear()
+    assert not list(tmp_path.iterdir())
+
+
+def test_images_that_were_lost_are_one_line(store, tmp_path):
+    store.put(EncodedFrame(7, 70, PAYLOADS))
+    (tmp_path / "images" / "7").unlink()
+    with pytest.raises(RecordingError, match=ONE_LINE):
+        store.get(7)
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
+    store = PictureStore(tmp_path / "missing" / "images")
+    with pytest.raises(RecordingError, match=ONE_LINE):
+        store.put(EncodedFrame(7, 70, PAYLOADS))
