@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, Rows
+from roadeval.data import BASELINE
 from roadeval.data.rows import joined
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import comparison, scored
 from roadeval.evaluation.comparison import Comparison, EndMissing
 from roadeval.evaluation.conditions import Condition, Judgement, judge
-from roadeval.evaluation.frame_counts import Window
+from roadeval.evaluation.effects import TESTED
 from roadeval.evaluation.pairing import Side, one_drive
 from roadeval.evaluation.settings import settings_of
 from roadeval.jobs.result import Result
+from roadeval.report.chart import Chart, looks
+from roadeval.report.charts.rates import over_windows
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.comparison import as_dict, judged, warnings
 from roadeval.results.rows import as_arrays, window_rows
@@ -50,11 +52,21 @@ class Compared:
     recordings: Mapping[str, Path]
     """By the results' labels; a folder has none."""
 
-    @property
-    def windows(self) -> Rows:
-        """ERR and the rest over the one drive that is compared, with each result as a variant."""
-        found = _windows(self.sides, self.comparison.settings.window)
-        return as_arrays("windows", window_rows(found))
+    def over_drive(self) -> list[Chart]:
+        """Return ERR over the one drive that is compared, of the masks that all results have."""
+        from roadeval.jobs.page_comparison import looks_of, masks_of, table_of
+
+        frames = {side.label: side.rows(side.parts[0], "frames") for side in self.sides}
+        masks = masks_of(self.sides, frames)
+        if not masks:
+            return []
+        blind = scored.finals(frames[self.sides[0].label].of_variant(BASELINE))
+        rows = table_of(masks, frames)
+        rows = joined([rows, blind.take(np.isin(blind["frame"], rows["frame"]))])
+        size = self.comparison.settings.window
+        size *= max(-(-len(rows.distinct("frame")) // (size * ROWS)), 1)
+        windows = as_arrays("windows", window_rows(scored.windows(rows, size)))
+        return over_windows(windows, [TESTED], looks_of(masks) | looks([BASELINE]))
 
     @property
     def content(self) -> dict[str, Any]:
@@ -225,7 +237,7 @@ def _document(compared: Compared, inspect: Inspect | None) -> Document:
     return document(
         compared.comparison,
         compared.judgements,
-        compared.windows,
+        compared.over_drive(),
         command if inspect and compared.recordings else None,
     )
 
@@ -239,18 +251,3 @@ def _markdown(compared: Compared, *_: object) -> bytes:
 def as_json(compared: Compared) -> str:
     """Write a comparison as JSON; undefined numbers become null."""
     return json_text(plain(compared.content))
-
-
-def _windows(sides: Sequence[Side], size: int) -> Iterator[Window]:
-    """Cut each result's first variant, and the base's baseline, into windows of common frames."""
-    if not sides:
-        return
-    frames = [side.rows(side.parts[0], "frames") for side in sides]
-    tables = []
-    for side, rows in zip(sides, frames, strict=True):
-        own = rows.of_variant(rows["variant"][0])
-        tables.append(own.replace(variant=np.full(len(own), side.label)))
-    common = set.intersection(*(set(table["frame"].tolist()) for table in tables))
-    together = joined([*tables, frames[0].of_variant(BASELINE)])
-    size *= max(-(-len(common) // (size * ROWS)), 1)
-    yield from scored.windows(together.take(np.isin(together["frame"], [*common])), size)

@@ -20,7 +20,7 @@ from roadeval.jobs.report_frames import rates_by_frame
 from roadeval.jobs.result import DriveResult
 from roadeval.recording import Recording
 from roadeval.report.browse import Strip
-from roadeval.report.chart import looks_of_results
+from roadeval.report.chart import Look, looks_of_results
 from roadeval.report.charts.rates import over_frames
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import LayerImage, faded
@@ -31,7 +31,7 @@ Inspect = Callable[[Path, int], str]
 
 
 @dataclass(frozen=True, slots=True)
-class _Mask:
+class ComparedMask:
     """A final mask that is compared: of which result and variant, and what the page calls it.
 
     ``own`` is what the result itself calls the variant.
@@ -69,10 +69,10 @@ def browsed(
         are there as keep it below `roadeval.jobs.page_frames.BYTES`.
     """
     rows = {side.label: side.rows(side.parts[0], "frames") for side in sides}
-    masks = list(_masks(sides, rows))
+    masks = masks_of(sides, rows)
     if not masks:
         return None
-    table = _table(masks, rows)
+    table = table_of(masks, rows)
     masks = [mask for mask in masks if mask.name in table.distinct("variant")]
     if not masks:
         return None
@@ -90,7 +90,7 @@ def browsed(
         charts=over_frames(
             table,
             [*SHORT],
-            looks_of_results({mask.name: (mask.result, mask.variant) for mask in masks}),
+            looks_of(masks),
         ),
         inspect=album.command if inspect and album.newest else None,
     )
@@ -99,20 +99,26 @@ def browsed(
     return replace(without, strips=strips, pictured=frozenset(each.frame for each in strips))
 
 
-def _masks(sides: Sequence[Side], rows: Mapping[str, Rows]) -> Iterator[_Mask]:
-    """Yield the final masks that all results have, one result after the other for each variant."""
+def masks_of(sides: Sequence[Side], rows: Mapping[str, Rows]) -> list[ComparedMask]:
+    """Return the final masks that all results have, one result after the other for each variant."""
     there = {label: own.distinct("variant") for label, own in rows.items()}
     if all(names == [label] for label, names in there.items()):
-        yield from (_Mask(label, label, label, label) for label in there)
-        return
+        return [ComparedMask(label, label, label, label) for label in there]
+    found = []
     for variant in next(iter(there.values())):
         if variant != BASELINE and all(variant in names for names in there.values()):
             for side in sides:
                 own = side.own_name(variant)
-                yield _Mask(f"{side.label}: {variant}", side.label, variant, own)
+                found.append(ComparedMask(f"{side.label}: {variant}", side.label, variant, own))
+    return found
 
 
-def _table(masks: Sequence[_Mask], frames: Mapping[str, Rows]) -> Rows:
+def looks_of(masks: Sequence[ComparedMask]) -> dict[str, Look]:
+    """Return how the masks are drawn: a hue a variant, a dash a result."""
+    return looks_of_results({mask.name: (mask.result, mask.variant) for mask in masks})
+
+
+def table_of(masks: Sequence[ComparedMask], frames: Mapping[str, Rows]) -> Rows:
     """Return the rows of the masks, each under its name as variant.
 
     Of a variant they are those of the frames on which all results have its mask.
@@ -132,7 +138,7 @@ def _table(masks: Sequence[_Mask], frames: Mapping[str, Rows]) -> Rows:
     return whole.take(np.argsort(whole["frame"], kind="stable"))
 
 
-def _facts(table: Rows, masks: Sequence[_Mask], noteworthy: float) -> Iterator[FrameFacts]:
+def _facts(table: Rows, masks: Sequence[ComparedMask], noteworthy: float) -> Iterator[FrameFacts]:
     """Yield each frame with the masks' rates, and whether the first of them got worse or better."""
     base, new = masks[0].name, masks[1].name
     for frame, stamp, rates in rates_by_frame(table, [*SHORT]):
@@ -149,7 +155,7 @@ class _Album:
 
     def __init__(
         self,
-        masks: Sequence[_Mask],
+        masks: Sequence[ComparedMask],
         recordings: Mapping[str, Path],
         facts: Sequence[FrameFacts],
         inspect: Inspect | None,
@@ -193,7 +199,7 @@ class _Album:
             errors: Any = self._recording(mask).layer(mask.own, ERRORS.name, frame)
             yield LayerImage(f"{mask.name}: errors", image, ERRORS, errors)
 
-    def _recording(self, mask: _Mask) -> Recording:
+    def _recording(self, mask: ComparedMask) -> Recording:
         recording = self._opened[mask.result].recording
         assert recording is not None
         return recording

@@ -117,7 +117,8 @@ def _written(
         rows = sum_rows(run.board.sums())
         sums = csv_lines(run.key, rows)
         results.append(sums)
-        facts = summary.of(run) | {"tables": results.tables}
+        shown = [each.frame for each in examples]
+        facts = summary.of(run) | {"examples": shown, "tables": results.tables}
         warnings, losses = summary.warnings(run), summary.losses(run)
         of_drive = {
             "scores": list(score_rows(facts, run.board.regions())),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -64,13 +64,21 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
         beyond=summary.get("beyond", {}),
         levels=result.levels,
         sampled=sampled,
-        examples=picker.examples(evenly(pictured, EXAMPLES)),
+        examples=picker.examples(_examples(summary, result.pictured, pictured)),
         thumbnails=picker.thumbnails(evenly(pictured, THUMBNAILS)),
         worst=picker.worst(),
         helped=picker.moved(paired, harmed=False),
         harmed=picker.moved(paired, harmed=True),
         coverage=_coverage(result, pictured),
     )
+
+
+def _examples(
+    summary: Mapping[str, Any], there: Collection[int], pictured: Sequence[int]
+) -> Sequence[int]:
+    """Return the frames of the figure that the run drew, or where they have no pictures others."""
+    drawn: list[int] = summary.get("examples", [])
+    return drawn if drawn and set(drawn) <= set(there) else evenly(pictured, EXAMPLES)
 
 
 def _pictured(result: DriveResult) -> list[int]:

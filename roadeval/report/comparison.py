@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import Final
 
-from roadeval.data import Rows
 from roadeval.data.words import DASH, interval, listing, number, percent, points, timestamp
 from roadeval.evaluation.comparison import (
     Change,
@@ -32,7 +31,8 @@ from roadeval.report.blocks import (
     TableOfContents,
     Text,
 )
-from roadeval.report.charts import differences, rates
+from roadeval.report.chart import Chart
+from roadeval.report.charts import differences
 from roadeval.report.charts.differences import MEAN, ForestRow
 from roadeval.report.fleet.common import MarkedRow, q_value, strata_table
 from roadeval.report.markdown import table as markdown_table
@@ -68,7 +68,7 @@ _LEFT_OUT: Final = (
 def document(
     comparison: Comparison,
     judgements: Sequence[Judgement],
-    windows: Rows,
+    over_drive: Sequence[Chart],
     inspect: Inspect | None = None,
 ) -> Document:
     """Return a comparison as a document.
@@ -79,8 +79,8 @@ def document(
         The comparison.
     judgements
         Of the limits that were set.
-    windows
-        The rows over the drive, with each result as a variant; may be empty.
+    over_drive
+        The rates of the masks over the drive; may be none.
     inspect
         Returns the command that opens a frame of a result, by its label; None: no commands.
     """
@@ -90,7 +90,7 @@ def document(
         title=listing(labels),
         subtitle="; ".join(map(_about, comparison.results)),
         footer=f"comparison of {listing(labels)}",
-        blocks=list(_blocks(comparison, judgements, windows, inspect)),
+        blocks=list(_blocks(comparison, judgements, over_drive, inspect)),
         keywords=["road recognition", "comparison"],
     )
 
@@ -128,7 +128,7 @@ def _about(result: ComparedResult) -> str:
 def _blocks(
     comparison: Comparison,
     judgements: Sequence[Judgement],
-    windows: Rows,
+    over_drive: Sequence[Chart],
     inspect: Inspect | None,
 ) -> Iterator[Block]:
     yield Heading("What changed")
@@ -153,11 +153,9 @@ def _blocks(
         )
     else:
         yield Figure(differences.levels(finals), "Rates of the final masks.")
-    if charts := rates.over_windows(windows, [TESTED]):
-        first = finals[0].variant
-        alone = all(row.result == row.variant for row in finals)
-        yield Heading("Over the drive" if alone else f"Over the drive: {first}", 2)
-        yield Figure(charts, "ERR of the final masks over the common frames.")
+    if over_drive:
+        yield Heading("Over the drive", 2)
+        yield Figure(over_drive, f"{TESTED} of the final masks over the common frames.")
     yield from _drives(comparison)
     yield from _where(comparison)
     if comparison.moved:

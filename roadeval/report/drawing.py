@@ -285,7 +285,7 @@ class HeatDrawing:
         """Return what Typst draws beside the picture, as JSON has it."""
         return {
             "kind": self.chart.kind,
-            "title": f"{self.chart.title}, {self.chart.unit}",
+            "title": self.chart.title,
             "shades": self.shades,
             "top": f"{self.chart.top:.3g} %",
         }

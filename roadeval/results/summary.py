@@ -18,12 +18,11 @@ SUMMARY: Final = "summary.json"
 PARTS: Final = (
     *("format", "verdict", "drive", "frames", "totals", "beyond", "curves", "difference"),
     *("against_unfiltered", "against_blind", "seeds", "oracles", "windows", "claims", "health"),
-    *("training", "seconds"),
-    *("warnings", "losses", "run", "settings", "methods", "versions", "log", "masks", "tables"),
-    *("files", "digest"),
+    *("examples", "training", "seconds", "warnings", "losses", "run", "settings", "methods"),
+    *("versions", "log", "masks", "tables", "files", "digest"),
 )
 """The parts of the summary, in the file's order."""
-OPTIONAL: Final = frozenset({"curves", "seeds", "methods", "masks", "tables", "files"})
+OPTIONAL: Final = frozenset({"curves", "seeds", "examples", "methods", "masks", "tables", "files"})
 """Parts that not every summary has: a recording has no files, and most runs train with one seed,
 have no network, and all masks in the log."""
 RESULTS: Final = (

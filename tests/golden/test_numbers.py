@@ -399,6 +399,16 @@ def test_the_report_s_milliseconds_are_the_summary_s_seconds(run, told, lines):
             assert f"{variant} {stage} {1000 * seconds:.2f}" in lines[run]
 
 
+def test_figure_2_shows_the_frames_that_the_report_shows(told, lines):
+    figure = next(each for each in told.texts["replay"]["figures"] if "Road masks" in each)
+    drawn = re.findall(r"text 'frame (\d+)'", figure)
+    assert len(drawn) == 4
+    assert [int(each) for each in drawn] == told.summary()["examples"]
+    text = "\n".join(lines["paper"])
+    figures = text[text.index("2 Over the drive") : text.index("The paper's figure 2")]
+    assert re.findall(r"frame (\d+)", figures) == drawn
+
+
 # --- The worst frames -----------------------------------------------------------------------------
 
 

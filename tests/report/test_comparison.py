@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 
 from roadeval.evaluation.comparison import (
     Disagreement,
@@ -16,12 +15,13 @@ from roadeval.evaluation.conditions import Condition, judge
 from roadeval.evaluation.pairing import Side
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.report.blocks import BulletList, Cell, Figure, Heading, Table, Text
+from roadeval.report.chart import Chart, ChartKind, Series, looks
 from roadeval.report.comparison import document, markdown
 from roadeval.report.pdf.typeset import pdf
 from roadeval.results.comparison import judged
 from tests.evaluation import making
-from tests.evaluation.making import a_change, a_difference, a_part, rows_of
-from tests.report.making import NO_WINDOWS, links_within, plain_rows, text
+from tests.evaluation.making import a_change, a_difference, a_part
+from tests.report.making import links_within, plain_rows, text
 
 CHANGE = a_change(a_difference(1.2, 0.5, 2), result="new|er")
 LIMITS = tuple(
@@ -42,15 +42,13 @@ def a_comparison(change=CHANGE, **more):
 
 def blocks(kind, comparison):
     """The blocks of a kind in a comparison's document."""
-    return [b for b in document(comparison, LIMITS, windows()).blocks if isinstance(b, kind)]
+    return [b for b in document(comparison, LIMITS, over_drive()).blocks if isinstance(b, kind)]
 
 
-def windows():
-    rates = {"ERR": 0.1, "FPR": 0.1, "FNR": 0.1}
-    place = {"window": 0, "first_frame": 0, "last_frame": 9, "frames": 10, "stage": "post"}
-    return rows_of(
-        pd.DataFrame([{**place, "variant": name, **rates} for name in ("base", "new|er")])
-    )
+def over_drive():
+    drawn = looks(["base: filtered", "new|er: filtered"])
+    series = [Series(name, look, [4.5], [10.0]) for name, look in drawn.items()]
+    return [Chart("ERR", ChartKind.LINES, series)]
 
 
 def test_markdown_tells_failures_first_and_keeps_names_from_breaking_the_table():
@@ -65,7 +63,7 @@ def test_markdown_tells_failures_first_and_keeps_names_from_breaking_the_table()
 
 
 def test_the_document_has_the_numbers_and_the_frames():
-    words = text(pdf(document(a_comparison(), LIMITS, windows())))
+    words = text(pdf(document(a_comparison(), LIMITS, over_drive())))
     for wanted in ("Limits exceeded", FAILED, "+1.20", "the <gap>", "new|er"):
         assert wanted in words
 
@@ -111,7 +109,7 @@ def test_different_drives_are_laid_side_by_side():
         "IoU": "11.20",
     }
     assert table.text_columns == range(3)
-    words = text(pdf(document(comparison, (), NO_WINDOWS)))
+    words = text(pdf(document(comparison, (), [])))
     assert "Different drives, side by side: no difference is given." in words
     assert "11.20" in words
 
@@ -133,7 +131,7 @@ def test_of_a_frame_of_disagreement_the_sum_of_both_shares_is_bold():
 
 
 def test_its_contents_lead_to_its_parts():
-    made = document(a_comparison(), LIMITS, NO_WINDOWS)
+    made = document(a_comparison(), LIMITS, [])
     assert links_within(pdf(made)) == 2
 
 
@@ -168,7 +166,7 @@ COMPARED, JUDGED = of_drives()
 
 
 def made_of(kind):
-    return [b for b in document(COMPARED, JUDGED, NO_WINDOWS).blocks if isinstance(b, kind)]
+    return [b for b in document(COMPARED, JUDGED, []).blocks if isinstance(b, kind)]
 
 
 def test_over_drives_what_stands_is_marked_and_the_drives_are_counted():
@@ -196,7 +194,7 @@ def test_the_document_has_the_plots_and_what_changed_by_tag():
     headings = [b.text for b in made_of(Heading)]
     assert "Which drives changed" in headings
     assert "Change of ERR of filtered by tag" in headings
-    words = text(pdf(document(COMPARED, JUDGED, NO_WINDOWS)))
+    words = text(pdf(document(COMPARED, JUDGED, [])))
     assert "filtered: over 30 drives new instead of base raises ERR of post" in words
     assert "Holm's correction for the 2 differences of ERR" in words
 

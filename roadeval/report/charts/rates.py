@@ -59,12 +59,14 @@ def _further_rates(windows: Rows) -> list[Chart]:
     return over_windows(windows, known)
 
 
-def over_windows(windows: Rows, rates: Sequence[str]) -> list[Chart]:
+def over_windows(
+    windows: Rows, rates: Sequence[str], drawn: Mapping[str, Look] | None = None
+) -> list[Chart]:
     """Return a chart a rate: each variant's final mask, window by window."""
     if not len(windows):
         return []
     final = scored.finals(windows)
-    return _along(final, (final["first_frame"] + final["last_frame"]) / 2, rates)
+    return _along(final, (final["first_frame"] + final["last_frame"]) / 2, rates, drawn)
 
 
 def over_frames(
@@ -81,7 +83,8 @@ def _along(
     """Return a chart a rate of rows that lie at ``x`` along the drive."""
     order = np.argsort(x, kind="stable")
     rows = final.take(order).replace(x=x[order])
-    drawn = drawn or looks(final.distinct("variant"))
+    names = final.distinct("variant")
+    drawn = drawn or looks(names)
     return [
         Chart(
             f"{rate}: {METRICS[rate].in_words}",
@@ -89,6 +92,7 @@ def _along(
             [
                 thinned(series(name, look, own["x"], 100 * own[rate]))
                 for name, look in drawn.items()
+                if name in names
                 for own in [rows.of_variant(name)]
             ],
             from_zero=not METRICS[rate].higher_is_better,

@@ -63,12 +63,16 @@ def curves(levels: Rows, quoted: Masks, totals: Masks) -> list[Chart]:
     # What is recall below the first chart is so beside the second, too.
     across, up = (_below(tprs), MOST), (_below(precisions), MOST)
     most = math.ceil(max([*filter(math.isfinite, fprs), STEP]) / STEP) * float(STEP)
-    whole = (-1.0, MOST)
-    lines = ChartKind.LINES
+    lines, whole = ChartKind.LINES, (-1.0, MOST)
     return [
         Chart("precision", lines, recall, across="recall", x_range=across, y_range=up),
         Chart("TPR", lines, roc, across="FPR", x_range=(-0.01 * most, most), y_range=across),
-        Chart("road", lines, [*bins, ideal], across="probability", x_range=whole, y_range=whole),
+        Chart(
+            *("share of road", lines, [*bins, ideal]),
+            across="probability",
+            x_range=whole,
+            y_range=whole,
+        ),
     ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from roadeval.data.words import percent, points, timestamp
+from roadeval.data.words import listing, percent, points, timestamp
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.scored import FILTER
 from roadeval.report.blocks import (
@@ -41,12 +41,11 @@ def section(findings: Findings) -> Iterator[Block]:
     if not findings.worst:
         yield Heading("The worst frames")
         yield Text(f"ERR of {first} is undefined on every frame, so no frame is the worst.")
-    rule = Text(
-        f"Highest ERR of {first}; of neighbouring frames only the worst. "
-        "Below the errors stand each variant's steps, from left to right.",
-        "note",
-    )
-    head = [Heading("The worst frames"), rule]
+    rule = f"Highest ERR of {first}; of neighbouring frames only the worst."
+    rows = (row for frame in findings.worst for row in frame.layers if row)
+    if stepped := list(dict.fromkeys(row[0].title.partition(":")[0] for row in rows)):
+        rule += f" Below the errors stand the steps of {listing(stepped)}, from left to right."
+    head = [Heading("The worst frames"), Text(rule, "note")]
     if findings.commands and not findings.viewable:
         head.append(Text(NO_COMMAND, "note"))
     yield from _frames(findings, head, findings.worst)
