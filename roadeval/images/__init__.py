@@ -4,10 +4,23 @@ No other room decodes them, so that camera, truth, masks and the pictures of a r
 checked and refused alike.
 """
 
-from roadeval.images.decoding import palette_indices, size_of, to_labels, to_png, to_rgb
-from roadeval.images.errors import DamagedImageError, ImageError
-from roadeval.images.formats import ImageFormat, format_of
-from roadeval.images.limits import MAX_PIXELS, Limits
+from roadeval.images.decoding import (
+    eight_bits,
+    palette_indices,
+    size_of,
+    to_labels,
+    to_png,
+    to_rgb,
+    without_colours,
+)
+from roadeval.images.formats import (
+    MAX_PIXELS,
+    DamagedImageError,
+    ImageError,
+    ImageFormat,
+    Limits,
+    format_of,
+)
 
 __all__ = [
     "MAX_PIXELS",
@@ -15,10 +28,12 @@ __all__ = [
     "ImageError",
     "ImageFormat",
     "Limits",
+    "eight_bits",
     "format_of",
     "palette_indices",
     "size_of",
     "to_labels",
     "to_png",
     "to_rgb",
+    "without_colours",
 ]

@@ -2,8 +2,7 @@
 
 `simplejpeg` tells of damage that other decoders hide: they fill in what they cannot read. Its
 pixels are those of OpenCV, bit for bit. All other formats are read by Pillow, after the checksums
-of a PNG were verified; a usual PNG by `roadeval.images.png`, as Pillow would. Damage that leaves a
-valid file cannot be known.
+of a PNG were verified. Damage that leaves a valid file cannot be known.
 
 A rotation that EXIF data asks for is not applied: labels and calibrations belong to the sensor's
 own rows and columns.
@@ -23,11 +22,13 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Rgb
-from roadeval.images.errors import DamagedImageError, ImageError
-from roadeval.images.formats import ImageFormat, format_of
-from roadeval.images.limits import Limits
-from roadeval.images.png import Png, decode
-from roadeval.images.samples import eight_bits
+from roadeval.images.formats import (
+    DamagedImageError,
+    ImageError,
+    ImageFormat,
+    Limits,
+    format_of,
+)
 
 Array = npt.NDArray[Any]
 File = bytes | memoryview
@@ -35,10 +36,10 @@ File = bytes | memoryview
 _SAMPLES: Final = ("L", "I;16", "I;16B", "I;16L", "I", "F")
 """Pillow's modes of images with one number a pixel."""
 MOST_SCANS: Final = 100
-"""Most scans of a file; libtiff has the same bound. Encoders write some ten. A scan of a few bytes
+"""Most scans of a JPEG; libtiff has the same bound. Encoders write some ten. A scan of a few bytes
 can cost the decoder a walk through the whole image: 200 kB of them would take over a minute."""
 _SCAN: Final = b"\xff\xda"
-_IMAGE_END: Final = 0xD9
+_END: Final = 0xD9
 _MARKER: Final = re.compile(rb"\xff[\xc0-\xcf\xd9-\xfe]")
 """Markers that end a scan: in its data a byte 255 is followed by 0, or by a restart marker."""
 
@@ -59,9 +60,6 @@ def to_rgb(data: File, limits: Limits) -> Rgb:
     format_ = _known_format(data)
     if format_.plugin is None:
         return _jpeg(data, limits)
-    if found := _usual_png(data, format_, limits):
-        pixels = found.pixels if found.palette is None else found.palette[found.pixels]
-        return pixels if pixels.ndim == 3 else _in_all_channels(pixels)
     image = _loaded(data, format_, limits)
     if image.mode in _SAMPLES:
         return _in_all_channels(_samples(image))
@@ -82,14 +80,13 @@ def to_labels(data: File, limits: Limits) -> Array:
     format_ = _known_format(data)
     if format_.plugin is None:
         return without_colours(_jpeg(data, limits))
-    if found := _usual_png(data, format_, limits):
-        if found.palette is not None:
-            return _indices_or_greys(found.pixels, found.palette)
-        return found.pixels if found.pixels.ndim == 2 else without_colours(found.pixels)
     image = _loaded(data, format_, limits)
     if image.mode == "P":
+        indices = np.array(image)
         palette = np.array(image.getpalette("RGB"), np.uint8).reshape(-1, 3)
-        return _indices_or_greys(np.array(image), palette)
+        used = palette[: int(indices.max()) + 1]
+        greys = (used == used[:, :1]).all() and len(used) > 1
+        return np.ascontiguousarray(used[indices, 0]) if greys else indices
     if image.mode in _SAMPLES:
         samples = _samples(image)
         return samples if samples.dtype == np.uint16 else eight_bits(samples)
@@ -105,9 +102,6 @@ def palette_indices(data: File, limits: Limits) -> npt.NDArray[np.uint8]:
         As `to_rgb`, and if it has no palette.
     """
     format_ = _known_format(data)
-    found = _usual_png(data, format_, limits)
-    if found is not None and found.palette is not None:
-        return found.pixels
     image = None if format_.plugin is None else _loaded(data, format_, limits)
     if image is None or image.mode != "P":
         raise ImageError("an image without a palette")
@@ -141,6 +135,15 @@ def without_colours(image: Rgb) -> Array:
     return np.ascontiguousarray(grey) if same else image
 
 
+def eight_bits(samples: Array) -> npt.NDArray[np.uint8]:
+    """Convert samples to 0..255: the upper half of 16 bits, floats from 0..1."""
+    if samples.dtype.kind == "u" and samples.dtype.itemsize == 2:
+        samples = samples >> 8
+    elif samples.dtype == np.float32:
+        samples = np.rint(np.clip(np.nan_to_num(samples), 0, 1) * 255)
+    return np.asarray(samples, np.uint8)
+
+
 def _known_format(data: File) -> ImageFormat:
     format_ = format_of(data)
     if format_ is None:
@@ -162,30 +165,14 @@ def _jpeg(data: File, limits: Limits) -> Rgb:
     import simplejpeg
 
     limits.check(*_jpeg_size(data))
-    _check_scans(data)
+    # What lies in a segment or behind the image can look like a scan, so those are counted first.
+    if bytes(data).count(_SCAN) > MOST_SCANS and _scans(bytes(data)) > MOST_SCANS:
+        raise ImageError(f"a JPEG of more than {MOST_SCANS} scans, which takes too long to decode")
     try:
         pixels: Rgb = simplejpeg.decode_jpeg(data, "RGB", strict=not limits.keep_damaged)
     except ValueError as error:
         raise DamagedImageError(f"a damaged JPEG ({error})") from error
     return pixels
-
-
-def _check_scans(data: bytes | memoryview) -> None:
-    """Refuse a JPEG of too many scans, before it is decoded; an `ImageError`."""
-    data = bytes(data)
-    # What lies in a segment or behind the image can look like a scan: only a hundred of them tell.
-    if data.count(_SCAN) > MOST_SCANS and _scans(data) > MOST_SCANS:
-        raise ImageError(f"a JPEG of more than {MOST_SCANS} scans, which takes too long to decode")
-
-
-def _scans(data: bytes) -> int:
-    """Count the scans from the first marker to the image's end."""
-    at, count = 2, 0
-    while (found := _MARKER.search(data, at)) is not None and data[found.end() - 1] != _IMAGE_END:
-        at = found.end()
-        count += found.group() == _SCAN
-        at += int.from_bytes(data[at : at + 2], "big")
-    return count
 
 
 def _jpeg_size(data: File) -> tuple[int, int]:
@@ -198,8 +185,14 @@ def _jpeg_size(data: File) -> tuple[int, int]:
     return width, height
 
 
-def _usual_png(data: File, format_: ImageFormat, limits: Limits) -> Png | None:
-    return decode(data, limits) if format_.name == "PNG" else None
+def _scans(data: bytes) -> int:
+    """Count the scans of a JPEG from the first marker to the image's end."""
+    at, count = 2, 0
+    while (found := _MARKER.search(data, at)) is not None and data[found.end() - 1] != _END:
+        at = found.end()
+        count += found.group() == _SCAN
+        at += int.from_bytes(data[at : at + 2], "big")
+    return count
 
 
 def _loaded(data: File, format_: ImageFormat, limits: Limits) -> Any:
@@ -261,9 +254,3 @@ def _samples(image: Any) -> Array:
 
 def _in_all_channels(samples: Array) -> Rgb:
     return np.repeat(eight_bits(samples)[..., None], 3, axis=2)
-
-
-def _indices_or_greys(indices: Array, palette: npt.NDArray[np.uint8]) -> Array:
-    used = palette[: int(indices.max()) + 1]
-    greys = (used == used[:, :1]).all() and len(used) > 1
-    return np.ascontiguousarray(used[indices, 0] if greys else indices)

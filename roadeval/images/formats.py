@@ -1,33 +1,58 @@
-"""Formats of image files, told by the files' first bytes."""
+"""Formats of image files, told by the files' first bytes, and what is refused."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final, NamedTuple
+
+MAX_PIXELS: Final = 1 << 25
+"""Most pixels of an image by default: 33.6 million, a little more than 7680x4320."""
+
+
+class ImageError(ValueError):
+    """An image that cannot be read, or is not read because it is too large.
+
+    Its message completes "frame 7: ...".
+    """
+
+
+class DamagedImageError(ImageError):
+    """An image file that is damaged; `Limits.keep_damaged` reads what is left of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How large an image may be, and whether it may be damaged."""
+
+    max_pixels: int = MAX_PIXELS
+    """Most pixels. An image's own head says how many it has, so none is decoded that has more."""
+    keep_damaged: bool = False
+    """Whether to decode a damaged file as far as it goes."""
+
+    def check(self, width: int, height: int) -> None:
+        """Refuse a size; an `ImageError` if it is empty or too large."""
+        if width <= 0 or height <= 0:
+            raise ImageError(f"an image of {width}x{height}")
+        if width * height > self.max_pixels:
+            raise ImageError(
+                f"an image of {width}x{height}, more than the {self.max_pixels} pixels that "
+                "`frames.max_pixels` allows"
+            )
 
 
 class ImageFormat(NamedTuple):
-    """A format that is read.
-
-    Parameters
-    ----------
-    name
-        As a person calls it.
-    skipped, magic
-        How many bytes to skip at the file's begin, and those that follow.
-    plugin
-        Name of Pillow's module and class for it; None for JPEG, which another library reads.
-    media_type
-        What viewers call it; None for formats that not all of them know.
-    exact
-        Whether it keeps every pixel's value. Of formats that can do both, the answer is no.
-    """
+    """A format that is read."""
 
     name: str
     skipped: int
+    """Bytes before the magic ones."""
     magic: bytes
     plugin: str | None
+    """Name of Pillow's module and class for it; None for JPEG, which another library reads."""
     media_type: str | None = None
+    """What viewers call it; None for formats that not all of them know."""
     exact: bool = True
+    """Whether it keeps every pixel's value. Of formats that can do both, the answer is no."""
 
 
 FORMATS: Final = (

@@ -25,7 +25,7 @@ from roadeval.data import (
 )
 from roadeval.data.packed import Packed
 from roadeval.errors import RoadevalError
-from roadeval.images.samples import eight_bits
+from roadeval.images import eight_bits
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import View
 from roadeval.training import Model

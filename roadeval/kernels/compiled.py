@@ -57,7 +57,6 @@ __all__ = [
     "run_sums",
     "transfer",
     "tree_sum",
-    "unfilter_rows",
 ]
 
 if lacking := [name for name in __all__ if not hasattr(_loops, name)]:
@@ -325,12 +324,3 @@ def mask_rows(mask: Bits, width: int) -> Plane:
     lines = np.empty((len(mask), 1 + -(-width // 8)), np.uint8)
     _loops.mask_rows(mask, len(mask), width, lines)
     return lines
-
-
-def unfilter_rows(lines: Plane, step: int) -> Plane:
-    """See `plain.unfilter_rows`."""
-    height, width = lines.shape
-    rows = np.empty((height + 1, width - 1), np.uint8)
-    rows[0] = 0
-    _loops.unfilter_rows(lines, height, width - 1, step, rows)
-    return rows[1:]

@@ -1,4 +1,10 @@
-"""A decision for every colour there is: 2^24 bits, in which a pixel's is looked up."""
+"""A decision for every colour there is: 2^24 bits, in which a pixel's is looked up.
+
+What depends on a pixel's three colours alone is a function on a cube of 256 levels a channel. Where
+it is a sum of products of one factor a channel, as of an RBF kernel, all colours of one red level
+are a product of matrices. Along a channel a factor changes slowly: polynomials through a few
+Chebyshev nodes interpolate it at every level, and their error is measured.
+"""
 
 from __future__ import annotations
 
@@ -7,21 +13,85 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial.chebyshev import chebpts1, chebvander
 
 from roadeval.data import Mask
-from roadeval.data.arrays import Planes, Words
+from roadeval.data.arrays import Floats, Planes, Words
 from roadeval.data.packed import ones
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.colour_cube import Slabs
 
 Colours = npt.NDArray[np.uint8]
 Decide = Callable[[Colours], npt.NDArray[np.bool_]]
+Margins = tuple[Callable[[int], Floats], float]
+"""From a red level 0..255 to ``(256, 256)`` float64 margins by green and blue level; no margin is
+further than the number from the true one."""
 
+LEVELS: Final = np.arange(256.0)
+EPS: Final = float(np.finfo(np.float64).eps)
+ENOUGH: Final = 1e-6
+"""Margins as near as this leave some twenty of all colours undecided."""
 UNDECIDED: Final = 2
 """The kernel's value for a colour that is not decided yet."""
 FEW: Final = 1 << 16
 """Up to so many undecided colours are decided at once, when the table is made."""
+_NODES: Final = (16, 24, 32, 48, 64, 96, 128, 256)
 _NONE: Final = np.zeros(0, np.uint64)
+
+
+def sums_of_terms(terms: Floats, offset: float) -> Margins:
+    """Return margins ``terms[0, R] + terms[1, G] + terms[2, B] + offset``, terms ``(3, 256)``."""
+    plane = terms[1][:, None] + terms[2][None, :] + offset
+    largest = float(np.abs(terms).max(axis=1).sum()) + abs(offset)
+    return lambda red: plane + terms[0, red], 4 * EPS * largest
+
+
+def sums_of_products(
+    weights: Floats, factor: Callable[[int, Floats], Floats], offset: float, *, rounding: float
+) -> Margins:
+    """Return the margins ``sum_i weights[i] f_i(0, R) f_i(1, G) f_i(2, B) + offset``.
+
+    Parameters
+    ----------
+    weights
+        ``(m,)``.
+    factor
+        ``factor(channel, levels)``: the ``(n, m)`` factors f_i of that channel, each in 0..1,
+        at ``(n,)`` levels in 0..255, whole or not.
+    offset
+        Added to every sum.
+    rounding
+        How far a factor may be off as it is computed.
+    """
+    total = float(np.abs(weights).sum())
+    exact = factor(1, LEVELS), factor(2, LEVELS)
+    for count in _NODES:  # the fewest whose error, twice, is small enough
+        nodes, matrix = _chebyshev(count) if count < 256 else (LEVELS, np.eye(256))
+        green, blue = factor(1, nodes), factor(2, nodes)
+        swell = float(np.abs(matrix).sum(axis=1).max())  # the most by which an error can grow
+        seen = max(np.abs(exact[0] - matrix @ green).max(), np.abs(exact[1] - matrix @ blue).max())
+        gap = float(seen) + swell * (count * EPS + 2 * rounding)
+        if 2 * gap <= ENOUGH / total:
+            break
+    red = factor(0, LEVELS) * weights
+    back = np.ascontiguousarray(matrix.T)
+
+    def margins(level: int) -> Floats:
+        values: Floats = matrix @ ((green * red[level]) @ blue.T) @ back
+        values += offset
+        return values
+
+    # What the factors are off, and one rounding for each addition of the three matrix products.
+    factors = (1 + rounding) * (1 + gap) ** 2 - 1
+    additions = swell**2 * (len(weights) + 2 * count + 4) * EPS
+    return margins, total * (factors + additions) + abs(offset) * EPS
+
+
+def _chebyshev(count: int) -> tuple[Floats, Floats]:
+    """Return ``(count,)`` Chebyshev nodes in 0..255; ``(256, count)`` from there to each level."""
+    nodes = chebpts1(count)
+    at_nodes, at_levels = (chebvander(x, count - 1) for x in (nodes, LEVELS / 127.5 - 1.0))
+    matrix = np.linalg.solve(at_nodes.T, at_levels.T).T
+    return (nodes + 1.0) * 127.5, matrix.astype(np.float64)
 
 
 class ColourTable:
@@ -37,7 +107,7 @@ class ColourTable:
         everywhere they are all colours, and only those that are looked up are decided.
     """
 
-    def __init__(self, margins: Slabs, decide: Decide) -> None:
+    def __init__(self, margins: Margins, decide: Decide) -> None:
         self._decide = decide
         self._words = road, left = _table(margins)
         if not left.any():
@@ -72,7 +142,7 @@ class ColourTable:
         return road, left
 
 
-def _table(margins: Slabs) -> tuple[Words, Words]:
+def _table(margins: Margins) -> tuple[Words, Words]:
     """Return the words of the colours that are road for certain, and of those undecided.
 
     A word holds a cube of 4x4x4 colours, so a block of four red levels fills 64 x 64 words::
@@ -90,9 +160,11 @@ def _table(margins: Slabs) -> tuple[Words, Words]:
     words = np.empty((2, 64, 64 * 64), np.uint64)
     block = np.empty((2, 64, 64, 4, 4), np.uint32)
     road, left = block
-    for red, margin in enumerate(margins):
-        above = margin > margins.error
-        for kind, slab in ((road, above), (left, above ^ (margin >= -margins.error))):
+    of_red, error = margins
+    for red in range(256):
+        margin = of_red(red)
+        above = margin > error
+        for kind, slab in ((road, above), (left, above ^ (margin >= -error))):
             kind[:, :, red & 3] = slab.view(np.uint32).reshape(64, 4, 64).transpose(0, 2, 1)
         if red & 3 == 3:
             colours = block.view(np.bool_).reshape(2, -1)

@@ -81,21 +81,11 @@ def test_twins_agree_on_random_images(image, width):
     assert_twins(image, width)
 
 
-@given(st.integers(1, 9), st.integers(0, 40), st.integers(1, 4), st.integers(0, 2**32))
-@settings(max_examples=100)
-def test_twins_take_back_the_same_filters(height, size, step, seed):
-    lines = np.random.default_rng(seed).integers(0, 256, (height, 1 + size), np.uint8)
-    lines[:, 0] %= 5
-    assert_same(fast.unfilter_rows(lines, step), plain.unfilter_rows(lines, step))
-
-
 @given(st.integers(1, 9), st.integers(0, 40), st.integers(1, 4), st.integers(1, 256))
 @settings(max_examples=100)
-def test_twins_filter_rows_alike_and_it_can_be_taken_back(height, size, step, levels):
+def test_twins_filter_rows_alike(height, size, step, levels):
     rows = RNG.integers(0, levels, (height, size), np.uint8)
-    lines = fast.filter_rows(rows, step)
-    assert_same(lines, plain.filter_rows(rows, step))
-    np.testing.assert_array_equal(plain.unfilter_rows(lines, step), rows)
+    assert_same(fast.filter_rows(rows, step), plain.filter_rows(rows, step))
 
 
 @given(st.integers(1, 5), st.integers(1, 140), st.sampled_from(plain.LABEL_BITS))

@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 
 from roadeval.pipeline import colour_table
-from roadeval.pipeline.colour_cube import Slabs
-from roadeval.pipeline.colour_table import FEW, ColourTable
+from roadeval.pipeline.colour_table import (
+    FEW,
+    LEVELS,
+    ColourTable,
+    sums_of_products,
+    sums_of_terms,
+)
 from tests.pipeline.images import noise
 
 GREEN, BLUE = np.indices((256, 256))
@@ -36,7 +41,7 @@ def every_colour(red):
 def test_every_colour_is_decided_as_by_the_definition(few, monkeypatch):
     monkeypatch.setattr(colour_table, "FEW", few)
     asked = []
-    table = ColourTable(Slabs(margin, 20.0), lambda c: asked.append(len(c)) or decide(c))
+    table = ColourTable((margin, 20.0), lambda c: asked.append(len(c)) or decide(c))
     assert sum(asked) > 0 or few == 0
     for red in (0, 29, 30, 31, 90, 147, 150, 255):
         colours = every_colour(red)
@@ -49,14 +54,14 @@ def test_what_is_certain_is_not_asked_for():
         raise AssertionError
 
     colours = noise(1, 4000)[0]
-    found = ColourTable(Slabs(margin, 0.0), fail).look_up(planes(colours))
+    found = ColourTable((margin, 0.0), fail).look_up(planes(colours))
     np.testing.assert_array_equal(found[0], decide(colours))
     assert 0 < found.mean() < 1
 
 
 def test_a_colour_is_asked_for_once():
     asked = []
-    nothing = Slabs(lambda red: np.zeros((256, 256)), 1.0)
+    nothing = (lambda red: np.zeros((256, 256)), 1.0)
     table = ColourTable(nothing, lambda c: asked.append(len(c)) or decide(c))
     image = noise(30, 40)
     apart = tuple(np.ascontiguousarray(image[..., c]) for c in range(3))
@@ -67,7 +72,7 @@ def test_a_colour_is_asked_for_once():
 
 
 def test_a_thread_that_comes_between_spoils_nothing(monkeypatch):
-    table = ColourTable(Slabs(lambda red: np.zeros((256, 256)), 1.0), decide)
+    table = ColourTable((lambda red: np.zeros((256, 256)), 1.0), decide)
     first, both = noise(1, 100)[0], noise(1, 200)[0]
     assert (both[:100] == first).all()
     began, places = table._words, colour_table._places
@@ -80,3 +85,35 @@ def test_a_thread_that_comes_between_spoils_nothing(monkeypatch):
     table.look_up(planes(first))
     monkeypatch.setattr(colour_table, "_places", while_another_ends)
     np.testing.assert_array_equal(table.look_up(planes(both))[0], decide(both))
+
+
+RNG = np.random.default_rng(0)
+CENTRES = RNG.uniform(0, 255, (7, 3))
+WEIGHTS = RNG.normal(0, 3, 7)
+
+
+def bells(width):
+    """Gaussian factors of a width in grey levels."""
+
+    def factor(channel, levels):
+        return np.exp(-(((levels[:, None] - CENTRES[:, channel]) / width) ** 2))
+
+    return factor
+
+
+@pytest.mark.parametrize("width", [3000.0, 80.0, 20.0, 5.0, 0.3])
+def test_sums_of_products_stay_within_their_bound(width):
+    margins, error = sums_of_products(WEIGHTS, bells(width), 0.25, rounding=1e-15)
+    assert error < 1e-5
+    r, g, b = (bells(width)(channel, LEVELS) for channel in range(3))
+    for red in (0, 17, 255):
+        exact = np.einsum("i,i,gi,bi->gb", WEIGHTS, r[red], g, b) + 0.25
+        assert np.abs(margins(red) - exact).max() <= error
+
+
+def test_sums_of_terms_are_sums():
+    terms = RNG.normal(0, 100, (3, 256))
+    margins, error = sums_of_terms(terms, -3.0)
+    for red in range(256):
+        exact = terms[0, red] + terms[1][:, None] + terms[2][None, :] - 3.0
+        assert np.abs(margins(red) - exact).max() <= error < 1e-10

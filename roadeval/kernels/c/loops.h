@@ -91,8 +91,6 @@ void filter_rows(
 void label_rows(
     const uint8_t *labels, int64_t height, int64_t width, int bits, uint8_t *lines);
 void mask_rows(const uint64_t *mask, int64_t height, int64_t width, uint8_t *lines);
-void unfilter_rows(
-    const uint8_t *lines, int64_t height, int64_t size, int64_t step, uint8_t *rows);
 
 PART int64_t least(int64_t a, int64_t b) { return a < b ? a : b; }
 PART int64_t most(int64_t a, int64_t b) { return a > b ? a : b; }

@@ -186,8 +186,6 @@ FUNCTION(label_rows, "B2 n n n >B2",
 
 FUNCTION(mask_rows, "Q2 n n >B2", mask_rows(ARRAY(0), SIZE(1), SIZE(2), ARRAY(3)))
 
-FUNCTION(unfilter_rows, "B2 n n n >B2", unfilter_rows(ARRAY(0), SIZE(1), SIZE(2), SIZE(3), ARRAY(4)))
-
 #define METHOD(name) {#name, (PyCFunction)(void (*)(void))call_##name, METH_FASTCALL, NULL}
 
 static PyMethodDef methods[] = {
@@ -195,7 +193,7 @@ static PyMethodDef methods[] = {
     METHOD(ring_sums), METHOD(transfer), METHOD(paint), METHOD(label_runs), METHOD(components),
     METHOD(keep_region), METHOD(fill_holes), METHOD(count_bits), METHOD(dilate), METHOD(erode),
     METHOD(outcomes), METHOD(add_outcomes), METHOD(geodesics), METHOD(tree_sum),
-    METHOD(filter_rows), METHOD(label_rows), METHOD(mask_rows), METHOD(unfilter_rows),
+    METHOD(filter_rows), METHOD(label_rows), METHOD(mask_rows),
     {NULL, NULL, 0, NULL},
 };
 

@@ -13,7 +13,6 @@ from roadeval.kernels.plain.rows import (
     filter_rows,
     label_rows,
     mask_rows,
-    unfilter_rows,
 )
 from roadeval.kernels.plain.runs import components, fill_holes, keep_region, label_runs, paint
 from roadeval.kernels.plain.trees import LEAVES, tree_sum
@@ -45,5 +44,4 @@ __all__ = [
     "run_sums",
     "transfer",
     "tree_sum",
-    "unfilter_rows",
 ]

@@ -73,32 +73,3 @@ def mask_rows(mask: Bits, width: int) -> Plane:
 
 def _unfiltered(single: Plane) -> Plane:
     return np.insert(np.packbits(single, axis=1), 0, np.uint8(0), axis=1)
-
-
-def unfilter_rows(lines: Plane, step: int) -> Plane:
-    """Add to each byte of a PNG file's rows what the filter of its row has taken from it.
-
-    Parameters
-    ----------
-    lines
-        ``(H, 1 + B)`` uint8: each row's filter, 0 to 4, and its bytes.
-    step
-        Bytes from a pixel to the next.
-
-    Returns
-    -------
-    numpy.ndarray
-        ``(H, B)`` uint8. The sums are taken modulo 256; beyond the image all is 0.
-    """
-    height, size = lines.shape
-    # With what is above the image, and to the left of it.
-    rows = np.zeros((height + 1, size - 1 + step), np.uint8)
-    for above, row, (kind, *line) in zip(rows, rows[1:], lines.tolist(), strict=False):
-        seen, found = above.tolist(), [0] * step
-        for place, byte in enumerate(line):
-            left, over, corner = found[place], seen[place + step], seen[place]
-            nearest = min((left, over, corner), key=lambda value: abs(left + over - corner - value))
-            taken = (0, left, over, (left + over) // 2, nearest)[kind]
-            found.append((byte + taken) % 256)
-        row[:] = found
-    return rows[1:, step:]

@@ -12,9 +12,13 @@ import numpy.typing as npt
 
 from roadeval import images
 from roadeval.data import Rgb
-from roadeval.images import DamagedImageError, ImageError, Limits
-from roadeval.images.decoding import without_colours
-from roadeval.images.samples import eight_bits
+from roadeval.images import (
+    DamagedImageError,
+    ImageError,
+    Limits,
+    eight_bits,
+    without_colours,
+)
 from roadeval.logs.container.readers import Buffer
 from roadeval.logs.errors import BadMessage, DamagedMessage
 from roadeval.logs.messages.pictures import (

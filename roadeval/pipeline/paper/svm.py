@@ -15,8 +15,14 @@ from pydantic.dataclasses import dataclass as validated
 from roadeval.data import Layer, LayerSpec, mask_spec
 from roadeval.data.arrays import Floats
 from roadeval.data.packed import Packed
-from roadeval.pipeline import colour_cube as cube
-from roadeval.pipeline.colour_table import ColourTable
+from roadeval.pipeline.colour_table import (
+    EPS,
+    LEVELS,
+    ColourTable,
+    Margins,
+    sums_of_products,
+    sums_of_terms,
+)
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask
 from roadeval.runtime.extensions import extension, whole
@@ -179,7 +185,7 @@ def colour_table(machine: SupportVectors, settings: SvmSettings) -> ColourTable:
         )
 
 
-def _margins(machine: SupportVectors, settings: SvmSettings) -> cube.Slabs:
+def _margins(machine: SupportVectors, settings: SvmSettings) -> Margins:
     """Return the decision values on the colour cube, less the threshold."""
     offset = machine.offset - settings.threshold
 
@@ -192,15 +198,15 @@ def _margins(machine: SupportVectors, settings: SvmSettings) -> cube.Slabs:
         result: Floats = np.exp(-settings.gamma * away**2)
         return result
 
-    every = np.stack([features(channel, cube.LEVELS) for channel in range(3)])
+    every = np.stack([features(channel, LEVELS) for channel in range(3)])
     if settings.kernel == "linear":
         plane = machine.weights @ machine.vectors
-        return cube.sums_of_terms(plane[:, None] * every, offset)
+        return sums_of_terms(plane[:, None] * every, offset)
     # A feature is off by a few roundings of the largest, and exp(-gamma x^2) is nowhere steeper
     # than sqrt(gamma).
     reach = float(max(np.abs(every).max(), np.abs(machine.vectors).max()))
-    rounding = 8 * cube.EPS * (1 + settings.gamma**0.5 * reach)
-    return cube.sums_of_products(machine.weights, factor, offset, rounding=rounding)
+    rounding = 8 * EPS * (1 + settings.gamma**0.5 * reach)
+    return sums_of_products(machine.weights, factor, offset, rounding=rounding)
 
 
 def bind(settings: SvmSettings, machine: SupportVectors) -> Callable[[View], Output]:
