@@ -16,7 +16,7 @@ import rerun as rr
 from roadeval.config import RunConfig
 from roadeval.data import FILTERED, UNFILTERED, Frame, VariantResult
 from roadeval.pipeline.chain import Pipeline
-from roadeval.pipeline.training_set import TrainingSet
+from roadeval.pipeline.stage import TrainingSet
 from roadeval.training.sampling import sample
 from tests.pipeline import reference
 

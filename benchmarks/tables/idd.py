@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from roadeval.config import RunConfig, configure
 from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame
 from roadeval.evaluation.score import BlindPrior
-from roadeval.pipeline.beyond.ground_features import GROUPS
+from roadeval.pipeline.beyond.features import GROUPS
 from roadeval.pipeline.chain import Chain
 from roadeval.pipeline.stage import View
 from roadeval.training import fit

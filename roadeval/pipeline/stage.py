@@ -28,13 +28,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
+import cv2
 import numpy as np
+import numpy.typing as npt
 
 from roadeval.data import ROAD, LayerSpec, Moment, Output, Packed, Rgb, Truth
 from roadeval.data.arrays import Planes
 from roadeval.errors import RoadevalError
-from roadeval.pipeline.channels import split
-from roadeval.pipeline.training_set import TrainingSet
 
 __all__ = ["MisfitError", "Output", "Stage", "StageError", "TrainingSet", "View", "perfect_mask"]
 
@@ -54,27 +54,18 @@ class StageError(RoadevalError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """What a stage sees of a frame: views of one image share its arrays.
-
-    Parameters
-    ----------
-    original
-        ``(H, W, 3)`` uint8 RGB: the image as logged.
-    image
-        The same after the filters that ran before this stage, C-contiguous.
-    planes
-        Red, green and blue of ``image``, ``(H, W)`` uint8 each.
-    mask
-        The previous stage's road mask, if there was one.
-    moment
-        When the image was taken; None for one that belongs to no drive.
-    """
+    """What a stage sees of a frame: views of one image share its arrays."""
 
     original: Rgb
+    """``(H, W, 3)`` uint8 RGB: the image as logged."""
     image: Rgb
+    """The same after the filters that ran before this stage, C-contiguous."""
     planes: Planes = field(repr=False)
+    """Red, green and blue of ``image``, ``(H, W)`` uint8 each."""
     mask: Packed | None = None
+    """The previous stage's road mask, if there was one."""
     moment: Moment | None = None
+    """When the image was taken; None for one that belongs to no drive."""
 
     @classmethod
     def of(cls, image: Rgb, moment: Moment | None = None) -> View:
@@ -92,78 +83,56 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class Stage(Generic[S, P]):
-    """One step of a pipeline.
-
-    Parameters
-    ----------
-    name
-        In a chain and in a configuration.
-    title
-        A few words for a person, as ``Phase 1: colour similarity``.
-    settings
-        The type of its settings; every field has a default.
-    bind
-        ``bind(settings, parameters)`` returns the pure function from `View` to `Output`. What
-        depends on settings and parameters alone (tables, structuring elements) is computed here,
-        once. A `MisfitError` if the parameters do not fit the settings.
-    layers
-        ``layers(settings)`` returns the layers that it will hand out, in order.
-    fit
-        ``fit(training_set, settings)`` learns the parameters; None if there is nothing to learn.
-    adapt
-        ``adapt(parameters, training_set, settings)`` learns further from a drive's own frames, on
-        top of what other drives have taught; None if that stays as it is.
-    parameters
-        The type of the parameters, for reading model files; None if there are none.
-    is_filter
-        Whether it only changes the image, and is left out of the ``unfiltered`` variant, which
-        shows what it contributes.
-    preprocesses
-        Whether it only changes the image, in every variant.
-    oracle
-        ``oracle(settings, parameters)`` returns the stage as it would be if it were perfect: a
-        pure function of `View` and the truth, of shadow for a filter, else of the road. None
-        where a perfect one would be of no interest.
-    inference_only
-        Settings that what is learnt does not depend on: a model may be used with other values
-        than it was trained with.
-    mask
-        The layer of its mask, and its name in tables and timing, where that is not ``name``:
-        stages that do the same in different ways are tabled under one name.
-    sees_mask_alone
-        Whether it looks at nothing but the mask before it. After a perfect mask its result is then
-        the same in every variant that has its settings.
-    resolve
-        ``resolve(settings)`` returns the settings with all stated that they leave to a file, its
-        digest included; a `RoadevalError` if the file cannot be used. None where they name none.
-    places
-        Settings that say where a file lies, and decide nothing once its digest is stated.
-    about
-        ``about(settings)`` returns what results tell of the stage beside its settings, as plain
-        data by name.
-    code
-        SHA-256 of the file that defines a stage of somebody else's; empty for roadeval's own, whose
-        version tells.
-    """
+    """One step of a pipeline."""
 
     name: str
+    """In a chain and in a configuration."""
     title: str
+    """A few words for a person, as ``Phase 1: colour similarity``."""
     settings: type[S]
+    """The type of its settings; every field has a default."""
     bind: Callable[[S, Any], Callable[[View], Output]]
+    """``bind(settings, parameters)`` returns the pure function from `View` to `Output`. What
+    depends on settings and parameters alone (tables, structuring elements) is computed here,
+    once. A `MisfitError` if the parameters do not fit the settings."""
     layers: Callable[[S], tuple[LayerSpec, ...]]
+    """``layers(settings)`` returns the layers that it will hand out, in order."""
     fit: Callable[[TrainingSet, S], P] | None = None
+    """``fit(training_set, settings)`` learns the parameters; None if there is nothing to learn."""
     adapt: Callable[[P, TrainingSet, S], P] | None = None
+    """``adapt(parameters, training_set, settings)`` learns further from a drive's own frames, on
+    top of what other drives have taught; None if that stays as it is."""
     parameters: type[P] | None = None
+    """The type of the parameters, for reading model files; None if there are none."""
     is_filter: bool = False
+    """Whether it only changes the image, and is left out of the ``unfiltered`` variant, which shows
+    what it contributes."""
     preprocesses: bool = False
+    """Whether it only changes the image, in every variant."""
     oracle: Callable[[S, Any], Callable[[View, Truth], Output]] | None = None
+    """``oracle(settings, parameters)`` returns the stage as it would be if it were perfect: a pure
+    function of `View` and the truth, of shadow for a filter, else of the road. None where a
+    perfect one would be of no interest."""
     inference_only: tuple[str, ...] = ()
+    """Settings that what is learnt does not depend on: a model may be used with other values than
+    it was trained with."""
     mask: str = ""
+    """The layer of its mask, and its name in tables and timing, where that is not ``name``: stages
+    that do the same in different ways are tabled under one name."""
     sees_mask_alone: bool = False
+    """Whether it looks at nothing but the mask before it. After a perfect mask its result is then
+    the same in every variant that has its settings."""
     resolve: Callable[[S], S] | None = None
+    """``resolve(settings)`` returns the settings with all stated that they leave to a file, its
+    digest included; a `RoadevalError` if the file cannot be used. None where they name none."""
     places: tuple[str, ...] = ()
+    """Settings that say where a file lies, and decide nothing once its digest is stated."""
     about: Callable[[S], Mapping[str, Any]] | None = None
+    """``about(settings)`` returns what results tell of the stage beside its settings, as plain data
+    by name."""
     code: str = ""
+    """SHA-256 of the file that defines a stage of somebody else's; empty for roadeval's own, whose
+    version tells."""
 
     @property
     def yields_mask(self) -> bool:
@@ -183,3 +152,38 @@ def perfect_mask(_settings: Any, _parameters: Any) -> Callable[[View, Truth], Ou
         return Output(mask=Packed.of(truth == ROAD))
 
     return run
+
+
+def split(image: Rgb) -> Planes:
+    """Return red, green and blue of an ``(H, W, 3)`` uint8 image, ``(H, W)`` uint8 each."""
+    red, green, blue = channels = [np.empty(image.shape[:2], np.uint8) for _ in range(3)]
+    # OpenCV takes three times as long where it allocates the arrays itself.
+    cv2.split(image, channels)
+    return red, green, blue
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrainingSet:
+    """Labelled pixels of some frames, as one variant's filters left them."""
+
+    images: tuple[Rgb, ...]
+    """The training frames, each ``(H, W, 3)`` uint8 RGB."""
+    frame: npt.NDArray[np.intp]
+    row: npt.NDArray[np.intp]
+    column: npt.NDArray[np.intp]
+    """``(n,)`` integers: where each sampled pixel lies."""
+    road: npt.NDArray[np.bool_]
+    """``(n,)`` bool: its label."""
+    seed: int = 0
+    """For whatever a fit draws at random."""
+    share: float | None = None
+    """Of road among the labelled pixels of the frames, from which as many pixels of road as of the
+    rest are sampled; None where the labels are a guess, whose share is not to be trusted."""
+
+    def colours(self) -> npt.NDArray[np.uint8]:
+        """Return the colours of the sampled pixels, ``(n, 3)`` uint8 RGB."""
+        colours = np.empty((len(self.road), 3), np.uint8)
+        for index, image in enumerate(self.images):
+            here = self.frame == index
+            colours[here] = image[self.row[here], self.column[here]]
+        return colours

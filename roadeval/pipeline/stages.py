@@ -6,22 +6,25 @@ Code of somebody else runs only where its name stands in a ``chain``: as an entr
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import inspect
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
-from roadeval.data import is_plain
+import numpy as np
+
+from roadeval.data import Layer, LayerKind, LayerSpec, is_plain, mask_spec
+from roadeval.data.packed import Packed
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import beyond, paper
-from roadeval.pipeline.function import stage_of_function
-from roadeval.pipeline.guard import guarded
-from roadeval.pipeline.stage import Stage
+from roadeval.pipeline.stage import Output, Stage, StageError, TrainingSet, View
 from roadeval.runtime.discovery import by_name, found_in
 from roadeval.runtime.text import visible
 
@@ -32,6 +35,15 @@ STAGES: Final[Mapping[str, Stage[Any, Any]]] = by_name(
     (*found_in(beyond, "STAGE"), *found_in(paper, "STAGE"))
 )
 """The stages of this package, found by their folder."""
+
+
+TAKEN: Final = ("image", "moment", "settings")
+"""The names of the arguments that a function may have."""
+FULL: Final = 65535
+"""The code of a probability of 1."""
+
+S = TypeVar("S")
+P = TypeVar("P")
 
 
 class UnknownStageError(RoadevalError, LookupError):
@@ -119,3 +131,150 @@ def _check(stage: Stage[Any, Any]) -> None:
     for spec in stage.layers(stage.settings()):
         if not is_plain(spec.name):
             raise ValueError(f"the name of its layer {spec.name!r} must be of letters and digits")
+
+
+# --- A plain function as a stage ------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class NoSettings:
+    """Settings of a function that has none."""
+
+
+def stage_of_function(name: str, function: Callable[..., Any]) -> Stage[Any, None]:
+    """Return the stage of a function from an image to a road mask.
+
+    Parameters
+    ----------
+    name
+        Of the stage.
+    function
+        Its arguments are given by their names: ``image``, ``(H, W, 3)`` uint8 RGB; ``moment``, a
+        `roadeval.data.Moment`, or None for an image by itself; and ``settings``, whose default is
+        an instance of a dataclass. It returns ``(H, W)`` bool or whole numbers, nonzero where road
+        is; or floats from 0 to 1, how probable road is, whose mask is what is above one half; or
+        an `Output` without layers other than its mask.
+
+    Raises
+    ------
+    TypeError
+        If it has other arguments.
+    """
+    arguments = inspect.signature(function).parameters
+    for argument, about in arguments.items():
+        if argument not in TAKEN and about.default is about.empty:
+            raise TypeError(f"its argument {argument} is none of {', '.join(TAKEN)}")
+    if "image" not in arguments:
+        raise TypeError("it has no argument image")
+    settings: type[Any] = NoSettings
+    if "settings" in arguments:
+        default = arguments["settings"].default
+        if isinstance(default, type) or not dataclasses.is_dataclass(default):
+            raise TypeError("the default of its argument settings is no instance of a dataclass")
+        settings = type(default)
+    spec = mask_spec(name, _title(name, function))
+
+    def bind(values: Any, _parameters: None) -> Callable[[View], Output]:
+        given = {"settings": values} if "settings" in arguments else {}
+
+        def run(view: View) -> Output:
+            seen = {"moment": view.moment} if "moment" in arguments else {}
+            return _output(function(image=view.image, **seen, **given), spec)
+
+        return run
+
+    return Stage(name, spec.title, settings, bind, lambda _settings: (spec,))
+
+
+def _title(name: str, function: Callable[..., Any]) -> str:
+    """Return the first line of a function's docstring, without its full stop."""
+    return (inspect.getdoc(function) or name).partition("\n")[0].rstrip(".") or name
+
+
+def _output(found: Any, spec: LayerSpec) -> Output:
+    if isinstance(found, Output):
+        if found.layers or found.mask is None:
+            return found
+        return dataclasses.replace(found, layers=(Layer(spec, found.mask),))
+    array = np.asarray(found)
+    if array.ndim != 2:
+        raise ValueError(f"it returned {array.dtype} of shape {array.shape}, and no (H, W) mask")
+    if array.dtype.kind != "f":
+        mask = Packed.of(array != 0)
+        return Output((Layer(spec, mask),), mask=mask)
+    if not ((array >= 0) & (array <= 1)).all():
+        raise ValueError("it returned floats that are no probabilities, from 0 to 1")
+    codes = np.rint(array * FULL).astype(np.uint16)
+    mask = Packed.of(codes > round(FULL / 2))
+    return Output((Layer(spec, mask),), mask=mask, probability=codes)
+
+
+# --- Somebody else's stage: its errors are named, and what it hands out is checked ----------------
+
+
+def guarded(stage: Stage[S, P]) -> Stage[S, P]:
+    """Return a stage whose every error is a `StageError`, and so is an output that cannot be."""
+
+    def bind(settings: S, parameters: Any) -> Callable[[View], Output]:
+        with _named(stage, "cannot be made ready"):
+            run = stage.bind(settings, parameters)
+            specs = stage.layers(settings)
+
+        def checked(view: View) -> Output:
+            with _named(stage, "failed"):
+                output = run(view)
+                _check_output(output, view, stage, specs)
+            return output
+
+        return checked
+
+    def fit(training_set: TrainingSet, settings: S) -> P:
+        assert stage.fit is not None
+        with _named(stage, "cannot learn"):
+            return stage.fit(training_set, settings)
+
+    return replace(stage, bind=bind, fit=None if stage.fit is None else fit)
+
+
+@contextmanager
+def _named(stage: Stage[Any, Any], what: str) -> Iterator[None]:
+    try:
+        yield
+    except (RoadevalError, MemoryError):
+        raise
+    except Exception as error:  # whatever somebody's code raises
+        said = visible(" ".join(f"{type(error).__name__}: {error}".split()))
+        raise StageError(f"stage {stage.name} {what}: {said}") from error
+
+
+def _check_output(
+    output: Output, view: View, stage: Stage[Any, Any], specs: tuple[LayerSpec, ...]
+) -> None:
+    """Raise an error where an output is none, or not of the image's size."""
+    if not isinstance(output, Output):
+        raise TypeError(f"it returned {type(output).__name__} and no Output")
+    size = view.image.shape[:2]
+    if stage.yields_mask and not isinstance(output.mask, Packed):
+        raise TypeError("it handed out no mask (Packed.of makes one)")
+    if output.mask is not None and output.mask.shape != size:
+        raise ValueError(f"its mask is {output.mask.shape}, and the image {size}")
+    image, codes = output.image, output.probability
+    if image is not None and (image.shape != view.image.shape or image.dtype != np.uint8):
+        raise ValueError(f"its image is {image.dtype} {image.shape}, not uint8 {view.image.shape}")
+    if codes is not None and (codes.shape != size or codes.dtype != np.uint16):
+        raise ValueError(f"its probability is {codes.dtype} {codes.shape}, not uint16 {size}")
+    for layer in output.layers:
+        if layer.spec not in specs:
+            raise ValueError(f"it handed out a layer {layer.spec.name!r} that it does not announce")
+        _check_layer(layer, size)
+
+
+def _check_layer(layer: Layer, size: tuple[int, int]) -> None:
+    """Raise an error where a layer is not of the image's size, or of a type that no codec takes."""
+    name, kind, array = layer.spec.name, layer.spec.kind, layer.array
+    if array.shape[:2] != size:
+        raise ValueError(f"its layer {name!r} is {array.shape}, not {size}")
+    if kind is LayerKind.MASK and array.dtype.kind not in "biu":
+        raise TypeError(f"its layer {name!r} holds {array.dtype}, and no whole numbers")
+    if kind in (LayerKind.LABELS, LayerKind.RGB) and array.dtype != np.uint8:
+        raise TypeError(f"its layer {name!r} holds {array.dtype}, not uint8")

@@ -12,9 +12,8 @@ import numpy as np
 
 from roadeval.data import NON_ROAD, ROAD, Rgb, Truth
 from roadeval.pipeline.beyond.exposure import ExposureSettings, expose, gains
-from roadeval.pipeline.beyond.ground.reach import reach
-from roadeval.pipeline.beyond.ground.scene import scene_of
-from roadeval.pipeline.beyond.working_image import stretched
+from roadeval.pipeline.beyond.features import reach
+from roadeval.pipeline.beyond.scene import scene_of, stretched
 from roadeval.pipeline.reference_patch import patch_mask
 from roadeval.training.settings import TrainingSettings
 

@@ -57,7 +57,7 @@ class TrainingSettings:
     """Self-supervision: pixels above this share of the height are not road."""
     far: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
     """Self-supervision: pixels below the horizon whose distance from the patch is less than this
-    are road, the others are not; see `roadeval.pipeline.beyond.ground.reach`. Most roads end at
+    are road, the others are not; see `roadeval.pipeline.beyond.features`. Most roads end at
     1."""
 
     @model_validator(mode="after")

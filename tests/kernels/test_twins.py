@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from roadeval import kernels
 from roadeval.data.packed import Packed, pack, unpack
 from roadeval.kernels import plain
-from roadeval.pipeline.paper import compensation, shadow_mask, similarity
+from roadeval.pipeline.paper import shadow, similarity
 from tests.pipeline.images import IMAGES, images, noise
 
 fast = pytest.importorskip(
@@ -23,10 +23,10 @@ WHITENING = similarity.whitening(np.cov(RNG.normal(0, 30, (3, 50))))
 
 
 def segments(image, width):
-    codes, histogram = plain.look_up_sum_min(cv2.split(image), shadow_mask.NDI_CODES)
-    mask = shadow_mask.shadow_mask(codes, shadow_mask.otsu_threshold(histogram), inclusive=False)
+    codes, histogram = plain.look_up_sum_min(cv2.split(image), shadow.NDI_CODES)
+    mask = shadow.shadow_mask(codes, shadow.otsu_threshold(histogram), inclusive=False)
     runs, count = plain.components(pack(mask), mask.shape[1], 8)
-    return runs, compensation.buffer_ring(Packed.of(mask), width).bits, count + 1
+    return runs, shadow.buffer_ring(Packed.of(mask), width).bits, count + 1
 
 
 def every_kernel(image, width):
@@ -38,7 +38,7 @@ def every_kernel(image, width):
     gain = RNG.uniform(0, 9, (count, 3))
     planes = cv2.split(image)
     return {
-        "look_up_sum_min": (planes, shadow_mask.NDI_CODES),
+        "look_up_sum_min": (planes, shadow.NDI_CODES),
         "run_sums": (planes, runs, count),
         "ring_sums": (planes, runs, ring, count, width),
         "paint": (runs, *shape),
@@ -254,7 +254,7 @@ def test_rings_are_summed_up_alike_across_words(width, reach):
     image = noise(40, width)
     mask = (cv2.blur(image[..., 1], (5, 5)) < 110).astype(np.uint8)
     runs, count = plain.components(pack(mask), width, 8)
-    ring = compensation.buffer_ring(Packed.of(mask), reach).bits
+    ring = shadow.buffer_ring(Packed.of(mask), reach).bits
     given = cv2.split(image), runs, ring, count + 1, reach
     sums = fast.ring_sums(*given)
     assert count > 3

@@ -3,8 +3,8 @@
 import numpy as np
 
 from roadeval.pipeline.chain import Pipeline
+from roadeval.pipeline.stage import TrainingSet
 from roadeval.pipeline.stages import STAGES
-from roadeval.pipeline.training_set import TrainingSet
 from tests.pipeline.images import noise
 
 NAMES = ("shadow", "similarity", "svm", "post")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Output, Packed, mask_spec
-from roadeval.pipeline.guard import guarded
 from roadeval.pipeline.stage import Stage, StageError, View
+from roadeval.pipeline.stages import guarded
 
 CLASSES = tuple(LabelClass(i, str(i), (i, 0, 0, 255)) for i in range(3))
 MASK = mask_spec("mask", "Mask")

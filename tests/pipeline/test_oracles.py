@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from roadeval.data.packed import Packed
-from roadeval.pipeline.paper import compensation
+from roadeval.pipeline.paper import shadow
 from roadeval.pipeline.stage import Output, View
 from roadeval.pipeline.stages import STAGES
 from tests.pipeline.images import noise
@@ -53,7 +53,7 @@ def test_a_perfect_svm_is_the_truth_with_ignored_pixels_as_non_road_given_to_pos
 
 def test_a_perfect_filter_compensates_true_shadow_and_all_stages_follow(chain):
     settings = chain.steps[0].settings
-    image, *_ = compensation.lift(View.of(IMAGE), Packed.of(TRULY_DARK == 1), settings)
+    image, *_ = shadow.lift(View.of(IMAGE), Packed.of(TRULY_DARK == 1), settings)
     assert (image != IMAGE).any()
     own = {step.stage.name: step.settings for step in chain.steps}
     after = chain_of(NAMES[1:], own)

@@ -14,7 +14,7 @@ import pytest
 from roadeval.cli.app import main
 from roadeval.config import configure
 from roadeval.errors import RoadevalError
-from roadeval.pipeline.beyond.blend import Blend, Stack
+from roadeval.pipeline.beyond.trees import Blend, Stack
 from roadeval.training import TrainingSettings, fit, save_model
 from roadeval.training.learning import from_file
 from tests.e2e.commands import DEMO

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,53 +24,36 @@ BINS: Final = 255
 """Ranges of a feature that a tree can tell apart: the most that scikit-learn knows."""
 
 
-class Growth(Protocol):
-    """Settings of the growing, see `roadeval.pipeline.beyond.trees.TreesSettings`."""
+class Growth(NamedTuple):
+    """How trees are grown."""
 
-    @property
-    def trees(self) -> int:
-        """Number of trees."""
-
-    @property
-    def leaves(self) -> int:
-        """Most leaves of a tree."""
-
-    @property
-    def rate(self) -> float:
-        """Learning rate."""
-
-    @property
-    def least(self) -> int:
-        """Least pixels of a leaf."""
-
-    @property
-    def share(self) -> float:
-        """Share of the features that each node chooses from."""
+    trees: int
+    leaves: int
+    """Of a tree, at most."""
+    rate: float
+    """Share of what is left to mend that a tree mends."""
+    least: int
+    """Training pixels of a leaf, at least."""
+    share: float
+    """Of the features, drawn anew for each node, among which it chooses."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Forest:
-    """The sum of T trees, see `roadeval.kernels.plain.tree_sum`.
-
-    Parameters
-    ----------
-    feature, threshold, kept
-        ``(T, NODES)`` int32, float32, uint32: which feature a node looks at, what it compares it
-        with, and a bit for each leaf that is left where it is above that.
-    values
-        ``(T, LEAVES)`` float32: what each leaf adds.
-    offset
-        Where the sum begins.
-    inputs
-        How many features of a pixel there were to choose from.
-    """
+    """The sum of T trees, see `roadeval.kernels.plain.tree_sum`."""
 
     feature: Indices
+    """``(T, NODES)`` int32: which feature a node looks at."""
     threshold: Values
+    """``(T, NODES)`` float32: what the node compares it with."""
     kept: Masks
+    """``(T, NODES)`` uint32: a bit for each leaf that is left where the feature is above that."""
     values: Values
+    """``(T, LEAVES)`` float32: what each leaf adds."""
     offset: float
+    """Where the sum begins."""
     inputs: int
+    """How many features of a pixel there were to choose from."""
 
     def __post_init__(self) -> None:
         check_arrays(self, np.int32, feature=("T", NODES))
@@ -94,9 +77,7 @@ class Forest:
         return total + np.float32(self.offset)
 
 
-def grow(
-    values: Values, road: Flags, weights: Floats | None, settings: Growth, seed: int
-) -> Forest:
+def grow(values: Values, road: Flags, weights: Floats | None, growth: Growth, seed: int) -> Forest:
     """Grow trees with scikit-learn's gradient boosting on histograms [1]_.
 
     By one thread: sums of many threads end with other last digits from one run to the next.
@@ -109,10 +90,8 @@ def grow(
         ``(n,)`` labels; both occur.
     weights
         ``(n,)`` of the pixels, above 0; None: all weigh the same.
-    settings
-        Of the growing.
-    seed
-        Of the draw of features.
+    growth, seed
+        How they are grown; of the draw of features.
 
     References
     ----------
@@ -132,11 +111,11 @@ def grow(
     )
     # Only here: the import takes a second, and a model from a file does not need it.
     boosting = whole("sklearn.ensemble").HistGradientBoostingClassifier(
-        learning_rate=settings.rate,
-        max_iter=settings.trees,
-        max_leaf_nodes=settings.leaves,
-        min_samples_leaf=settings.least,
-        max_features=settings.share,
+        learning_rate=growth.rate,
+        max_iter=growth.trees,
+        max_leaf_nodes=growth.leaves,
+        min_samples_leaf=growth.least,
+        max_features=growth.share,
         early_stopping=False,
         random_state=seed,
     )
@@ -153,18 +132,8 @@ def bin_edges(feature: Values, weights: Floats) -> Values:
 
     Bin i holds what is above edge i - 1, and at most edge i: a value alone where there are few of
     them, else values of equal weight together, up to a weighted quantile (averaged inverted CDF).
-
-    Parameters
-    ----------
-    feature
-        ``(n,)`` finite values.
-    weights
-        ``(n,)`` of the pixels, above 0.
-
-    Returns
-    -------
-    Values
-        ``(e,)`` float32, each once; none where all values are equal.
+    ``feature`` and ``weights`` (above 0) are ``(n,)``; the edges ``(e,)`` float32, none where all
+    values are equal.
     """
     order = np.argsort(feature)
     ascending: Values = feature[order]

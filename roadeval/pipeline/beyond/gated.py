@@ -1,29 +1,66 @@
 """A shadow filter with a learnt gate: dark road becomes as bright as the lit road of its frame.
 
 The paper's filter (`shadow`) takes whatever has a high NDI for shadow. This one asks of every dark
-pixel how likely it is road in the shade (`shaded_road`), and brightens it so far. There is no
-region and no hard threshold in it: half a doubt is half the gain. Where the training frames have no
-road in the shade nothing is learnt, and every frame passes as it came, bit for bit.
+pixel how likely it is road in the shade, and brightens it so far. There is no region and no hard
+threshold in it: half a doubt is half the gain. Where the training frames have no road in the shade
+nothing is learnt, and every frame passes as it came, bit for bit.
+
+A shadow, a dark car and a hedge may have one colour. What tells them apart is learnt, as Guo, Dai
+and Hoiem learn their shadow detector [1]_, but by pixel: a logistic regression on what surrounds a
+dark pixel, on its place, and on what lies between it and the vehicle. All brightness is relative to
+the frame's own sunlit road, so that it holds for any exposure.
+
+References
+----------
+.. [1] R. Guo, Q. Dai, D. Hoiem, Single-Image Shadow Detection and Removal using Paired Regions,
+   CVPR 2011.
+.. [2] A. Rahimi, B. Recht, Weighted Sums of Random Kitchen Sinks: Replacing Minimization with
+   Randomization in Learning, NIPS 2008.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Annotated, Final
 
 import cv2
 import numpy as np
+import numpy.typing as npt
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb, Truth, colours
-from roadeval.data.arrays import Values
+from roadeval.data.arrays import Floats, Values
 from roadeval.data.packed import Packed
-from roadeval.pipeline.beyond.shade_candidates import OFFSET, GatedSettings, Look, as_told, look
-from roadeval.pipeline.beyond.shaded_road import ShadedRoad, fit, gains, shade_of
-from roadeval.pipeline.beyond.working_image import enlarged, reduced, stretched
+from roadeval.pipeline.beyond.features import paths
+from roadeval.pipeline.beyond.scene import Scene, enlarged, mean, reduced, stretched
 from roadeval.pipeline.paper.shadow import SHADOW_COLOUR
-from roadeval.pipeline.stage import Output, Stage, View
+from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
+from roadeval.pipeline.reference_patch import ReferencePatch, Share
+from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
 
+GRID: Final = (12, 16)
+"""Rows and columns of the cells by which the place of road is learnt."""
+WINDOWS: Final = (3, 9)
+"""Sides of the squares over which texture is averaged."""
+PATCH: Final = ReferencePatch()
+FEATURES: Final = 13 + 2 * len(WINDOWS)
+"""Of a pixel, see `features_of`."""
+STEPS: Final = 0.05
+"""Added to a geodesic distance before the logarithm: ten steps on smooth ground."""
+LEVEL: Final = 0.85
+"""The frame's sunlit level is this quantile of the brightness of where road is likely."""
+LIT: Final = 0.7
+"""Lit road is brighter than this share of the sunlit level."""
+OFFSET: Final = np.float32(8)
+"""Added to a channel before ratios are taken, as in `LOGS`."""
+LEAST: Final = 30
+"""Candidates of either kind, of those sampled, that there must be to learn from."""
+NOTHING: Final = -20.0
+"""The log-odds of every candidate where there was too little to learn from."""
+_ROUNDS: Final = 25
 EDGE: Final = 2
 """Pixels of the working image beside the shadow that are neither it nor lit."""
 
@@ -43,6 +80,322 @@ SHADED: Final = LayerSpec(
 )
 SHADOW: Final = _mask("shadow", "More likely road in the shade than not", "shadow")
 COMPENSATED: Final = LayerSpec("compensated", LayerKind.RGB, "Compensated image", exact=False)
+
+
+@validated(frozen=True, config=ConfigDict(extra="forbid"))
+class GatedSettings:
+    """Settings of the gated filter. Lengths are in pixels of the working image."""
+
+    width: Annotated[int, Field(ge=32, le=4096)] = 160
+    """Of the working image: wider ones are reduced to it for all that is decided. Texture then
+    means the same for every camera, and the time is the same too."""
+    darkness: Share = 0.6
+    """Candidates are darker than this share of the sunlit level."""
+    place: Share = 0.05
+    """Candidates lie where at least this share of the training pixels is road: sky, trees and
+    houses are elsewhere."""
+    planes: Annotated[int, Field(ge=1, le=4096)] = 128
+    """Planes of the feature map on which the odds are learnt. What a frame costs grows with them.
+    """
+    penalty: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.01
+    """Of the squared weights, a training pixel."""
+    odds: Annotated[float, Field(gt=0, le=1e6)] = 0.1
+    """Factor of the odds that a candidate is shaded road. The more, the more dark road comes back,
+    and the more is brightened that is none. A classifier on colours takes all of that for road,
+    and wants caution; one that sees place and surroundings as well takes 1."""
+    least: Annotated[float, Field(ge=0, lt=1)] = 0.1
+    """Below this probability nothing is brightened."""
+    window: Annotated[int, Field(ge=1, le=99)] = 1
+    """Side of the square over which a candidate's own colour is averaged: texture finer than it
+    stays."""
+    greatest: Annotated[float, Field(ge=1, le=255)] = 8.0
+    """Greatest gain of a channel."""
+    softness: Annotated[int, Field(ge=1, le=99)] = 3
+    """Side of the square that the gains are averaged over, so that edges stay soft."""
+
+
+# --- Dark pixels where road may be ----------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """A working image as the filter sees it."""
+
+    image: Rgb
+    """``(h, w, 3)`` uint8 RGB."""
+    level: float
+    """Sunlit level of ``R + G + B``."""
+    lit: Floats
+    """``(3,)``: mean colour of lit road."""
+    place: Values
+    """``(h, w)`` float32: the road's share by place."""
+    likely: npt.NDArray[np.bool_]
+    """``(h, w)``: whether that is more than half."""
+    candidates: npt.NDArray[np.bool_]
+    """``(h, w)`` bool."""
+
+
+def look(image: Rgb, place: Floats, settings: GatedSettings) -> Look:
+    """Find the sunlit level, lit road's colour and the candidates of a working image.
+
+    Where road is likely by its place alone, nearly every frame has some that is lit: that level is
+    within a tenth of the true one, where the colour of road finds a third.
+    """
+    height, width = image.shape[:2]
+    total = _brightness(image)
+    share: Values = cv2.resize(place.astype(np.float32), (width, height))
+    likely = share > 0.5
+    level = _quantile(total[likely], share[likely], LEVEL)
+    shining = likely & (total >= LIT * level)
+    lit = np.asarray(cv2.mean(image, shining.view(np.uint8))[:3])
+    candidates = (total < settings.darkness * level) & (share > settings.place)
+    return Look(image, level, lit, share, likely, candidates)
+
+
+def _brightness(image: Rgb) -> npt.NDArray[np.uint16]:
+    """Return ``R + G + B`` of ``(H, W, 3)`` uint8 RGB, ``(H, W)`` uint16."""
+    red, green, blue = cv2.split(image)
+    total: npt.NDArray[np.uint16] = cv2.add(
+        cv2.add(red, green, dtype=cv2.CV_16U), blue, dtype=cv2.CV_16U
+    )
+    return total
+
+
+def _quantile(values: npt.NDArray[np.uint16], weights: Values, share: float) -> float:
+    """Return the least value that holds, with those below it, a share of the weight; 0 for none."""
+    counted = np.cumsum(np.bincount(values, weights, minlength=1))
+    return float(np.searchsorted(counted, share * counted[-1])) if counted[-1] > 0 else 0.0
+
+
+def features_of(seen: Look) -> Values:
+    """Compute the features of every pixel, ``(F, h, w)`` float32.
+
+    Log brightness and two log-chromaticities relative to those of lit road; the two as they are;
+    the distance from the middle column, and the row; the steepest edge across the column below and
+    the darkest in it, relative to the sunlit level; texture, for each window the root of the mean
+    absolute slope across and down; the logarithms of the geodesic distances from the reference
+    patch (`features.paths`); and the road's share by place.
+    """
+    scene = Scene.of(seen.image, seen.image, PATCH)
+    light, red, blue = scene.tones
+    top = np.float32(np.log(seen.level / 3 + OFFSET))
+    lit = np.log(seen.lit + OFFSET).astype(np.float32)
+    down, across = np.mgrid[: scene.shape[0], : scene.shape[1]].astype(np.float32) + np.float32(0.5)
+    slopes = [np.abs(slope) for slope in scene.slopes]
+    met = np.sqrt(cv2.blur(slopes[1], (5, 3))), mean(light, 5) - top
+    found: Values = np.stack(
+        [
+            light - top,
+            red - (lit[0] - lit[1]),
+            blue - (lit[2] - lit[1]),
+            red,
+            blue,
+            np.abs(across * np.float32(2 / scene.shape[1]) - 1),
+            down / np.float32(scene.shape[0]),
+            np.maximum.accumulate(met[0][::-1])[::-1],
+            np.minimum.accumulate(met[1][::-1])[::-1],
+            *(np.sqrt(mean(slope, side)) for side in WINDOWS for slope in slopes),
+            *(np.log(far + np.float32(STEPS)) for far in paths(scene)),
+            seen.place,
+        ]
+    )
+    return found
+
+
+# --- What is learnt -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShadedRoad:
+    """Learnt parameters of the gated filter: where road is, and the odds of road in the shade."""
+
+    place: Floats
+    """``GRID`` float64: by cell of the image, the share of the training pixels that is road."""
+    planes: Values
+    """``(K, F)`` float32."""
+    bias: Values
+    """``(K,)`` float32."""
+    weights: Values
+    """``(K,)`` float32."""
+    offset: float
+    """The log-odds are ``sum_k weights[k] max(planes[k] . x + bias[k], 0) + offset``."""
+
+    def __post_init__(self) -> None:
+        check_arrays(self, np.float64, place=GRID)
+        check_range("place", self.place, 0, 1)
+        check_arrays(self, np.float32, planes=("K", FEATURES), bias=("K",), weights=("K",))
+        check_arrays(self, np.float32, offset=())
+        check_range("offset", self.offset, -GREATEST, GREATEST)
+
+
+def fit(sample: TrainingSet, settings: GatedSettings) -> ShadedRoad:
+    """Learn where road is, and the odds that a dark pixel is road."""
+    place = learn_place(sample)
+    values, road = at_candidates(sample, place, settings)
+    if min(road.sum(), (~road).sum()) < LEAST:
+        none = np.zeros((1, FEATURES), np.float32)
+        return ShadedRoad(place, none, none[:, 0], none[:, 0], NOTHING)
+    planes, bias = draw_planes(values, settings.planes, sample.seed)
+    mapped = np.maximum(values @ planes.T + bias, 0).astype(np.float64)
+    weights, offset = logistic(mapped, road, settings.penalty)
+    return ShadedRoad(place, planes, bias, weights.astype(np.float32), offset)
+
+
+def learn_place(sample: TrainingSet) -> Floats:
+    """Return the share of the training pixels in each cell that is road, both halves alike.
+
+    One pixel of either class more keeps a cell that was hardly seen undecided.
+    """
+    height, width = np.array([image.shape[:2] for image in sample.images]).T
+    row = sample.row * GRID[0] // height[sample.frame]
+    column = sample.column * GRID[1] // width[sample.frame]
+    counts = np.ones((2, *GRID))
+    for across in (column, GRID[1] - 1 - column):
+        np.add.at(counts, (sample.road.astype(np.intp), row, across), 1)
+    share: Floats = counts[1] / counts.sum(axis=0)
+    return share
+
+
+def at_candidates(
+    sample: TrainingSet, place: Floats, settings: GatedSettings
+) -> tuple[Values, npt.NDArray[np.bool_]]:
+    """Return the features ``(n, F)`` and labels ``(n,)`` of the sampled pixels that are dark."""
+    values, road = [], []
+    for index, image in enumerate(sample.images):
+        here = sample.frame == index
+        seen = look(reduced(image, settings.width), place, settings)
+        rows, columns = seen.candidates.shape
+        row = sample.row[here] * rows // image.shape[0]
+        column = sample.column[here] * columns // image.shape[1]
+        dark = seen.candidates[row, column]
+        values.append(features_of(seen)[:, row[dark], column[dark]].T)
+        road.append(sample.road[here][dark])
+    return np.concatenate(values), np.concatenate(road)
+
+
+def draw_planes(values: Values, count: int, seed: int) -> tuple[Values, Values]:
+    """Draw planes ``(count, F)`` and their bias ``(count,)`` for ``(n, F)`` features.
+
+    Directions are uniform on the sphere of standardised features; each plane goes through one of
+    the pixels, and is scaled so that its largest value there is 1 [2]_.
+    """
+    rng = np.random.default_rng(seed)
+    deviation = values.std(axis=0)
+    planes = rng.normal(size=(count, values.shape[1]))
+    planes /= np.linalg.norm(planes, axis=1, keepdims=True) * np.where(deviation > 0, deviation, 1)
+    bias = -(planes * values[rng.integers(0, len(values), count)]).sum(axis=1)
+    largest = np.maximum((values @ planes.T + bias).max(axis=0), 1e-6)
+    return (planes / largest[:, None]).astype(np.float32), (bias / largest).astype(np.float32)
+
+
+def logistic(mapped: Floats, road: npt.NDArray[np.bool_], penalty: float) -> tuple[Floats, float]:
+    """Fit a logistic regression with an L2 penalty, by Newton's method.
+
+    scikit-learn's gives the same weights, and its import alone takes a second.
+
+    The weights w of standardised columns z and the offset b minimise the mean of
+    ``ln(1 + exp(-s (w . z + b)))``, s being 1 for road and -1 for the rest, plus
+    ``penalty / 2 |w|^2``; returned are those of the columns as they are.
+
+    Parameters
+    ----------
+    mapped
+        ``(n, K)``.
+    road
+        ``(n,)``: both classes occur.
+    penalty
+        Above 0.
+
+    Returns
+    -------
+    weights, offset
+        ``(K,)`` float64, and a number.
+    """
+    mean, deviation = mapped.mean(axis=0), np.maximum(mapped.std(axis=0), 1e-6)
+    columns = np.column_stack([(mapped - mean) / deviation, np.ones(len(mapped))])
+    ridge = np.append(np.full(len(mean), penalty), 1e-6)
+    weights = np.zeros(len(ridge))
+    for _ in range(_ROUNDS):
+        share = _sigmoid(columns @ weights)
+        slope = columns.T @ (share - road) / len(road) + ridge * weights
+        bend = (columns * np.maximum(share * (1 - share), 1e-6)[:, None]).T @ columns / len(road)
+        step = np.linalg.solve(bend + np.diag(ridge), slope)
+        weights -= step
+        if np.abs(step).max() < 1e-6:
+            break
+    own = weights[:-1] / deviation
+    return own, float(weights[-1] - mean @ own)
+
+
+def probability(seen: Look, model: ShadedRoad, odds: float) -> Values:
+    """Return the probability of every pixel to be road in the shade, ``(h, w)`` float32.
+
+    0 where there is no candidate.
+    """
+    result: Values = np.zeros(seen.candidates.shape, np.float32)
+    if seen.candidates.any():
+        values = features_of(seen)[:, seen.candidates].T
+        sums = np.maximum(values @ model.planes.T + model.bias, 0) @ model.weights
+        result[seen.candidates] = _sigmoid(sums + np.float32(model.offset + np.log(odds)))
+    return result
+
+
+def _sigmoid(values: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
+    share: npt.NDArray[np.floating] = 1 / (1 + np.exp(-np.clip(values, -30, 30)))
+    return share
+
+
+# --- How far pixels are brightened ----------------------------------------------------------------
+
+
+def gains(seen: Look, shaded: Values, settings: GatedSettings) -> Values:
+    """Return the gain of each channel at each pixel, ``(h, w, 3)`` float32; 1 is no change.
+
+    It is ``(L / S)^p``: L is the mean colour of lit road, S that of the candidates around the
+    pixel, and p the probability that it is road in the shade. L / S is the ratio of illumination
+    if it is. No gain is less than 1 or more than ``greatest``; averaged over a square in the end.
+    """
+    dark = seen.candidates.astype(np.float32)
+    side = (settings.window, settings.window)
+    around = cv2.blur(seen.image.astype(np.float32) * dark[..., None], side)
+    own = around / np.maximum(cv2.blur(dark, side), 1e-6)[..., None]
+    ratio = np.log((seen.lit + OFFSET).astype(np.float32)) - np.log(own + OFFSET)
+    np.clip(ratio, 0, np.log(settings.greatest), out=ratio)
+    soft: Values = cv2.blur(
+        np.exp(ratio * shaded[..., None]), (settings.softness, settings.softness)
+    )
+    return soft
+
+
+def shade_of(seen: Look, model: ShadedRoad, settings: GatedSettings) -> Values:
+    """Return how far each pixel is brightened, 0 to 1, ``(h, w)`` float32."""
+    found = probability(seen, model, settings.odds)
+    found -= np.float32(settings.least)
+    found /= np.float32(1 - settings.least)
+    return np.maximum(found, 0, out=found)
+
+
+def brighten(image: Rgb, gain: Values) -> Rgb:
+    """Return ``(I + 8) g - 8`` of ``(H, W, 3)`` uint8 RGB; rounded and clipped.
+
+    Gains ``(h, w, 3)`` float32, none below 1, are of colours with `OFFSET` added: noise in the dark
+    does not grow by all of them.
+    """
+    bright = image.copy()
+    touched = np.flatnonzero((gain > 1).any(axis=(1, 2)))
+    if len(touched):
+        scale = len(image) / len(gain)
+        # Interpolation reaches no further than to the next row.
+        first, end = int((touched[0] - 1) * scale), math.ceil((touched[-1] + 2) * scale)
+        rows = slice(max(first, 0), end)
+        here = stretched(gain, image.shape)[rows]
+        result = cv2.multiply(image[rows], here, dtype=cv2.CV_32F)
+        cv2.scaleAdd(here, float(OFFSET), result, dst=result)
+        cv2.convertScaleAbs(result, dst=bright[rows], beta=-float(OFFSET))
+    return bright
+
+
+# --- The stage ------------------------------------------------------------------------------------
 
 
 def bind(settings: GatedSettings, model: ShadedRoad) -> Callable[[View], Output]:
@@ -83,30 +436,10 @@ def oracle(settings: GatedSettings, model: ShadedRoad) -> Callable[[View, Truth]
         shadow = enlarged((truth == 1).view(np.uint8), small.shape)
         if not shadow.any():
             return Output(image=view.image)
-        seen = as_told(look(small, model.place, settings), shadow)
+        seen = replace(look(small, model.place, settings), candidates=shadow > 0)
         return Output(image=brighten(view.image, gains(seen, shadow.astype(np.float32), settings)))
 
     return run
-
-
-def brighten(image: Rgb, gain: Values) -> Rgb:
-    """Return ``(I + 8) g - 8`` of ``(H, W, 3)`` uint8 RGB; rounded and clipped.
-
-    Gains ``(h, w, 3)`` float32, none below 1, are of colours with `OFFSET` added: noise in the dark
-    does not grow by all of them.
-    """
-    bright = image.copy()
-    touched = np.flatnonzero((gain > 1).any(axis=(1, 2)))
-    if len(touched):
-        scale = len(image) / len(gain)
-        # Interpolation reaches no further than to the next row.
-        first, end = int((touched[0] - 1) * scale), math.ceil((touched[-1] + 2) * scale)
-        rows = slice(max(first, 0), end)
-        here = stretched(gain, image.shape)[rows]
-        result = cv2.multiply(image[rows], here, dtype=cv2.CV_32F)
-        cv2.scaleAdd(here, float(OFFSET), result, dst=result)
-        cv2.convertScaleAbs(result, dst=bright[rows], beta=-float(OFFSET))
-    return bright
 
 
 def _masks(seen: Look, shaded: Values) -> dict[str, Mask]:

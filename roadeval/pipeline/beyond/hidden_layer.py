@@ -9,7 +9,7 @@ less.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 import cv2
 import numpy as np
@@ -38,45 +38,24 @@ STEP: Final = 0.002
 Codes = npt.NDArray[np.uint8]
 
 
-class Training(Protocol):
-    """Settings of the training, see `roadeval.pipeline.beyond.trees.TreesSettings`."""
-
-    @property
-    def hidden(self) -> int:
-        """Number of planes."""
-
-    @property
-    def passes(self) -> int:
-        """How often as many pixels are drawn as there are."""
-
-    @property
-    def noise(self) -> float:
-        """Deviation of what is added to each rank."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class HiddenLayer:
-    """Rectified planes through ranks, and their weighted sum.
-
-    Parameters
-    ----------
-    lowest, scale
-        ``(F,)`` float32: a feature x has the code ``scale (x - lowest)``, rounded, 0 to 255.
-    ranks
-        ``(F, CODES)`` float32: what each code counts for, -1 to 1.
-    planes, bias, weights
-        ``(K, F)``, ``(K,)``, ``(K,)`` float32.
-    shift
-        Where the sum begins.
-    """
+    """Rectified planes through ranks, and their weighted sum."""
 
     lowest: Values
+    """``(F,)`` float32."""
     scale: Values
+    """``(F,)`` float32: a feature x has the code ``scale (x - lowest)``, rounded, 0 to 255."""
     ranks: Values
+    """``(F, CODES)`` float32: what each code counts for, -1 to 1."""
     planes: Values
+    """``(K, F)`` float32."""
     bias: Values
+    """``(K,)`` float32."""
     weights: Values
+    """``(K,)`` float32."""
     shift: float
+    """Where the sum begins."""
 
     def __post_init__(self) -> None:
         check_arrays(
@@ -108,25 +87,21 @@ class HiddenLayer:
 
 
 def train(
-    values: Values, road: Flags, weights: Floats | None, settings: Training, seed: int
+    values: Values,
+    road: Flags,
+    weights: Floats | None,
+    seed: int,
+    *,
+    planes: int,
+    passes: int,
+    noise: float,
 ) -> HiddenLayer:
     """Train a network with scikit-learn's Adam, by one thread.
 
     Each pass draws pixels anew by their weights, and adds other noise to their ranks: few frames
     show few values of what is the same all over a frame, and nothing shall hang on their digits.
-
-    Parameters
-    ----------
-    values
-        ``(n, F)`` features, finite.
-    road
-        ``(n,)`` labels; both occur.
-    weights
-        ``(n,)`` of the pixels, above 0; None: all weigh the same.
-    settings
-        Of the training.
-    seed
-        Of all draws.
+    The arguments are those of `roadeval.pipeline.beyond.forest.grow`, the number of planes, passes
+    through as many pixels as there are, and the deviation of what is added to each rank.
     """
     from threadpoolctl import threadpool_limits
 
@@ -138,28 +113,28 @@ def train(
     rng, count = np.random.default_rng(seed), len(road)
     chances = None if weights is None else weights / weights.sum()
     network = whole("sklearn.neural_network").MLPClassifier(
-        (settings.hidden,),
+        (planes,),
         alpha=PENALTY,
         batch_size=min(count, max(FEWEST, min(BATCH, count // STEPS))),
         learning_rate_init=STEP,
         random_state=seed,
     )
     with threadpool_limits(1, "blas"):
-        for number in range(settings.passes):
+        for number in range(passes):
             drawn = rng.choice(count, count, p=chances)
-            noise = rng.standard_normal((count, seen.shape[1]), dtype=np.float32)
-            noise *= np.float32(settings.noise)
-            noise += seen[drawn]
+            noisy = rng.standard_normal((count, seen.shape[1]), dtype=np.float32)
+            noisy *= np.float32(noise)
+            noisy += seen[drawn]
             if number:
-                left = 1 - number / settings.passes
+                left = 1 - number / passes
                 network._optimizer.learning_rate_init = STEP * left
-            network.partial_fit(noise, road[drawn], classes=[False, True])
-    (planes, out), (bias, shift) = network.coefs_, network.intercepts_
+            network.partial_fit(noisy, road[drawn], classes=[False, True])
+    (inner, out), (bias, shift) = network.coefs_, network.intercepts_
     return HiddenLayer(
         lowest,
         scale,
         ranks,
-        np.ascontiguousarray(planes.T, np.float32),
+        np.ascontiguousarray(inner.T, np.float32),
         bias.astype(np.float32),
         np.ascontiguousarray(out[:, 0], np.float32),
         float(shift.item()),

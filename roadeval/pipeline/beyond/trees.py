@@ -2,11 +2,11 @@
 
 The log-odds of road are the weighted mean of two opinions: the sum of many small decision trees,
 each of which was grown to mend what those before it leave [1]_, and a network with one hidden layer
-(`roadeval.pipeline.beyond.hidden_layer`). A term that is not learnt is taken from them:
+(`hidden_layer`). A term that is not learnt is taken from them:
 ``x = mean - w s max(d - 1, 0)`` with the distance d from the reference patch, 1 where roads end,
-and the share s of light (`roadeval.pipeline.beyond.ground.reach`); ``p = 1 / (1 + exp(-x))``. It is
+and the share s of light (`roadeval.pipeline.beyond.features`); ``p = 1 / (1 + exp(-x))``. It is
 computed on a working image, and brought to the camera's pixels along the edges of its image
-(`roadeval.pipeline.beyond.guided`).
+(`roadeval.pipeline.beyond.working_image`).
 
 References
 ----------
@@ -17,6 +17,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Final
 
@@ -28,14 +29,20 @@ from roadeval.data import Layer, LayerKind, LayerSpec, Rgb, mask_spec
 from roadeval.data.arrays import Flags, Floats, Values
 from roadeval.data.packed import Packed
 from roadeval.kernels.plain.trees import LEAVES
-from roadeval.pipeline.beyond.blend import Blend, Stack
-from roadeval.pipeline.beyond.forest import grow
-from roadeval.pipeline.beyond.ground.reach import FEATURES, beyond, combined, inputs, lit
-from roadeval.pipeline.beyond.ground.scene import scene_of
-from roadeval.pipeline.beyond.ground_features import GROUPS, at_samples, features, names_of
-from roadeval.pipeline.beyond.guided import guided
-from roadeval.pipeline.beyond.hidden_layer import train
-from roadeval.pipeline.beyond.working_image import stretched
+from roadeval.pipeline.beyond.features import (
+    GROUPS,
+    REACH,
+    at_samples,
+    beyond,
+    combined,
+    features,
+    lit,
+    names_of,
+    reach_inputs,
+)
+from roadeval.pipeline.beyond.forest import Forest, Growth, grow
+from roadeval.pipeline.beyond.hidden_layer import HiddenLayer, train
+from roadeval.pipeline.beyond.scene import guided, scene_of, stretched
 from roadeval.pipeline.reference_patch import ReferencePatch
 from roadeval.pipeline.stage import (
     MisfitError,
@@ -73,7 +80,7 @@ class TreesSettings:
     width: Annotated[int, Field(ge=32, le=1024)] = 160
     """Columns of the working image."""
     features: Annotated[tuple[str, ...], Field(min_length=1)] = tuple(GROUPS)
-    """Groups of features, each a file of `roadeval.pipeline.beyond.ground`."""
+    """Groups of features, see `roadeval.pipeline.beyond.features`."""
     patch: ReferencePatch = ReferencePatch()
     """The reference patch, from which distances of colour and paths are measured."""
     trees: Annotated[int, Field(ge=1, le=1000)] = 150
@@ -110,6 +117,71 @@ class TreesSettings:
         return names
 
 
+# --- What is learnt -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Blend:
+    """A forest and a network that learnt from the same pixels."""
+
+    forest: Forest
+    network: HiddenLayer
+    """They see the same features."""
+
+    def __post_init__(self) -> None:
+        if self.forest.inputs != self.network.inputs:
+            raise ValueError(
+                f"the forest sees {self.forest.inputs} features of a pixel, and the network "
+                f"{self.network.inputs}"
+            )
+
+    @property
+    def inputs(self) -> int:
+        """How many features of a pixel both see."""
+        return self.network.inputs
+
+    def log_odds(self, values: Values, weight: Values | float) -> Values:
+        """Return the weighted mean of both for each pixel of ``(inputs, n)`` features, ``(n,)``.
+
+        The weight, 0 to 1, is the network's: one, or ``(n,)``.
+        """
+        trees, network = self.forest.sums(values), self.network.sums(values)
+        mean: Values = trees + np.asarray(weight, np.float32) * (network - trees)
+        return mean
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stack:
+    """A blend, and the one of other drives that it was taught on top of, if any."""
+
+    top: Blend
+    """Its last feature is what the base gives, where there is one."""
+    base: Blend | None = None
+    """None: there is none."""
+
+    def __post_init__(self) -> None:
+        if self.base is not None and self.top.inputs != self.base.inputs + 1:
+            raise ValueError(
+                f"what stands on top sees {self.top.inputs} features of a pixel, and the base "
+                f"{self.base.inputs}"
+            )
+
+    @property
+    def inputs(self) -> int:
+        """How many features of a pixel are given to it."""
+        return (self.base or self.top).inputs
+
+    def log_odds(self, values: Values, weight: Values | float) -> Values:
+        """Return what the blend on top gives for each pixel, ``(n,)`` float32.
+
+        ``values`` and ``weight`` are as in `Blend.log_odds`; both blends take the same weight.
+        """
+        if self.base is not None:
+            known = self.base.log_odds(values, weight)
+            values = np.concatenate([values, known[None]])
+        return self.top.log_odds(values, weight)
+
+
 def see(settings: TreesSettings, image: Rgb) -> Values:
     """Compute the features of ``(H, W, 3)`` uint8 RGB, ``(F, h, w)`` float32."""
     return features(scene_of(image, settings.width, settings.patch), settings.features)
@@ -139,8 +211,11 @@ def adapt(known: Stack, sample: TrainingSet, settings: TreesSettings) -> Stack:
 def _grown(values: Values, sample: TrainingSet, settings: TreesSettings) -> Blend:
     road = np.concatenate([sample.road, sample.road])
     weights = None if sample.share is None else balanced_back(road, sample.share)
-    forest = grow(values, road, weights, settings, sample.seed)
-    return Blend(forest, train(values, road, weights, settings, sample.seed))
+    s, seed = settings, sample.seed
+    growth = Growth(s.trees, s.leaves, s.rate, s.least, s.share)
+    forest = grow(values, road, weights, growth, seed)
+    network = train(values, road, weights, seed, planes=s.hidden, passes=s.passes, noise=s.noise)
+    return Blend(forest, network)
 
 
 def balanced_back(road: Flags, share: float) -> Floats:
@@ -160,6 +235,9 @@ def check_fit(learnt: Stack, settings: TreesSettings) -> None:
         )
 
 
+# --- What is decided ------------------------------------------------------------------------------
+
+
 def network_weight(values: Values, settings: TreesSettings) -> Values | float:
     """Return the network's weight in the mean for ``(F, n)`` features, ``(n,)`` float32.
 
@@ -168,9 +246,9 @@ def network_weight(values: Values, settings: TreesSettings) -> Values | float:
     one third in the shade, where it misses more road.
     """
     names = names_of(settings.features)
-    if FEATURES[-1] not in names:
+    if REACH[-1] not in names:
         return IN_LIGHT
-    share = lit(values[names.index(FEATURES[-1])])
+    share = lit(values[names.index(REACH[-1])])
     weight: Values = np.float32(IN_SHADE) + np.float32(IN_LIGHT - IN_SHADE) * share
     return weight
 
@@ -191,12 +269,12 @@ def bind(settings: TreesSettings, learnt: Stack) -> Callable[[View], Output]:
     """Return the trees as a pure function of what they see; a `MisfitError`, see `check_fit`."""
     check_fit(learnt, settings)
     names = names_of(settings.features)
-    known = [names.index(name) for name in FEATURES if name in names]
+    known = [names.index(name) for name in REACH if name in names]
 
     def run(view: View) -> Output:
         scene, shape = scene_of(view.image, settings.width, settings.patch), view.image.shape
         seen = features(scene, settings.features)
-        over, around, light = seen[known] if len(known) == len(FEATURES) else inputs(scene)
+        over, around, light = seen[known] if len(known) == len(REACH) else reach_inputs(scene)
         far = combined(over, around)
         opinion = log_odds(seen, learnt, settings)
         odds = opinion - np.float32(settings.reach_weight) * beyond(far, light)

@@ -3,15 +3,15 @@
 | equation | what | function |
 |---|---|---|
 | 2 | Mahalanobis distance to the road's colour | `similarity.bind`, `similarity.fit` |
-| 3 | value | `hsi.value` |
-| 4 | saturation | `hsi.saturation` |
-| 5 | hue | `hsi.hue` |
-| 6 | NDI | `shadow_mask.ndi` |
-| 7 | Otsu's threshold | `shadow_mask.otsu_threshold`, `shadow_mask.printed_threshold` |
-| 8 | shadow mask | `shadow_mask.shadow_mask` |
-| 9 | connected components | `compensation.connected_components` |
-| 10 | buffer rings | `compensation.buffer_ring`, `compensation.ring_pairs` |
-| 11 | compensation | `compensation.compensation`, `compensation.compensate` |
+| 3 | value | `shadow.value` |
+| 4 | saturation | `shadow.saturation` |
+| 5 | hue | `shadow.hue` |
+| 6 | NDI | `shadow.ndi` |
+| 7 | Otsu's threshold | `shadow.otsu_threshold`, `shadow.printed_threshold` |
+| 8 | shadow mask | `shadow.shadow_mask` |
+| 9 | connected components | `shadow.connected_components` |
+| 10 | buffer rings | `shadow.buffer_ring`, `shadow.ring_pairs` |
+| 11 | compensation | `shadow.compensation`, `shadow.compensate` |
 | 12-16 | support vector machine | `svm.fit` (14), `svm.decision` (15, 16) |
 | 17 | dilation | `post.dilate` |
 | 18 | erosion | `post.erode` |

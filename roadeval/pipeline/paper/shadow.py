@@ -1,37 +1,38 @@
 """Phase 2, the shadow filter (section 3.2): finds shadow and gives it the colours around it.
 
-The mask (Eq. 6-8) is in `shadow_mask`, components, rings and the compensation (Eq. 9-11) in
-`compensation`.
+Hue, saturation and value (Eq. 3-5), the mask by NDI and Otsu's threshold (Eq. 6-8), components and
+buffer rings (Eq. 9-10), their compensation (Eq. 11), the stage.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Final
+from dataclasses import dataclass
+from typing import Annotated, Final, Literal
 
 import numpy as np
+import numpy.typing as npt
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import (
     LabelClass,
     Layer,
     LayerKind,
     LayerSpec,
+    Mask,
     Packed,
+    Rgb,
     Truth,
     colours,
     everywhere,
 )
+from roadeval.data.arrays import Floats, Labels, Runs
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.paper.compensation import Compensation, lift
-from roadeval.pipeline.paper.shadow_mask import (
-    NDI_CODES,
-    otsu_threshold,
-    printed_threshold,
-    shadow_mask,
-)
-from roadeval.pipeline.paper.shadow_settings import ShadowSettings
 from roadeval.pipeline.stage import Output, Stage, View
+
+Codes = npt.NDArray[np.uint8]
 
 SHADOW_COLOUR: Final = colours.with_opacity(colours.SHADOW, 160)
 RING_COLOUR: Final = colours.with_opacity(colours.RING, 220)
@@ -56,6 +57,363 @@ RINGS: Final = LayerSpec(
 COMPENSATED: Final = LayerSpec(
     "compensated", LayerKind.RGB, "Compensated image (Eq. 11)", exact=False
 )
+
+
+@validated(frozen=True, config=ConfigDict(extra="forbid"))
+class ShadowSettings:
+    """Settings of the shadow filter."""
+
+    threshold: Literal["otsu", "printed"] = "otsu"
+    """``otsu``: the between-class variance of Otsu (1979); ``printed``: Eq. 7 with the definitions
+    printed beside it, which lands at the edge of the histogram."""
+    inclusive: bool = False
+    """Whether the threshold's own code is shadow, as printed in Eq. 8. Otsu's upper class begins
+    above it."""
+    connectivity: Literal[4, 8] = 8
+    """Neighbours that make one component (Eq. 9): 8 or 4."""
+    ring_width: Annotated[int, Field(ge=1, le=16)] = 1
+    """Number of 3x3 dilations that make a buffer ring (Eq. 10), at most 16: the work grows with its
+    square."""
+    min_area: Annotated[int, Field(ge=1)] = 1
+    """Components of fewer pixels are left as they are."""
+    max_gain: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+    """Upper bound of the contrast gain of Eq. 11; none as printed. Gains above 3 are common."""
+    statistic: Literal["deviation", "printed"] = "deviation"
+    """``deviation``: ``mu_ring + (I - mu) * sigma_ring / sigma``, which gives the component its
+    ring's mean and standard deviation; ``printed``: Eq. 11 literally, variances and inverted."""
+    colour_space: Literal["rgb", "hsi"] = "rgb"
+    """Where the compensation happens: ``rgb``, or ``hsi`` (S and V of Eq. 3-5, hue kept, converted
+    back as step 5 of section 4.2 says)."""
+
+
+# --- Hue, saturation and value: Eq. 3-5 -----------------------------------------------------------
+
+
+def value(rgb: npt.NDArray[np.uint8]) -> Floats:
+    """Return V of ``(..., 3)`` uint8 RGB: ``(R + G + B) / 3`` over 255, in 0..1 (Eq. 3)."""
+    result: Floats = rgb.sum(axis=-1, dtype=np.int64) / (3 * 255)
+    return result
+
+
+def saturation(rgb: npt.NDArray[np.uint8]) -> Floats:
+    """Return S of ``(..., 3)`` uint8 RGB: ``1 - 3 min / (R + G + B)`` 0 for black (Eq. 4)."""
+    total = rgb.sum(axis=-1, dtype=np.int64)
+    low = rgb.min(axis=-1).astype(np.int64)
+    return np.where(total > 0, 1.0 - 3.0 * low / np.maximum(total, 1), 0.0)
+
+
+def hue(rgb: npt.NDArray[np.uint8]) -> Floats:
+    """Return H of ``(..., 3)`` uint8 RGB in degrees, 0..360; 0 for greys (Eq. 5).
+
+    The printed equation gives both branches the condition ``B <= G``; the second one is
+    ``360 - theta`` where ``B > G``.
+    """
+    r, g, b = (rgb[..., c].astype(np.float64) for c in range(3))
+    root = np.sqrt((r - g) ** 2 + (r - b) * (g - b))
+    cosine = 0.5 * ((r - g) + (r - b)) / np.where(root > 0, root, 1.0)
+    theta = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return np.where(root > 0, np.where(b <= g, theta, 360.0 - theta), 0.0)
+
+
+def hsv_to_rgb(h: Floats, s: Floats, v: Floats) -> npt.NDArray[np.uint8]:
+    """Invert Eq. 3-5: ``(...,)`` degrees, 0..1, 0..1 to ``(..., 3)`` uint8 RGB, clipped.
+
+    Within each third of the hue circle the least channel is ``V (1 - S)``, the leading one
+    follows from the hue, and the last one from ``R + G + B = 3 V``.
+    """
+    third = np.floor(np.mod(h, 360.0) / 120.0).astype(np.int64) % 3
+    angle = np.radians(np.mod(h, 120.0))
+    least = v * (1.0 - s)
+    leading = v * (1.0 + s * np.cos(angle) / np.cos(np.pi / 3.0 - angle))
+    between = 3.0 * v - least - leading
+    rgb = np.empty((*np.shape(h), 3))
+    # Third 0 runs from red to green, 1 from green to blue, 2 from blue to red.
+    for channel in range(3):
+        place = (channel - third) % 3
+        rgb[..., channel] = np.select([place == 0, place == 1], [leading, between], least)
+    return np.clip(np.rint(rgb * 255.0), 0, 255).astype(np.uint8)
+
+
+# --- The mask: Eq. 6-8 ----------------------------------------------------------------------------
+
+
+def ndi(saturation: Floats, value: Floats) -> Floats:
+    """Compute the normalised difference index ``(S - V) / (S + V)`` in -1..1 (Eq. 6, section 3.2).
+
+    The printed ``S - V / S - V`` lacks its brackets and a sign. ``S + V`` is 0 for pure black
+    alone, which is -1 like every other grey, so that a rectified image's border is no shadow.
+    """
+    total = saturation + value
+    return np.where(total > 0, (saturation - value) / np.where(total > 0, total, 1.0), -1.0)
+
+
+def ndi_code(index: Floats) -> Codes:
+    """Quantise NDI in -1..1 to the codes 0..255, ``rint((NDI + 1) * 127.5)``, uint8."""
+    return np.rint((index + 1.0) * 127.5).astype(np.uint8)
+
+
+def _ndi_codes() -> Codes:
+    total = np.arange(3 * 255 + 1, dtype=np.float64)[:, None]
+    least = np.minimum(np.arange(256, dtype=np.float64)[None, :], np.floor(total / 3))
+    # NDI stays the same when S and V grow alike: times 765 (R + G + B) both are whole numbers,
+    # and a code that lies halfway, as (R + G + B, min) = (85, 0) does, is rounded as one.
+    return ndi_code(ndi(3 * 255 * (total - 3.0 * least), total**2))
+
+
+NDI_CODES: Final = _ndi_codes()
+"""``(766, 256)`` uint8: the code of Eq. 6 by ``R + G + B`` and ``min(R, G, B)``, on which alone
+S, V and so NDI depend."""
+
+
+_LEVELS: Final = np.arange(256)
+"""j of Eq. 7."""
+
+
+def otsu_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
+    """Return Otsu's threshold of a ``(256,)`` histogram (Eq. 7 as its source means it).
+
+    The lowest T that maximises ``(mu_T w(T) - mu(T))^2 / (w(T) (1 - w(T)))``, with the weight
+    ``w(T)`` and the first moment ``mu(T) = sum_{j<=T} j p_j`` of the lower class. The printed
+    text defines ``mu(T)`` as the upper class's weight. None with a single occupied code.
+    """
+    lower, moment = histogram.cumsum(), (histogram * _LEVELS).cumsum()
+    total = lower[-1]
+    return _first_maximum(moment[-1] * lower - moment * total, lower * (total - lower))
+
+
+def printed_threshold(histogram: npt.NDArray[np.int64]) -> int | None:
+    """Return Eq. 7's threshold with the definitions printed beside it: ``mu(T) = sum_{j>T} p_j``.
+
+    The lowest T that maximises ``(mu_T w(T) - mu(T))^2 / (w(T) mu(T))``, where it is defined.
+    None with a single occupied code.
+    """
+    lower, mean = histogram.cumsum(), (histogram * _LEVELS).sum()
+    total = lower[-1]
+    upper = total - lower
+    return _first_maximum(mean * lower - upper * total, lower * upper)
+
+
+def _first_maximum(difference: npt.NDArray[np.int64], weights: npt.NDArray[np.int64]) -> int | None:
+    """Return the lowest T of greatest ``difference^2 / weights``, of those with positive weights.
+
+    Both criteria of Eq. 7 times the squared number of pixels: whole numbers, so that codes
+    that no pixel has tie exactly with the code below them.
+    """
+    if not weights.any():
+        return None
+    criterion = difference.astype(np.float64) ** 2 / np.maximum(weights, 1)
+    return int(np.argmax(np.where(weights > 0, criterion, -1.0)))
+
+
+def shadow_mask(codes: Codes, threshold: int | None, *, inclusive: bool) -> Mask:
+    """Return the mask of Eq. 8, ``(H, W)`` uint8: codes above ``threshold`` (or equal to it)."""
+    if threshold is None:
+        return np.zeros(codes.shape, np.uint8)
+    return (codes >= threshold if inclusive else codes > threshold).view(np.uint8)
+
+
+# --- Components and buffer rings: Eq. 9-10 --------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Components:
+    """Connected components of an image of ``shape`` (H, W), numbered from 1.
+
+    ``runs`` is ``(n, 4)`` int32: row, first column, column after the last, and label of each of
+    their rows' stretches. ``count`` is their number.
+    """
+
+    runs: Runs
+    count: int
+    shape: tuple[int, int]
+
+    def labels(self) -> Labels:
+        """Return their label image: ``(H, W)`` int32, 0 outside."""
+        return KERNELS.paint(self.runs, *self.shape)
+
+
+def connected_components(shadow: Packed, connectivity: int) -> Components:
+    """Return the 4- or 8-connected components of a mask: Eq. 9's fixed point for every seed."""
+    runs, count = KERNELS.components(shadow.bits, shadow.width, connectivity)
+    return Components(runs, count, shadow.shape)
+
+
+def buffer_ring(shadow: Packed, width: int) -> Packed:
+    """Return the union of all buffer rings (Eq. 10): within ``width`` dilations, and not shadow."""
+    reached = KERNELS.dilate(shadow.bits, np.full(width + 1, width), shadow.width)
+    return Packed(reached & ~shadow.bits, shadow.width)
+
+
+def ring_pairs(
+    labels: Labels, ring: Mask, width: int
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Return every ``(component, pixel)`` where the pixel lies in the component's ring (Eq. 10).
+
+    Pixels are flat indices; a pixel near two components occurs with both.
+    """
+    y, x = np.nonzero(ring)
+    rows, columns = labels.shape
+    size = rows * columns
+    pairs = np.empty(0, np.int64)
+    for dy in range(-width, width + 1):
+        keys = []
+        for dx in range(-width, width + 1):
+            v, u = y + dy, x + dx
+            valid = (v >= 0) & (v < rows) & (u >= 0) & (u < columns)
+            near = labels[v[valid], u[valid]].astype(np.int64)
+            keys.append((near * size + y[valid] * columns + x[valid])[near > 0])
+        # Row by row: the repetitions of a wide ring would take much memory together.
+        pairs = np.unique(np.concatenate([pairs, *keys]))
+    return pairs // size, pairs % size
+
+
+# --- Compensation: Eq. 11 -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moments:
+    """Pixels ``(count,)``, means and population standard deviations ``(count, C)`` by label."""
+
+    pixels: npt.NDArray[np.int64]
+    mean: Floats
+    deviation: Floats
+
+    def __getitem__(self, labels: slice) -> Moments:
+        """Return those of some of the labels."""
+        return Moments(self.pixels[labels], self.mean[labels], self.deviation[labels])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Compensation:
+    """The linear map of each component, ``target + (I - source) * gain``; ``(count, C)`` each.
+
+    ``applied`` is ``(count,)`` bool: the components that have a ring and the least area. The
+    others map to themselves.
+    """
+
+    source: Floats
+    target: Floats
+    gain: Floats
+    applied: npt.NDArray[np.bool_]
+
+
+def moments_of_sums(sums: npt.NDArray[np.int64]) -> Moments:
+    """Moments by label from `roadeval.kernels.plain.run_sums`.
+
+    The variance is taken about the grey level next to the mean, in integers: nothing cancels,
+    a constant component has a deviation of exactly 0, and no component is too large.
+    """
+    # Whole numbers below 2^53, so that their products and differences are exact in float64. By
+    # columns in memory, so that NumPy works on contiguous values.
+    exact = sums.astype(np.float64, order="F")
+    n, first, second = np.maximum(exact[:, :1], 1.0), exact[:, 1:4], exact[:, 4:]
+    mean = first / n
+    level = np.rint(mean)
+    about = (first - n * level) / n
+    variance = (second - level * (2.0 * first - n * level)) / n - about**2
+    return Moments(sums[:, 0], mean, np.sqrt(variance))
+
+
+def moments_of_values(labels: npt.NDArray[np.integer], values: Floats, count: int) -> Moments:
+    """Moments by label of ``(n, C)`` values, in two passes; below 1e-9 a deviation is 0."""
+    pixels = np.bincount(labels, minlength=count)
+    n = np.maximum(pixels, 1)[:, None]
+
+    def mean(quantity: Floats) -> Floats:
+        columns = [np.bincount(labels, quantity[:, c], count) for c in range(quantity.shape[1])]
+        return np.stack(columns, axis=1) / n
+
+    centre = mean(values)
+    deviation = np.sqrt(mean((values - centre[labels]) ** 2))
+    return Moments(pixels, centre, np.where(deviation < 1e-9, 0.0, deviation))
+
+
+def compensation(inside: Moments, ring: Moments, settings: ShadowSettings) -> Compensation:
+    """Compute the linear map of Eq. 11 for every component, each channel by itself.
+
+    ``deviation`` gives ``mu_ring + (I - mu) * sigma_ring / sigma`` (gain 1 where sigma is 0),
+    after which the component has its ring's mean and deviation. ``printed`` gives
+    ``mu_ring + (I - mu) / sigma_ring^2 * sigma^2`` (gain 1 where the ring's variance is 0),
+    which has the ratio upside down and flattens the region instead.
+    """
+    if settings.statistic == "deviation":
+        numerator, denominator = ring.deviation, inside.deviation
+    else:
+        numerator, denominator = inside.deviation**2, ring.deviation**2
+    gain = np.where(denominator > 0, numerator / np.where(denominator > 0, denominator, 1.0), 1.0)
+    if settings.max_gain is not None:
+        gain = np.minimum(gain, settings.max_gain)
+    applied = (ring.pixels > 0) & (inside.pixels >= settings.min_area)
+    applied[0] = False
+    here = applied[:, None]
+    return Compensation(
+        inside.mean,
+        np.where(here, ring.mean, inside.mean),
+        np.where(here, gain, 1.0),
+        applied,
+    )
+
+
+def compensate(
+    view: View, found: Components, ring: Packed, settings: ShadowSettings
+) -> tuple[Rgb, Compensation]:
+    """Apply Eq. 11 to every component of the image that is seen.
+
+    ``ring`` is the union of their buffer rings. Without a component it is the image itself.
+    """
+    if settings.colour_space == "hsi":
+        return _compensate_hsi(view.image, found, ring, settings)
+    count, width = found.count + 1, settings.ring_width
+    inside = KERNELS.run_sums(view.planes, found.runs, count)
+    around = KERNELS.ring_sums(view.planes, found.runs, ring.bits, count, width)
+    # In one call: most of its time does not depend on their number.
+    both = moments_of_sums(np.concatenate([inside, around]))
+    change = compensation(both[:count], both[count:], settings)
+    # The kernels take C-contiguous arrays.
+    linear = map(np.ascontiguousarray, (change.source, change.target, change.gain))
+    image = KERNELS.transfer(view.image, found.runs, *linear) if found.count else view.image
+    return image, change
+
+
+def lift(
+    view: View, shadow: Packed, settings: ShadowSettings
+) -> tuple[Rgb, Packed, int, Compensation]:
+    """Compensate what a mask calls shadow: components, rings, linear map (Eq. 9-11).
+
+    Returns the image, the rings, the number of components, and the map of each.
+    """
+    found = connected_components(shadow, settings.connectivity)
+    ring = buffer_ring(shadow, settings.ring_width)
+    image, change = compensate(view, found, ring, settings)
+    return image, ring, found.count, change
+
+
+def _compensate_hsi(
+    image: Rgb, found: Components, ring: Packed, settings: ShadowSettings
+) -> tuple[Rgb, Compensation]:
+    """Compensate saturation and value, keep the hue, and convert back (section 4.2, step 5)."""
+    labels = found.labels()
+    label, pixel = ring_pairs(labels, ring.pixels(), settings.ring_width)
+    flat = image.reshape(-1, 3)
+    shadow = np.flatnonzero(labels)
+    k = labels.ravel()[shadow]
+    values = _saturation_value(flat[shadow])
+    inside = moments_of_values(k, values, found.count + 1)
+    around = moments_of_values(label, _saturation_value(flat[pixel]), found.count + 1)
+    change = compensation(inside, around, settings)
+    mapped = change.target[k] + (values - change.source[k]) * change.gain[k]
+    mapped = np.clip(mapped, 0.0, 1.0)
+    result = flat.copy()
+    # Components that are left as they are come back exactly: the conversion inverts every hsi.
+    result[shadow] = hsv_to_rgb(hue(flat[shadow]), mapped[:, 0], mapped[:, 1])
+    return result.reshape(image.shape), change
+
+
+def _saturation_value(rgb: npt.NDArray[np.uint8]) -> Floats:
+    return np.stack([saturation(rgb), value(rgb)], axis=-1)
+
+
+# --- The stage ------------------------------------------------------------------------------------
 
 
 def bind(settings: ShadowSettings, _parameters: None) -> Callable[[View], Output]:

@@ -5,19 +5,17 @@ import numpy as np
 import pytest
 from sklearn.linear_model import LogisticRegression
 
-from roadeval.pipeline.beyond import gated, shaded_road
-from roadeval.pipeline.beyond.shade_candidates import (
+from roadeval.pipeline.beyond import gated
+from roadeval.pipeline.beyond.gated import (
     FEATURES,
     GRID,
     GatedSettings,
-    features_of,
-    look,
-)
-from roadeval.pipeline.beyond.shaded_road import (
     ShadedRoad,
+    features_of,
     gains,
     learn_place,
     logistic,
+    look,
     probability,
 )
 from roadeval.pipeline.stage import TrainingSet, View
@@ -163,7 +161,7 @@ def test_shade_on_the_road_is_learnt_and_a_dark_car_is_not():
         [*columns, *rng.integers(0, WIDTH, 100)],
         [True] * 100 + [False] * 100 + [True] * 100,
     )
-    learnt = shaded_road.fit(sample, GatedSettings())
+    learnt = gated.fit(sample, GatedSettings())
     _, layers = run(image, learnt)
     assert layers["shaded"][85:110, 25:65].min() > 0.8
     assert layers["shaded"][85:110, 95:135].max() < 0.2
@@ -172,7 +170,7 @@ def test_shade_on_the_road_is_learnt_and_a_dark_car_is_not():
 def test_nothing_is_brightened_where_there_was_no_shade_to_learn_from():
     image = road([40, 40, 40])
     rows, columns = np.indices((35, 60)).reshape(2, -1) + np.array([[70], [50]])
-    learnt = shaded_road.fit(sampled([image], rows, columns, np.zeros(len(rows))), GatedSettings())
+    learnt = gated.fit(sampled([image], rows, columns, np.zeros(len(rows))), GatedSettings())
     assert run(image, learnt)[0].image is image
 
 

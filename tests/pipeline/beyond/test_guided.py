@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from roadeval.pipeline.beyond.guided import CONTRAST, SIDE, guided
+from roadeval.pipeline.beyond.scene import CONTRAST, SIDE, guided
 
 
 def grey(levels):

@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 from sklearn.neural_network import MLPClassifier
 
-from roadeval.pipeline.beyond.blend import Blend
-from roadeval.pipeline.beyond.forest import grow
-from roadeval.pipeline.beyond.ground.reach import SHADE, SUN
-from roadeval.pipeline.beyond.ground_features import GROUPS, names_of
+from roadeval.pipeline.beyond.features import GROUPS, SHADE, SUN, names_of
+from roadeval.pipeline.beyond.forest import Growth, grow
 from roadeval.pipeline.beyond.hidden_layer import CODES, HiddenLayer, codes_of, train
-from roadeval.pipeline.beyond.trees import TreesSettings, balanced_back, network_weight
+from roadeval.pipeline.beyond.trees import Blend, TreesSettings, balanced_back, network_weight
 
-SMALL = TreesSettings(trees=10, leaves=8, least=5, hidden=32, passes=100, noise=0.1)
+SMALL = {"planes": 32, "passes": 100, "noise": 0.1}
 
 
 def features_and_road(seed=0, count=1000):
@@ -28,7 +26,7 @@ def planes_of(values):
 
 @pytest.fixture(scope="module")
 def network():
-    return train(*features_and_road(), None, SMALL, 0)
+    return train(*features_and_road(), None, 0, **SMALL)
 
 
 def test_it_learns_what_no_plane_alone_parts(network):
@@ -37,10 +35,10 @@ def test_it_learns_what_no_plane_alone_parts(network):
 
 
 def test_the_same_seed_trains_the_same_network(network):
-    again = train(*features_and_road(), None, SMALL, 0)
+    again = train(*features_and_road(), None, 0, **SMALL)
     for field in fields(HiddenLayer):
         np.testing.assert_array_equal(getattr(again, field.name), getattr(network, field.name))
-    assert (train(*features_and_road(), None, SMALL, 1).planes != network.planes).any()
+    assert (train(*features_and_road(), None, 1, **SMALL).planes != network.planes).any()
 
 
 def test_what_is_beyond_all_that_was_seen_counts_as_the_outermost(network):
@@ -62,7 +60,7 @@ def test_ranks_are_even_and_codes_hold_the_range(network):
 def test_a_feature_that_never_varies_does_no_harm():
     values, road = features_and_road()
     values[:, 3] = 7
-    found = train(values, road, None, SMALL, 0).sums(planes_of(values))
+    found = train(values, road, None, 0, **SMALL).sums(planes_of(values))
     assert np.isfinite(found).all()
     assert ((found > 0) == road).mean() > 0.9
 
@@ -70,7 +68,7 @@ def test_a_feature_that_never_varies_does_no_harm():
 def test_rarer_road_is_less_probable():
     values, road = features_and_road()
     few, many = (
-        train(values, road, balanced_back(road, share), SMALL, 0).sums(planes_of(values))
+        train(values, road, balanced_back(road, share), 0, **SMALL).sums(planes_of(values))
         for share in (0.05, 0.95)
     )
     assert few.mean() < many.mean() - 1
@@ -78,7 +76,7 @@ def test_rarer_road_is_less_probable():
 
 def test_a_blend_is_the_weighted_mean(network):
     values, road = features_and_road()
-    forest = grow(values, road, None, SMALL, 0)
+    forest = grow(values, road, None, Growth(10, 8, 0.1, 5, 0.33), 0)
     seen = planes_of(values)
     trees, other = forest.sums(seen), network.sums(seen)
     blend = Blend(forest, network)

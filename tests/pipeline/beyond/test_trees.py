@@ -8,13 +8,10 @@ import pytest
 from sklearn.ensemble import HistGradientBoostingClassifier
 
 from roadeval.pipeline.beyond import trees
-from roadeval.pipeline.beyond.blend import Blend, Stack
-from roadeval.pipeline.beyond.forest import ALL, BINS, NODES, bin_edges, grow
-from roadeval.pipeline.beyond.ground.reach import reach
-from roadeval.pipeline.beyond.ground.scene import scene_of
-from roadeval.pipeline.beyond.ground_features import at_samples, names_of
-from roadeval.pipeline.beyond.trees import TreesSettings, balanced_back
-from roadeval.pipeline.beyond.working_image import stretched
+from roadeval.pipeline.beyond.features import at_samples, names_of, reach
+from roadeval.pipeline.beyond.forest import ALL, BINS, NODES, Growth, bin_edges, grow
+from roadeval.pipeline.beyond.scene import scene_of, stretched
+from roadeval.pipeline.beyond.trees import Blend, Stack, TreesSettings, balanced_back
 from roadeval.pipeline.stage import MisfitError, TrainingSet, View
 
 SMALL = TreesSettings(width=32, trees=20, leaves=8, least=5)
@@ -61,8 +58,8 @@ def test_the_arrays_say_what_scikit_learns_trees_say(leaves, weighted):
     values, road = features_and_road(count=1000)
     values = values.round(1)  # so few that scikit-learn's own bins are the same in each version
     weights = balanced_back(road, 0.2) if weighted else None
-    settings = replace(SMALL, leaves=leaves, share=1.0)
-    found = grow(values, road, weights, settings, 0).sums(np.ascontiguousarray(values.T))
+    growth = Growth(SMALL.trees, leaves, SMALL.rate, SMALL.least, share=1.0)
+    found = grow(values, road, weights, growth, 0).sums(np.ascontiguousarray(values.T))
     boosting = HistGradientBoostingClassifier(
         learning_rate=SMALL.rate,
         max_iter=SMALL.trees,

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from skimage.color import rgb2hsv
 
-from roadeval.pipeline.paper import hsi as colour
+from roadeval.pipeline.paper import shadow as colour
 from tests.pipeline.images import noise
 
 
@@ -47,17 +47,17 @@ def test_conversion_inverts_on_every_seventh_level_and_on_random_colours():
     levels = np.append(np.arange(0, 256, 7), 255).astype(np.uint8)
     lattice = np.stack(np.meshgrid(levels, levels, levels), axis=-1)
     for rgb in (lattice, noise(300, 300)):
-        back = colour.to_rgb(colour.hue(rgb), colour.saturation(rgb), colour.value(rgb))
+        back = colour.hsv_to_rgb(colour.hue(rgb), colour.saturation(rgb), colour.value(rgb))
         np.testing.assert_array_equal(back, rgb)
 
 
 def test_colours_outside_the_cube_are_clipped():
-    white_bright_red = colour.to_rgb(np.array(0.0), np.array(1.0), np.array(1.0))
+    white_bright_red = colour.hsv_to_rgb(np.array(0.0), np.array(1.0), np.array(1.0))
     assert white_bright_red.tolist() == [255, 0, 0]
 
 
 def test_a_hue_of_360_degrees_is_red():
     full, v = np.array(1.0), np.array(1 / 3)
     np.testing.assert_array_equal(
-        colour.to_rgb(np.array(360.0), full, v), colour.to_rgb(np.array(0.0), full, v)
+        colour.hsv_to_rgb(np.array(360.0), full, v), colour.hsv_to_rgb(np.array(0.0), full, v)
     )

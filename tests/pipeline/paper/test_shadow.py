@@ -12,8 +12,8 @@ from skimage.filters import threshold_otsu
 
 from roadeval.data.packed import Packed
 from roadeval.kernels import KERNELS, plain
-from roadeval.pipeline.paper import compensation, shadow, shadow_mask
-from roadeval.pipeline.paper.shadow_settings import ShadowSettings
+from roadeval.pipeline.paper import shadow
+from roadeval.pipeline.paper.shadow import ShadowSettings
 from roadeval.pipeline.stage import View
 from tests.pipeline import reference
 from tests.pipeline.images import DARK, IMAGES, LIT, images, mask, masks, noise, picture
@@ -24,7 +24,7 @@ PRINTED = ShadowSettings(
 
 
 def codes_of(image):
-    return KERNELS.look_up_sum_min(cv2.split(image), shadow_mask.NDI_CODES)
+    return KERNELS.look_up_sum_min(cv2.split(image), shadow.NDI_CODES)
 
 
 def run(image, options=None):
@@ -46,7 +46,7 @@ def test_ndi_of_every_sum_and_minimum():
     expected = np.where(halfway & (nearest % 2 == 1), nearest - 1, nearest)
     possible = total - least <= 510
     np.testing.assert_array_equal(
-        shadow_mask.NDI_CODES[total[possible].astype(int), least[possible].astype(int)],
+        shadow.NDI_CODES[total[possible].astype(int), least[possible].astype(int)],
         expected[possible].astype(int),
     )
     assert halfway[possible].sum() == 2
@@ -106,7 +106,7 @@ def test_otsu_is_the_first_maximum_of_the_between_class_variance(histogram):
     def moment(p, t):
         return sum(level * share for level, share in p.items() if level <= t)
 
-    assert shadow_mask.otsu_threshold(as_array(histogram)) == first_maximum(histogram, moment)
+    assert shadow.otsu_threshold(as_array(histogram)) == first_maximum(histogram, moment)
 
 
 @given(histograms)
@@ -114,7 +114,7 @@ def test_the_printed_threshold_takes_the_upper_weight_for_mu(histogram):
     def weight(p, t):
         return sum(share for level, share in p.items() if level > t)
 
-    assert shadow_mask.printed_threshold(as_array(histogram)) == first_maximum(histogram, weight)
+    assert shadow.printed_threshold(as_array(histogram)) == first_maximum(histogram, weight)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -122,51 +122,51 @@ def test_otsu_equals_opencv_and_scikit_image(seed):
     rng = np.random.default_rng(seed)
     parts = rng.normal(rng.uniform(20, 100), 15, 4000), rng.normal(rng.uniform(110, 230), 20, 3000)
     codes = np.clip(np.concatenate(parts), 0, 255).astype(np.uint8).reshape(70, 100)
-    ours = shadow_mask.otsu_threshold(np.bincount(codes.ravel(), minlength=256))
+    ours = shadow.otsu_threshold(np.bincount(codes.ravel(), minlength=256))
     assert ours == threshold_otsu(codes)
     assert ours == cv2.threshold(codes, 0, 255, cv2.THRESH_OTSU)[0]
 
 
 def test_otsu_takes_the_lower_of_two_equal_maxima():
-    assert shadow_mask.otsu_threshold(as_array({10: 5, 20: 5, 30: 5})) == 10
+    assert shadow.otsu_threshold(as_array({10: 5, 20: 5, 30: 5})) == 10
 
 
 def test_otsu_ties_on_codes_that_no_pixel_has_go_to_the_lowest():
-    assert shadow_mask.otsu_threshold(as_array({3: 7, 200: 9})) == 3
+    assert shadow.otsu_threshold(as_array({3: 7, 200: 9})) == 3
 
 
 @pytest.mark.parametrize("pixels", [10**4, 3 * 10**7])
 def test_thresholds_do_not_depend_on_the_number_of_pixels(pixels):
     counts = as_array({40: 4, 50: 3, 90: 1, 180: 2}) * (pixels // 10)
-    assert shadow_mask.otsu_threshold(counts) == 90
-    assert shadow_mask.printed_threshold(counts) == 90
+    assert shadow.otsu_threshold(counts) == 90
+    assert shadow.printed_threshold(counts) == 90
 
 
 def test_the_printed_threshold_is_at_the_lower_edge_where_most_codes_are_near_0():
     # Mean 60/56. T = 0: w = 1/56, criterion 53.0; T = 1: w = 51/56, criterion 9.7.
-    assert shadow_mask.printed_threshold(as_array({0: 1, 1: 50, 2: 5})) == 0
+    assert shadow.printed_threshold(as_array({0: 1, 1: 50, 2: 5})) == 0
     # Mean 1: (w - mu)^2 / (w mu) is the same for w = 1/102 and for w = 101/102.
-    assert shadow_mask.printed_threshold(as_array({0: 1, 1: 100, 2: 1})) == 0
+    assert shadow.printed_threshold(as_array({0: 1, 1: 100, 2: 1})) == 0
 
 
 def test_the_printed_threshold_lands_at_the_edge_of_the_histogram():
     counts = as_array({level: 400 - abs(level - 100) for level in range(5, 200)})
-    assert shadow_mask.printed_threshold(counts) == 198
-    assert 80 < shadow_mask.otsu_threshold(counts) < 120
+    assert shadow.printed_threshold(counts) == 198
+    assert 80 < shadow.otsu_threshold(counts) < 120
 
 
-@pytest.mark.parametrize("threshold", [shadow_mask.otsu_threshold, shadow_mask.printed_threshold])
+@pytest.mark.parametrize("threshold", [shadow.otsu_threshold, shadow.printed_threshold])
 def test_a_single_occupied_code_has_no_threshold_and_no_shadow(threshold):
     assert threshold(as_array({77: 12})) is None
     codes = np.full((3, 4), 77, np.uint8)
-    assert not shadow_mask.shadow_mask(codes, None, inclusive=False).any()
-    assert not shadow_mask.shadow_mask(codes, None, inclusive=True).any()
+    assert not shadow.shadow_mask(codes, None, inclusive=False).any()
+    assert not shadow.shadow_mask(codes, None, inclusive=True).any()
 
 
 def test_the_threshold_itself_is_shadow_only_as_printed():
     codes = np.array([[4, 5, 6]], np.uint8)
-    assert shadow_mask.shadow_mask(codes, 5, inclusive=False).tolist() == [[0, 0, 1]]
-    assert shadow_mask.shadow_mask(codes, 5, inclusive=True).tolist() == [[0, 1, 1]]
+    assert shadow.shadow_mask(codes, 5, inclusive=False).tolist() == [[0, 0, 1]]
+    assert shadow.shadow_mask(codes, 5, inclusive=True).tolist() == [[0, 1, 1]]
 
 
 # --- Eq. 9 and 10 ---------------------------------------------------------------------------------
@@ -178,7 +178,7 @@ CROSS, SQUARE = ndimage.generate_binary_structure(2, 1), ndimage.generate_binary
 @given(shadowed=masks)
 @settings(max_examples=60)
 def test_components_are_the_fixed_points_of_the_iteration(connectivity, b, shadowed):
-    found = compensation.connected_components(Packed.of(shadowed), connectivity)
+    found = shadow.connected_components(Packed.of(shadowed), connectivity)
     labels, count = found.labels(), found.count
     assert set(np.unique(labels)) - {0} == set(range(1, count + 1))
     assert ((labels > 0) == shadowed).all()
@@ -204,7 +204,7 @@ def test_a_ring_by_hand():
 
 
 def buffer_ring(shadowed, width):
-    return compensation.buffer_ring(Packed.of(shadowed), width).pixels()
+    return shadow.buffer_ring(Packed.of(shadowed), width).pixels()
 
 
 def literal_rings(shadowed, labels, width):
@@ -219,9 +219,9 @@ def literal_rings(shadowed, labels, width):
 @given(shadowed=masks, width=st.integers(1, 3))
 @settings(max_examples=60)
 def test_rings_equal_the_dilation_of_each_component_alone(connectivity, shadowed, width):
-    labels = compensation.connected_components(Packed.of(shadowed), connectivity).labels()
+    labels = shadow.connected_components(Packed.of(shadowed), connectivity).labels()
     union = buffer_ring(shadowed, width)
-    label, pixel = compensation.ring_pairs(labels, union, width)
+    label, pixel = shadow.ring_pairs(labels, union, width)
     expected = list(literal_rings(shadowed, labels, width))
     assert (union == sum([ring for *_, ring in expected], np.zeros(shadowed.shape, bool))).all()
     for k, _, ring in expected:
@@ -232,7 +232,7 @@ def test_rings_equal_the_dilation_of_each_component_alone(connectivity, shadowed
 def test_a_pixel_between_two_components_counts_in_both_rings():
     image = noise(1, 7)
     labels = np.array([[0, 1, 0, 0, 2, 0, 0]], np.int32)
-    ring = compensation.buffer_ring(Packed.of(labels > 0), 2).bits
+    ring = shadow.buffer_ring(Packed.of(labels > 0), 2).bits
     outside = KERNELS.ring_sums(cv2.split(image), plain.label_runs(labels), ring, 3, 2)
     assert outside[1, 1:4].tolist() == image[0, [0, 2, 3]].sum(axis=0).tolist()
     assert outside[2, 1:4].tolist() == image[0, [2, 3, 5, 6]].sum(axis=0).tolist()
@@ -240,7 +240,7 @@ def test_a_pixel_between_two_components_counts_in_both_rings():
 
 def one(labels):
     """The component that a hand-made label image holds."""
-    return compensation.Components(plain.label_runs(labels), 1, labels.shape)
+    return shadow.Components(plain.label_runs(labels), 1, labels.shape)
 
 
 # --- Eq. 11 ---------------------------------------------------------------------------------------
@@ -252,12 +252,12 @@ def test_compensation_by_hand():
     image = np.repeat(grey[..., None], 3, axis=2)
     labels = np.array([[0, 1, 0], [0, 1, 0]], np.int32)
     ring = Packed.of(labels == 0)
-    result, change = compensation.compensate(View.of(image), one(labels), ring, ShadowSettings())
+    result, change = shadow.compensate(View.of(image), one(labels), ring, ShadowSettings())
     assert change.gain[1].tolist() == [3.0, 3.0, 3.0]
     assert result[..., 0].tolist() == [[94, 94, 106], [94, 106, 106]]
 
     printed = ShadowSettings(statistic="printed")
-    result, change = compensation.compensate(View.of(image), one(labels), ring, printed)
+    result, change = shadow.compensate(View.of(image), one(labels), ring, printed)
     assert change.gain[1, 0] == pytest.approx(4 / 36)
     assert result[..., 0].tolist() == [[94, 100, 106], [94, 100, 106]]
 
@@ -302,9 +302,9 @@ options = st.builds(
 
 def check_rgb(image, chosen):
     shadowed = run(image, chosen)[1]["shadow"]
-    found = compensation.connected_components(Packed.of(shadowed), chosen.connectivity)
-    ring = compensation.buffer_ring(Packed.of(shadowed), chosen.ring_width)
-    result, _ = compensation.compensate(View.of(image), found, ring, chosen)
+    found = shadow.connected_components(Packed.of(shadowed), chosen.connectivity)
+    ring = shadow.buffer_ring(Packed.of(shadowed), chosen.ring_width)
+    result, _ = shadow.compensate(View.of(image), found, ring, chosen)
     connectivity = 2 if chosen.connectivity == 8 else 1
     assert_rounded(result, literal_eq_11(image, shadowed, chosen, connectivity))
     np.testing.assert_array_equal(result[shadowed == 0], image[shadowed == 0])
@@ -341,10 +341,8 @@ def test_a_component_gets_the_mean_and_deviation_of_its_ring():
     image = np.clip(image, 0, 255).astype(np.uint8)
     labels = np.zeros((40, 40), np.int32)
     labels[10:30, 10:30] = 1
-    ring = compensation.buffer_ring(Packed.of(labels > 0), 3)
-    result, _ = compensation.compensate(
-        View.of(image), one(labels), ring, ShadowSettings(ring_width=3)
-    )
+    ring = shadow.buffer_ring(Packed.of(labels > 0), 3)
+    result, _ = shadow.compensate(View.of(image), one(labels), ring, ShadowSettings(ring_width=3))
     around, inside = image[ring.pixels() > 0].astype(float), result[labels > 0].astype(float)
     # Rounding moves no pixel, and so neither statistic, by more than half a level.
     np.testing.assert_allclose(inside.mean(axis=0), around.mean(axis=0), rtol=0, atol=0.5)
@@ -354,8 +352,8 @@ def test_a_component_gets_the_mean_and_deviation_of_its_ring():
 def test_a_constant_component_takes_the_mean_of_its_ring_with_gain_1():
     image = picture("....", ".#..", "....")
     labels = mask("....", ".#..", "....").astype(np.int32)
-    ring = compensation.buffer_ring(Packed.of(labels > 0), 1)
-    result, change = compensation.compensate(View.of(image), one(labels), ring, ShadowSettings())
+    ring = shadow.buffer_ring(Packed.of(labels > 0), 1)
+    result, change = shadow.compensate(View.of(image), one(labels), ring, ShadowSettings())
     assert change.gain[1].tolist() == [1.0, 1.0, 1.0]
     assert result[1, 1].tolist() == np.rint(image[ring.pixels() > 0].mean(axis=0)).tolist()
 
@@ -365,7 +363,7 @@ def test_a_component_without_a_ring_is_left_as_it_is(colour_space):
     image = noise(3, 4)
     labels, ring = np.ones((3, 4), np.int32), Packed.of(np.zeros((3, 4), np.uint8))
     chosen = ShadowSettings(colour_space=colour_space)
-    result, change = compensation.compensate(View.of(image), one(labels), ring, chosen)
+    result, change = shadow.compensate(View.of(image), one(labels), ring, chosen)
     np.testing.assert_array_equal(result, image)
     assert change.applied.tolist() == [False, False]
 
@@ -376,7 +374,7 @@ def test_the_gain_may_be_bounded_and_is_not_by_default():
     ring = Packed.of(np.array([[1, 0, 0, 1]], np.uint8))
     for most, gain in ((None, 125.0), (4.0, 4.0)):
         chosen = ShadowSettings(max_gain=most)
-        _, change = compensation.compensate(View.of(image), one(labels), ring, chosen)
+        _, change = shadow.compensate(View.of(image), one(labels), ring, chosen)
         assert change.gain[1, 0] == gain
 
 
@@ -384,7 +382,7 @@ def test_the_gain_may_be_bounded_and_is_not_by_default():
 def test_moments_equal_numpy_on_the_pixels_themselves(image):
     labels = np.ones(image.shape[:2], np.int32)
     sums = KERNELS.run_sums(cv2.split(image), one(labels).runs, 2)
-    moments = compensation.moments_of_sums(sums)
+    moments = shadow.moments_of_sums(sums)
     pixels = image.reshape(-1, 3).astype(float)
     assert moments.pixels[1] == len(pixels)
     np.testing.assert_allclose(moments.mean[1], pixels.mean(axis=0), rtol=1e-14)
@@ -396,7 +394,7 @@ def test_moments_equal_numpy_on_the_pixels_themselves(image):
 def test_a_constant_component_has_no_deviation_in_hsi_either(pixels):
     values = np.repeat(noise(1, 99)[0] / 255, pixels, axis=0)
     labels = np.repeat(np.arange(99), pixels)
-    moments = compensation.moments_of_values(labels, values, 99)
+    moments = shadow.moments_of_values(labels, values, 99)
     assert (moments.deviation == 0).all()
 
 
@@ -407,7 +405,7 @@ def test_moments_of_huge_components_neither_overflow_nor_cancel(pixels):
     mixed = 9 * tenth * np.array([254, 254**2]) + tenth * np.array([255, 255**2])
     even = pixels * np.array([255, 255**2])
     sums = np.array([[pixels, *[s] * 3, *[q] * 3] for s, q in (mixed, even)], np.int64)
-    moments = compensation.moments_of_sums(sums)
+    moments = shadow.moments_of_sums(sums)
     np.testing.assert_allclose(moments.mean[:, 0], [254.1, 255], rtol=1e-15)
     np.testing.assert_allclose(moments.deviation[:, 0], [0.3, 0], rtol=1e-14)
 
@@ -449,12 +447,12 @@ def test_facts_state_threshold_components_and_gains():
     image[2, 0] = 255  # so that the left ring varies much, and the right one does not
     facts = run(image)[0].facts
     _, histogram = codes_of(image)
-    assert facts["threshold"] == pytest.approx(shadow_mask.otsu_threshold(histogram) / 127.5 - 1)
+    assert facts["threshold"] == pytest.approx(shadow.otsu_threshold(histogram) / 127.5 - 1)
     assert facts["shadow_share"] == pytest.approx(3 / 15)
     assert facts["components"] == facts["compensated"] == 2
-    found = compensation.connected_components(Packed.of(run(image)[1]["shadow"]), 8)
-    ring = compensation.buffer_ring(Packed.of(found.labels() > 0), 1)
-    _, change = compensation.compensate(View.of(image), found, ring, ShadowSettings())
+    found = shadow.connected_components(Packed.of(run(image)[1]["shadow"]), 8)
+    ring = shadow.buffer_ring(Packed.of(found.labels() > 0), 1)
+    _, change = shadow.compensate(View.of(image), found, ring, ShadowSettings())
     assert facts["max_gain"] == change.gain.max() > 3
     assert facts["gains_above_3"] == (change.gain > 3).any(axis=1).sum() == 1
     left = shadow.bind(ShadowSettings(min_area=2), None)(View.of(image)).facts
@@ -464,7 +462,7 @@ def test_facts_state_threshold_components_and_gains():
 def test_a_component_with_one_gain_above_3_is_counted_once_and_one_left_alone_is_not():
     gain = np.array([[9.0, 9.0, 9.0], [1.0, 3.1, 3.2], [3.0, 3.0, 3.0], [9.0, 9.0, 9.0]])
     applied = np.array([False, True, True, False])
-    change = compensation.Compensation(gain, gain, gain, applied)
+    change = shadow.Compensation(gain, gain, gain, applied)
     facts = shadow._facts(100, Packed.of(np.eye(4, dtype=np.uint8)), 3, change)
     assert (facts["max_gain"], facts["gains_above_3"]) == (3.2, 1)
     assert (facts["components"], facts["compensated"], facts["shadow_share"]) == (3, 2, 0.25)

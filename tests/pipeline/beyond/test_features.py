@@ -8,19 +8,18 @@ from skimage.graph import MCP_Geometric
 from skimage.measure import block_reduce
 from skimage.transform import downscale_local_mean
 
-from roadeval.pipeline.beyond.ground import (
-    barriers,
-    colour,
-    light,
-    paths,
-    place,
-    scans,
-    surroundings,
-    texture,
+from roadeval.pipeline.beyond.features import (
+    GROUPS,
+    REACH,
+    beyond,
+    combined,
+    features,
+    names_of,
+    outwards,
+    reach,
+    reach_inputs,
 )
-from roadeval.pipeline.beyond.ground.reach import FEATURES, beyond, combined, inputs, reach
-from roadeval.pipeline.beyond.ground.scene import from_patch, scene_of, steepness, tones_of
-from roadeval.pipeline.beyond.ground_features import GROUPS, features, names_of
+from roadeval.pipeline.beyond.scene import from_patch, scene_of, steepness, tones_of
 from roadeval.pipeline.reference_patch import ReferencePatch
 
 PATCH = ReferencePatch()
@@ -113,10 +112,10 @@ def test_an_image_of_one_colour_has_no_feature_that_is_not_finite():
 
 
 def test_colour_is_projected_relative_to_the_patch(scene):
-    *channels, _, red, blue = colour.compute(scene)[:6]
+    *channels, _, red, blue = GROUPS["colour"].compute(scene)[:6]
     np.testing.assert_array_equal(np.stack(channels, axis=2), scene.image)
     inside = scene.patch > 0
-    for angle, found in zip((30, 45, 60), colour.compute(scene)[6:9], strict=True):
+    for angle, found in zip((30, 45, 60), GROUPS["colour"].compute(scene)[6:9], strict=True):
         way = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         own = way[0] * np.median(red[inside]) + way[1] * np.median(blue[inside])
         close(found, way[0] * red + way[1] * blue - own)
@@ -124,7 +123,7 @@ def test_colour_is_projected_relative_to_the_patch(scene):
 
 def test_light_is_held_against_the_lower_half_and_the_row(scene):
     own = scene.tones[0].astype(float)
-    half, bright, row, far = light.compute(scene)
+    half, bright, row, far = GROUPS["light"].compute(scene)
     lower = np.sort(own[HEIGHT // 2 :].ravel())
     close(own - half, lower[[len(lower) // 2 - 1, len(lower) // 2]].mean())
     assert np.mean(own[HEIGHT // 2 :] < (own - bright)[0, 0]) == pytest.approx(0.8, abs=0.01)
@@ -133,14 +132,14 @@ def test_light_is_held_against_the_lower_half_and_the_row(scene):
 
 
 def test_place_is_the_pixels_centre(scene):
-    across, outer, down = place.compute(scene)
+    across, outer, down = GROUPS["place"].compute(scene)
     close(across[0, [0, 31, 32, 63]], [-63 / 64, -1 / 64, 1 / 64, 63 / 64])
     np.testing.assert_array_equal(outer, np.abs(across))
     close(down[[0, 47], 0], [0.5 / 48, 47.5 / 48])
 
 
 def test_texture_is_the_root_of_the_mean_slope(scene):
-    found = texture.compute(scene)
+    found = GROUPS["texture"].compute(scene)
     for place_, (side, way) in enumerate((side, way) for side in (3, 9, 21) for way in (0, 1)):
         mean = averaged(np.abs(slopes(scene.tones[0])[way]), side)
         close(found[place_][INNER], np.sqrt(mean)[INNER], 1e-3)
@@ -149,7 +148,7 @@ def test_texture_is_the_root_of_the_mean_slope(scene):
 
 
 def test_surroundings_are_means_and_their_changes(scene):
-    found = surroundings.compute(scene)
+    found = GROUPS["surroundings"].compute(scene)
     for place_, (side, tone) in enumerate((s, t) for s in (7, 19, 41) for t in scene.tones):
         close(found[place_][INNER], averaged(tone, side)[INNER], 1e-3)
     mean = found[0]
@@ -159,7 +158,7 @@ def test_surroundings_are_means_and_their_changes(scene):
 
 
 def test_a_column_is_walked_from_below_and_from_above(scene):
-    found = scans.compute(scene)
+    found = GROUPS["scans"].compute(scene)
     steep = np.sqrt(averaged(np.abs(slopes(scene.tones[0])[1]), 3, 5))
     bright, colours = averaged(scene.tones[0], 5), averaged(scene.colour, 3)
     hue, edge = averaged(scene.hue, 3), averaged(np.hypot(*slopes(scene.tones[0])), 3, 5)
@@ -180,7 +179,7 @@ def test_a_column_is_walked_from_below_and_from_above(scene):
 @pytest.mark.parametrize("width", [1, 2, 7, 8])
 def test_a_row_is_walked_from_the_middle_outwards(width):
     plane = np.random.default_rng(width).random((3, width)).astype(np.float32)
-    found, half = scans.outwards(plane), width // 2
+    found, half = outwards(plane), width // 2
     for y, x in np.ndindex(plane.shape):
         met = plane[y, half : x + 1] if x >= half else plane[y, x:half]
         assert found[y, x] == met.max()
@@ -190,7 +189,7 @@ def test_paths_are_the_integrals_of_their_costs_along_the_cheapest_path(scene):
     edge = np.hypot(*slopes(scene.tones[0]))
     hue, distance = np.minimum(scene.hue, 10), np.minimum(scene.colour, 15)
     costs = edge, edge / 2 + hue / 20, 0.03 * distance
-    for cost, found in zip(costs, paths.compute(scene), strict=True):
+    for cost, found in zip(costs, GROUPS["paths"].compute(scene), strict=True):
         expected, _ = MCP_Geometric(0.005 + cost).find_costs(np.argwhere(scene.patch))
         # A step aslant is 1 % shorter than the root of 2, and a cost is rounded to 1e-4.
         close(found, expected, 0.02)
@@ -205,14 +204,16 @@ def street(kerb=74, height=48, width=96):
 
 @pytest.mark.parametrize("kind", range(3))
 def test_a_kerb_is_a_step_for_whatever_lies_beyond_it(kind):
-    found = paths.compute(scene_of(street(), 96, PATCH))[kind]
+    found = GROUPS["paths"].compute(scene_of(street(), 96, PATCH))[kind]
     assert found[:, 78:].min() > 1.5 * found[:, :72].max()
 
 
 def test_a_kerb_that_ends_is_walked_around():
     ends = street()
     ends[:28, 74:76] = 98
-    around, behind = (paths.compute(scene_of(s, 96, PATCH))[0][30, 84] for s in (ends, street()))
+    around, behind = (
+        GROUPS["paths"].compute(scene_of(s, 96, PATCH))[0][30, 84] for s in (ends, street())
+    )
     assert around < 0.75 * behind
 
 
@@ -228,15 +229,15 @@ def test_barriers_are_the_greatest_of_four_pixels(scene):
         np.maximum(averaged(yellow, 3) - averaged(yellow, 15), 0),
         np.maximum(averaged(tones[0], 15) - averaged(tones[0], 3), 0),
     ]
-    found = barriers.compute(scene)
+    found = GROUPS["barriers"].compute(scene)
     for mine, plane in zip(found, expected, strict=False):
         close(mine[INNER], block_reduce(plane, (2, 2), np.max)[INNER], 1e-3)
     for mine, plane in zip(found[10:15], found[:5], strict=True):
-        np.testing.assert_array_equal(mine, scans.outwards(plane))
+        np.testing.assert_array_equal(mine, outwards(plane))
 
 
 def test_squared_barriers_are_costs_of_a_path(scene):
-    edge, relative, *_, around, relative_around = barriers.compute(scene)
+    edge, relative, *_, around, relative_around = GROUPS["barriers"].compute(scene)
     for cost, found in ((20 * edge**2, around), (0.05 * relative**2, relative_around)):
         expected, _ = MCP_Geometric(0.005 + np.minimum(cost, 6.5)).find_costs(
             np.argwhere(scene.patch)
@@ -247,10 +248,10 @@ def test_squared_barriers_are_costs_of_a_path(scene):
 def test_a_path_of_squares_would_rather_go_around_a_kerb():
     ends = street()
     ends[:20, 74:76] = 98
-    names, behind = barriers.GROUP.names, {}
+    names, behind = GROUPS["barriers"].names, {}
     for kind, image in (("ends", ends), ("whole", street())):
         large = cv2.resize(image, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
-        found = barriers.compute(scene_of(large, 96, PATCH))
+        found = GROUPS["barriers"].compute(scene_of(large, 96, PATCH))
         for way in ("over", "around"):
             behind[way, kind] = found[names.index(f"{way}_edge")][30, 84]
     share = {way: behind[way, "ends"] / behind[way, "whole"] for way in ("over", "around")}
@@ -263,7 +264,7 @@ def test_reach_is_the_mean_of_two_distances_over_their_thresholds(scene):
     over, around = (found[names.index(n)] for n in ("paths.over_edges", "barriers.around_edge"))
     np.testing.assert_array_equal(reach(scene), combined(over, around))
     close(reach(scene), (over / 1.0 + around / 1.5) / 2)
-    for name, plane in zip(FEATURES, inputs(scene), strict=True):
+    for name, plane in zip(REACH, reach_inputs(scene), strict=True):
         np.testing.assert_array_equal(plane, found[names.index(name)])
 
 
@@ -276,7 +277,7 @@ def test_only_lit_ground_lies_beyond_the_end_of_the_road():
 def test_a_line_of_one_fine_pixel_is_a_barrier_on_the_way():
     image = np.full((96, 128, 3), 100, np.uint8)
     image[:, 100] = 40
-    dark = barriers.compute(scene_of(image, 64, PATCH))[9]
+    dark = GROUPS["barriers"].compute(scene_of(image, 64, PATCH))[9]
     assert dark[40, 60] > 2 * dark[40, 40]
 
 
