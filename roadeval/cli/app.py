@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import traceback
 from collections.abc import Callable, Sequence
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
+from typer.core import TyperCommand
 
 from roadeval.cli import commands, console, messages, signals, streams
 from roadeval.cli.exit_codes import ExitCode
@@ -49,8 +50,24 @@ def _place(command: Callable[..., int]) -> int:
     return FIRST.index(name) if name in FIRST else len(FIRST)
 
 
+class Command(TyperCommand):
+    """A command whose help shows the options part by part."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write arguments and options, each part below its title."""
+        parts: dict[str, list[tuple[str, str]]] = {}
+        for param in self.get_params(ctx):
+            if record := param.get_help_record(ctx):
+                own = "Arguments" if param.param_type_name == "argument" else "Options"
+                part = getattr(param, "rich_help_panel", None) or own
+                parts.setdefault(part, []).append(record)
+        for part, records in parts.items():
+            with formatter.section(part):
+                formatter.write_dl(records)
+
+
 for _command in sorted(found_in(commands, "COMMAND"), key=_place):
-    app.command()(_command)
+    app.command(cls=Command)(_command)
 
 
 def _show_version(wanted: bool) -> None:

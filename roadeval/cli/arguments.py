@@ -167,8 +167,7 @@ def _network(name: str, path: str) -> Variant:
 
 def _masks(name: str, path: str) -> tuple[str, dict[str, Any]]:
     """Return the table of masks that lie under a path, or that a file describes."""
-    from roadeval.config import read_tables
-    from roadeval.config.masks import with_masks
+    from roadeval.config import read_tables, with_masks
 
     if not path.endswith(".toml"):
         return name, {"path": path}

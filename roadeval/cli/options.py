@@ -1,29 +1,167 @@
-"""The options that repeat settings of a run's configuration, each declared once.
+"""The options that give settings of a run's configuration their values.
 
-A setting is named as in the configuration, ``table.key``. Its documentation, type and range stand
-there; here stand its flag, a line of help, and how its words are read. No other module knows a
-flag: errors name settings, and `with_flags` replaces these names.
+An option is made of a setting's field: its flag, its type and its meaning stand there. Only what is
+no single setting is declared here. No other module knows a flag: errors name settings, and
+`with_flags` replaces these names.
 """
 
 from __future__ import annotations
 
+import builtins
+import dataclasses
 import inspect
 import re
-from collections.abc import Callable, Iterable, Mapping
+import types
+import typing
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import wraps
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_hints
 
-from roadeval.cli.option import Option, color, named, switch, variant
+import typer
 
-OPTIONS: Final = (
-    Option("output.save", ("--save",), "OUT.rrd", "Recording. Default: recordings/<drive>.rrd"),
-    Option(
-        "output.reports", ("--reports",), "DIR", "Tables and figures. Default: reports/<drive>/"
-    ),
-    Option(
-        "output.mcap", ("--mcap",), "OUT.mcap", "Masks and rates as a log, to open beside DRIVE."
-    ),
+from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
+from roadeval.logs.settings import FrameSettings, LabelSettings, TopicSettings
+from roadeval.runtime.settings import Flag, meanings
+from roadeval.training.settings import TrainingSettings
+
+GROUPS: Final = {
+    "output": "Output",
+    "methods": "Methods",
+    "training": "Training",
+    "topics": "Truth",
+    "labels": "Truth",
+    "frames": "Range",
+    "input": "Input",
+    "run": "Execution",
+    "fleet": "Fleet",
+}
+"""The parts of the help, in their order, by the tables whose settings stand there."""
+SETTINGS: Final = {
+    "output": OutputSettings,
+    "training": TrainingSettings,
+    "topics": TopicSettings,
+    "labels": LabelSettings,
+    "frames": FrameSettings,
+    "run": ExecutionSettings,
+    "fleet": FleetSettings,
+}
+"""The settings that flags set, by the names of their tables."""
+
+Given = Mapping[str, Any]
+"""Values of options by the names of their settings; one that was not typed is not there."""
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Option:
+    """An option of the command line that gives a setting its value."""
+
+    setting: str
+    """``table.key`` in a run's configuration; the others are read by `roadeval.cli.arguments`."""
+    flags: tuple[str, ...]
+    """As they are typed; the last one is named in messages."""
+    metavar: str | None
+    """Stands for the value in the help; none for a switch."""
+    help: str
+    kind: Any = str
+    """The type of what is typed; a list for an option that can be repeated."""
+    read: Callable[[str], Any] | None = None
+    """Turns a word of such a list into a value."""
+    group: str = "Methods"
+    """Its part of the help."""
+
+    @classmethod
+    def of(cls, table: str, key: str, hint: Any, default: Any, meaning: str) -> Option | None:
+        """Return the option of a setting that has a flag, by the type of its field."""
+        flag = next((each for each in get_args(hint)[1:] if isinstance(each, Flag)), None)
+        if flag is None:
+            return None
+        sentences = re.split(r"(?<=[.:]) (?=[A-Z])", " ".join(meaning.replace("``", "").split()))
+        told = [sentences[0], *(each for each in sentences[1:] if each.startswith("Default"))]
+        kind, read = _kind(hint)
+        if get_origin(kind) is list:
+            told.append("Repeatable.")
+        elif default and kind is not bool:
+            told.append(f"Default: {default}.")
+        group = flag.group or GROUPS[table]
+        names = tuple(flag.names.split())
+        return cls(f"{table}.{key}", names, flag.metavar or None, " ".join(told), kind, read, group)
+
+    @property
+    def argument(self) -> str:
+        """The name of the Python argument that receives the value."""
+        return self.setting.replace(".", "_")
+
+    def parameter(self) -> inspect.Parameter:
+        """Return the parameter that Typer makes the option of."""
+        # Whoever opens a file tells whether it can be read, as of any other problem with it.
+        option = typer.Option(
+            *self.flags,
+            metavar=self.metavar,
+            show_default=False,
+            help=self.help,
+            readable=False,
+            rich_help_panel=self.group,
+        )
+        return inspect.Parameter(
+            self.argument,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=None,
+            annotation=Annotated[self.kind | None, option],
+        )
+
+    def value(self, typed: Any) -> Any:
+        """Read what was typed; None where nothing was."""
+        if self.read is None:
+            return None if typed == [] else typed
+        return [self.read(word) for word in typed] if typed else None
+
+
+def _kind(hint: Any) -> tuple[Any, Callable[[str], Any] | None]:
+    """Return what is typed for a value of a type, and how its words are read."""
+    kind = _bare(hint)
+    match get_origin(kind):
+        case None:
+            return kind, None
+        case typing.Literal:
+            return str, None
+        case builtins.tuple:
+            return (list[int], None) if _bare(get_args(kind)[0]) is int else (list[str], color)
+        case _:
+            return list[str], named
+
+
+def _bare(hint: Any) -> Any:
+    """Return a type without its metadata, and without None."""
+    while get_origin(hint) is Annotated:
+        hint = get_args(hint)[0]
+    if get_origin(hint) in (Union, types.UnionType):
+        return _bare(next(each for each in get_args(hint) if each is not types.NoneType))
+    return hint
+
+
+def color(text: str) -> tuple[int, ...]:
+    """Read ``R,G,B``, 0..255 each."""
+    parts = text.split(",")
+    if len(parts) != 3 or not all(part.strip().isdecimal() for part in parts):
+        raise typer.BadParameter(f"{text!r} is not R,G,B (as 128,64,128)")
+    return tuple(int(part) for part in parts)
+
+
+def named(text: str) -> tuple[str, str]:
+    """Read ``NAME=VALUE``."""
+    name, _, value = text.partition("=")
+    if not name or not value:
+        raise typer.BadParameter(f"{text!r} is not NAME=...")
+    return name, value
+
+
+def _variant(text: str) -> tuple[str, str | None]:
+    """Read ``NAME=FILE.toml`` or ``NAME=PRESET``, or the name of a preset alone."""
+    return named(text) if "=" in text else (text, None)
+
+
+METHODS: Final = (
     Option(
         "preset",
         ("--preset",),
@@ -47,7 +185,7 @@ OPTIONS: Final = (
         "One more variant beside filtered and unfiltered: of a file, or a preset by its name. "
         "Repeatable.",
         list[str],
-        variant,
+        _variant,
     ),
     Option(
         "nets",
@@ -75,161 +213,24 @@ OPTIONS: Final = (
         "name, or of several, as 'monday*.mcap'. Repeatable.",
         list[str],
         named,
+        "Input",
     ),
-    Option(
-        "training.model",
-        ("--model",),
-        "FILE",
-        "Made by 'roadeval train'. Default: the drive's first frames train one.",
-    ),
-    switch(
-        "training.adapt",
-        "--adapt",
-        "Let the model learn further from the drive's first frames, which are not evaluated then.",
-    ),
-    Option(
-        "training.frames",
-        ("--train-frames",),
-        "N",
-        "Labelled frames to train on, which are never evaluated. Default: 10.",
-        int,
-    ),
-    Option(
-        "training.placement",
-        ("--train-on",),
-        "WHERE",
-        "The 'first' labelled frames, or some 'spread' along the drive. Default: first.",
-    ),
-    Option(
-        "training.gap",
-        ("--train-gap",),
-        "N",
-        "Frames to leave out after those trained on, or on both sides. Default: 0; spread: a "
-        "quarter of their distance.",
-        int,
-    ),
-    Option(
-        "training.seeds",
-        ("--seeds",),
-        "N",
-        "Train N times, each with another draw of pixels: shows how far the rates depend on it.",
-        int,
-    ),
-    Option("topics.image", ("--image-topic",), "T", "The camera, where the log has several."),
-    Option("topics.truth", ("--truth-topic",), "T", "The label images that say where road is."),
-    Option("topics.shadow", ("--shadow-topic",), "T", "The masks that say where shadow truly is."),
-    Option(
-        "labels.road", ("--road-label",), "V", "A truth value that is road. Repeatable.", list[int]
-    ),
-    Option(
-        "labels.ignore",
-        ("--ignore-label",),
-        "V",
-        "A truth value to count nowhere. Repeatable.",
-        list[int],
-    ),
-    Option(
-        "labels.road_colors",
-        ("--road-color",),
-        "R,G,B",
-        "A truth colour that is road. Repeatable.",
-        list[str],
-        color,
-    ),
-    Option(
-        "labels.ignore_colors",
-        ("--ignore-color",),
-        "R,G,B",
-        "A truth colour to count nowhere. Repeatable.",
-        list[str],
-        color,
-    ),
-    Option(
-        "labels.tolerance",
-        ("--label-tolerance",),
-        "N",
-        "For masks compressed as JPEG: ignore values farther than N from the known ones.",
-        int,
-    ),
-    Option(
-        "topics.masks",
-        ("--mask-topic",),
-        "NAME=TOPIC",
-        "Score masks that the log carries, as one more variant. Repeatable.",
-        list[str],
-        named,
-    ),
-    Option(
-        "topics.sync_tolerance_ms",
-        ("--sync-tolerance",),
-        "MS",
-        "How far truth and image may be apart. Default: half a frame period.",
-        float,
-    ),
-    switch("topics.resize_truth", "--resize-truth", "Bring truth of another size to the image's."),
-    Option(
-        "frames.scale",
-        ("--scale",),
-        "F",
-        "Reduce frames and truth to this share of their size first: quicker, and coarser.",
-        float,
-    ),
-    switch("frames.keep_corrupt", "--keep-corrupt", "Use damaged data as far as it goes."),
-    Option(
-        "frames.max_pixels",
-        ("--max-pixels",),
-        "N",
-        "Leave out images of more pixels. Default: 33554432, a little more than 7680x4320.",
-        int,
-    ),
-    Option(
-        "frames.start",
-        ("-S", "--start"),
-        "TIME",
-        "Seconds from the log's start, nanoseconds, or RFC 3339.",
-    ),
-    Option(
-        "frames.end", ("-E", "--end"), "TIME", "Likewise; a frame at that very time is not read."
-    ),
-    Option("frames.every", ("--every",), "N", "Read every N-th frame.", int),
-    Option("frames.max_frames", ("--max-frames",), "N", "Stop after N frames read.", int),
-    Option(
-        "output.record",
-        ("--record",),
-        "WHAT",
-        "all (the default), masks, worst:K, every:N or none.",
-    ),
-    Option("run.jobs", ("--jobs",), "N", "Worker threads. Default: one per CPU core.", int),
-    Option(
-        "fleet.folds",
-        ("--folds",),
-        "K",
-        "Score each drive by a model of others: deal drives, or their groups, into K folds.",
-        int,
-    ),
-    Option(
-        "fleet.keep", ("--keep",), "WHAT", "Recordings: all, those of the worst:N drives, or none."
-    ),
-    Option("fleet.workers", ("--workers",), "N", "Processes. Default: one per CPU core.", int),
-    Option(
-        "fleet.memory_gib",
-        ("--memory",),
-        "GIB",
-        "What each process may take. Default: its share of the machine's.",
-        float,
-    ),
-    Option(
-        "fleet.scheduler",
-        ("--scheduler",),
-        "ADDRESS",
-        "A Dask scheduler, as tcp://host:8786, or its file: its workers replay the drives.",
-    ),
-    Option(
-        "fleet.max_failures",
-        ("--max-failures",),
-        "N|P%",
-        "Exit with code 1 if more drives fail. Default: however many.",
-    ),
+)
+"""The options that are more than one setting."""
+
+
+def _of_settings() -> Iterator[Option]:
+    for table, kind in SETTINGS.items():
+        hints, texts = get_type_hints(kind, include_extras=True), meanings(kind)
+        for field in dataclasses.fields(kind):
+            default = None if field.default is dataclasses.MISSING else field.default
+            option = Option.of(table, field.name, hints[field.name], default, texts[field.name])
+            if option is not None:
+                yield option
+
+
+OPTIONS: Final = tuple(
+    sorted((*METHODS, *_of_settings()), key=lambda option: [*GROUPS.values()].index(option.group))
 )
 """In the order of the help."""
 
@@ -237,9 +238,6 @@ FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option i
     "trust_sources": "--trust-sources"
 }
 _MARKED: Final = re.compile(r"`(\w+(?:\.\w+)?)`")
-
-Given = Mapping[str, Any]
-"""Values of options by the names of their settings; one that was not typed is not there."""
 
 
 def with_flags(text: str) -> str:
@@ -274,7 +272,7 @@ def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
     def decorate(command: Callable[..., int]) -> Callable[..., int]:
         @wraps(command)
         def run(*args: Any, **values: Any) -> int:
-            given = {o.setting: _value(o, values.pop(o.argument, None)) for o in chosen}
+            given = {o.setting: o.value(values.pop(o.argument, None)) for o in chosen}
             typed = {name: value for name, value in given.items() if value is not None}
             return command(*args, given=typed, **values)
 
@@ -293,10 +291,3 @@ def _with_options(signature: inspect.Signature, options: Iterable[Option]) -> in
     others = [each for each in own if each.kind is each.KEYWORD_ONLY]
     parameters = [*arguments, *(option.parameter() for option in options), *others]
     return signature.replace(parameters=parameters)
-
-
-def _value(option: Option, typed: Any) -> Any:
-    """Read what was typed; None where nothing was."""
-    if option.read is None:
-        return None if typed == [] else typed
-    return [option.read(word) for word in typed] if typed else None

@@ -8,18 +8,27 @@ from typing import TYPE_CHECKING, Final
 from roadeval.runtime.on_demand import on_demand
 
 if TYPE_CHECKING:
-    from roadeval.config.drives import DriveSettings
-    from roadeval.config.errors import ConfigError
-    from roadeval.config.log import log_config
-    from roadeval.config.names import check_variant_name
-    from roadeval.config.networks import network_variant
-    from roadeval.config.presets import PRESETS
-    from roadeval.config.run import RunConfig, configure
+    from roadeval.config.document import documented, run_toml
+    from roadeval.config.run import (
+        OF_A_LOG,
+        DriveSettings,
+        RunConfig,
+        configure,
+        load_config,
+        log_config,
+    )
     from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
-    from roadeval.config.toml import load_config, read_tables
-    from roadeval.config.variants import Variant
+    from roadeval.config.tables import ConfigError, read_tables
+    from roadeval.config.variants import (
+        PRESETS,
+        Variant,
+        check_variant_name,
+        network_variant,
+        with_masks,
+    )
 
 __all__ = [
+    "OF_A_LOG",
     "PRESETS",
     "ConfigError",
     "DriveSettings",
@@ -30,27 +39,34 @@ __all__ = [
     "Variant",
     "check_variant_name",
     "configure",
+    "documented",
     "load_config",
     "log_config",
     "network_variant",
     "read_tables",
+    "run_toml",
+    "with_masks",
 ]
 
 _MODULES: Final = {
-    "PRESETS": "presets",
-    "ConfigError": "errors",
-    "DriveSettings": "drives",
+    "OF_A_LOG": "run",
+    "PRESETS": "variants",
+    "ConfigError": "tables",
+    "DriveSettings": "run",
     "ExecutionSettings": "settings",
     "FleetSettings": "settings",
     "OutputSettings": "settings",
     "RunConfig": "run",
     "Variant": "variants",
-    "check_variant_name": "names",
+    "check_variant_name": "variants",
     "configure": "run",
-    "load_config": "toml",
-    "log_config": "log",
-    "network_variant": "networks",
-    "read_tables": "toml",
+    "documented": "document",
+    "load_config": "run",
+    "log_config": "run",
+    "network_variant": "variants",
+    "read_tables": "tables",
+    "run_toml": "document",
+    "with_masks": "variants",
 }
 
 if not TYPE_CHECKING:  # there every name is known

@@ -1,24 +1,58 @@
-"""The whole effective configuration as TOML with each setting's documentation and range."""
+"""Configurations as TOML files: that of a run, and one to edit that explains every setting."""
 
 from __future__ import annotations
 
-import ast
 import dataclasses
 import inspect
 import textwrap
 import types
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import pairwise
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin, get_type_hints
 
 from roadeval.config.run import RunConfig
 from roadeval.config.settings import SECTIONS
-from roadeval.config.toml import without_none
 from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
+from roadeval.runtime.settings import meanings
+from roadeval.runtime.text import visible, visible_lines
 
 WIDTH: Final = 100
 _BOUNDS: Final = {"ge": "at least {}", "gt": "above {}", "le": "at most {}", "lt": "below {}"}
+
+
+def run_toml(config: RunConfig, drive: str, version: str, command: str = "replay") -> str:
+    """Write the TOML file that makes a run again, with every effective setting.
+
+    Parameters
+    ----------
+    config, drive, version
+        Of the run; for a person the drive's name, or how many there are.
+    command
+        That takes the file.
+    """
+    import tomlkit
+
+    document = tomlkit.document()
+    document.add(
+        tomlkit.comment(
+            f"The configuration of a {command} of {visible(drive)} by roadeval {version}."
+        )
+    )
+    document.add(
+        tomlkit.comment(
+            f"To repeat the run, give this file to roadeval {command} as its configuration."
+        )
+    )
+    for key, value in _without_none(config.as_dict()).items():
+        document.add(key, value)
+    return visible_lines(tomlkit.dumps(document))
+
+
+def _without_none(value: Any) -> Any:
+    """Return plain data as TOML has it: without settings that are None, and with lists."""
+    if isinstance(value, Mapping):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    return [_without_none(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def documented(config: RunConfig) -> str:
@@ -52,7 +86,7 @@ def _stages(pipeline: Pipeline, prefix: str) -> list[str]:
 
 def _table(name: str, settings: Any) -> str:
     """Write the table of a settings dataclass; those within it follow as tables of their own."""
-    meanings = _meanings(type(settings))
+    texts = meanings(type(settings))
     hints = get_type_hints(type(settings), include_extras=True)
     title = (inspect.getdoc(type(settings)) or "").partition("\n\n")[0]
     lines, inner = [*_comment(title), f"[{name}]"], []
@@ -62,28 +96,9 @@ def _table(name: str, settings: Any) -> str:
             inner.append(_table(f"{name}.{field.name}", value))
             continue
         allowed = _allowed(hints[field.name])
-        lines += ["", *_comment(" ".join(filter(None, (meanings.get(field.name), allowed))))]
+        lines += ["", *_comment(" ".join(filter(None, (texts.get(field.name), allowed))))]
         lines.append(_assignment(field.name, value))
     return "\n\n".join(["\n".join(lines), *inner])
-
-
-def _meanings(kind: type) -> dict[str, str]:
-    """Return the string that follows each field in the source of a settings class."""
-    try:
-        source = inspect.getsource(kind)
-    except (OSError, TypeError):  # a class that was made in no file
-        return {}
-    (described,) = ast.parse(textwrap.dedent(source)).body
-    assert isinstance(described, ast.ClassDef)
-    found = {}
-    for field, after in pairwise(described.body):
-        match field, after:
-            case (
-                ast.AnnAssign(target=ast.Name(name)),
-                ast.Expr(value=ast.Constant(value=str(text))),
-            ):
-                found[name] = text
-    return found
 
 
 def _assignment(name: str, value: Any) -> str:
@@ -93,9 +108,9 @@ def _assignment(name: str, value: Any) -> str:
         return f"# {name} ="
     if isinstance(value, Mapping):
         table = tomlkit.inline_table()
-        table.update(without_none(value))
+        table.update(_without_none(value))
         return f"{name} = {table.as_string()}"
-    return f"{name} = {tomlkit.item(without_none(value)).as_string()}"
+    return f"{name} = {tomlkit.item(_without_none(value)).as_string()}"
 
 
 def _comment(text: str) -> list[str]:
@@ -124,5 +139,5 @@ def _bounds(constraints: Iterable[Any]) -> Iterator[str]:
             yield from (
                 text.format(getattr(each, name))
                 for name, text in _BOUNDS.items()
-                if hasattr(each, name)
+                if getattr(each, name, None) is not None
             )

@@ -27,21 +27,21 @@ import dataclasses
 import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from pathlib import Path
+from typing import Any, Final
 
-from roadeval.config.drives import DriveSettings, drives_of
-from roadeval.config.errors import ConfigError
-from roadeval.config.masks import of_drive, with_masks
-from roadeval.config.names import check_variant_name
-from roadeval.config.override import override
-from roadeval.config.presets import PRESETS
 from roadeval.config.settings import SECTIONS, ExecutionSettings, FleetSettings, OutputSettings
+from roadeval.config.tables import ConfigError, override, prefix, read_tables
 from roadeval.config.variants import (
+    PRESETS,
     Variant,
     check_tables,
+    check_variant_name,
+    masks_of,
     pipeline_of,
     preset_of,
     variants_of,
+    with_masks,
 )
 from roadeval.data import FINAL_STAGE
 from roadeval.errors import RoadevalError
@@ -49,7 +49,60 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.logs.settings import LabelSettings, LogConfig
 from roadeval.pipeline.chain import Pipeline
 from roadeval.recording import RecordRule
+from roadeval.runtime.text import public_url
 from roadeval.training.settings import TrainingSettings
+
+OF_A_LOG: Final[tuple[str, ...]] = ("topics", "labels", "frames", "masks")
+"""The tables that may differ from drive to drive."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveSettings:
+    """What is asked of some drives in place of what is asked of all."""
+
+    path: str
+    """Of the drives: a path, or the end of one, as a file's name; ``*`` and ``?`` stand for any
+    text within a name."""
+    tables: Mapping[str, Mapping[str, Any]]
+    """``topics``, ``labels``, ``frames`` and ``masks`` in the shape of a TOML file. Labels take the
+    place of the run's as a whole, the others key by key."""
+    where: str = field(default="", compare=False)
+    """Begins a message about them."""
+
+    @classmethod
+    def of(cls, tables: Mapping[str, Any], where: str) -> DriveSettings:
+        """Make the settings from an entry of ``[[drives]]``; `RunConfig` validates its tables.
+
+        Raises
+        ------
+        ConfigError
+            If the entry has no path, or a table that holds for the whole run.
+        """
+        path = tables.get("path")
+        if not isinstance(path, str) or not path or "\0" in path:
+            raise ConfigError(f"{where}: path must name a log, or several as *.mcap")
+        rest = {key: value for key, value in tables.items() if key != "path"}
+        path = public_url(path)
+        check_tables(rest, OF_A_LOG, f"{where} {path}")
+        return cls(path, rest, f"{where} {path}")
+
+    def holds_for(self, drive: str | os.PathLike[str]) -> bool:
+        """Whether a drive is one of these."""
+        wanted, typed = public_url(self.path), Path(public_url(os.fspath(drive)))
+        real = typed.resolve()
+        return real == Path(wanted).resolve() or typed.match(wanted) or real.match(wanted)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry of ``[[drives]]``."""
+        return {"path": self.path, **self.tables}
+
+
+def drives_of(entries: Any, where: str) -> Iterable[DriveSettings]:
+    """Read the entries of ``[[drives]]``; a `ConfigError` for what cannot be used."""
+    begin = prefix(where)
+    if not isinstance(entries, list | tuple) or not all(isinstance(e, Mapping) for e in entries):
+        raise ConfigError(f"{begin}drives must be tables, each under [[drives]]")
+    return [DriveSettings.of(entry, f"{begin}[[drives]]") for entry in entries]
 
 
 def _paper() -> Pipeline:
@@ -211,7 +264,7 @@ class RunConfig(LogConfig):
         for drive in self.drives:
             if drive.holds_for(path):
                 config = config._with_drive(drive)
-        return replace(config, masks=of_drive(config.masks, path))
+        return replace(config, masks=masks_of(config.masks, path))
 
     def _with_drive(self, drive: DriveSettings) -> RunConfig:
         labels = LabelSettings() if "labels" in drive.tables else self.labels
@@ -254,7 +307,7 @@ class RunConfig(LogConfig):
         return {name: dataclasses.asdict(own) for name, own in self.masks.items()}
 
     def _with_variants(self, tables: Any, where: str) -> tuple[Variant, ...]:
-        begin = f"{where}: " if where else ""
+        begin = prefix(where)
         if not isinstance(tables, Mapping):
             raise ConfigError(f"{begin}[variants] must hold a table for each variant")
         for name, own in tables.items():
@@ -289,3 +342,39 @@ def configure(tables: Mapping[str, Any] | None = None, *, where: str = "") -> Ru
     name = preset_of(tables, "paper", where)
     base = replace(RunConfig(), preset=name).override(PRESETS[name], f"preset {name}")
     return base.override({key: value for key, value in tables.items() if key != "preset"}, where)
+
+
+def load_config(path: str | Path, preset: str | None = None, *, trusted: bool = True) -> RunConfig:
+    """Read the configuration of a run from a TOML file.
+
+    Parameters
+    ----------
+    path
+        The file, in the shape that the top of this module describes.
+    preset
+        The preset to start from where the file names none; ``paper`` otherwise.
+    trusted
+        Whether the user has named the file; one that came with results, or lies in a recording,
+        loads no code.
+
+    Raises
+    ------
+    ConfigError
+        If the file is missing, no TOML, or holds a key or a value that cannot be used.
+    """
+    base = {} if preset is None else {"preset": preset}
+    return configure({**base, **read_tables(path, trusted=trusted)}, where=str(path))
+
+
+def log_config(tables: Mapping[str, Any]) -> LogConfig:
+    """Return what some tables ask of a log alone, without stages and their settings.
+
+    Raises
+    ------
+    ConfigError
+        For a key or a value that cannot be used; names it, and what is allowed.
+    """
+    asked = LogConfig()
+    tables_of_a_log = ("topics", "labels", "frames")
+    found = {name: override(getattr(asked, name), tables, name) for name in tables_of_a_log}
+    return replace(asked, **found)

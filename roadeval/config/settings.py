@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import dataclass
 from typing import Annotated, Final
 
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as validated
+from annotated_types import Interval
+
+from roadeval.runtime.settings import Checked, Flag
 
 SECTIONS: Final = (
     *("topics", "labels", "frames", "training", "evaluation", "output", "run", "fleet"),
@@ -14,52 +17,61 @@ SECTIONS: Final = (
 `roadeval.config.RunConfig`."""
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+def _keep(value: object) -> object:
+    if isinstance(value, str) and not re.fullmatch(r"all|none|worst:[1-9]\d{0,5}", value):
+        raise ValueError("must be all, none or worst:N")
+    return value
+
+
+def _failures(value: object) -> object:
+    shares = r"\d{1,9}|\d{1,2}(\.\d+)?%|100%"
+    if isinstance(value, str) and not re.fullmatch(shares, value):
+        raise ValueError("must be a number of drives, as 3, or a share of them up to 100%, as 10%")
+    return value
+
+
+@dataclass(frozen=True)
 class OutputSettings:
     """Where the results of a run are written, and which pictures are recorded."""
 
-    save: str | None = None
-    """The recording; ``recordings/<drive>.rrd`` by default."""
-    reports: str | None = None
-    """The folder of tables and figures; ``reports/<drive>/`` by default."""
-    mcap: str | None = None
-    """A log of masks, error maps and rates, to open beside the drive; none by default."""
-    record: str = "all"
-    """Whose pictures are recorded: ``all``; ``masks`` and labels, with the camera's image; all
-    pictures of the ``worst:K`` frames by ERR, or of ``every:N``-th frame; ``none``, which means
-    no recording."""
+    save: Annotated[str | None, Flag("--save", "OUT.rrd")] = None
+    """The recording. Default: ``recordings/<drive>.rrd``."""
+    reports: Annotated[str | None, Flag("-o --reports", "DIR")] = None
+    """The folder of tables and figures. Default: ``reports/<drive>/``."""
+    mcap: Annotated[str | None, Flag("--mcap", "OUT.mcap")] = None
+    """Masks, error maps and rates as a log, to open beside the drive. Default: none."""
+    record: Annotated[str, Flag("--record", "WHAT")] = "all"
+    """Whose pictures are recorded: ``all``, ``masks``, ``worst:K``, ``every:N`` or ``none``. With
+    ``masks`` go labels and the camera's image; of the ``worst:K`` frames by ERR, and of
+    ``every:N``-th frame, all pictures are recorded; ``none`` means no recording."""
     figures: bool = True
     """Whether the paper's figures are drawn; a fleet does not draw those of its drives."""
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True)
 class ExecutionSettings:
     """How a run is executed; changes no number."""
 
-    jobs: Annotated[int, Field(ge=1, le=1000)] | None = None
-    """Worker threads; one per CPU core by default."""
+    jobs: Annotated[int | None, Interval(ge=1, le=1000), Flag("--jobs", "N")] = None
+    """Worker threads. Default: one per CPU core."""
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True)
 class FleetSettings:
     """How a fleet of drives is replayed; means nothing to a single drive."""
 
-    folds: Annotated[int, Field(ge=2, le=1000)] | None = None
-    """Deal the drives, or their groups, into so many folds: each is scored by a model that learnt
-    from the other folds. Copies of one log are of one group. None: ``training.model`` scores
-    all, or each drive trains its own."""
-    training_drives: Annotated[int, Field(ge=1, le=10_000)] = 20
-    """Drives that the model of a fold learns from, at most; drawn by ``training.seed``, groups in
-    turn. Their training frames are held decoded."""
-    keep: Annotated[str, Field(pattern=r"^(all|none|worst:[1-9]\d{0,5})$")] = "none"
-    """Whose recordings stay: ``all``; those of the ``worst:N`` drives by ERR; ``none``, which means
-    that none is made."""
-    workers: Annotated[int, Field(ge=1, le=1000)] | None = None
-    """Processes that replay drives; one a processor by default."""
-    memory_gib: Annotated[float, Field(gt=0, le=100_000)] | None = None
-    """What each of them may take; by default its share of the machine's."""
-    scheduler: str | None = None
-    """Address of a Dask scheduler whose workers replay the drives, or the file that it has written;
-    by default processes of this machine do."""
-    max_failures: Annotated[str, Field(pattern=r"^(\d{1,9}|\d{1,2}(\.\d+)?%|100%)$")] | None = None
-    """Drives that may fail, as ``3`` or ``10%``, without the fleet having failed."""
+    folds: Annotated[int | None, Interval(ge=2, le=1000), Flag("--folds", "K")] = None
+    """Score each drive by a model of others: deal drives, or their groups, into K folds. Each fold
+    is scored by a model that learnt from the others. Copies of one log are of one group. Without
+    folds ``training.model`` scores all, or each drive trains its own."""
+    keep: Annotated[str, Checked(_keep), Flag("--keep", "WHAT")] = "none"
+    """Recordings that stay: ``all``, those of the ``worst:N`` drives by ERR, or ``none``, which
+    means that none is made."""
+    workers: Annotated[int | None, Interval(ge=1, le=1000), Flag("--workers", "N")] = None
+    """Processes that replay drives. Default: one per CPU core."""
+    memory_gib: Annotated[float | None, Interval(gt=0, le=100_000), Flag("--memory", "GIB")] = None
+    """What each process may take. Default: its share of the machine's."""
+    scheduler: Annotated[str | None, Flag("--scheduler", "ADDRESS")] = None
+    """A Dask scheduler, as ``tcp://host:8786``, or its file: its workers replay the drives."""
+    max_failures: Annotated[str | None, Checked(_failures), Flag("--max-failures", "N|P%")] = None
+    """Exit with code 1 if more drives fail. Default: however many."""

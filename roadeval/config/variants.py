@@ -1,19 +1,72 @@
-"""Variants: named pipelines that run side by side."""
+"""Variants, named methods that run side by side, and the presets that they start from.
+
+A variant is a pipeline, a network, or masks that another method has made.
+"""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
 
-from roadeval.config.errors import ConfigError
-from roadeval.config.names import check_variant_name
-from roadeval.config.override import either, override
-from roadeval.config.presets import PRESETS
 from roadeval.config.settings import SECTIONS
-from roadeval.data import ERRORS, FILTERED, FINAL_STAGE, UNFILTERED, VariantLayout
+from roadeval.config.tables import ConfigError, either, override, prefix, read_tables
+from roadeval.data import (
+    ERRORS,
+    FILTERED,
+    FINAL_STAGE,
+    RESERVED,
+    UNFILTERED,
+    VariantLayout,
+    is_plain,
+)
+from roadeval.logs.settings import MaskSettings
 from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
+
+PAPER_CHAIN: Final = ("shadow", "similarity", "svm", "post")
+
+PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
+    "paper": {"chain": PAPER_CHAIN},
+    "printed": {
+        "chain": PAPER_CHAIN,
+        "shadow": {
+            "threshold": "printed",
+            "inclusive": True,
+            "statistic": "printed",
+            "colour_space": "hsi",
+        },
+        "svm": {"kernel": "linear"},
+        "post": {"operations": ("close", "open")},
+    },
+    "printed_order": {"chain": PAPER_CHAIN, "post": {"operations": ("close", "open")}},
+    "hsi": {"chain": PAPER_CHAIN, "shadow": {"colour_space": "hsi"}},
+    "gated": {"chain": ("gated", "similarity", "svm", "post")},
+    "robust": {
+        "chain": ("exposure", "trees", "post"),
+        "training": {"pixels_per_class": 1000, "max_pixels": 50_000},
+        "post": {"region": "all"},
+    },
+}
+"""By name, each in the shape of a TOML file (see `roadeval.config.run`).
+
+``printed_order`` and ``hsi`` are ``paper`` with one thing as the text has it: the order of
+post-processing (section 4.4), and the colour space of the compensation (section 4.2, step 5). They
+show beside it, as variants, what that thing does.
+
+``robust`` keeps every region of its mask: vehicles cut a road in pieces.
+"""
+LONGEST: Final = 64
+"""Letters of a variant's name: it is printed in the columns of tables."""
+DRIVE: Final = "{drive}"
+"""Stands in a path of masks for the name of the drive."""
+AS_IT_IS: Final[Mapping[str, Any]] = {"operations": (), "region": "all", "fill": False}
+"""Settings of phase 4 that leave a mask as it is."""
+
+Masks = Mapping[str, MaskSettings]
+"""Settings of masks that lie beside the log, by the variant's name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +92,7 @@ class Variant:
         for section in SECTIONS:
             if section in rest:
                 raise ConfigError(
-                    f"{_prefix(where)}[{section}] holds for the whole run: it belongs in the "
+                    f"{prefix(where)}[{section}] holds for the whole run: it belongs in the "
                     "configuration of the run"
                 )
         pipeline = pipeline_of(base, rest, where)
@@ -84,7 +137,7 @@ def preset_of(tables: Mapping[str, Any], default: str, where: str) -> str:
     """Return the name of the preset that tables start from; a `ConfigError` if there is none."""
     name = tables.get("preset", default)
     if not isinstance(name, str) or name not in PRESETS:
-        raise ConfigError(f"{_prefix(where)}preset: there is no {name!r}; choose {either(PRESETS)}")
+        raise ConfigError(f"{prefix(where)}preset: there is no {name!r}; choose {either(PRESETS)}")
     return name
 
 
@@ -94,9 +147,9 @@ def check_tables(tables: Mapping[str, Any], known: Collection[str], where: str) 
         if key not in known:
             names = either(name for name in known if name != "chain")
             if isinstance(tables[key], Mapping):
-                raise ConfigError(f"{_prefix(where)}[{key}] is no table here; choose {names}")
+                raise ConfigError(f"{prefix(where)}[{key}] is no table here; choose {names}")
             raise ConfigError(
-                f"{_prefix(where)}{key} stands in no table; put it below one of {names}"
+                f"{prefix(where)}{key} stands in no table; put it below one of {names}"
             )
 
 
@@ -118,13 +171,13 @@ def pipeline_of(base: Pipeline | None, tables: Mapping[str, Any], where: str) ->
     layers = [spec.name for spec in (*pipeline.layers(), ERRORS)]
     for name in layers:
         if layers.count(name) > 1:
-            raise ConfigError(f"{_prefix(where)}chain: two layers are called {name}")
+            raise ConfigError(f"{prefix(where)}chain: two layers are called {name}")
     return pipeline
 
 
 def _chain(names: Any, where: str) -> tuple[str, ...]:
     """Check a chain: known stages, each once, one mask of a name, and the final one last."""
-    begin = f"{_prefix(where)}chain"
+    begin = f"{prefix(where)}chain"
     if not isinstance(names, list | tuple) or not names:
         raise ConfigError(f"{begin} must be a list of stages; choose {either(stages.names())}")
     for name in names:
@@ -147,5 +200,87 @@ def _chain(names: Any, where: str) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _prefix(where: str) -> str:
-    return f"{where}: " if where else ""
+def check_variant_name(name: str, taken: Collection[str]) -> None:
+    """Refuse, as a `ConfigError`, a variant's name that results cannot hold, or that is taken.
+
+    A spreadsheet takes a cell that begins with ``-`` for a formula, and Matplotlib leaves what
+    begins with ``_`` out of a legend.
+    """
+    if not is_plain(name) or name[0] in "-_" or len(name) > LONGEST:
+        shown = name if len(name) <= LONGEST else f"{name[:LONGEST]}..."
+        raise ConfigError(
+            f"variant {shown!r}: a name is made of letters, digits, '-' and '_' alone, begins with "
+            f"a letter or a digit, and has at most {LONGEST} of them"
+        )
+    if name in RESERVED:
+        raise ConfigError(f"variant {name!r}: the name is reserved ({either(RESERVED)})")
+    if name in taken:
+        raise ConfigError(f"variant {name!r}: the name is taken; choose another")
+
+
+def network_variant(name: str, path: str) -> Variant:
+    """Return the variant of a network: its mask, which phase 4 leaves as it is.
+
+    Parameters
+    ----------
+    name
+        Of the variant.
+    path
+        An ONNX file, or a TOML file with the settings of the stage ``net``, whose ``file`` is
+        found from the folder of the TOML file. Its table ``[post]`` asks for post-processing.
+
+    Raises
+    ------
+    ConfigError
+        If the TOML file cannot be used. The network itself is opened when it is run.
+    """
+    tables: Mapping[str, Any] = {"file": path}
+    if in_a_file := Path(path).suffix == ".toml":
+        tables = read_tables(path)
+    settings = {key: value for key, value in tables.items() if key != "post"}
+    file, post = settings.get("file"), tables.get("post", {})
+    if not isinstance(file, str) or not file:
+        raise ConfigError(f"{path}: file must name the network, an ONNX file")
+    if not isinstance(post, Mapping):
+        raise ConfigError(f"{path}: [post] must be a table")
+    if in_a_file:
+        settings["file"] = str(Path(path).parent / file)
+    chain = {"chain": ("net", "post"), "net": settings, "post": {**AS_IT_IS, **post}}
+    return Variant.of(name, chain, path if in_a_file else "")
+
+
+def with_masks(current: Masks, tables: Any, where: str) -> Masks:
+    """Return settings with those of further tables: key by key where the name is there.
+
+    Raises
+    ------
+    ConfigError
+        For a key or a value that cannot be used.
+    """
+    if not isinstance(tables, Mapping):
+        raise ConfigError(f"{prefix(where)}[masks] must hold a table for each variant")
+    found = dict(current)
+    for name, own in tables.items():
+        table = f"masks.{name}"
+        found[name] = override(found.get(name, MaskSettings()), {table: own}, table, where)
+    return found
+
+
+def masks_of(masks: Masks, drive: str | os.PathLike[str]) -> Masks:
+    """Return settings with the drive's name in their paths: its file's, without the ending.
+
+    A `ConfigError` if some have no path.
+    """
+    path = Path(drive)
+    name = path.name if path.is_dir() else path.stem
+    for own, each in masks.items():
+        if not each.path:
+            raise ConfigError(f"[masks.{own}] has no path: a folder, or LOG.mcap:/topic")
+    return {
+        own: replace(
+            each,
+            path=each.path.replace(DRIVE, name),
+            images=each.images and each.images.replace(DRIVE, name),
+        )
+        for own, each in masks.items()
+    }

@@ -22,8 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from roadeval.config import DriveSettings, RunConfig, read_tables
-from roadeval.config.drives import OF_A_LOG
+from roadeval.config import OF_A_LOG, DriveSettings, RunConfig, read_tables
 from roadeval.data.names import is_plain
 from roadeval.fleet.errors import FleetError
 from roadeval.fleet.urls import shown

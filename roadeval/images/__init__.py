@@ -1,26 +1,32 @@
 """Image files: from their bytes to arrays. A damaged file is an error, never half a picture.
 
 No other room decodes them, so that camera, truth, masks and the pictures of a recording are read,
-checked and refused alike.
+checked and refused alike. Names are imported when they are first used: a command that reads
+settings needs little else.
 """
 
-from roadeval.images.decoding import (
-    eight_bits,
-    palette_indices,
-    size_of,
-    to_labels,
-    to_png,
-    to_rgb,
-    without_colours,
-)
-from roadeval.images.formats import (
-    MAX_PIXELS,
-    DamagedImageError,
-    ImageError,
-    ImageFormat,
-    Limits,
-    format_of,
-)
+from typing import TYPE_CHECKING, Final
+
+from roadeval.runtime.on_demand import on_demand
+
+if TYPE_CHECKING:
+    from roadeval.images.decoding import (
+        eight_bits,
+        palette_indices,
+        size_of,
+        to_labels,
+        to_png,
+        to_rgb,
+        without_colours,
+    )
+    from roadeval.images.formats import (
+        MAX_PIXELS,
+        DamagedImageError,
+        ImageError,
+        ImageFormat,
+        Limits,
+        format_of,
+    )
 
 __all__ = [
     "MAX_PIXELS",
@@ -37,3 +43,14 @@ __all__ = [
     "to_rgb",
     "without_colours",
 ]
+
+_FORMATS: Final = (
+    *("MAX_PIXELS", "DamagedImageError", "ImageError", "ImageFormat", "Limits", "format_of"),
+)
+_MODULES: Final = {
+    **dict.fromkeys(__all__, "decoding"),
+    **dict.fromkeys(_FORMATS, "formats"),
+}
+
+if not TYPE_CHECKING:  # there every name is known
+    __getattr__ = on_demand(__name__, _MODULES)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from roadeval.config import RunConfig
-from roadeval.config.document import documented
+from roadeval.config import RunConfig, documented
 
 
 def config_toml(config: RunConfig | None = None) -> str:

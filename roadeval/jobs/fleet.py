@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from roadeval.config import RunConfig
-from roadeval.config.toml import run_toml
+from roadeval.config import RunConfig, run_toml
 from roadeval.evaluation.conditions import Condition
 from roadeval.fleet.errors import FleetError
 from roadeval.fleet.sources import find_drives

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from roadeval import logs
 from roadeval.config import RunConfig
@@ -29,6 +29,11 @@ MODELS = "models"
 def model_path(folder: Path, fold: int) -> Path:
     """Return the file of a fold's model in a fleet's folder."""
     return folder / MODELS / f"fold_{fold}.model"
+
+
+TRAINING_DRIVES: Final = 20
+"""Drives that the model of a fold learns from, at most; drawn by ``training.seed``, groups in turn.
+Their training frames are held decoded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +133,7 @@ def _trained(task: FoldTask) -> FoldModel:
 
 def _wanted(task: FoldTask) -> str:
     """Return the digest of all that decides the model."""
-    parts: list[Any] = [asked(task.config, ""), task.config.fleet.training_drives]
+    parts: list[Any] = [asked(task.config, "")]
     for entry, own in task.candidates:
         try:
             parts.append([entry.id, asked(own, ""), dict(stamp(entry.source))])
@@ -155,7 +160,7 @@ def _drawn(task: FoldTask) -> tuple[dict[Path, Sequence[Frame]], dict[str, str]]
     drawn: dict[Path, Sequence[Frame]] = {}
     passed: dict[str, str] = {}
     for entry, own in task.candidates:
-        if len(drawn) == task.config.fleet.training_drives or held.is_full:
+        if len(drawn) == TRAINING_DRIVES or held.is_full:
             break
         try:
             frames = list(_frames_of(entry, own, held))

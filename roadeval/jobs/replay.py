@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from roadeval import logs
-from roadeval.config import RunConfig
-from roadeval.config.toml import run_toml
+from roadeval.config import RunConfig, run_toml
 from roadeval.data import FrameResult
 from roadeval.jobs import summary
 from roadeval.jobs.examples import ExampleFrames

@@ -6,13 +6,13 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Final, Literal
 
-from pydantic import AfterValidator, BeforeValidator, ConfigDict, Field, model_validator
-from pydantic.dataclasses import dataclass as validated
+from annotated_types import Interval
 
-from roadeval.images import MAX_PIXELS
+from roadeval.images.limits import MAX_PIXELS
 from roadeval.logs.errors import LogError
+from roadeval.runtime.settings import Checked, Flag
 
 NS: Final = 1_000_000_000
 _EPOCH: Final = datetime.fromisoformat("1970-01-01T00:00:00+00:00")
@@ -60,50 +60,51 @@ def _rfc_3339_ns(match: re.Match[str], text: str) -> int:
     return seconds * NS + int((fraction or "").ljust(9, "0"))
 
 
-def _as_text(moment: object) -> object:
-    """Take a number, or a date that TOML knows, for its text."""
-    if isinstance(moment, datetime):
-        return moment.isoformat()
-    return str(moment) if isinstance(moment, int | float) else moment
+def _time(moment: object) -> object:
+    """Take a number, or a date that TOML knows, for its text, which must be a moment."""
+    if isinstance(moment, int | float) and not isinstance(moment, bool):
+        moment = str(moment)
+    if isinstance(moment, str):
+        try:
+            parse_time(moment)
+        except LogError as error:
+            raise ValueError(str(error)) from error
+    return moment
 
 
-def _check_time(text: str) -> str:
-    try:
-        parse_time(text)
-    except LogError as error:
-        raise ValueError(str(error)) from error
-    return text
-
-
-Time = Annotated[str, BeforeValidator(_as_text), AfterValidator(_check_time)]
+Time = Annotated[str, Checked(_time)]
 """A moment as `roadeval.logs.parse_time` reads it."""
-Label = Annotated[int, Field(ge=0, le=65535)]
-Level = Annotated[int, Field(ge=0, le=255)]
+Count = Interval(ge=1, le=1_000_000_000)
+Value = Annotated[int, Interval(ge=0, le=65535)]
+Level = Annotated[int, Interval(ge=0, le=255)]
 Color = tuple[Level, Level, Level]
 """Red, green and blue, 0..255 each."""
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True)
 class TopicSettings:
     """Topics, where the log leaves a choice, and how label images are paired with images."""
 
-    image: str | None = None
-    """The camera's topic."""
-    truth: str | None = None
+    image: Annotated[str | None, Flag("--image-topic", "T", "Input")] = None
+    """The camera's topic, where the log has several."""
+    truth: Annotated[str | None, Flag("--truth-topic", "T")] = None
     """The topic of label images that show where road is; an empty name takes none."""
-    shadow: str | None = None
+    shadow: Annotated[str | None, Flag("--shadow-topic", "T")] = None
     """The topic of masks that show where shadow truly is; an empty name takes none."""
-    masks: Mapping[str, str] = field(default_factory=dict)
-    """Topics of road masks that the log already carries, by the name of their variant: a network's
-    output, for example, which is then scored beside the pipeline."""
-    sync_tolerance_ms: Annotated[float, Field(ge=0, le=86_400_000)] | None = None
-    """Milliseconds between the stamps of an image and its label image, at most; half the frame
-    period by default."""
-    resize_truth: bool = False
-    """Whether label images of another size are scaled to the image's (nearest pixel)."""
+    masks: Annotated[Mapping[str, str], Flag("--mask-topic", "NAME=TOPIC", "Methods")] = field(
+        default_factory=dict
+    )
+    """Score road masks that the log carries, a network's output, say, as one more variant."""
+    sync_tolerance_ms: Annotated[
+        float | None, Interval(ge=0, le=86_400_000), Flag("--sync-tolerance", "MS")
+    ] = None
+    """Milliseconds between the stamps of an image and its truth, at most. Default: half the frame
+    period."""
+    resize_truth: Annotated[bool, Flag("--resize-truth")] = False
+    """Scale label images of another size to the image's (nearest pixel)."""
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True)
 class LabelSettings:
     """Which values, or colours, of a label image mean road, and which are ignored.
 
@@ -111,22 +112,21 @@ class LabelSettings:
     0 and 255 (road), with 128 for ignore; or among 0 and 1 (road), with 255 for ignore.
     """
 
-    road: tuple[Label, ...] = ()
-    """Values that are road; of an image with a palette, its indices."""
-    ignore: tuple[Label, ...] = ()
-    """Values that are counted nowhere."""
-    road_colors: tuple[Color, ...] = ()
-    """Colours that are road, red, green and blue."""
-    ignore_colors: tuple[Color, ...] = ()
-    """Colours that are counted nowhere."""
-    tolerance: Annotated[int, Field(ge=1, le=127)] | None = None
-    """For masks whose compression changes values, as JPEG does: a value at most so far from one
-    that means road (255 by default), from 0 or from one to ignore means the same; the others,
-    which lie at edges, are counted nowhere, and their share is told. Without it such masks are
-    refused."""
+    road: Annotated[tuple[Value, ...], Flag("--road-label", "V")] = ()
+    """Truth values that are road. Of an image with a palette, its indices."""
+    ignore: Annotated[tuple[Value, ...], Flag("--ignore-label", "V")] = ()
+    """Truth values that are counted nowhere."""
+    road_colors: Annotated[tuple[Color, ...], Flag("--road-color", "R,G,B")] = ()
+    """Truth colours that are road, red, green and blue."""
+    ignore_colors: Annotated[tuple[Color, ...], Flag("--ignore-color", "R,G,B")] = ()
+    """Truth colours that are counted nowhere."""
+    tolerance: Annotated[int | None, Interval(ge=1, le=127), Flag("--label-tolerance", "N")] = None
+    """For masks compressed as JPEG: ignore values farther than this from the known ones. A value at
+    most so far from one that means road (255 by default), from 0 or from one to ignore means the
+    same; the others lie at edges, and their share is reported. Without it such masks are refused.
+    """
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def __post_init__(self) -> None:
         if (self.road or self.ignore) and (self.road_colors or self.ignore_colors):
             raise ValueError("the truth's labels are given as values or as colours, not as both")
         if self.ignore and not self.road:
@@ -139,10 +139,9 @@ class LabelSettings:
             raise ValueError("`labels.tolerance` is for masks of values, in which 0 is non-road")
         for both in {*self.road} & {*self.ignore} or {*self.road_colors} & {*self.ignore_colors}:
             raise ValueError(f"label {both} cannot mean road and ignore at once")
-        return self
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True)
 class MaskSettings:
     """Another method's road masks that do not lie in the log."""
 
@@ -154,46 +153,45 @@ class MaskSettings:
     name; or by ``stamp``, for a folder the time that the name is (seconds, or milli-, micro- or
     nanoseconds since 1970). By default stamps of a log, and of a folder in which every name is a
     time of more than ten digits."""
-    first: Annotated[int, Field(ge=0, le=1_000_000_000)] = 0
+    first: Annotated[int, Interval(ge=0, le=1_000_000_000)] = 0
     """The number of the first frame's mask."""
     images: str | None = None
     """The folder of images that the log was made of, in their order: masks belong to the image of
     the same name, endings such as ``_mask`` aside. ``{drive}`` stands for the same here."""
-    threshold: Annotated[float, Field(gt=0, le=1)] | None = None
+    threshold: Annotated[float | None, Interval(gt=0, le=1)] = None
     """For confidence maps: road is what has at least this confidence. A value of 8 or 16 bits is a
     share of the greatest such value; one with a fraction is from 0 to 1."""
     labels: LabelSettings = LabelSettings()
     """For masks of other values than 0 and 255 (road), or 0 and 1 (road): what they mean."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
+    def __post_init__(self) -> None:
         if self.images is not None and (self.pair is not None or self.first):
             raise ValueError("with images masks are paired by name: leave out pair and first")
         if self.threshold is not None and self.labels != LabelSettings():
             raise ValueError("threshold is for confidence maps, labels are for masks of classes")
-        return self
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True)
 class FrameSettings:
     """Which frames of the log are read, and how."""
 
-    start: Time | None = None
-    """First log time: seconds from the log's start, nanoseconds, or RFC 3339."""
-    end: Time | None = None
-    """Likewise; a frame at that very time is not read."""
-    every: Annotated[int, Field(ge=1, le=1_000_000_000)] = 1
-    """Read every so many frames."""
-    max_frames: Annotated[int, Field(ge=1, le=1_000_000_000)] | None = None
-    """Stop after so many frames read."""
-    scale: Annotated[float, Field(gt=0, le=1)] = 1.0
-    """Reduce frames and truth to this share of their width and height first: a cheaper look at a
-    long log, with other results."""
-    keep_corrupt: bool = False
+    start: Annotated[Time | None, Flag("-S --start", "TIME")] = None
+    """First time: seconds from the log's start, nanoseconds, or RFC 3339."""
+    end: Annotated[Time | None, Flag("-E --end", "TIME")] = None
+    """End time, exclusive."""
+    every: Annotated[int, Count, Flag("--every", "N")] = 1
+    """Read every N-th frame."""
+    max_frames: Annotated[int | None, Count, Flag("--max-frames", "N")] = None
+    """Stop after N frames read."""
+    scale: Annotated[float, Interval(gt=0, le=1), Flag("--scale", "F", "Input")] = 1.0
+    """Reduce frames and truth to this share of their width and height first. It is quicker and
+    coarser, and gives other results."""
+    keep_corrupt: Annotated[bool, Flag("--keep-corrupt", group="Input")] = False
     """Use damaged data: messages whose checksum is wrong, and images of which a part is lost."""
-    max_pixels: Annotated[int, Field(ge=1, le=1 << 30)] = MAX_PIXELS
-    """Most pixels of an image. One whose head claims more is not decoded: a damaged head may claim
-    any size."""
+    max_pixels: Annotated[int, Interval(ge=1, le=1 << 30), Flag("--max-pixels", "N", "Input")] = (
+        MAX_PIXELS
+    )
+    """Leave out images of more pixels. They are not decoded: a damaged head may claim any size."""
 
 
 @dataclass(frozen=True, slots=True)

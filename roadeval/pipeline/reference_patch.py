@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-from pydantic import ConfigDict, Field, model_validator
-from pydantic.dataclasses import dataclass as validated
+from annotated_types import Interval
 
-from roadeval.data import Mask
+if TYPE_CHECKING:
+    from roadeval.data import Mask
 
-Share = Annotated[float, Field(ge=0, le=1)]
+Share = Annotated[float, Interval(ge=0, le=1)]
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+@dataclass(frozen=True)
 class ReferencePatch:
     """A trapezoid, symmetric about the image's middle; all as shares of height and width."""
 
@@ -27,11 +27,9 @@ class ReferencePatch:
     bottom_width: Share = 0.4
     """Width of the lower edge."""
 
-    @model_validator(mode="after")
-    def _upright(self) -> ReferencePatch:
+    def __post_init__(self) -> None:
         if self.top >= self.bottom:
             raise ValueError("top must lie above bottom (a smaller share of the height)")
-        return self
 
 
 @lru_cache(maxsize=16)
@@ -40,6 +38,8 @@ def patch_mask(height: int, width: int, patch: ReferencePatch) -> Mask:
 
     A pixel belongs to it when its centre does; each row holds at least the middle.
     """
+    import numpy as np
+
     top, bottom = (round(share * (height - 1)) for share in (patch.top, patch.bottom))
     share = np.linspace(patch.top_width, patch.bottom_width, bottom - top + 1)
     half = np.maximum(share * width / 2, 0.5)

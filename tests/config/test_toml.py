@@ -7,11 +7,17 @@ from itertools import pairwise
 import pytest
 
 from roadeval.cli.options import OPTIONS
-from roadeval.config import PRESETS, RunConfig, configure, load_config, network_variant
-from roadeval.config.document import documented
-from roadeval.config.errors import ConfigError
+from roadeval.config import (
+    PRESETS,
+    ConfigError,
+    RunConfig,
+    configure,
+    documented,
+    load_config,
+    network_variant,
+    run_toml,
+)
 from roadeval.config.settings import SECTIONS
-from roadeval.config.toml import run_toml
 
 OTHER = {
     "output.save": "out.rrd",
@@ -124,8 +130,7 @@ def test_every_setting_is_documented_with_its_range():
     ]
     assert undocumented == ['preset = "gated"']
     assert (
-        "# Worker threads; one per CPU core by default. At least 1, at most 1000.\n# jobs =\n"
-        in text
+        "# Worker threads. Default: one per CPU core. At least 1, at most 1000.\n# jobs =\n" in text
     )
     assert "One of auto, truth, patch.\nsource" in text.replace("\n# ", " ")
     assert "Above 0, at most 1.\nscale = 1.0\n" in text

@@ -3,9 +3,9 @@
 from typing import Any
 
 import pytest
-from pydantic import ValidationError
 
-from roadeval.logs import FrameSettings, LogError, parse_time
+from roadeval.config import ConfigError, configure
+from roadeval.logs import LogError, parse_time
 
 SECOND = 1_000_000_000
 
@@ -42,5 +42,5 @@ def test_anything_else_is_refused(text: str) -> None:
     "given", [{"start": "soon"}, {"end": "-3"}, {"every": 0}, {"max_frames": 0}]
 )
 def test_settings_of_frames_are_checked(given: dict[str, Any]) -> None:
-    with pytest.raises(ValidationError, match=next(iter(given))):
-        FrameSettings(**given)
+    with pytest.raises(ConfigError, match=next(iter(given))):
+        configure({"frames": given})

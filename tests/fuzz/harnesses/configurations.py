@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import tomlkit
 
-from roadeval.config import PRESETS, configure, load_config
-from roadeval.config.document import documented
-from roadeval.config.toml import run_toml
+from roadeval.config import PRESETS, configure, documented, load_config, run_toml
 from tests.config.test_toml import OTHER, tables
 from tests.fuzz.harness import Harness, scratch
 

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
-from time import monotonic
+from time import process_time
 
 import pytest
 
@@ -307,10 +307,10 @@ def test_a_file_that_a_recorder_lists_and_that_is_not_read_is_told(
 def test_a_note_that_says_nothing_of_files_is_no_loss(tmp_path: Path, note: bytes) -> None:
     (tmp_path / "a_0.mcap").write_bytes(LOGS["broken/ok.mcap"].data())
     (tmp_path / "metadata.yaml").write_bytes(note)
-    start = monotonic()
+    start = process_time()
     with open_log(tmp_path) as log:
         assert log.losses == ()
-    assert monotonic() - start < 5
+    assert process_time() - start < 5
 
 
 @broken(["chunk_crc_field_bad"])

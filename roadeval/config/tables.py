@@ -1,0 +1,222 @@
+"""Tables of TOML files: read, and put in the place of settings; messages name the key."""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import takewhile
+from json import dumps
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from roadeval.errors import RoadevalError
+from roadeval.runtime.files import check_input
+from roadeval.runtime.text import is_utf8, visible
+
+PLAIN_WORDS: Final[Mapping[str, str]] = {
+    "int_": "must be a whole number",
+    "float_": "must be a number",
+    "finite_number": "must be a finite number",
+    "bool_": "must be true or false",
+    "string_pattern": "must match {pattern}",
+    "string_": "must be text",
+    "tuple_type": "must be a list",
+    "dict_type": "must be a table",
+    "dataclass_type": "must be a table",
+    "greater_than_equal": "must be at least {ge}",
+    "greater_than": "must be above {gt}",
+    "less_than_equal": "must be at most {le}",
+    "less_than": "must be below {lt}",
+    "literal_error": "must be {expected}",
+    "too_long": "must be a list of at most {max_length}",
+    "missing": "is too short a list",
+}
+"""What is wrong with a value, by how the validating library's name of the problem begins."""
+NOT_UTF8: Final = (
+    "its bytes are not UTF-8, which no configuration can hold: choose another name, or set "
+    "PYTHONUTF8=1 where the system speaks another encoding"
+)
+NUL: Final = "holds a zero byte, which no name and no path can"
+QUOTED: Final = 60
+"""Letters of a wrong value that a message quotes."""
+
+_JSON: Final = TypeAdapter(dict[str, Any], config=ConfigDict(ser_json_inf_nan="constants"))
+
+Keys = tuple[str | int, ...]
+"""The names, and the numbers of items, that lead to a value."""
+
+
+class ConfigError(RoadevalError):
+    """A setting that cannot be used: which file, which key, and what is allowed."""
+
+
+def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
+    """Read the tables of a TOML file, or of the ``run.toml`` that a recording holds.
+
+    A `ConfigError` if there are none to read, or they name code that may not be loaded: see
+    `roadeval.config.load_config`.
+    """
+    try:
+        tables = tomllib.loads(_text(Path(path)))
+    except FileNotFoundError as error:
+        raise ConfigError(f"{path}: there is no such configuration file") from error
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: cannot be read: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: not valid TOML: {error}") from error
+    except RecursionError as error:
+        raise ConfigError(f"{path}: its values are nested too deeply") from error
+    if not trusted or Path(path).suffix == ".rrd":
+        _refuse_code(tables, path)
+    return tables
+
+
+def _refuse_code(tables: Mapping[str, Any], path: str | Path) -> None:
+    """Refuse, as a `ConfigError`, a chain that names a module: the file may be anybody's."""
+    variants = tables.get("variants", {})
+    asked = [tables, *(variants.values() if isinstance(variants, Mapping) else ())]
+    for each in asked:
+        chain = each.get("chain", ()) if isinstance(each, Mapping) else ()
+        for name in chain if isinstance(chain, list) else ():
+            if isinstance(name, str) and ":" in name:
+                raise ConfigError(
+                    f"{path}: its chain names code, {visible(name)}, which is loaded only from a "
+                    "TOML file that you give: replay the drive with the run.toml of its results"
+                )
+
+
+def _text(path: Path) -> str:
+    check_input(path)
+    if path.suffix != ".rrd":
+        return path.read_text(encoding="utf-8-sig")  # some editors begin a file with a mark
+    from roadeval.recording import Recording
+
+    text = Recording(path).result("run")
+    if text is None:
+        raise ConfigError(
+            f"{path}: holds no configuration, for the run was cut: replay the drive once with its "
+            "options, and that recording holds them"
+        )
+    return text
+
+
+def override(settings: Any, tables: Mapping[str, Any], table: str, where: str = "") -> Any:
+    """Return a settings dataclass with the values of one table in place, validated as a whole.
+
+    Parameters
+    ----------
+    settings
+        A dataclass.
+    tables
+        Tables by name; that of this name may be missing.
+    table
+        The name of the settings' table.
+    where
+        The file, for messages; without one they name settings between backticks.
+
+    Raises
+    ------
+    ConfigError
+        For an unknown key or a value out of range; names the key.
+    """
+    values = tables.get(table, {})
+    if not isinstance(values, Mapping):
+        raise ConfigError(f"{prefix(where)}[{table}] must be a table")
+    if not values:
+        return settings
+    if problem := _unusable(values, settings):
+        keys, message = problem
+        raise ConfigError(_named(table, keys, where) + message)
+    merged = _merged(dataclasses.asdict(settings), values)
+    try:
+        # As JSON, for then a list is a tuple and a table a dataclass, but true is no number.
+        json = _JSON.dump_json(merged, fallback=str)
+        return TypeAdapter(type(settings)).validate_json(json, strict=True)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise ConfigError(_named(table, first["loc"], where) + _plainly(first)) from error
+
+
+def prefix(where: str) -> str:
+    """Begin a message with the file that it is about, if there is one."""
+    return f"{where}: " if where else ""
+
+
+def either(names: Iterable[str]) -> str:
+    """List names to choose from."""
+    return ", ".join(sorted(names))
+
+
+def quoted(value: Any) -> str:
+    """Write a value as it stands in a file, and no more of it than a message can hold.
+
+    >>> quoted(True)
+    'true'
+    """
+    text = dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= QUOTED else f"{text[:QUOTED]}..."
+
+
+def _named(table: str, keys: Sequence[str | int], where: str) -> str:
+    """Begin a message with the setting that it is about, in a file or on its own.
+
+    >>> _named("labels", ("road", 0), "")
+    '`labels.road`, item 1: '
+    >>> _named("post", ("patch", "top"), "wide.toml")
+    'wide.toml: [post] patch.top: '
+    """
+    # After an item's number comes which of its types the validating library tried.
+    names = list(takewhile(lambda part: isinstance(part, str), keys))
+    key, rest = ".".join(map(str, names)), keys[len(names) :]
+    item = f", item {int(rest[0]) + 1}" if rest else ""
+    if where:
+        return f"{where}: [{table}] {key}{item}{': ' if key else ''}"
+    return f"`{table}.{key}`{item}: " if key else ""
+
+
+def _unusable(values: Mapping[str, Any], settings: Any, keys: Keys = ()) -> tuple[Keys, str] | None:
+    """Return the first key without a setting, or text that none can hold, and what is wrong."""
+    known = None
+    if dataclasses.is_dataclass(settings):
+        known = [field.name for field in dataclasses.fields(settings)]
+    for key, value in values.items():
+        here = (*keys, key)
+        if known is not None and key not in known:
+            choice = f"there is no such setting; choose {either(known)}"
+            return here, choice if known else "it has no settings"
+        if isinstance(value, Mapping):
+            if problem := _unusable(value, getattr(settings, key, None), here):
+                return problem
+        elif isinstance(value, str):
+            if not is_utf8(value):
+                return here, NOT_UTF8
+            if "\0" in value:
+                return here, NUL
+    return None
+
+
+def _merged(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in values.items():
+        inner = merged.get(key)
+        if isinstance(inner, Mapping) and isinstance(value, Mapping):
+            merged[key] = _merged(inner, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def _plainly(problem: Mapping[str, Any]) -> str:
+    """Say what a value must be, in other words than the validating library's, and what it is."""
+    message, given = str(problem["msg"]).removeprefix("Value error, "), problem["input"]
+    for begin, words in PLAIN_WORDS.items():
+        if problem["type"].startswith(begin):
+            message = words.format_map(problem.get("ctx", {}))
+            break
+    shown = problem["loc"] and not isinstance(given, Mapping)
+    return f"{message} (given: {quoted(given)})" if shown else message

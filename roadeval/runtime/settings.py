@@ -1,0 +1,68 @@
+"""Settings: the fields of a dataclass, each with its meaning, its checks and the flag that sets it.
+
+A field's meaning is the string after it; range, checks and flag are metadata of its type.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Flag:
+    """The flag of the command line that sets a field."""
+
+    names: str
+    """As they are typed, with spaces between them; messages name the last one."""
+    metavar: str = ""
+    """Stands for the value in the help; empty for a switch."""
+    group: str = ""
+    """Its part of the help, where that is not the part of its table."""
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """A function that a field's value passes through: it raises ValueError, or returns a value."""
+
+    function: Callable[[Any], Any]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Let pydantic, which validates settings, call the function first."""
+        from pydantic import BeforeValidator
+
+        return BeforeValidator(self.function).__get_pydantic_core_schema__(source, handler)
+
+
+def meanings(kind: type) -> Mapping[str, str]:
+    """Return the string that follows each field in the source of a class; none without a source."""
+    return _meanings(kind.__module__).get(kind.__qualname__, {})
+
+
+@cache
+def _meanings(module: str) -> Mapping[str, Mapping[str, str]]:
+    """Return the strings that follow the fields of a module's classes."""
+    try:
+        source = inspect.getsource(sys.modules[module])
+    except (KeyError, OSError, TypeError):
+        return {}
+    classes = [each for each in ast.parse(source).body if isinstance(each, ast.ClassDef)]
+    return {each.name: dict(_strings(each)) for each in classes}
+
+
+def _strings(described: ast.ClassDef) -> list[tuple[str, str]]:
+    found = []
+    for field, after in pairwise(described.body):
+        match field, after:
+            case (
+                ast.AnnAssign(target=ast.Name(name)),
+                ast.Expr(value=ast.Constant(value=str(text))),
+            ):
+                found.append((name, inspect.cleandoc(text)))
+    return found
