@@ -10,7 +10,7 @@ from typing import Annotated, Final, Literal
 
 from annotated_types import Interval
 
-from roadeval.images.limits import MAX_PIXELS
+from roadeval.images.formats import MAX_PIXELS
 from roadeval.logs.errors import LogError
 from roadeval.runtime.settings import Checked, Flag
 

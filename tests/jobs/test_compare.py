@@ -7,7 +7,8 @@ import pytest
 
 from roadeval import compare
 from roadeval.errors import RoadevalError
-from roadeval.jobs.compare import as_json, asked
+from roadeval.jobs.compare import as_json
+from roadeval.jobs.result import asked
 from roadeval.results.fleet.folder import Fleet
 from roadeval.results.fleet.record import frames_path
 from tests.results.fleet.making import RUN, fleet_of
