@@ -20,10 +20,10 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.recording.layout import DamagedError, RecordingError
 from roadeval.results.fleet.folder import Fleet
 from roadeval.results.fleet.kind import is_fleet
-from roadeval.results.fleet.record import RESULTS, frames_path
+from roadeval.results.fleet.record import frames_path
 from roadeval.results.fleet.tables import read_frames
 from roadeval.results.folder import RUN, ResultsFolder
-from roadeval.results.rows import Key, cells, drive_row, effect_rows, score_rows
+from roadeval.results.rows import Key, as_arrays, cells, drive_row, effect_rows, score_rows
 from roadeval.results.schema import TABLES
 from roadeval.results.sentences import verdict
 from roadeval.results.tables import AGAIN, ResultsError, parquet_rows
@@ -396,9 +396,9 @@ def _members(fleet: Fleet) -> Iterator[Part]:
 
 
 def _rows_of_member(fleet: Fleet, drive: str, table: str) -> Rows:
-    """Return the rows of a fleet's drive; its frames from their Parquet file, which is smaller."""
+    """Return the rows of a fleet's drive; of its frames alone, for they are in one small file."""
     if table != "frames":
-        return DriveResult(fleet.path / RESULTS / drive).table(table)
+        return as_arrays(table, ())
     try:
         return parquet_rows(read_frames(fleet.path, drive), table)
     except FileNotFoundError:
