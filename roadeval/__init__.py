@@ -27,8 +27,7 @@ if TYPE_CHECKING:
     from roadeval.jobs.compare import compare
     from roadeval.jobs.config import config_toml
     from roadeval.jobs.demo import demo
-    from roadeval.jobs.fleet import FleetOutcome, replay_fleet
-    from roadeval.jobs.fleet_run import FleetProgress
+    from roadeval.jobs.fleet import FleetOutcome, FleetProgress, replay_fleet
     from roadeval.jobs.frame import run_frame
     from roadeval.jobs.info import info
     from roadeval.jobs.pack import pack
@@ -79,7 +78,7 @@ _HOMES: Final = {
     **dict.fromkeys(("Model", "load_model", "save_model"), "training"),
     "Fleet": "results.fleet.folder",
     "FleetOutcome": "jobs.fleet",
-    "FleetProgress": "jobs.fleet_run",
+    "FleetProgress": "jobs.fleet",
     "Outcome": "jobs.replay",
     "Progress": "jobs.progress",
     "Recording": "recording",

@@ -11,7 +11,7 @@ from roadeval.cli import console
 from roadeval.cli.progress import LINE_PERIOD_S
 
 if TYPE_CHECKING:
-    from roadeval.jobs.fleet_run import FleetProgress, OnFleetProgress
+    from roadeval.jobs.fleet import FleetProgress, OnFleetProgress
 
 
 @contextmanager

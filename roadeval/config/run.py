@@ -49,6 +49,7 @@ from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.logs.settings import LabelSettings, LogConfig
 from roadeval.pipeline.chain import Pipeline
 from roadeval.recording import RecordRule
+from roadeval.runtime.discovery import Code
 from roadeval.runtime.text import public_url
 from roadeval.training.settings import TrainingSettings
 
@@ -177,10 +178,14 @@ class RunConfig(LogConfig):
         """Return the pipeline of every variant, by name."""
         return {variant.name: variant.pipeline for variant in self.variants()}
 
-    def others_code(self) -> list[str]:
-        """Return the digests of the files with stages that are not roadeval's own, in order."""
-        stages = (stage for pipeline in self.pipelines().values() for stage in pipeline.stages())
-        return sorted({stage.code for stage in stages if stage.code})
+    def others_code(self) -> dict[str, Code]:
+        """Return the code of stages that are not roadeval's own, by their names in a chain."""
+        return {
+            name: stage.code
+            for pipeline in self.pipelines().values()
+            for name, stage in zip(pipeline.chain, pipeline.stages(), strict=True)
+            if stage.code is not None
+        }
 
     def resolved(self) -> RunConfig:
         """Return the configuration with settings stated that stages find in files.

@@ -3,9 +3,54 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
 
+from roadeval.errors import RoadevalError
+from roadeval.fleet.entry import DriveEntry
 from roadeval.fleet.errors import FleetError
+from roadeval.logs import files_of, identity_of
+
+
+def groups_of(entries: Sequence[DriveEntry]) -> dict[str, str]:
+    """Return the group of each drive by its ID; one that stands alone is its own.
+
+    Logs with the same bytes are in one group, together with all other drives of their groups; those
+    behind URLs are not compared.
+    """
+    groups = {entry.id: entry.group or entry.id for entry in entries}
+    for same in _alike(entries):
+        joined = {groups[entry.id] for entry in same}
+        first = groups[same[0].id]
+        groups = {drive: first if own in joined else own for drive, own in groups.items()}
+    return groups
+
+
+def _alike(entries: Sequence[DriveEntry]) -> list[list[DriveEntry]]:
+    """Return drives whose files are the same, in their order. Only those of one size are read."""
+    same_size = defaultdict[tuple[int, ...], list[tuple[DriveEntry, list[Path]]]](list)
+    for entry in entries:
+        # A drive that cannot be read is reported when it is replayed.
+        with suppress(RoadevalError, OSError):
+            if entry.path is not None:
+                files = files_of(entry.path)[0]
+                same_size[tuple(file.stat().st_size for file in files)].append((entry, files))
+    same = defaultdict[tuple[str, ...], list[DriveEntry]](list)
+    for logs in same_size.values():
+        for entry, files in logs if len(logs) > 1 else ():
+            with suppress(OSError):
+                same[tuple(map(_content, files))].append(entry)
+    return [drives for drives in same.values() if len(drives) > 1]
+
+
+def _content(file: Path) -> str:
+    with file.open("rb") as opened:
+        if found := identity_of(opened):
+            return found
+        opened.seek(0)
+        return hashlib.file_digest(opened, "sha256").hexdigest()
 
 
 def deal(groups: Mapping[str, str], folds: int, seed: int) -> dict[str, int]:

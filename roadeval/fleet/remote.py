@@ -17,11 +17,11 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
+from roadeval.fleet.entry import HEAD, in_order, is_heading, is_log
 from roadeval.fleet.errors import FleetError
-from roadeval.fleet.naming import HEAD, METADATA, in_order, is_heading, is_log
 from roadeval.fleet.stores import Place, ask, is_open, place_of
 from roadeval.fleet.urls import BUCKETS, file_of, is_url, last_part, scheme_of, shown
-from roadeval.runtime.text import visible
+from roadeval.logs import METADATA
 
 _BLOCK: Final = 4 << 20
 """Bytes that are in memory at once."""
@@ -67,28 +67,18 @@ def staged(source: str, folder: Path | None = None) -> Iterator[Path]:
         yield copy
 
 
-def stamp(source: str) -> Mapping[str, Any]:
-    """Return what tells at little cost whether a drive has changed: plain data, by file.
+def stamp(url: str) -> Mapping[str, Mapping[str, Any]]:
+    """Return what tells at little cost whether a drive behind a URL has changed, by file.
 
-    Of a path ``size`` and ``mtime_ns``; of a URL ``size``, ``etag`` and ``last_modified``, the last
-    two None where the server does not tell them.
+    Plain data: ``size``, ``etag`` and ``last_modified``, the last two None where the server does
+    not tell them.
 
     Raises
     ------
     FleetError
         If it is not there, or cannot be asked.
     """
-    here = _local(source)
-    if here is None:
-        return {_file_name(url): _facts(place_of(url)) for url in _files(source)}
-    try:
-        files = sorted(here.glob("*.mcap"), key=in_order) if here.is_dir() else [here]
-        facts = {file.name: file.stat() for file in files}
-    except OSError as error:
-        raise FleetError(f"{visible(str(here))}: {error.strerror or error}") from error
-    return {
-        name: {"size": each.st_size, "mtime_ns": each.st_mtime_ns} for name, each in facts.items()
-    }
+    return {_file_name(each): _facts(place_of(each)) for each in _files(url)}
 
 
 def drives_below(url: str) -> list[str]:

@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import Final
 
 from roadeval.errors import RoadevalError
-from roadeval.fleet.entry import DriveEntry, entry_of, identity
+from roadeval.fleet.entry import DriveEntry, counts, entry_of, identity, in_order, is_bag, is_log
 from roadeval.fleet.errors import FleetError
 from roadeval.fleet.manifest import ManifestEntry, is_manifest, read_manifest
-from roadeval.fleet.naming import counts, in_order, is_bag, is_log
 from roadeval.fleet.remote import drives_below
 from roadeval.fleet.urls import file_of, is_url, last_part, scheme_of
 from roadeval.logs import files_of

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
@@ -118,16 +117,9 @@ class FrameGatherer:
         return times | dict(zip(names, means.tolist(), strict=True))
 
     def finish(self) -> None:
-        """Write the rows and the worst frames' pictures in place of those of an earlier replay.
-
-        Raises
-        ------
-        OSError
-            If they cannot be written.
-        """
+        """Write the rows and the worst frames' pictures; an OSError if they cannot be written."""
         if self._lights:
             self._rows.finish()
-        shutil.rmtree(self._folder / PICTURES / self._drive, ignore_errors=True)
         for each in self._worst:
             put(self._folder / self._picture(each), each.picture)
 

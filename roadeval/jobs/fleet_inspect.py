@@ -12,7 +12,7 @@ from roadeval.config import OutputSettings, RunConfig, load_config
 from roadeval.errors import RoadevalError
 from roadeval.fleet.remote import staged
 from roadeval.fleet.urls import is_url, shown
-from roadeval.jobs.fleet_models import model_path
+from roadeval.jobs.fleet_work import model_path
 from roadeval.jobs.progress import OnProgress, ignore
 from roadeval.jobs.replay import Outcome, replay
 from roadeval.results.fleet.folder import Fleet

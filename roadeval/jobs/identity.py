@@ -1,17 +1,32 @@
-"""The digest of all that decides what a run finds."""
+"""What decides what a run finds, and what tells whether it has changed."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import platform
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from roadeval import logs
 from roadeval.config import ExecutionSettings, FleetSettings, OutputSettings, RunConfig
+from roadeval.errors import RoadevalError
 from roadeval.version import VERSION
+
+OPENCV: Final = (
+    *("opencv-python-headless", "opencv-python"),
+    *("opencv-contrib-python-headless", "opencv-contrib-python"),
+)
+"""The packages that bring OpenCV; where none did, it tells its version itself."""
+COMPUTING: Final = (
+    *("numpy", "scipy", "scikit-learn", *OPENCV, "onnxruntime"),
+    *("av", "isal", "mcap", "pillow", "simplejpeg"),
+)
+"""The packages that decode and compute: another version may give other numbers."""
 
 
 def deciding(config: RunConfig) -> RunConfig:
@@ -20,8 +35,36 @@ def deciding(config: RunConfig) -> RunConfig:
     return replace(config, output=output, run=ExecutionSettings(), fleet=FleetSettings())
 
 
+@cache
+def computing() -> dict[str, str]:
+    """Return the versions of the installed packages that compute, and of OpenCV in any case."""
+    found = {}
+    for package in COMPUTING:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    if not found.keys() & set(OPENCV):
+        import cv2
+
+        found["opencv"] = cv2.__version__
+    return found
+
+
+def software(config: RunConfig) -> dict[str, str]:
+    """Return the versions of all that computes: roadeval, Python, packages, and others' stages.
+
+    Of a stage that is not roadeval's own it is the digest of its code, see
+    `roadeval.runtime.discovery.code_of`. Not told are the processor, and how packages were
+    compiled.
+    """
+    python = ".".join(platform.python_version_tuple()[:2])
+    own = {name: code.digest for name, code in config.others_code().items()}
+    return {"roadeval": VERSION, "python": python, **computing(), **own}
+
+
 def identity(log: logs.Log, config: RunConfig, masks: Mapping[str, str] | None = None) -> str:
-    """Return a digest of the log, the settings, the model file and the version, in hexadecimal.
+    """Return a digest of the log, the settings, the model file and the software, in hexadecimal.
 
     Equal for the same input, wherever log, model and masks lie. ``masks`` are the digests of those
     that lie beside the log, by their variant.
@@ -39,18 +82,25 @@ def identity(log: logs.Log, config: RunConfig, masks: Mapping[str, str] | None =
 def asked(
     config: RunConfig, model: str, *, of: str = "", masks: Mapping[str, Any] | None = None
 ) -> str:
-    """Return a digest of the settings, the version and the SHA-256 of a model file, in hexadecimal.
+    """Return a digest of the settings, the software and the SHA-256 of a model, in hexadecimal.
 
-    With ``of``, the SHA-256 of a log, and what tells the content of masks that lie beside it, it is
-    that of all that decides what a run finds. Of stages that are not roadeval's own it holds the
-    code of the file that defines them.
+    With ``of``, the SHA-256 of a log, and those of masks that lie beside it, it is that of all that
+    decides what a run finds.
     """
     plain = {name: replace(each, path="", images=None) for name, each in config.masks.items()}
     nowhere = "" if config.training.adapt else None  # wherever the file lies
     training = replace(config.training, model=nowhere)
     settings = replace(deciding(config).without_places(), training=training, masks=plain)
-    parts = [VERSION, of, json.dumps(settings.as_dict(), sort_keys=True), model]
-    if masks:
-        parts.append(json.dumps(masks, sort_keys=True))
-    parts += config.others_code()
-    return hashlib.blake2b("\n".join(parts).encode(), digest_size=16).hexdigest()
+    parts = [settings.as_dict(), software(config), of, model, masks or {}]
+    text = json.dumps(parts, sort_keys=True)
+    return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+
+
+def content_of(path: Path, config: RunConfig, model: str) -> str | None:
+    """Return the `identity` of a replay of a log, which is read whole; None if it cannot be."""
+    try:
+        with logs.open_log(path, config) as log:
+            masks = log.select().digests() if config.masks else {}
+            return asked(config, model, of=log.sha256, masks=masks)
+    except RoadevalError:
+        return None

@@ -15,8 +15,9 @@ from roadeval.runtime.on_demand import on_demand
 if TYPE_CHECKING:
     from roadeval.logs.container.damage import Damage
     from roadeval.logs.errors import FrameError, LogError
-    from roadeval.logs.files import files_of, natural
+    from roadeval.logs.files import METADATA, files_of, natural
     from roadeval.logs.frames import Accounting, FrameStream, LoggedFrame
+    from roadeval.logs.identity import identity_of
     from roadeval.logs.log import Log, LogDescription, describe, open_log
     from roadeval.logs.messages.encoding import TopicKind
     from roadeval.logs.selection import Selection
@@ -29,12 +30,13 @@ if TYPE_CHECKING:
         parse_time,
     )
     from roadeval.logs.topics.description import TopicInfo
-    from roadeval.logs.truth.source import LabelSource, mask_stamp
+    from roadeval.logs.truth.source import LabelSource, mask_files
     from roadeval.logs.writing.pack import PackResult, pack
     from roadeval.logs.writing.sidecar import NoSidecar, SidecarWriter
     from roadeval.logs.writing.writer import LogWriter
 
 __all__ = [
+    "METADATA",
     "Accounting",
     "Damage",
     "FrameError",
@@ -58,7 +60,8 @@ __all__ = [
     "TopicSettings",
     "describe",
     "files_of",
-    "mask_stamp",
+    "identity_of",
+    "mask_files",
     "natural",
     "open_log",
     "pack",
@@ -66,6 +69,7 @@ __all__ = [
 ]
 
 _MODULES: Final = {
+    "METADATA": "files",
     "Accounting": "frames",
     "Damage": "container.damage",
     "FrameError": "errors",
@@ -89,7 +93,8 @@ _MODULES: Final = {
     "TopicSettings": "settings",
     "describe": "log",
     "files_of": "files",
-    "mask_stamp": "truth.source",
+    "identity_of": "identity",
+    "mask_files": "truth.source",
     "natural": "files",
     "open_log": "log",
     "pack": "writing.pack",

@@ -18,8 +18,10 @@ _HEAD: Final = 64
 _DAMAGED: Final = 2
 """Bytes of the first eight that may be wrong in what still counts as an MCAP file."""
 
+METADATA: Final = "metadata.yaml"
+"""The file in which rosbag2 describes the files beside it."""
 _NOTE: Final = 16 << 20
-"""Bytes of ``metadata.yaml`` that are read: those of a hundred thousand files."""
+"""Bytes of it that are read: those of a hundred thousand files."""
 # rosbag2 writes this one way. A parser of YAML would know them all, and ends the process on some.
 _LIST: Final = re.compile(r"^ *relative_file_paths:[ \r]*\n((?: *- .*\n?)+)", re.MULTILINE)
 _ITEM: Final = re.compile(r"^ *-(.*)$", re.MULTILINE)
@@ -59,7 +61,7 @@ def files_of(path: Path) -> tuple[list[Path], list[Damage]]:
     """List the MCAP files of a log: the file itself, or a rosbag2 folder's in natural order.
 
     A file in a folder that is no MCAP file is left out, and returned as damage, and so is one that
-    is not there though the folder's ``metadata.yaml`` lists it, or though those before and after it
+    is not there though the folder's `METADATA` lists it, or though those before and after it
     are: a recorder numbers its files from 0.
 
     Raises
@@ -106,7 +108,7 @@ def _listed(folder: Path, there: Set[Path]) -> set[Path]:
     other files.
     """
     try:
-        with (folder / "metadata.yaml").open("rb") as file:
+        with (folder / METADATA).open("rb") as file:
             note = file.read(_NOTE).decode(errors="replace")
     except OSError:
         return set()

@@ -35,6 +35,7 @@ import numpy.typing as npt
 from roadeval.data import ROAD, LayerSpec, Moment, Output, Packed, Rgb, Truth
 from roadeval.data.arrays import Planes
 from roadeval.errors import RoadevalError
+from roadeval.runtime.discovery import Code
 
 __all__ = ["MisfitError", "Output", "Stage", "StageError", "TrainingSet", "View", "perfect_mask"]
 
@@ -130,9 +131,8 @@ class Stage(Generic[S, P]):
     about: Callable[[S], Mapping[str, Any]] | None = None
     """``about(settings)`` returns what results tell of the stage beside its settings, as plain data
     by name."""
-    code: str = ""
-    """SHA-256 of the file that defines a stage of somebody else's; empty for roadeval's own, whose
-    version tells."""
+    code: Code | None = None
+    """Of a stage of somebody else's; None for roadeval's own, whose version tells."""
 
     @property
     def yields_mask(self) -> bool:

@@ -9,13 +9,15 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import inspect
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Final, TypeVar
 
 import numpy as np
@@ -25,7 +27,7 @@ from roadeval.data.packed import Packed
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import beyond, paper
 from roadeval.pipeline.stage import Output, Stage, StageError, TrainingSet, View
-from roadeval.runtime.discovery import by_name, found_in
+from roadeval.runtime.discovery import by_name, code_of, found_in
 from roadeval.runtime.text import visible
 
 GROUP: Final = "roadeval.stages"
@@ -66,39 +68,45 @@ def _somebodys(name: str) -> Stage[Any, Any]:
     try:
         found = _imported(name)
         default = name.partition(":")[2].rpartition(".")[2] if ":" in name else name
-        file = _file(found)
+        modules = _modules(found, name)
         if callable(found) and not isinstance(found, type):
             found = stage_of_function(default, found)
         if not isinstance(found, Stage):
             raise TypeError(f"it is {type(found).__name__}, and neither a Stage nor a function")
         _check(found)
+        return _told(guarded(found), name, modules)
     except UnknownStageError:
         raise
     except Exception as error:  # whatever somebody's module raises
         said = visible(" ".join(f"{type(error).__name__}: {error}".split()))
         raise UnknownStageError(f"stage {name!r} cannot be used: {said}") from error
-    return _told(guarded(found), name, file)
 
 
-def _file(found: Any) -> Path | None:
-    """Return the file that defines a function or a stage; None where there is none."""
-    module = inspect.getmodule(found.bind if isinstance(found, Stage) else found)
-    path = getattr(module, "__file__", None)
-    return Path(path) if path else None
+def _modules(found: Any, name: str) -> list[ModuleType]:
+    """Return the module that defines a function or a stage, and the one that the chain names."""
+    defining = inspect.getmodule(found.bind if isinstance(found, Stage) else found)
+    named = sys.modules.get(name.partition(":")[0])
+    return [module for module in (defining, named) if module is not None]
 
 
-def _told(stage: Stage[Any, Any], name: str, file: Path | None) -> Stage[Any, Any]:
+def _told(stage: Stage[Any, Any], name: str, modules: Sequence[ModuleType]) -> Stage[Any, Any]:
     """Return a stage that tells results where its code comes from."""
-    if file is None:
+    code = code_of(module.__name__ for module in modules)
+    file = getattr(modules[0], "__file__", None) if modules else None
+    if not code.digest or file is None:
         return stage
-    digest = hashlib.sha256(file.read_bytes()).hexdigest()
-    told = {"stage": name, "file": file.name, "sha256": digest}
+    told = {
+        "stage": name,
+        "file": Path(file).name,
+        "sha256": hashlib.sha256(Path(file).read_bytes()).hexdigest(),
+        "code": {"digest": code.digest, "files": len(code.files), "packages": code.packages},
+    }
     own = stage.about
 
     def about(settings: Any) -> Mapping[str, Any]:
         return told if own is None else {**told, **own(settings)}
 
-    return replace(stage, about=about, code=digest)
+    return replace(stage, about=about, code=code)
 
 
 def _imported(name: str) -> Any:

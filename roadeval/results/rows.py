@@ -203,6 +203,7 @@ def drive_row(facts: Mapping[str, Any], name: str, source: str) -> dict[str, Any
     name, source
         See the columns.
     """
+    # Not the outcome's: those tell of other runs' files, too.
     losses, warnings, is_scored = facts["losses"], facts["warnings"], bool(facts["totals"])
     status = (DAMAGED if losses else SCORED) if is_scored else UNSCORED
     return {

@@ -261,7 +261,7 @@ _OF_DRIVES: Final = (
             Column("warnings", Kind.TEXT, "warnings, a sentence a line"),
             Column("verdict", Kind.TEXT, "the verdict on this drive alone"),
             Column("model", Kind.NAME, "SHA-256 of the model file; empty if it trained its own"),
-            Column("identity", Kind.NAME, "digest of log, settings, model and version"),
+            Column("identity", Kind.NAME, "digest of log, settings, model and software"),
             *LIGHT,
         ),
     ),

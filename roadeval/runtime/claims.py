@@ -10,10 +10,44 @@ from __future__ import annotations
 import errno
 import os
 import platform
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
+from typing import Final
+
+from roadeval.runtime.files import own_names
+
+PATIENCE_S: Final = 0.2
+"""Between two looks whether another run has ended with a file."""
+
+
+@contextmanager
+def alone(*files: Path) -> Iterator[None]:
+    """Hold files by the first of them, whose folder is made, once whoever has it has ended.
+
+    What a run that was killed has left of them is removed.
+
+    Raises
+    ------
+    OSError
+        If nothing can be written to the folder.
+    """
+    home = files[0].parent
+    home.mkdir(parents=True, exist_ok=True)
+    with ExitStack() as claims:
+        while True:
+            try:
+                certain = claims.enter_context(claimed(files[0], home))
+                break
+            except BlockingIOError:
+                time.sleep(PATIENCE_S)
+        for file in files if certain else ():
+            with suppress(OSError):
+                for left in own_names(file):
+                    left.unlink()
+        yield
 
 
 @contextmanager

@@ -1,12 +1,25 @@
-"""Modules found by the folder in which they lie, so that adding one file adds one thing."""
+"""Modules: those of a folder, so that adding one file adds one thing; and their code."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import hashlib
+import re
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from pkgutil import iter_modules
 from types import ModuleType
-from typing import Any
+from typing import Any, Final
+
+_NAMED: Final = re.compile(
+    r"""(?:^|[;:])[ \t]*from[ \t]+([^\W\d]\w*)|(?:import_module|__import__)\(\s*["']([^\W\d]\w*)""",
+    re.MULTILINE,
+)
+_LISTED: Final = re.compile(r"(?:^|[;:])[ \t]*import[ \t]+([\w., \t]+)", re.MULTILINE)
+"""Statements that import; a line of a text that looks like one costs nothing but a look."""
 
 
 def by_name(things: Iterable[Any]) -> dict[str, Any]:
@@ -44,3 +57,102 @@ def found_in(package: ModuleType, name: str) -> tuple[Any, ...]:
     names = sorted(module.name for module in iter_modules(package.__path__))
     modules = [import_module(f"{package.__name__}.{each}") for each in names if each[0] != "_"]
     return tuple(getattr(module, name) for module in modules if hasattr(module, name))
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """The code of some modules, and what tells whether it has changed."""
+
+    modules: tuple[str, ...]
+    digest: str
+    """Of the files that count and the packages' versions, in hexadecimal; empty without a file."""
+    files: tuple[str, ...]
+    """The files that count, as ``mine/net/weights.npz``."""
+    packages: Mapping[str, str] = field(hash=False)
+    """Versions of the installed packages that these files import."""
+
+
+def code_of(names: Iterable[str]) -> Code:
+    """Return the code of modules as their files are now. None of them is imported.
+
+    Of each module its top-level package counts whole, data included; a module without a package
+    counts as its file. What a counted file imports counts in the same way where nobody has
+    installed it, as a module beside it. Of an installed package the version counts, and nothing of
+    what that requires in turn. Python's own modules and roadeval's do not count. Not seen are
+    modules that are imported by a computed name, files outside the packages, and what compiled
+    modules load.
+    """
+    from importlib.metadata import packages_distributions
+
+    roots = {name.partition(".")[0] for name in names}
+    installed = packages_distributions() if roots else {}
+    files: dict[str, Path] = {}
+    packages: dict[str, str] = {}
+    todo, seen = roots, {__name__.partition(".")[0], *sys.stdlib_module_names}
+    while todo := todo - seen:
+        seen |= todo
+        for name in sorted(todo):
+            places = _places(name)
+            versions = _versions(places, installed.get(name, ()))
+            packages |= versions
+            if name in roots or not versions:
+                files |= _files(name, places)
+        todo = {name for path in files.values() for name in _imported(path)}
+    parts = [f"{name} {_digest(files[name])}" for name in sorted(files)]
+    parts += [f"{name}=={version}" for name, version in sorted(packages.items())]
+    digest = hashlib.sha256("\n".join(parts).encode()).hexdigest() if files else ""
+    return Code(tuple(sorted(roots)), digest, tuple(sorted(files)), dict(sorted(packages.items())))
+
+
+def _places(name: str) -> list[Path]:
+    """Return the folders of a package, or the file of a module; none where there is neither."""
+    try:
+        spec = find_spec(name)
+    except ValueError:  # a running program has made it
+        return []
+    if spec is None:
+        return []
+    file = [spec.origin] if spec.has_location and spec.origin else []
+    return [Path(place) for place in spec.submodule_search_locations or file]
+
+
+def _versions(places: Iterable[Path], distributions: Iterable[str]) -> dict[str, str]:
+    """Return the versions of the distributions that have put a module where it lies."""
+    from importlib.metadata import distribution
+
+    found = {name: distribution(name) for name in distributions}
+    return {
+        name: each.version
+        for name, each in found.items()
+        # Without a list of its files it may be somebody's work, which is named by its folder alone.
+        if each.read_text("RECORD")
+        and any(place.is_relative_to(str(each.locate_file(""))) for place in places)
+    }
+
+
+def _files(name: str, places: Iterable[Path]) -> Iterator[tuple[str, Path]]:
+    """Yield the files of a module or package, each with its name."""
+    for place in places:
+        if place.is_file():
+            yield place.name, place
+        for path in place.rglob("*"):
+            below = path.relative_to(place)
+            hidden = any(part[0] == "." or part == "__pycache__" for part in below.parts)
+            if path.is_file() and not hidden:
+                yield f"{name}/{below.as_posix()}", path
+
+
+def _imported(path: Path) -> Iterator[str]:
+    """Yield the names of the top-level modules that a source file may import."""
+    if path.suffix != ".py":
+        return
+    text = path.read_text(errors="replace")
+    for pair in _NAMED.findall(text):
+        yield from filter(None, pair)
+    for name in ",".join(_LISTED.findall(text)).split(","):
+        yield from re.findall(r"\w+", name)[:1]
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -18,7 +18,7 @@ from roadeval.cli.app import main
 from roadeval.cli.screens.fleet import problems
 from roadeval.errors import RoadevalError
 from roadeval.jobs.fleet_inspect import recording_of, worst_frames
-from roadeval.jobs.fleet_models import train_fold
+from roadeval.jobs.fleet_work import train_fold
 from roadeval.logs import LogWriter
 from roadeval.results.fleet.record import record_path, recording_path
 from tests.e2e.commands import here

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from roadeval.fleet.copies import groups_of
 from roadeval.fleet.entry import entry_of
+from roadeval.fleet.folds import groups_of
 from roadeval.logs.container.records import MAGIC
 
 

@@ -211,21 +211,6 @@ def test_a_drive_is_never_in_memory_as_a_whole(server, tmp_path, monkeypatch):
     assert peak < 20 * MIB
 
 
-def test_a_stamp_of_a_path_is_size_and_time_of_each_file(tmp_path):
-    for name in ("bag_10.mcap", "bag_2.mcap", "metadata.yaml"):
-        (tmp_path / name).write_bytes(name.encode())
-        os.utime(tmp_path / name, ns=(1, 5_000_000_001))
-    of_folder = {
-        "bag_2.mcap": {"size": 10, "mtime_ns": 5_000_000_001},
-        "bag_10.mcap": {"size": 11, "mtime_ns": 5_000_000_001},
-    }
-    assert stamp(str(tmp_path)) == of_folder
-    assert list(stamp(str(tmp_path))) == list(of_folder)
-    assert stamp((tmp_path / "bag_2.mcap").as_uri()) == {"bag_2.mcap": of_folder["bag_2.mcap"]}
-    with pytest.raises(RoadevalError, match=r"gone\.mcap: No such file"):
-        stamp(str(tmp_path / "gone.mcap"))
-
-
 def test_a_stamp_of_a_url_asks_for_its_head_alone(server):
     facts = stamp(server.url("whole/a.mcap"))["a.mcap"]
     assert facts["size"] == len(CONTENT)

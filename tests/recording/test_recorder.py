@@ -1,7 +1,10 @@
 """The recording as a file: complete under its name, partial where a run ended early."""
 
+import errno
 import json
+import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -252,27 +255,53 @@ TOO_LARGE = """
 import resource, signal, sys
 from pathlib import Path
 from roadeval.recording import RecordingError
+from roadeval.recording.write import recorder
 from tests.recording.making import record, some_frames
 
+recorder.PATIENCE_S = 1.0
+recorder.Recorder.check_disk_space = lambda self: None
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
 try:
     record(Path(sys.argv[1]), some_frames())
 except RecordingError as error:
     print(error)
+    print(error.__cause__.strerror)
 """
 
 
-def test_a_file_whose_index_could_not_be_written_does_not_get_its_name(recording, tmp_path):
-    # In a process of its own, for the limit on the size of files holds for all of it.
-    limit = recording.path.stat().st_size * 9 // 10
-    command = [sys.executable, "-c", TOO_LARGE, str(tmp_path / "out.rrd"), str(limit)]
+def recorded_with_too_little_room(path, limit):
+    """Record in a process of its own, for a limit on the size of files holds for all of it."""
+    command = [sys.executable, "-c", TOO_LARGE, str(path), str(limit)]
     root = Path(__file__).resolve().parents[2]
     done = subprocess.run(
         command, cwd=root, check=False, capture_output=True, text=True, timeout=60
     )
     assert "is the disk full" in done.stdout, done.stderr
-    assert not (tmp_path / "out.rrd").exists()
+    assert not path.exists()
+    return done.stdout.splitlines()[-1]
+
+
+def test_a_file_whose_index_could_not_be_written_does_not_get_its_name(recording, tmp_path):
+    limit = recording.path.stat().st_size * 9 // 10
+    assert recorded_with_too_little_room(tmp_path / "out.rrd", limit) == os.strerror(errno.EIO)
+
+
+def test_a_disk_on_which_rerun_can_write_no_more_ends_the_run_and_is_told_as_full(
+    recording, tmp_path
+):
+    if not shutil.which("mount") or not hasattr(os, "geteuid") or os.geteuid():
+        pytest.skip("only root may mount a small disk")
+    size = f"size={recording.path.stat().st_size // 2}"
+    if subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", size, "tmpfs", tmp_path], check=False
+    ).returncode:
+        pytest.skip("no disk can be mounted here")
+    try:
+        found = recorded_with_too_little_room(tmp_path / "out.rrd", 1 << 30)
+    finally:
+        subprocess.run(["umount", tmp_path], check=True)
+    assert found == os.strerror(errno.ENOSPC)
 
 
 def test_a_place_that_cannot_be_written_is_told_at_once(tmp_path):

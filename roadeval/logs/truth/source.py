@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Final, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -203,24 +203,15 @@ def log_and_topic(path: str) -> tuple[str, str] | None:
     return None if found is None else (found[1], found[2])
 
 
-def mask_stamp(settings: MaskSettings) -> Mapping[str, Any]:
-    """Return what tells at little cost whether masks have changed: size and time of each file.
+def mask_files(settings: MaskSettings) -> list[Path]:
+    """Return the files that hold masks, or give them their frames, whether they are there or not.
 
-    Empty where they cannot be looked at.
+    An OSError if a folder cannot be listed.
     """
     place = log_and_topic(settings.path)
-    folders = [Path(settings.path if place is None else place[0])]
-    if settings.images is not None:
-        folders.append(Path(settings.images))
-    files = [file for each in folders for file in ([each] if each.is_file() else _inside(each))]
-    with suppress(OSError):
-        facts = {str(file): file.stat() for file in files}
-        return {name: [each.st_size, each.st_mtime_ns] for name, each in facts.items()}
-    return {}
-
-
-def _inside(folder: Path) -> list[Path]:
-    return sorted(folder.iterdir()) if folder.is_dir() else []
+    named = (settings.path if place is None else place[0], settings.images)
+    folders = [Path(each) for each in named if each is not None]
+    return [f for each in folders for f in (sorted(each.iterdir()) if each.is_dir() else [each])]
 
 
 def _stamps(labels: Pictures, camera: Camera) -> tuple[Stamps, Stamps]:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
+import ctypes
+import errno
 import hashlib
+import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -26,8 +30,12 @@ UNWRITTEN: Final = 4 << 20
 """Bytes that may wait for Rerun's own thread to write them, which has no limit itself."""
 
 LEAST_FREE: Final = 64 << 20
-"""Bytes that must stay free on the disk, so that the end of a recording can still be written: Rerun
-may wait forever where a write fails."""
+"""Bytes that must stay free on the disk beside what waits. Checked before each chunk but the last,
+for which it is meant: the partial recording then ends whole."""
+
+PATIENCE_S: Final = 10.0
+PATIENCE: Final = 30
+"""How often, and for how long each time, a slow disk is waited for."""
 
 
 class Recorder:
@@ -51,7 +59,7 @@ class Recorder:
         self._layout = layout
         self._encoder = FrameEncoder(layout)
         self._rows, self._numbers = Batcher(IMAGES_AND_TEXT), Batcher(NUMBERS)
-        self._begun = self._finished = False
+        self._begun = self._finished = self._failed = False
         self._chunks = self._unwritten = 0
         self._states: dict[str, str] = {}
         self._sums = MessageSums(self.partial)
@@ -177,15 +185,21 @@ class Recorder:
         self._log_static([(self._sums.mark(), [rr.TextDocument("")])])
         self._close()
         if indexed_chunks(self.partial) < self._chunks:
-            raise self._incomplete()
+            raise self._incomplete() from _failure(errno.EIO)
         self._finished = True
 
     def check_disk_space(self) -> None:
-        """Raise a `RecordingError` if the disk is full, or as good as full."""
+        """Raise a `RecordingError` if the disk is full, or as good as full; by an ENOSPC."""
+        if self._is_disk_full():
+            raise RecordingError(
+                f"{self.path}: cannot be written: the disk is full ({LEAST_FREE >> 20} MiB must "
+                "stay free)"
+            ) from _failure(errno.ENOSPC)
+
+    def _is_disk_full(self) -> bool:
         disk = shutil.disk_usage(self.partial.parent)
-        # What is not a disk, as /proc, has no size.
-        if disk.total and disk.free < LEAST_FREE + self._rows.size:
-            raise RecordingError(f"{self.path}: cannot be written: the disk is full")
+        # A place that is no disk, as /proc, has no size.
+        return bool(disk.total) and disk.free < LEAST_FREE + self._rows.size
 
     def _add_images(self, encoded: EncodedFrame) -> None:
         when = encoded.number, encoded.stamp_ns
@@ -232,6 +246,8 @@ class Recorder:
             self._flush_stream()
 
     def _open_stream(self) -> rr.RecordingStream:
+        if self._failed:
+            raise self._incomplete()
         if self._stream is None:
             raise RuntimeError("a recorder is used inside its 'with' block")
         return self._stream
@@ -256,11 +272,22 @@ class Recorder:
 
     def _flush_stream(self) -> None:
         self._unwritten = 0
-        try:
-            self._open_stream().flush()
-            self._sums.read_on()
-        except (RuntimeError, OSError) as error:
-            raise self._incomplete() from error
+        stream = self._open_stream()
+        for _ in range(PATIENCE):
+            try:
+                stream.flush(timeout_sec=PATIENCE_S)
+                self._sums.read_on()
+                return
+            except OSError as error:
+                raise self._incomplete() from error
+            except RuntimeError as error:
+                if "timed out" not in str(error) or self._is_disk_full():
+                    break
+        # Its thread has ended. Rerun may wait for that for ever, here and when the process ends.
+        atexit.unregister(rr.rerun_shutdown)
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(stream))
+        self._failed, self._stream = True, None
+        raise self._incomplete() from _failure(errno.ENOSPC if self._is_disk_full() else errno.EIO)
 
     def _close(self) -> None:
         if self._stream is None:
@@ -268,11 +295,17 @@ class Recorder:
         try:
             self.flush()
         finally:
-            self._stream.disconnect()
-            self._stream = None
+            if self._stream is not None:
+                self._stream.disconnect()
+                self._stream = None
 
     def _incomplete(self) -> RecordingError:
         return RecordingError(f"{self.partial}: cannot be written any further; is the disk full?")
+
+
+def _failure(number: int) -> OSError:
+    """Return the error that Rerun has met, or would meet, and does not tell."""
+    return OSError(number, os.strerror(number))
 
 
 class NullRecorder:

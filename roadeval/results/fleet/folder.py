@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import cached_property
@@ -14,7 +13,7 @@ from roadeval.data import is_plain
 from roadeval.evaluation.conditions import Condition
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.fleet.conditions import DriveJudgement, judge_drives
-from roadeval.results.fleet.kind import FLEET, JUNIT, METRICS, RUN, is_fleet
+from roadeval.results.fleet.kind import FILES, FLEET, JUNIT, METRICS, RUN, is_fleet
 from roadeval.results.fleet.metrics import flat_metrics, junit_xml
 from roadeval.results.fleet.record import (
     RECORDS,
@@ -28,7 +27,7 @@ from roadeval.results.fleet.tables import Member, read_frames, write_tables
 from roadeval.results.schema import TABLES
 from roadeval.results.summary import ALTERED, digest_of, is_as_written, json_text, plain
 from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, read_parquet
-from roadeval.runtime.claims import claimed
+from roadeval.runtime.claims import alone
 from roadeval.runtime.files import check_folder, leads_outside, put
 from roadeval.runtime.text import is_utf8
 
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-PATIENCE_S: Final = 0.2
 RESULTS: Final = (
     *("verdict", "counts", "frames", "rates", "effects", "strata", "conditions", "warnings"),
 )
@@ -109,7 +107,8 @@ class FleetWriter:
         conditions
             Judged on each drive, see `roadeval.results.fleet.conditions`.
         """
-        with self._explained(), self._alone():
+        # Two commands may replay drives of one folder together.
+        with self._explained(), alone(*(self.folder / name for name in FILES)):
             asked = {member.drive: member.asked for member in members}
             write_tables(self.folder, members, _Records(self.folder, asked))
             judgements = [*judge_drives(self.folder, conditions, settings.least_frames)]
@@ -130,17 +129,6 @@ class FleetWriter:
     def _drives(self) -> Iterator[Mapping[str, Any]]:
         columns = ["drive", "name", "status", "reason", "losses", "seconds", "verdict"]
         yield from read_parquet(self.folder / "drives.parquet", "drives", columns).to_pylist()
-
-    @contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Hold the tables: two commands may replay drives of one folder together."""
-        while True:
-            try:
-                with claimed(self.folder / FLEET, self.folder):
-                    yield
-                    return
-            except BlockingIOError:
-                time.sleep(PATIENCE_S)
 
     @contextmanager
     def _explained(self) -> Iterator[None]:

@@ -1,0 +1,520 @@
+"""The work of a fleet's workers: a drive replayed to its record, a model trained for a fold."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import shutil
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+from roadeval import logs
+from roadeval.config import ExecutionSettings, OutputSettings, RunConfig
+from roadeval.data import Frame
+from roadeval.errors import RoadevalError
+from roadeval.fleet.entry import DriveEntry, in_order
+from roadeval.fleet.errors import FleetError
+from roadeval.fleet.remote import staged, stamp
+from roadeval.jobs.fleet_frames import FrameGatherer
+from roadeval.jobs.identity import asked, content_of, software
+from roadeval.jobs.replay import replay
+from roadeval.logs import METADATA, identity_of
+from roadeval.recording import RecordingError
+from roadeval.results.fleet.record import (
+    FAILED,
+    FRAMES,
+    PICTURES,
+    RECORDINGS,
+    RESULTS,
+    Record,
+    frames_path,
+    read_record,
+    record_path,
+    recording_path,
+    results_path,
+)
+from roadeval.results.rows import Key, cells, drive_row
+from roadeval.results.schema import ALL, TABLES
+from roadeval.results.summary import json_text
+from roadeval.runtime import memory
+from roadeval.runtime.claims import alone
+from roadeval.runtime.files import own_names, put
+from roadeval.training import TrainingError, learning, save_model
+from roadeval.training.held import HeldFrames
+
+MODELS: Final = "models"
+TRAINING_DRIVES: Final = 20
+"""Drives that the model of a fold learns from, at most; drawn by ``training.seed``, groups in turn.
+Their training frames are held decoded."""
+FULL: Final = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS})
+CHANGE_TIMES: Final = os.name == "posix"
+"""Whether ``st_ctime`` tells when a file was changed, which nobody can set."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveTask:
+    """The task of a worker that replays a drive; travels to another process."""
+
+    folder: Path
+    """The fleet's: the same path for every worker."""
+    entry: DriveEntry
+    config: RunConfig
+    """Of this drive, its model included."""
+    software: Mapping[str, str]
+    """That of the program that asks, see `roadeval.jobs.identity.software`."""
+    model: str = ""
+    """SHA-256 of the model file; empty where the drive trains its own."""
+    fold: int | None = None
+    """Whose model that is; None without folds."""
+    recorded: bool = False
+    """Whether a recording is made."""
+    required: bool = False
+    """Whether a drive without a recording is not done."""
+    retry: bool = False
+    """Whether a drive that has failed is tried again."""
+
+    @property
+    def asked(self) -> str:
+        """Digest of settings, software and model."""
+        return asked(self.config, self.model, of=str(self.fold))
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """The report of a drive that is done, to the command that replays the fleet."""
+
+    drive: str
+    status: str
+    reason: str
+    frames: int
+    asked: str
+    """What its record was made for."""
+    err: float | None
+    """The ERR by which the worst drives are kept; None where nothing was scored."""
+    repeated: bool = False
+    """Whether the drive was done before."""
+
+
+def replay_drive(task: DriveTask) -> Done:
+    """Replay a drive and write its record, unless that stands there already.
+
+    While another command works on the same drive, this one waits for it.
+
+    Raises
+    ------
+    FleetError
+        If the fleet's disk fails, or the worker has other software: whatever is wrong with the
+        drive itself is in its record.
+    """
+    _check(task.software, task.config)
+    model = task.config.training.model
+    if task.model and hashlib.sha256(Path(model or "").read_bytes()).hexdigest() != task.model:
+        raise FleetError(f"{model}: has changed since the command began; give it again")
+    own = [record_path(task.folder, task.entry.id), frames_path(task.folder, task.entry.id)]
+    with ending_the_run(task.folder), alone(*own):
+        record, repeated = standing(task), True
+        if record is None:
+            record, repeated = _made(task)
+            record.write(task.folder)
+        attempts(task).unlink(missing_ok=True)
+        return done(record, repeated=repeated)
+
+
+def standing(task: DriveTask) -> Record | None:
+    """Return the record of a drive that needs not be replayed: it is whole, and nothing changed."""
+    record = _usable(task)
+    if record is None:
+        return None
+    now = seen(task.entry, task.config)
+    sure = record.failed or (now is not None and now["sure"])
+    return record if sure and record.stamp == now else None
+
+
+def _usable(task: DriveTask) -> Record | None:
+    """Return the record of a drive that needs not be replayed if its log is the same."""
+    record = read_record(task.folder, task.entry.id)
+    if record is None or record.asked != task.asked or not record.is_whole(task.folder):
+        return None
+    if record.failed and task.retry:
+        return None
+    lacking = task.required and not recording_path(task.folder, record.drive).exists()
+    return None if lacking and record.value("evaluated") else record
+
+
+def done(record: Record, *, repeated: bool = False) -> Done:
+    """Return what the fleet's command is told of a record."""
+    status, reason, frames = (record.value(name) for name in ("status", "reason", "evaluated"))
+    names = TABLES["scores"].names
+    rows = (dict(zip(names, row, strict=True)) for row in record.rows["scores"])
+    # The mean ERR of the first variant's final mask.
+    err = next((row["ERR"] for row in rows if row["final"] and row["region"] == ALL), None)
+    return Done(record.drive, status, reason or "", frames or 0, record.asked, err, repeated)
+
+
+def failed(task: DriveTask, reason: str, exit_code: int = 1) -> Record:
+    """Return the record of a drive that could not be used; what replays have left of it goes."""
+    _remove(task, RESULTS, FRAMES, PICTURES, RECORDINGS)
+    row = {
+        "name": task.entry.name,
+        "source": task.entry.shown,
+        "status": FAILED,
+        "exit_code": exit_code,
+        "reason": reason,
+        "attempts": _begun(task),
+        "fold": task.fold,
+        "model": task.model or None,
+    }
+    drives = cells("drives", Key(task.entry.id, ""), [row])
+    rows = {"drives": drives, "scores": [], "effects": [], "worst": []}
+    return Record(task.entry.id, task.asked, seen(task.entry, task.config), rows)
+
+
+def attempts(task: DriveTask) -> Path:
+    """Return the file that tells how often a drive was begun since it was last done."""
+    return record_path(task.folder, task.entry.id).with_suffix(".begun")
+
+
+def _begun(task: DriveTask) -> int:
+    try:
+        return int(attempts(task).read_text())
+    except (OSError, ValueError):
+        return 0
+
+
+# --- What tells that something has changed --------------------------------------------------------
+
+
+def seen(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
+    """Return what tells at little cost whether a drive's log, or masks beside it, have changed.
+
+    Plain data. Where ``content`` differs it has; where nothing differs it has not, if that is
+    ``sure``; else only reading all tells. None where it cannot be looked at.
+    """
+    try:
+        masks = [file for own in config.masks.values() for file in logs.mask_files(own)]
+        times: dict[str, Any] = {str(file): _times(file) for file in masks}
+        if entry.path is None:
+            facts = stamp(entry.source)
+            tags = {name: each["etag"] for name, each in facts.items()}
+            sizes = {name: each["size"] for name, each in facts.items()}
+            return {"content": sizes, "times": times | tags, "sure": None not in tags.values()}
+        files = _files(entry.path)
+        content = {file.name: _content(file) for file in files}
+        times |= {str(file): _times(file) for file in files}
+        sure = CHANGE_TIMES or (not masks and None not in content.values())
+        return {"content": content, "times": times, "sure": sure}
+    except (OSError, RoadevalError):
+        return None  # what is wrong turns out where it is read
+
+
+def _files(path: Path) -> list[Path]:
+    """Return the files that make a log, of a folder with what a recorder noted of them."""
+    if not path.is_dir():
+        return [path]
+    note = path / METADATA
+    return [*sorted(path.glob("*.mcap"), key=in_order), *([note] if note.exists() else [])]
+
+
+def _content(file: Path) -> str | None:
+    if file.name == METADATA:
+        return hashlib.sha256(file.read_bytes()).hexdigest()
+    with file.open("rb", buffering=0) as opened:
+        return identity_of(opened)
+
+
+def _times(file: Path) -> list[int]:
+    facts = file.stat()
+    return [facts.st_size, facts.st_mtime_ns, facts.st_ctime_ns]
+
+
+def _check(asking: Mapping[str, str], config: RunConfig) -> None:
+    """Raise a FleetError if a worker's software is not that of the command."""
+    own = software(config)
+    for name in sorted(asking.keys() | own.keys()):
+        mine, theirs = own.get(name, "none"), asking.get(name, "none")
+        if mine != theirs:
+            raise FleetError(
+                f"a worker has {name} {mine[:12]}, and the command {theirs[:12]}: install the same "
+                "everywhere, and start the workers again"
+            )
+
+
+# --- A drive --------------------------------------------------------------------------------------
+
+
+def _made(task: DriveTask) -> tuple[Record, bool]:
+    """Return a drive's record, and whether it is an earlier one: its log only looked changed.
+
+    Whatever is wrong with the drive becomes its record.
+    """
+    before, earlier = seen(task.entry, task.config), _usable(task)
+    attempts(task).write_text(str(_begun(task) + 1))
+    try:
+        with staged(task.entry.source) as path:
+            if earlier is not None and _is_same(task, path, earlier, before):
+                return replace(earlier, stamp=before), True
+            return _replayed(task, path, before), False
+    except Exception as error:
+        if _disk_failure(error):
+            raise
+        known = isinstance(error, RoadevalError) or memory.is_lacking(error)
+        said = memory.LACKING if memory.is_lacking(error) else " ".join(str(error).split())
+        reason = said if known else f"{type(error).__name__}: {said} (a defect of roadeval)"
+        return failed(task, reason, 1 if known else 70), False
+
+
+def _is_same(task: DriveTask, path: Path, earlier: Record, now: Mapping[str, Any] | None) -> bool:
+    """Return whether an earlier record is of the same content, which is read whole."""
+    if earlier.failed or None in (earlier.stamp, now):
+        return False
+    assert earlier.stamp is not None
+    assert now is not None
+    if earlier.stamp["content"] != now["content"]:
+        return False
+    return bool(content_of(path, task.config, task.model) == earlier.value("identity"))
+
+
+def _replayed(task: DriveTask, path: Path, before: Mapping[str, Any] | None) -> Record:
+    memory.forget_peak()
+    started = time.perf_counter()
+    drive, folder = task.entry.id, task.folder
+    results = results_path(folder, drive)
+    with FrameGatherer(folder, drive) as gatherer:
+        outcome = replay(path, _config(task, results), on_frame=gatherer.add)
+        _remove(task, PICTURES, *(() if task.recorded else (RECORDINGS,)))
+        gatherer.finish()
+    if not outcome.summary["frames"]["evaluated"]:
+        _remove(task, FRAMES)
+    masks = {name: each["sha256"] for name, each in outcome.summary.get("masks", {}).items()}
+    row = (
+        drive_row(outcome.summary, task.entry.name, task.entry.shown)
+        | gatherer.facts()
+        | {
+            "fold": task.fold,
+            "model": task.model or None,
+            "identity": asked(
+                task.config, task.model, of=outcome.summary["log"]["sha256"], masks=masks
+            ),
+            "size_bytes": sum(
+                each.stat().st_size for each in ([path] if path.is_file() else path.iterdir())
+            ),
+            "attempts": _begun(task),
+            "seconds": time.perf_counter() - started,
+            "peak_memory_mib": memory.peak_mib(),
+        }
+    )
+    own = {"drives": [row], **outcome.rows, "worst": [*gatherer.worst_rows()]}
+    key = Key(drive, outcome.summary["drive"]["camera"])
+    rows = {table: cells(table, key, each) for table, each in own.items()}
+    return Record(drive, task.asked, before, rows)
+
+
+def _remove(task: DriveTask, *folders: str) -> None:
+    """Remove what earlier replays, of something else, have left of a drive in some folders."""
+    folder, drive = task.folder, task.entry.id
+    recording = recording_path(folder, drive)
+    paths = {
+        RESULTS: results_path(folder, drive),
+        FRAMES: frames_path(folder, drive).parent,
+        PICTURES: folder / PICTURES / drive,
+        RECORDINGS: recording,
+    }
+    partial = own_names(recording, hidden=False) if recording.parent.exists() else []
+    for path in (*(paths[each] for each in folders), *(partial if RECORDINGS in folders else ())):
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def _config(task: DriveTask, results: Path) -> RunConfig:
+    """Return the configuration of the replay: one thread, its outputs in the fleet's folder."""
+    record = task.config.output.record if task.recorded else "none"
+    output = OutputSettings(
+        save=str(recording_path(task.folder, task.entry.id)) if record != "none" else None,
+        reports=str(results),
+        record=record,
+        figures=False,
+    )
+    return replace(task.config, drives=(), output=output, run=ExecutionSettings(jobs=1))
+
+
+# --- The fleet's disk -----------------------------------------------------------------------------
+
+
+@contextmanager
+def ending_the_run(folder: Path) -> Iterator[None]:
+    """Turn what fails because of the fleet's disk, as every drive would, into a FleetError."""
+    try:
+        yield
+    except FleetError:
+        raise
+    except Exception as error:
+        failure = error if isinstance(error, OSError) else _disk_failure(error)
+        if failure is None:
+            raise
+        reason = (
+            f"{folder}: cannot be written: {failure.strerror}"
+            if isinstance(failure, OSError)
+            else str(failure)
+        )
+        raise FleetError(
+            f"{reason}; what is done is kept, and the same command again does the rest"
+        ) from error
+
+
+def _disk_failure(error: BaseException | None) -> BaseException | None:
+    """Return the error that says that nothing can be written any more; None if none does."""
+    while error is not None:
+        full = isinstance(error, OSError) and error.errno in FULL
+        if full or (isinstance(error, RecordingError) and isinstance(error.__cause__, OSError)):
+            return error
+        error = error.__cause__
+    return None
+
+
+# --- The models of folds --------------------------------------------------------------------------
+
+
+def model_path(folder: Path, fold: int) -> Path:
+    """Return the file of a fold's model in a fleet's folder."""
+    return folder / MODELS / f"fold_{fold}.model"
+
+
+@dataclass(frozen=True, slots=True)
+class FoldTask:
+    """The task of a worker that trains the model of a fold."""
+
+    folder: Path
+    """Of the fleet."""
+    fold: int
+    """Whose drives the model will score."""
+    candidates: tuple[tuple[DriveEntry, RunConfig], ...]
+    """Drives of the other folds, with their configurations, in the order of being asked."""
+    config: RunConfig
+    """Of the fleet."""
+    software: Mapping[str, str]
+    """That of the program that asks."""
+
+    @property
+    def path(self) -> Path:
+        """The model file."""
+        return model_path(self.folder, self.fold)
+
+
+@dataclass(frozen=True, slots=True)
+class FoldModel:
+    """The model of a fold."""
+
+    fold: int
+    """Whose drives it will score."""
+    sha256: str
+    """Of its file; empty where there is none."""
+    problem: str = ""
+    """Why there is none."""
+
+
+def train_fold(task: FoldTask) -> FoldModel:
+    """Train the model of a fold, unless it is there and nothing has changed.
+
+    A drive without truth, or one that cannot be used, is passed by, and the next one is asked.
+
+    Raises
+    ------
+    FleetError
+        If the fleet's disk fails, or the worker has other software.
+    """
+    _check(task.software, task.config)
+    about = task.path.with_suffix(".json")
+    with ending_the_run(task.folder), alone(task.path, about):
+        looks = [seen(entry, replace(own, masks={})) for entry, own in task.candidates]
+        parts = [asked(task.config, ""), looks]
+        parts += [[entry.id, asked(own, "")] for entry, own in task.candidates]
+        wanted = hashlib.blake2b(json.dumps(parts).encode(), digest_size=16).hexdigest()
+        sure = all(look is None or look["sure"] for look in looks)
+        if sure and (model := _trained_before(task, about, wanted)):
+            return model
+        return _trained(task, about, wanted)
+
+
+def _trained_before(task: FoldTask, about: Path, wanted: str) -> FoldModel | None:
+    try:
+        told = json.loads(about.read_bytes())
+        digest = hashlib.sha256(task.path.read_bytes()).hexdigest()
+    except (OSError, ValueError):
+        return None
+    if not isinstance(told, dict) or (told.get("asked"), told.get("sha256")) != (wanted, digest):
+        return None
+    return FoldModel(task.fold, digest)
+
+
+def _trained(task: FoldTask, about: Path, wanted: str) -> FoldModel:
+    drawn, passed = _drawn(task)
+    if not drawn:
+        why = f": {min(passed.values())}" if passed else ""
+        return FoldModel(
+            task.fold,
+            "",
+            f"the model of fold {task.fold} could not be trained: none of the "
+            f"{len(task.candidates)} drives of the other folds gives training frames{why}",
+        )
+    try:
+        model = learning.from_drives(drawn, task.config.pipelines(), task.config.training)
+    except TrainingError as error:
+        return FoldModel(task.fold, "", str(error))
+    save_model(model, task.path)
+    digest = hashlib.sha256(task.path.read_bytes()).hexdigest()
+    told = {
+        "fold": task.fold,
+        "asked": wanted,
+        "sha256": digest,
+        "drives": {path.name: len(frames) for path, frames in drawn.items()},
+        "passed_by": passed,
+        "training_frames": sorted(model.digests),
+    }
+    put(about, json_text(told).encode())
+    return FoldModel(task.fold, digest)
+
+
+def _drawn(task: FoldTask) -> tuple[dict[Path, Sequence[Frame]], dict[str, str]]:
+    """Return the training frames of as many drives as are wanted, and why others gave none."""
+    held = HeldFrames()
+    drawn: dict[Path, Sequence[Frame]] = {}
+    passed: dict[str, str] = {}
+    for entry, own in task.candidates:
+        if len(drawn) == TRAINING_DRIVES or held.is_full:
+            break
+        try:
+            frames = list(_frames_of(entry, own, held))
+        except RoadevalError as error:
+            if _disk_failure(error):
+                raise
+            passed[entry.id] = " ".join(str(error).split())
+            continue
+        if frames:
+            drawn[Path(entry.id)] = frames
+        else:
+            passed[entry.id] = "no frame with truth"
+    return drawn, passed
+
+
+def _frames_of(entry: DriveEntry, own: RunConfig, held: HeldFrames) -> Iterator[Frame]:
+    """Decode the training frames of a drive, and hold them as long as there is room."""
+    with staged(entry.source) as path, logs.open_log(path, replace(own, masks={})) as log:
+        selection = log.select()
+        if selection.truth is None:
+            return
+        begin = partial(log.frames, selection)
+        for frame in learning.spread(begin, own.training.frames, labelled=True):
+            if frame.truth is None:
+                return
+            if not held.add(frame):
+                return
+            yield frame

@@ -1,0 +1,257 @@
+"""A fleet that goes on in its folder: the result is that of one go, whatever has changed."""
+
+import errno
+import importlib
+import os
+import shutil
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import roadeval
+from roadeval import RoadevalError
+from roadeval.jobs import identity
+from roadeval.pipeline import stages
+from tests.e2e.test_fleet import Here, ThreadTasks, run, tables, write
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("logs")
+    for number, name in enumerate("ab"):
+        write(folder / f"{name}.mcap", 100 * number)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def ran(logs, tmp_path_factory):
+    """A fleet in one go that keeps the recording of its worst drive."""
+    folder = tmp_path_factory.mktemp("fleet") / "f"
+    run(logs, folder, keep="worst:1")
+    return folder
+
+
+@pytest.fixture
+def folder(ran, tmp_path):
+    return shutil.copytree(ran, tmp_path / "f")
+
+
+def files(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+def drive(folder, name="a"):
+    (found,) = (folder / "results").glob(f"{name}-*")
+    return found.name
+
+
+def rewritten(path, change):
+    """Change a file's content, and keep its size and times."""
+    before, content = path.stat(), path.read_bytes()
+    path.write_bytes(change(content))
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert path.stat().st_size == before.st_size
+
+
+def flipped(content):
+    place = len(content) // 2
+    return content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :]
+
+
+# --- What has changed -----------------------------------------------------------------------------
+
+
+def test_a_log_that_has_changed_and_kept_its_size_and_time_is_replayed(logs, tmp_path):
+    mine = shutil.copytree(logs, tmp_path / "logs")
+    run(mine, tmp_path / "f")
+    rewritten(mine / "a.mcap", flipped)
+    again, submitted = run(mine, tmp_path / "f")
+    assert (again.replayed, submitted) == (1, ["a"])
+    one_go, _ = run(mine, tmp_path / "g")
+    assert again.counts == one_go.counts != {"scored": 2}
+    assert tables(tmp_path / "f") == tables(tmp_path / "g")
+
+
+def test_where_no_change_of_a_file_is_noted_its_checksums_tell(logs, tmp_path, monkeypatch):
+    times = "roadeval.jobs.fleet_work._times"
+    monkeypatch.setattr(times, lambda file: [file.stat().st_size])
+    monkeypatch.setattr("roadeval.jobs.fleet_work.CHANGE_TIMES", False)
+    mine = shutil.copytree(logs, tmp_path / "logs")
+    run(mine, tmp_path / "f")
+    assert run(mine, tmp_path / "f")[1] == []
+    rewritten(mine / "a.mcap", lambda content: content.replace(b"roadeval", b"ROADEVAL", 1))
+    assert run(mine, tmp_path / "f")[0].replayed == 1
+
+
+def test_a_log_that_was_only_touched_is_read_and_not_replayed(logs, tmp_path):
+    mine = shutil.copytree(logs, tmp_path / "logs")
+    run(mine, tmp_path / "f")
+    (mine / "a.mcap").touch()
+    again, submitted = run(mine, tmp_path / "f")
+    assert (again.replayed, submitted) == (0, ["a"])
+    assert run(mine, tmp_path / "f")[1] == []
+
+
+def test_of_a_log_that_is_none_any_more_no_results_are_left(logs, tmp_path):
+    mine = shutil.copytree(logs, tmp_path / "logs")
+    run(mine, tmp_path / "f", keep="all")
+    own = drive(tmp_path / "f")
+    (mine / "a.mcap").write_bytes(b"nothing of the kind")
+    again, _ = run(mine, tmp_path / "f", keep="all")
+    assert again.counts == {"scored": 1, "failed": 1}
+    assert [name for name in files(tmp_path / "f") if own in name] == [f"records/{own}.json"]
+
+
+def test_masks_that_have_changed_and_kept_size_and_time_are_another_input(logs, tmp_path):
+    masks = tmp_path / "masks"
+    masks.mkdir()
+    with roadeval.logs.open_log(logs / "a.mcap") as log:
+        width, height = log.select().size
+    for number in range(14):
+        np.save(masks / f"{number}.npy", np.zeros((height, width), bool))
+    tables = {"training": {"frames": 4}, "masks": {"net": {"path": str(masks)}}}
+    config = roadeval.configure(tables)
+
+    def replayed():
+        return roadeval.replay_fleet(
+            logs / "a.mcap", tmp_path / "f", config, executor=Here()
+        ).replayed
+
+    assert (replayed(), replayed()) == (1, 0)
+    rewritten(masks / "13.npy", lambda content: content[:-1] + b"\1")
+    assert (replayed(), replayed()) == (1, 0)
+    (masks / "13.npy").touch()
+    assert replayed() == 0
+
+
+def test_other_versions_of_what_computes_replay_every_drive(logs, folder, monkeypatch):
+    monkeypatch.setattr(identity, "computing", lambda: {"opencv-python-headless": "4.14"})
+    assert run(logs, folder, keep="worst:1")[0].replayed == 2
+
+
+def test_a_worker_with_another_version_is_refused(logs, tmp_path, monkeypatch):
+    other = identity.computing() | {"numpy": "1.0"}
+
+    class Elsewhere(Here):
+        def submit(self, do, /, task):
+            with monkeypatch.context() as there:
+                there.setattr(identity, "computing", lambda: other)
+                return super().submit(do, task)
+
+    with pytest.raises(RoadevalError, match=r"a worker has numpy 1\.0, and the command \d"):
+        run(logs, tmp_path / "f", executor=Elsewhere())
+
+
+def test_a_module_that_a_method_imports_is_part_of_what_is_asked(logs, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "fleetmine.py").write_text(
+        "import fleetbeside\ndef road(image): return image[..., 0] > fleetbeside.BOUND\n"
+    )
+
+    def replayed(bound, *, restart=False):
+        (tmp_path / "fleetbeside.py").write_text(f"BOUND = {bound}\n")
+        importlib.invalidate_caches()
+        if restart:
+            stages._somebodys.cache_clear()
+            for name in ("fleetmine", "fleetbeside"):
+                sys.modules.pop(name, None)
+        tables = {"chain": ["fleetmine:road", "post"], "training": {"frames": 4}}
+        config = roadeval.configure(tables)
+        return roadeval.replay_fleet(
+            logs / "a.mcap", tmp_path / "f", config, executor=Here()
+        ).replayed
+
+    assert (replayed(20, restart=True), replayed(20)) == (1, 0)
+    with pytest.raises(RoadevalError, match="its code has changed since this program imported it"):
+        replayed(200)
+    assert replayed(200, restart=True) == 1
+
+
+def test_a_model_that_changes_while_the_fleet_runs_ends_it(logs, tmp_path):
+    model, other = tmp_path / "m.model", tmp_path / "o.model"
+    for path, frames in ((model, 4), (other, 5)):
+        roadeval.train(
+            [logs / "b.mcap"], path, roadeval.configure({"training": {"frames": frames}})
+        )
+
+    class Meanwhile(Here):
+        def submit(self, do, /, task):
+            shutil.copy(other, model)
+            return super().submit(do, task)
+
+    config = roadeval.configure({"training": {"model": str(model)}})
+    with pytest.raises(RoadevalError, match="has changed since the command began"):
+        roadeval.replay_fleet(logs, tmp_path / "f", config, executor=Meanwhile())
+
+
+# --- What a command that was killed has left ------------------------------------------------------
+
+
+def test_what_a_killed_worker_has_left_is_in_no_table_and_goes(logs, ran, folder):
+    own = drive(folder)
+    (folder / "records" / f"{own}.json").unlink()
+    left = {
+        Path("recordings", f"{own}.0123abcd.partial.rrd"): b"half a recording",
+        Path("records", f".{own}.0123abcd.partial.json"): b"{",
+        Path("frames", f"drive={own}", ".frames.0123abcd.partial.parquet"): b"PAR1",
+        Path("records", f"{own}.begun"): b"1",
+        Path("records", f".{own}.json.lock"): b"process 1",
+        Path(".drives.0123abcd.partial.parquet"): b"PAR1",
+    }
+    for path, content in left.items():
+        (folder / path).write_bytes(content)
+    run(logs, folder, keep="worst:1")
+    assert files(folder) == files(ran)
+    assert tables(folder) == tables(ran)
+
+
+def test_a_worker_killed_after_its_last_step_leaves_nothing(logs, ran, folder):
+    (folder / "records" / f"{drive(folder)}.begun").write_text("1")
+    again, submitted = run(logs, folder, keep="worst:1")
+    assert (again.replayed, submitted) == (0, ["a"])
+    assert files(folder) == files(ran)
+
+
+@pytest.mark.parametrize("lost", [True, False])
+def test_the_worst_drives_recording_alone_is_kept_whatever_was_left(lost, logs, ran, folder):
+    (kept,) = (folder / "recordings").iterdir()
+    other = next(each for each in (drive(folder, name) for name in "ab") if each != kept.stem)
+    shutil.copy(kept, kept.with_stem(other))
+    if lost:
+        kept.unlink()
+    again, _ = run(logs, folder, keep="worst:1")
+    assert again.replayed == int(lost)
+    assert files(folder) == files(ran)
+
+
+# --- A full disk ----------------------------------------------------------------------------------
+
+
+def test_a_nearly_full_disk_ends_the_run_and_the_same_command_goes_on(logs, tmp_path, monkeypatch):
+    with monkeypatch.context() as nearly_full:
+        nearly_full.setattr(
+            "roadeval.recording.write.recorder.shutil.disk_usage",
+            lambda folder: SimpleNamespace(total=1 << 40, free=1 << 20),
+        )
+        said = r"the disk is full \(64 MiB must stay free\); what is done is kept"
+        with pytest.raises(RoadevalError, match=said):
+            run(logs, tmp_path / "f", keep="all")
+    assert run(logs, tmp_path / "f", keep="all")[0].counts == {"scored": 2}
+    run(logs, tmp_path / "g", keep="all")
+    assert files(tmp_path / "f") == files(tmp_path / "g")
+    assert tables(tmp_path / "f") == tables(tmp_path / "g")
+
+
+def test_no_room_for_a_folds_model_ends_the_run(logs, tmp_path, monkeypatch):
+    def fail(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as full:
+        full.setattr("roadeval.training.model.put", fail)
+        with pytest.raises(RoadevalError, match="cannot be written: No space left on device; what"):
+            run(logs, tmp_path / "f", executor=ThreadTasks(), folds=2)
+    again, _ = run(logs, tmp_path / "f", executor=ThreadTasks(), folds=2)
+    assert again.counts == {"scored": 2}
