@@ -115,7 +115,7 @@ def test_the_recording_holds_the_masks_that_were_scored(once):
 def test_the_summary_file_is_the_outcome_s_summary(once):
     folder, outcome = once
     written = json.loads((folder / "reports" / "summary.json").read_text())
-    assert written["format"] == {"name": "roadeval-summary", "version": 3}
+    assert written["format"] == {"name": "roadeval-summary", "version": 4}
     assert written == json.loads(summary_text(outcome.summary))
 
 

@@ -1,0 +1,115 @@
+"""A replay, the comparison of its variants and a fleet of that drive judge alike."""
+
+import numpy as np
+import pytest
+
+from roadeval.evaluation import scored
+from roadeval.evaluation.comparison import compare, variants_as_sides
+from roadeval.evaluation.effects import as_parts, drive_effects
+from roadeval.evaluation.pairing import Side
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.results.fleet.folder import FleetWriter
+from roadeval.results.fleet.record import Record
+from roadeval.results.fleet.tables import Member
+from roadeval.results.rows import Key, cells, effect_rows, score_rows
+from roadeval.results.sentences import degree, sentence, verdict
+from tests.evaluation.making import APart, a_table, autoregression, rows_of
+
+SETTINGS = EvaluationSettings()
+RNG = np.random.default_rng(11)
+SHIFTS = {
+    "unfiltered": (0, 0.2),
+    "filtered": (8, 6),
+    "robust": (-9, 2),
+    "gated": (-0.7, 1.5),
+    "close": (0.2, 0.3),
+    "same": (0, 0),
+    "blind": (3, 5),
+}
+"""The mean change of each variant's ERR in points, and how much it varies."""
+BASE = 20 + 3 * autoregression(RNG, 91, 0.9)
+DRIVE = {
+    (name, "post"): np.rint(BASE + shift + spread * autoregression(RNG, 91, 0.9)).astype(int)
+    for name, (shift, spread) in SHIFTS.items()
+}
+DRIVE["same", "post"] = DRIVE["unfiltered", "post"]
+
+
+def a_drive(variants):
+    """The rows of a drive with these variants."""
+    names = [*variants, "blind"]
+    return rows_of(a_table({(name, "post"): DRIVE[name, "post"].tolist() for name in names}))
+
+
+def replayed(rows):
+    effects = drive_effects([*scored.mask_counts(rows)], SETTINGS)
+    return effects, verdict(scored.totals(rows), effects, SETTINGS)
+
+
+def a_fleet_of(rows, folder):
+    """The content of ``fleet.json`` of a fleet of this drive."""
+    effects, _ = replayed(rows)
+    facts = {"totals": scored.totals(rows), "beyond": {}, **as_parts(effects)}
+    about = {"status": "scored", "evaluated": len(rows.distinct("frame")), "sha256": "d1"}
+    tables = {
+        "drives": [about],
+        "scores": score_rows(facts, {}),
+        "effects": effect_rows(facts),
+        "worst": [],
+    }
+    key = Key("street", "/camera")
+    writer, member = FleetWriter(folder), Member("street", "street", "street.mcap")
+    writer.begin()
+    made = {name: cells(name, key, own) for name, own in tables.items()}
+    Record("street", "asked", None, made).write(folder)
+    return writer.finish([member], SETTINGS, {}, "")
+
+
+CASES = [
+    ["filtered", "unfiltered"],
+    ["filtered", "unfiltered", "robust"],
+    ["filtered", "unfiltered", "robust", "gated"],
+    ["filtered", "unfiltered", "gated", "close", "same"],
+    ["unfiltered", "robust", "gated"],
+]
+
+
+@pytest.mark.parametrize("variants", CASES)
+def test_all_three_judge_the_same_difference_alike(variants, tmp_path):
+    rows = a_drive(variants)
+    effects, told = replayed(rows)
+    sides = variants_as_sides(Side("street", [APart({"frames": rows})]), variants)
+    changes = compare(sides, SETTINGS, across_variants=True).changes
+    of_replay = {e.variant: e.rates["ERR"] for e in effects if e.base == "unfiltered"}
+    of_compare = {change.variant: change.difference["ERR"] for change in changes}
+    assert of_compare == of_replay
+    assert {each.comparisons for each in of_replay.values()} <= {
+        None,
+        sum(not each.is_zero for each in of_replay.values()),
+    }
+    fleet = a_fleet_of(rows, tmp_path / "fleet")
+    assert fleet["verdict"] == told
+    of_fleet = {
+        e["variant"]: (e["mean"], e["low"], e["high"], e["p"], e["p_holm"], e["comparisons"])
+        for e in fleet["effects"]
+        if (e["base"], e["metric"]) == ("unfiltered", "ERR")
+    }
+    assert of_fleet == {
+        name: (each.mean, each.low, each.high, each.p, each.p_holm, each.comparisons)
+        for name, each in of_replay.items()
+    }
+
+
+def test_the_cases_have_differences_of_several_degrees():
+    effects, _ = replayed(a_drive(CASES[2] + ["close", "same"]))
+    found = {degree(e.rates["ERR"], SETTINGS).name for e in effects if e.base == "unfiltered"}
+    assert found >= {"SURE", "LITTLE", "SAME"}
+    assert len(found) >= 4
+
+
+def test_the_sentence_of_a_replay_is_that_of_the_comparison_but_for_what_brings_it_about():
+    rows = a_drive(CASES[2])
+    effects, told = replayed(rows)
+    (effect,) = (e for e in effects if (e.base, e.variant) == ("unfiltered", "filtered"))
+    said = sentence(effect.rates["ERR"], "the filter", "ERR of post", SETTINGS)
+    assert told.startswith(said)
