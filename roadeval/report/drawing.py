@@ -334,7 +334,7 @@ def _positions(chart: Chart, frames: Span | None) -> tuple[Span, list[Tick]]:
 
 def _values_span(chart: Chart) -> Span:
     """Return the range of a chart's values, a little wider than they are."""
-    found = [*chart.share]
+    found = [each for each in chart.share if math.isfinite(each)]
     for each in chart.series:
         found += [value for value in (*each.y, *each.low, *each.high) if math.isfinite(value)]
     if level := chart.level:

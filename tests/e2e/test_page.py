@@ -374,7 +374,7 @@ def test_of_many_drives_each_is_a_point_with_its_interval(many, watched):
     changes = {
         row["drive"]: row
         for row in effects
-        if (row["kind"], row["metric"], row["final"]) == ("filter", "ERR", True)
+        if (row["base"], row["metric"], row["final"]) == ("unfiltered", "ERR", True)
         and row["mean"] is not None
     }
     second = sorted(changes.values(), key=lambda row: (-row["mean"], row["drive"]))[1]
