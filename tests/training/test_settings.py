@@ -1,8 +1,8 @@
 """What cannot be asked of a training."""
 
 import pytest
-from pydantic import ValidationError
 
+from roadeval.config import ConfigError, configure
 from roadeval.training import TrainingSettings
 
 
@@ -16,12 +16,12 @@ def test_the_settings_of_each_seed_are_those_of_one_training():
     [
         ({"seeds": 2, "model": "city.model"}, "`training.model` is trained already"),
         ({"seeds": 2, "seed": 1_000_000_000}, "no seed may be above 1000000000"),
-        ({"seeds": 0}, "greater than or equal to 1"),
+        ({"seeds": 0}, "must be at least 1"),
     ],
 )
 def test_seeds_that_cannot_be_are_refused(given, said):
-    with pytest.raises(ValidationError, match=said):
-        TrainingSettings(**given)
+    with pytest.raises(ConfigError, match=said):
+        configure({"training": given})
 
 
 def test_a_model_file_may_be_used_and_a_single_seed_be_the_last():
