@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import takewhile
 from json import dumps
@@ -13,6 +12,7 @@ from typing import Any, Final
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from roadeval.errors import RoadevalError
+from roadeval.runtime.documents import read_toml
 from roadeval.runtime.files import check_input
 from roadeval.runtime.text import is_utf8, visible
 
@@ -60,14 +60,14 @@ def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
     `roadeval.config.load_config`.
     """
     try:
-        tables = tomllib.loads(_text(Path(path)))
+        tables = read_toml(_text(Path(path)))
     except FileNotFoundError as error:
         raise ConfigError(f"{path}: there is no such configuration file") from error
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:
         raise ConfigError(f"{path}: not valid TOML: {error}") from error
     except RecursionError as error:
         raise ConfigError(f"{path}: its values are nested too deeply") from error

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import csv
 import re
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +25,7 @@ from roadeval.config import OF_A_LOG, DriveSettings, RunConfig, read_tables
 from roadeval.data.names import is_plain
 from roadeval.fleet.errors import FleetError
 from roadeval.fleet.urls import shown
+from roadeval.runtime.documents import read_toml
 from roadeval.runtime.files import check_input
 
 _KEYS: Final = ("path", "group", "tags", *OF_A_LOG)
@@ -144,8 +144,8 @@ def _value(column: str, cell: str) -> Any:
     if column in ("path", "group"):
         return cell
     try:
-        value = tomllib.loads(f"value = {cell}")["value"]
-    except tomllib.TOMLDecodeError:
+        value = read_toml(f"value = {cell}")["value"]
+    except ValueError:
         return cell
     return value if isinstance(value, bool | int | float | list) else cell
 

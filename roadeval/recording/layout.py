@@ -25,6 +25,7 @@ from roadeval.data.colours import CLEAR, SHADOW, with_opacity
 from roadeval.data.counts import OUTCOMES
 from roadeval.data.layer import IGNORED_CLASS
 from roadeval.errors import RoadevalError
+from roadeval.runtime.documents import read_json
 
 APPLICATION: Final = "roadeval"
 """Name of this program in its recordings."""
@@ -133,7 +134,7 @@ class Layout:
     def from_json(cls, text: str) -> Layout:
         """Return the layout that `to_json` wrote; unknown fields are ignored."""
         known = {each.name for each in fields(cls)}
-        raw = {name: value for name, value in json.loads(text).items() if name in known}
+        raw = {name: value for name, value in read_json(text).items() if name in known}
         raw["variants"] = tuple(_variant(v) for v in raw["variants"])
         raw["rates"] = tuple(raw["rates"])
         return cls(**raw)

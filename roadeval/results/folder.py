@@ -6,7 +6,6 @@ It is built beside the one of its name, and replaces it as one: see `roadeval.ru
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -17,6 +16,7 @@ from roadeval.data import Rows
 from roadeval.results.schema import OF_A_DRIVE, TABLES, TableSchema
 from roadeval.results.summary import SUMMARY, read_summary, summary_text
 from roadeval.results.tables import ResultsError, read_rows, read_table
+from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.folders import Content, NewFolder
 
 if TYPE_CHECKING:
@@ -35,8 +35,8 @@ def belonging(folder: Path) -> frozenset[str]:
     A summary lists them in all formats.
     """
     listed = None
-    with suppress(OSError, ValueError, RecursionError, AttributeError):
-        listed = json.loads((folder / SUMMARY).read_bytes()).get("files")
+    with suppress(OSError, ValueError, AttributeError):
+        listed = read_json(read_bounded(folder / SUMMARY)).get("files")
     names = [str(name) for name in listed] if isinstance(listed, list) else []
     plain = {name for name in names if _is_name(name)}
     return frozenset(plain) | {SUMMARY, RUN, *(f"{table}.csv" for table in OF_A_DRIVE)}

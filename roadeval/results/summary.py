@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from roadeval.results.tables import ResultsError
-from roadeval.runtime.files import check_input
-from roadeval.runtime.text import visible, visible_lines
+from roadeval.runtime.documents import LONGEST, read_bounded, read_json
+from roadeval.runtime.text import elided, visible, visible_lines
 
 FORMAT: Final[Mapping[str, Any]] = {"name": "roadeval-summary", "version": 4}
 SUMMARY: Final = "summary.json"
@@ -32,6 +32,8 @@ RESULTS: Final = (
 )
 """Parts that tell what came out and by which method, of which ``digest`` holds a checksum. Whoever
 moves or renames files may mend what the others say of them."""
+VALUES: Final = 200_000
+"""Values that are read of a summary; a run with two variants writes some two thousand."""
 ALTERED: Final = "its content is not what was written"
 _LEVELS: Final = {
     **dict.fromkeys(("drive", "frames", "training", "run", "versions", "log"), 1),
@@ -56,7 +58,7 @@ def is_as_written(content: Mapping[str, Any]) -> bool:
     try:
         stated = content["digest"]
         return bool(stated == digest_of(content, stated["parts"]))
-    except (TypeError, KeyError, RecursionError):  # the digest is damaged, or a part is endless
+    except (TypeError, KeyError):  # the digest is damaged
         return False
 
 
@@ -84,8 +86,7 @@ def read_summary(path: Path) -> dict[str, Any]:
         If there is none, or it is damaged or of another format.
     """
     try:
-        check_input(path)
-        text = path.read_text(encoding="utf-8")
+        text = read_bounded(path).decode()
     except OSError as error:
         raise ResultsError(
             f"{path.parent}: no results here ({SUMMARY}: {error.strerror}); "
@@ -108,8 +109,8 @@ def parse_summary(text: str, where: object) -> dict[str, Any]:
         If it is damaged or of another format. ``where`` begins the message.
     """
     try:
-        summary = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        summary = read_json(text, VALUES)
+    except ValueError as error:
         raise ResultsError(f"{where}: not a summary ({error}); make it anew") from error
     form = summary.get("format") if isinstance(summary, dict) else None
     number = form.get("version") if isinstance(form, dict) else None
@@ -152,11 +153,15 @@ def json_text(value: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Turn mappings, sequences, paths and undefined numbers into what JSON has."""
+    """Turn mappings, sequences, paths and undefined numbers into what JSON has.
+
+    A text of any length, as of a topic's name, is shortened to what is read again.
+    """
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
-    return str(value) if isinstance(value, Path) else value
+    value = str(value) if isinstance(value, Path) else value
+    return elided(value, LONGEST) if isinstance(value, str) and len(value) > LONGEST else value

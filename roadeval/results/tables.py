@@ -15,6 +15,7 @@ from roadeval.data import Rows, is_plain
 from roadeval.data.rows import Cells
 from roadeval.errors import RoadevalError
 from roadeval.results.schema import ARROW, KEY, TABLES, TAG, Column, Kind, TableSchema
+from roadeval.runtime.documents import BYTES, LONG, check_texts
 from roadeval.runtime.files import NewFile, check_input
 
 if TYPE_CHECKING:
@@ -24,6 +25,12 @@ if TYPE_CHECKING:
 
 NAMED: Final = 40
 """Letters of a wrong name that a message quotes."""
+ROWS: Final = 10_000
+"""Rows that a file of any size may have; a larger one has at least a byte for each."""
+UNPACKED: Final = 256 << 20
+COLUMNS: Final = 1_000
+WORDS: Final = 1_000
+"""Different words in a column of a drive's table: variants, stages, regions."""
 BATCH: Final = 50_000
 """Rows of a table that wait in memory before they are written."""
 FLEET_FORMAT: Final = {"name": "roadeval-fleet", "version": 2}
@@ -170,8 +177,13 @@ def _check_cells(column: Column, cells: pa.ChunkedArray) -> None:
     """Refuse, as a ValueError, a column that lacks a value, or a name that is none."""
     if cells.null_count:
         raise ValueError(f"column {column.name} lacks a value")
-    chunks = cells.chunks if column.kind is Kind.NAME else ()
-    for name in (name for chunk in chunks for name in chunk.dictionary.to_pylist()):
+    if column.kind not in _WORDS:
+        return
+    words = {word for chunk in cells.chunks for word in chunk.dictionary.to_pylist()}
+    if len(words) > WORDS:
+        raise ValueError(f"column {column.name} holds {len(words):,} different words")
+    check_texts(words)
+    for name in words if column.kind is Kind.NAME else ():
         if not is_plain(name):
             raise ValueError(f"column {column.name} holds {name[:NAMED]!r}, which is no name")
 
@@ -320,9 +332,15 @@ def read_parquet(
     from pyarrow import parquet
 
     try:
+        check_input(path)
         # As one file: of a path with "drive=" in it a column would be made.
         with parquet.ParquetFile(path, page_checksum_verification=True) as file:
-            table = file.read(columns=columns)
+            _check_size(file.metadata, path.stat().st_size)
+            words = [each.name for each in file.schema_arrow if each.type == pa.string()]
+        with parquet.ParquetFile(
+            path, page_checksum_verification=True, read_dictionary=words
+        ) as file:
+            table = _checked_words(file.read(columns=columns))
     except FileNotFoundError:
         raise
     except (OSError, ValueError, pa.ArrowException) as error:
@@ -338,6 +356,41 @@ def read_parquet(
             )
         elif column.name == "drive":
             _check_drives(path, table["drive"])
+    return table
+
+
+def _check_size(metadata: parquet.FileMetaData, size: int) -> None:
+    """Refuse, as a ValueError, a small file that would fill the memory."""
+    groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
+    unpacked = sum(each.total_byte_size for each in groups)
+    if metadata.num_rows > ROWS + size or unpacked > UNPACKED + 100 * size:
+        raise ValueError(
+            f"{size:,} bytes that unpack to {metadata.num_rows:,} rows and {unpacked:,} bytes"
+        )
+    if metadata.num_columns > COLUMNS:
+        raise ValueError(f"{metadata.num_columns:,} columns, and at most {COLUMNS:,} are read")
+
+
+def _checked_words(table: pa.Table) -> pa.Table:
+    """Return a table with plain words in place of dictionaries; a ValueError if they are too long.
+
+    Until then a long word that many rows have is in memory once.
+    """
+    import pyarrow as pa
+
+    for place, field in enumerate(table.schema):
+        if not pa.types.is_dictionary(field.type):
+            continue
+        letters = 0
+        for chunk in table.column(place).chunks:
+            words = chunk.dictionary.to_pylist()
+            counts = np.bincount(_filled(chunk.indices, len(words)), minlength=len(words) + 1)
+            times = [*zip(words, counts.tolist(), strict=False)]
+            check_texts(word for word, n in times for _ in range(n if len(word) > LONG else 1))
+            letters += sum(len(word) * n for word, n in times)
+        if letters > BYTES:
+            raise ValueError(f"column {field.name} has {letters:,} letters")
+        table = table.set_column(place, field.name, table.column(place).cast(pa.string()))
     return table
 
 

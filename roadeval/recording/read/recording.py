@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Iterable
 from functools import cached_property
 from os import PathLike
@@ -20,6 +19,7 @@ from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.read.rrd_file import RrdFile, flat, whole
 from roadeval.results.summary import another_format, parse_summary
 from roadeval.results.tables import read_rows, read_table
+from roadeval.runtime.documents import check_texts, read_json
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,7 +59,7 @@ class Recording:
             raise RecordingError(f"{self.path}: the recording ends before its first frame")
         with whole(self.path, at.LAYOUT):
             if form != at.FORMAT:
-                version = json.loads(text).get("properties", {}).get("version")
+                version = read_json(text).get("properties", {}).get("version")
                 sentence = another_format(version, later=form > at.FORMAT)
                 raise RecordingError(f"{self.path}: {sentence}")
             self.layout = Layout.from_json(text)
@@ -121,7 +121,7 @@ class Recording:
         text = self.result(at.SUMMARY)
         summary = {} if text is None else parse_summary(text, self.path)
         with whole(self.path, at.SECONDS):
-            seconds = json.loads(self._file.document(at.SECONDS) or "{}")
+            seconds = read_json(self._file.document(at.SECONDS) or "{}")
         return summary | ({"seconds": seconds} if seconds else {})
 
     @cached_property
@@ -212,10 +212,13 @@ class Recording:
 
     @cached_property
     def _notes(self) -> dict[int, tuple[str, ...]]:
-        notes: dict[int, tuple[str, ...]] = {}
+        notes = defaultdict[int, list[str]](list)
         for frame, note in self._file.rows(at.NOTES, "TextLog:text"):
-            notes[frame] = (*notes.get(frame, ()), note)
-        return notes
+            notes[frame].append(note)
+        with whole(self.path, at.NOTES):
+            for own in notes.values():
+                check_texts(own)
+        return {frame: tuple(own) for frame, own in notes.items()}
 
     def _array(self, path: str, frame: int) -> npt.NDArray[Any]:
         if path not in self._codecs:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import cached_property
@@ -28,6 +27,7 @@ from roadeval.results.schema import TABLES
 from roadeval.results.summary import ALTERED, digest_of, is_as_written, json_text, plain
 from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, read_parquet
 from roadeval.runtime.claims import alone
+from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import check_folder, leads_outside, put
 from roadeval.runtime.text import is_utf8
 
@@ -71,8 +71,8 @@ class FleetWriter:
         with self._explained():
             check_folder(self.folder)
             if is_fleet(self.folder):
-                with suppress(ValueError, RecursionError):  # damage: it is written anew
-                    _check_format(path := self.folder / FLEET, json.loads(path.read_bytes()))
+                with suppress(ValueError):  # damage: it is written anew
+                    _check_format(path := self.folder / FLEET, read_json(read_bounded(path)))
             elif not (self.folder / RECORDS).is_dir() and _has_files(self.folder):
                 raise ResultsError(
                     f"{self.folder}: holds other files and is no fleet's folder; name a new one"
@@ -283,12 +283,12 @@ def _read(folder: Path) -> dict[str, Any]:
     """Read ``fleet.json``; a `ResultsError` if it is not there, damaged or of another format."""
     path = folder / FLEET
     try:
-        content = json.loads(path.read_bytes())
+        content = read_json(read_bounded(path))
     except OSError as error:
         raise ResultsError(
             f"{folder}: no fleet here ({FLEET}: {error.strerror}); make one with roadeval fleet"
         ) from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise ResultsError(f"{path}: damaged ({error}); {AGAIN}") from error
     _check_format(path, content)
     if reason := _damage(content):

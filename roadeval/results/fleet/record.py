@@ -16,6 +16,7 @@ from typing import Any, Final
 from roadeval.results.schema import OF_DRIVES, TABLES
 from roadeval.results.summary import SUMMARY, digest_of, is_as_written
 from roadeval.results.tables import FLEET_FORMAT, ResultsError
+from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import put
 
 RECORDS: Final = "records"
@@ -100,12 +101,12 @@ class Record:
 def read_record(folder: Path, drive: str) -> Record | None:
     """Read the record of a drive; None where there is none, or it is of another version."""
     try:
-        content = json.loads(record_path(folder, drive).read_bytes())
+        content = read_json(read_bounded(record_path(folder, drive)))
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
         raise ResultsError(f"{record_path(folder, drive)}: {error.strerror}") from error
-    except (ValueError, RecursionError):
+    except ValueError:
         return None  # not ours, or not whole: it is made again
     return _of(content, drive)
 

@@ -1,0 +1,120 @@
+"""JSON and TOML from anybody: what is read of a document is bounded.
+
+A few kilobytes can nest more than any program unpacks, name a table by twenty thousand words, or
+hold a word that takes minutes to typeset.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Final
+
+from roadeval.runtime.files import check_input
+
+LONGEST: Final = 12_000
+"""Letters of a text; what is written is shortened to as many."""
+LONG: Final = 1_000
+LONG_TOGETHER: Final = 500_000
+"""Letters of all texts of more than `LONG` letters."""
+LISTED: Final = 1_000_000
+"""Letters of the texts of a list."""
+VALUES: Final = 2_000_000
+DEPTH: Final = 32
+"""Tables and lists inside one another."""
+BYTES: Final = 64 << 20
+TOML_BYTES: Final = 1 << 20
+DOTS: Final = 2_000
+"""Parts of a name of TOML: reading one takes time by the square of their number."""
+
+
+def read_bounded(path: Path) -> bytes:
+    """Return the bytes of a document; an OSError or ValueError if it is none, or too large."""
+    check_input(path)
+    with path.open("rb") as file:
+        content = file.read(BYTES + 1)
+    _check_size(len(content), BYTES)
+    return content
+
+
+def read_json(content: str | bytes, values: int = VALUES) -> Any:
+    """Read a JSON document; a ValueError if it is damaged, or holds more than is read of one."""
+    _check_size(len(content), BYTES)
+    comma, bracket, brace = (",", "[", "{") if isinstance(content, str) else (b",", b"[", b"{")
+    if sum(map(content.count, (comma, bracket, brace))) > 2 * values:  # type: ignore[arg-type]
+        raise ValueError(f"it holds more than {values:,} values")
+    try:
+        found = json.loads(content)
+    except RecursionError as error:
+        raise ValueError(_too_deep()) from error
+    _check(found, values)
+    return found
+
+
+def read_toml(text: str) -> dict[str, Any]:
+    """Read a TOML document; a ValueError if it is damaged, or holds more than is read of one."""
+    _check_size(len(text), TOML_BYTES)
+    if sum(line.count(".") ** 2 for line in text.splitlines()) > DOTS**2:
+        raise ValueError(f"a name in it has more than {DOTS:,} parts, or several have so many")
+    try:
+        found = tomllib.loads(text)
+    except RecursionError as error:
+        raise ValueError(_too_deep()) from error
+    except ValueError as error:
+        if re.search("limit .* for integer string", str(error)):
+            raise ValueError("a number in it has thousands of digits") from error
+        raise
+    _check(found, VALUES)
+    return found
+
+
+def check_texts(texts: Iterable[str]) -> None:
+    """Refuse, as a ValueError, texts that would take too long to show."""
+    together = 0
+    for text in (line for each in texts for line in each.split("\n")):
+        if len(text) > LONGEST:
+            raise ValueError(
+                f"it holds a text of {len(text):,} letters, and at most {LONGEST:,} are read"
+            )
+        together += len(text) if len(text) > LONG else 0
+        if together > LONG_TOGETHER:
+            raise ValueError(f"its long texts have more than {LONG_TOGETHER:,} letters together")
+
+
+def _check_size(size: int, most: int) -> None:
+    if size > most:
+        raise ValueError(f"it has {size:,} bytes, and at most {most:,} are read")
+
+
+def _check(document: Any, most: int) -> None:
+    """Refuse, as a ValueError, what is too deep, too much, or too long to be shown."""
+    texts: list[str] = []
+    level: list[Any] = [document]
+    depth = values = 0
+    while level:
+        depth, values = depth + 1, values + len(level)
+        inner: list[Any] = []
+        if depth > DEPTH:
+            raise ValueError(_too_deep())
+        if values > most:
+            raise ValueError(f"it holds more than {most:,} values")
+        for each in level:
+            match each:
+                case str():
+                    texts.append(each)
+                case dict():
+                    texts += each
+                    inner += each.values()
+                case list():
+                    inner += each
+                    if sum(len(text) for text in each if isinstance(text, str)) > LISTED:
+                        raise ValueError(f"a list in it has more than {LISTED:,} letters")
+        level = inner
+    check_texts(texts)
+
+
+def _too_deep() -> str:
+    return f"it nests more than {DEPTH} tables and lists inside one another"

@@ -1,0 +1,91 @@
+"""JSON and TOML from anybody: what would take minutes or gigabytes is refused in a sentence."""
+
+import json
+import time
+
+import pytest
+
+from roadeval.runtime.documents import (
+    LONG_TOGETHER,
+    LONGEST,
+    check_texts,
+    read_bounded,
+    read_json,
+    read_toml,
+)
+from tests.fixtures.shared import shared
+
+BIG = "x" * (LONGEST + 1)
+MANY = "y" * 1_001
+
+
+@pytest.mark.parametrize(
+    ("document", "reason"),
+    [
+        ({"verdict": BIG}, "a text of 12,001 letters, and at most 12,000 are read"),
+        ({"a": [{BIG: 1}]}, "a text of 12,001 letters"),
+        ({str(n): MANY for n in range(500)}, "its long texts have more than 500,000 letters"),
+        (["z" * 1_000] * 1_001, "a list in it has more than 1,000,000 letters"),
+        ([0] * 101, "more than 100 values"),
+        ([[[0] * 40] * 2] * 2, "more than 100 values"),
+    ],
+)
+def test_json_that_holds_too_much_is_refused(document, reason):
+    with pytest.raises(ValueError, match=reason):
+        read_json(json.dumps(document), 100 if "values" in reason else 10_000)
+
+
+@pytest.mark.parametrize(
+    "deep", ["[" * 100_000, "[" * 40 + "]" * 40, '{"a":' * 40 + "1" + "}" * 40]
+)
+def test_json_that_nests_too_deep_is_refused(deep):
+    with pytest.raises(ValueError, match="nests more than 32"):
+        read_json(deep)
+
+
+def test_what_is_written_is_read():
+    kept = {"a": "x" * LONGEST, "b": ["w" * 1_000] * 900, "c": [1.5, None, True], "d\n": {}}
+    assert read_json(json.dumps(kept)) == kept
+    assert read_json(json.dumps(kept).encode()) == kept
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("a = " + "[" * 1_000 + "]" * 1_000, "nests more than 32"),
+        ("a = " + "[" * 40 + "]" * 40, "nests more than 32"),
+        ("a = " + "{b = " * 400 + "1" + "}" * 400, "nests more than 32"),
+        (".".join("a" * 50) + " = 1", "nests more than 32"),
+        ("x." * 20_000 + "y = 1", "a name in it has more than 2,000 parts"),
+        ("[" + "x." * 1_500 + "y]\n" + "[" + "x." * 1_500 + "z]", "or several have so many"),
+        ("a = " + "9" * 5_000, "thousands of digits"),
+        ("# " + "x" * (1 << 20), "bytes, and at most 1,048,576 are read"),
+        ("a = [1", "Unclosed array"),
+        (f"a = '{BIG}'", "a text of 12,001 letters"),
+    ],
+)
+def test_toml_that_holds_too_much_is_refused_at_once(text, reason):
+    begun = time.process_time()
+    with pytest.raises(ValueError, match=reason):
+        read_toml(text)
+    assert time.process_time() - begun < 2
+
+
+@pytest.mark.parametrize("path", shared("failures", "nested_arrays.toml"))
+def test_the_nested_arrays_that_were_a_defect_are_refused(path):
+    with pytest.raises(ValueError, match="nests more than 32"):
+        read_toml(path.read_text())
+
+
+def test_lines_are_texts_of_their_own():
+    check_texts(["\n".join(["x" * 900] * 2_000)])
+    with pytest.raises(ValueError, match="long texts"):
+        check_texts(["\n".join([MANY] * (LONG_TOGETHER // 1_000))])
+
+
+def test_a_document_is_a_file_that_ends(tmp_path):
+    (tmp_path / "large").write_bytes(bytes(65 << 20))
+    with pytest.raises(ValueError, match="at most 67,108,864 are read"):
+        read_bounded(tmp_path / "large")
+    with pytest.raises(OSError, match="is a folder"):
+        read_bounded(tmp_path)
