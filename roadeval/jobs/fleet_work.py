@@ -45,6 +45,7 @@ from roadeval.results.schema import ALL, TABLES
 from roadeval.results.summary import json_text
 from roadeval.runtime import memory
 from roadeval.runtime.claims import alone
+from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import own_names, put
 from roadeval.training import TrainingError, learning, save_model
 from roadeval.training.held import HeldFrames
@@ -446,7 +447,7 @@ def train_fold(task: FoldTask) -> FoldModel:
 
 def _trained_before(task: FoldTask, about: Path, wanted: str) -> FoldModel | None:
     try:
-        told = json.loads(about.read_bytes())
+        told = read_json(read_bounded(about))
         digest = hashlib.sha256(task.path.read_bytes()).hexdigest()
     except (OSError, ValueError):
         return None
