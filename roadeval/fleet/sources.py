@@ -160,7 +160,7 @@ def _in_bag(entry: DriveEntry, bags: set[Path]) -> DriveEntry:
 def _once(entries: Iterable[DriveEntry]) -> list[DriveEntry]:
     kept: dict[str, DriveEntry] = {}
     for entry in entries:
-        key = entry.source if entry.path is None else str(entry.path.resolve())
+        key = entry.source if entry.path is None else os.path.realpath(entry.path)
         first = kept.get(key)
         if first is None or first.known == (None, {}, {}):
             kept[key] = entry if first is None or entry.known != first.known else first

@@ -15,12 +15,12 @@ from mcap.records import Channel, Schema
 
 from roadeval.images import Limits
 from roadeval.logs.container.damage import Damage, damage_of
-from roadeval.logs.container.file import Container
+from roadeval.logs.container.file import containers_in
 from roadeval.logs.errors import BadRecord, LogError
 from roadeval.logs.files import files_of
 from roadeval.logs.frames import FrameStream
 from roadeval.logs.messages.encoding import TopicKind
-from roadeval.logs.messages.pictures import kind_of, message_is_whole
+from roadeval.logs.messages.pictures import kind_of, message_stamp
 from roadeval.logs.selection import Selection, settle
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import named
@@ -73,8 +73,11 @@ class Log:
         self._lost_files = damage
         self._beside: list[Log] = []
         self._containers = [
-            Container(f, _is_image, message_is_whole, keep_corrupt=config.frames.keep_corrupt)
-            for f in files
+            container
+            for file in files
+            for container in containers_in(
+                file, _is_image, message_stamp, keep_corrupt=config.frames.keep_corrupt
+            )
         ]
         self._readers = topic_readers(self._containers, self._limits, lacks_files=bool(damage))
         self.topics: tuple[TopicInfo, ...] = tuple(
@@ -108,7 +111,7 @@ class Log:
     @property
     def size(self) -> int:
         """Bytes of all its files."""
-        return sum(container.source.size for container in self._containers)
+        return sum(len(container.source) for container in self._containers)
 
     def _kept(self, topic: TopicInfo) -> str:
         reader = self._readers[topic.name]
@@ -133,17 +136,14 @@ class Log:
         LogError
             If the disk fails.
         """
-        digests = []
+        digests = {container.path: hashlib.sha256() for container in self._containers}
         for container in self._containers:
-            digest = hashlib.sha256()
             try:
-                container.read_all(digest.update)
+                container.read_all(digests[container.path].update)
             except BadRecord as error:
                 raise LogError(f"{container.path}: {error}") from error
-            digests.append(digest.hexdigest())
-        if len(digests) == 1:
-            return digests[0]
-        return hashlib.sha256("".join(digests).encode()).hexdigest()
+        found = [digest.hexdigest() for digest in digests.values()]
+        return found[0] if len(found) == 1 else hashlib.sha256("".join(found).encode()).hexdigest()
 
     def select(self, *, several: bool = False) -> Selection:
         """Settle what to replay: what is asked for, and the rest where the log leaves no doubt.

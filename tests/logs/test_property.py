@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from roadeval.logs import FrameError, LogConfig, LogError, TopicSettings, open_log
-from roadeval.logs.container.file import OUTSIDE, Container
+from roadeval.logs.container.file import OUTSIDE, Container, containers_in
 from tests.logs.making import CAMERA, CONTAINERS, small_log
 
 CASES = 250
@@ -53,7 +53,7 @@ def places(container: Container) -> Iterator[tuple[int, tuple[int, int]]]:
 def make(path: Path, name: str) -> Good:
     images = small_log(path, name)
     data = path.read_bytes()
-    container = Container(path, lambda *_: True, lambda *_: True)
+    (container,) = containers_in(path, lambda *_: True, lambda *_: 0)
     spans = dict(places(container))
     container.close()
     data_end = data.index(b"\x0f\x04" + bytes(7))

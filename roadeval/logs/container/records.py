@@ -1,8 +1,8 @@
-"""The records of an MCAP file, read strictly: a record that does not add up is refused.
+"""Bytes by position, and the records of an MCAP file in them.
 
-The layouts are those of https://mcap.dev/spec. Schemas, channels and statistics are read by the
-`mcap` library. Messages, chunks and indexes are read here, where a length that contradicts another
-is an error, and from a few bytes, so that a file can be walked through without reading its data.
+The layouts are those of https://mcap.dev/spec. The `mcap` library reads all records but messages,
+chunks and message indexes: those are read here from a few bytes, so that a file can be walked
+through without reading its data. Whatever does not add up raises a `BadRecord`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import io
 import struct
 import sys
 from collections.abc import Callable, Iterator
-from typing import Any, Final, NamedTuple
+from typing import IO, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +20,6 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 
-from roadeval.logs.container.readers import Buffer, ByteReader
 from roadeval.logs.errors import BadRecord
 
 MAGIC: Final = b"\x89MCAP0\r\n"
@@ -30,35 +29,96 @@ MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
 """Channel, sequence, log time, publish time."""
 CHUNK_HEAD: Final = struct.Struct("<QQQII")
 """Start time, end time, uncompressed size, CRC, length of the compression's name."""
-CHUNK_INDEX_HEAD: Final = struct.Struct("<QQQQI")
-"""Start time, end time, offset and length of the chunk, bytes of its index offsets."""
-INDEX_OFFSET: Final = struct.Struct("<HQ")
-"""Channel, offset of its message index."""
 INDEX_HEAD: Final = struct.Struct("<HI")
 """Channel, bytes of entries."""
 LARGEST: Final = 1 << 28
 """Bytes of a message or definition; one that claims more is damaged."""
+LONGEST_NAME: Final = 64
+"""No compression has a longer name; a chunk that claims so is damaged."""
 PRIVATE: Final = 0x80
 """Opcodes from here on belong to applications."""
 PADDING: Final = 4
 """A message may be padded at its end to a multiple of so many bytes, as CDR does."""
-LONGEST_NAME: Final = 64
-"""No compression has a longer name; a chunk that claims so is damaged."""
 
-LONGEST_CHUNK_HEAD: Final = CHUNK_HEAD.size + LONGEST_NAME + 8
-"""Bytes of a chunk's body in which its head ends, whatever the compression."""
+WINDOW: Final = 64 << 10
+"""Bytes read at once while walking from record to record."""
+GLANCE: Final = 1 << 10
+"""Bytes read at once after a leap, as over the data of a chunk."""
 
+Buffer = bytes | memoryview
 Entries = npt.NDArray[np.int64]
 """``(n, 2)``: log times of messages, and offsets of their records in the chunk."""
 
 
-class Place(NamedTuple):
-    """A record's place: ``offset`` of its opcode, ``body`` of its content, ``end`` after it."""
+class FileBytes:
+    """A part of a file, sliced like `bytes`; a `BadRecord` where the disk fails.
+
+    Nothing is mapped: pages of a mapped file count as memory of the program, and a file that
+    shrinks while it is read would end the program with a bus error.
+    """
+
+    def __init__(self, file: IO[bytes], begin: int = 0, size: int | None = None) -> None:
+        self._file = file
+        self.begin = begin
+        self._size = file.seek(0, 2) - begin if size is None else size
+        self._window = memoryview(b"")
+        self._window_at = self._at = 0
+
+    def part(self, begin: int, end: int) -> FileBytes:
+        """Return a part of this part."""
+        return FileBytes(self._file, self.begin + begin, end - begin)
+
+    def __len__(self) -> int:
+        return self._size
+
+    def __getitem__(self, part: slice, /) -> Buffer:
+        start, stop = part.start, min(part.stop, self._size)
+        if start >= stop:
+            return memoryview(b"")
+        at, end = start - self._window_at, stop - self._window_at
+        if at < 0 or end > len(self._window):
+            if stop - start > GLANCE:
+                return self._read(start, stop - start)
+            walks_on = 0 <= at <= len(self._window) + GLANCE
+            window = min(WINDOW if walks_on else GLANCE, self._size - start)
+            self._window, self._window_at = memoryview(self._read(start, window)), start
+            at, end = 0, stop - start
+        return self._window[at:end]
+
+    def _read(self, offset: int, length: int) -> bytes:
+        try:
+            self._file.seek(self.begin + offset)
+            data = self._file.read(length)
+            while len(data) < length and (more := self._file.read(length - len(data))):
+                data += more
+        except OSError as error:
+            raise BadRecord(f"unreadable on its disk ({error.strerror})") from error
+        return data
+
+    def read(self, size: int) -> bytes:
+        """Return the next bytes, as a file does; none at the end."""
+        data = bytes(self[self._at : self._at + size])
+        self._at += len(data)
+        return data
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+Bytes = FileBytes | memoryview
+"""Bytes that need not lie in memory."""
+
+
+class Record(NamedTuple):
+    """A record: ``offset`` of its opcode, ``body`` of its content, ``end`` after it."""
 
     opcode: int
     offset: int
     body: int
     end: int
+    content: Any = None
+    """What it says, as far as that was read."""
 
 
 class Message(NamedTuple):
@@ -72,79 +132,54 @@ class Message(NamedTuple):
 
 
 class Chunk(NamedTuple):
-    """A chunk's head: where its compressed data lies and what it claims to hold.
-
-    ``offset`` is the record's, ``data_offset`` and ``data_size`` the compressed data's, all in
-    the file; ``size`` and ``crc`` are of the uncompressed records (CRC 0: not given); ``start``
-    and ``end`` are the log times of its messages, both closed. ``crc`` is None where it may
-    be damaged. A chunk that is ``cut`` continues beyond the end of the file; the head of one that
-    is ``repaired`` was damaged, and is taken from the file's summary.
-    """
+    """A chunk's head: where its data lies in the file, and what it claims to hold."""
 
     offset: int
     start: int
     end: int
+    """Log times of its first and its last message."""
     size: int
+    """Bytes of its records, uncompressed."""
     crc: int | None
+    """Checksum of these; 0 if not given, None if it may be damaged."""
     compression: str
     data_offset: int
     data_size: int
     cut: bool = False
+    """Whether it continues beyond the end of the file."""
     repaired: bool = False
+    """Whether its own head is damaged, and what it says was found out otherwise."""
 
+    @property
+    def data_end(self) -> int:
+        """Where its data ends in the file."""
+        return self.data_offset + self.data_size
 
-class ChunkIndex(NamedTuple):
-    """A chunk in the file's summary: its head without the checksum, and where its record ends.
-
-    ``index_offsets`` are packed pairs of a channel and the offset of its message index.
-    """
-
-    chunk: Chunk
-    end: int
-    index_offsets: bytes
-
-    def has_index_at(self, offset: int) -> bool:
-        """Whether one of the chunk's message indexes begins here."""
-        return any(offset == at for _, at in INDEX_OFFSET.iter_unpack(self.index_offsets))
+    @property
+    def listing(self) -> tuple[object, ...]:
+        """What the summary says of it as well, but for its place."""
+        return self.start, self.end, self.size, self.compression, self.data_size
 
 
 class _Strict(ReadDataStream):
     """The library's stream, that refuses a read across the record's end."""
 
     def read(self, length: int) -> bytes:
-        if length > sys.maxsize:
-            raise EndOfFile
-        data: bytes = super().read(length)
+        data: bytes = super().read(length) if length <= sys.maxsize else b""
         if len(data) != length:
             raise EndOfFile
         return data
 
 
 _READERS: Final[dict[int, Callable[[ReadDataStream], Any]]] = {
-    Opcode.HEADER: mcap_records.Header.read,
-    Opcode.FOOTER: mcap_records.Footer.read,
-    Opcode.SCHEMA: mcap_records.Schema.read,
-    Opcode.CHANNEL: mcap_records.Channel.read,
-    Opcode.MESSAGE_INDEX: mcap_records.MessageIndex.read,
-    Opcode.CHUNK_INDEX: mcap_records.ChunkIndex.read,
-    Opcode.ATTACHMENT: mcap_records.Attachment.read,
-    Opcode.ATTACHMENT_INDEX: mcap_records.AttachmentIndex.read,
-    Opcode.STATISTICS: mcap_records.Statistics.read,
-    Opcode.METADATA: mcap_records.Metadata.read,
-    Opcode.METADATA_INDEX: mcap_records.MetadataIndex.read,
-    Opcode.SUMMARY_OFFSET: mcap_records.SummaryOffset.read,
-    Opcode.DATA_END: mcap_records.DataEnd.read,
+    opcode: getattr(mcap_records, opcode.name.title().replace("_", "")).read
+    for opcode in Opcode
+    if opcode not in (Opcode.MESSAGE, Opcode.CHUNK)
 }
 
 
 def parse(opcode: int, body: Buffer) -> Any:
-    """Read a record that is neither message nor chunk, by the `mcap` library.
-
-    Raises
-    ------
-    BadRecord
-        If the body is too short for what its own fields claim, or is not what they say.
-    """
+    """Read a record that is neither message nor chunk, by the `mcap` library."""
     if opcode not in _READERS:
         raise BadRecord(f"a record of unknown kind {opcode}")
     try:
@@ -153,113 +188,60 @@ def parse(opcode: int, body: Buffer) -> Any:
         raise BadRecord(f"a {Opcode(opcode).name.lower()} record that does not add up") from error
 
 
-def parse_chunk(place: Place, head: Buffer) -> Chunk:
-    """Read a chunk's head from the first bytes of its body.
-
-    The length of its data is what the head says, which may contradict the record's own.
-
-    Raises
-    ------
-    BadRecord
-        If it is no chunk's head.
-    """
+def parse_chunk(source: Bytes, record: Record) -> Chunk:
+    """Read a chunk's head; the length that it says of its data may contradict the record's own."""
+    head = source[record.body : record.body + CHUNK_HEAD.size + LONGEST_NAME + 8]
     if len(head) < CHUNK_HEAD.size:
         raise BadRecord("a chunk without a head")
     start, end, size, crc, name_length = CHUNK_HEAD.unpack_from(head)
-    data_offset = CHUNK_HEAD.size + name_length + 8
-    if name_length > LONGEST_NAME or len(head) < data_offset:
+    data_at = CHUNK_HEAD.size + name_length + 8
+    if name_length > LONGEST_NAME or len(head) < data_at:
         raise BadRecord("a chunk whose head is damaged")
-    name = bytes(head[CHUNK_HEAD.size : data_offset - 8]).decode("utf-8", "replace")
-    (data_size,) = struct.unpack_from("<Q", head, data_offset - 8)
-    return Chunk(place.offset, start, end, size, crc, name, place.body + data_offset, data_size)
-
-
-def parse_chunk_index(body: Buffer) -> ChunkIndex:
-    """Read a chunk's index in the summary.
-
-    Raises
-    ------
-    BadRecord
-        If its lengths contradict each other.
-    """
-    try:
-        start, end, offset, length, map_length = CHUNK_INDEX_HEAD.unpack_from(body)
-        at = CHUNK_INDEX_HEAD.size + map_length
-        _, name_length = struct.unpack_from("<QI", body, at)
-        name = bytes(body[at + 12 : at + 12 + name_length]).decode()
-        data_size, size = struct.unpack_from("<QQ", body, at + 12 + name_length)
-    except (struct.error, UnicodeDecodeError) as error:
-        raise BadRecord("a chunk index that does not add up") from error
-    data_offset = offset + length - data_size
-    head = data_offset - offset - HEAD.size
-    if map_length % INDEX_OFFSET.size or head != CHUNK_HEAD.size + name_length + 8:
-        raise BadRecord("a chunk index that does not add up")
-    chunk = Chunk(offset, start, end, size, None, name, data_offset, data_size)
-    return ChunkIndex(chunk, offset + length, bytes(body[CHUNK_INDEX_HEAD.size : at]))
+    name = bytes(head[CHUNK_HEAD.size : data_at - 8]).decode("utf-8", "replace")
+    (data_size,) = struct.unpack_from("<Q", head, data_at - 8)
+    return Chunk(record.offset, start, end, size, crc, name, record.body + data_at, data_size)
 
 
 def parse_message_index(body: Buffer) -> tuple[int, Entries]:
-    """Read a message index: the channel, and its messages.
-
-    Raises
-    ------
-    BadRecord
-        If its length is not a whole number of entries.
-    """
-    if len(body) < INDEX_HEAD.size:
-        raise BadRecord("a message index without a head")
-    channel_id, length = INDEX_HEAD.unpack_from(body)
+    """Read a message index: the channel, and its messages."""
+    channel_id, length = INDEX_HEAD.unpack_from(body) if len(body) >= INDEX_HEAD.size else (0, 1)
     if length % 16 or INDEX_HEAD.size + length > len(body):
         raise BadRecord("a message index whose lengths contradict each other")
-    entries = np.frombuffer(body, "<i8", length // 8, INDEX_HEAD.size)
+    # A copy, so that it does not hold the file's window.
+    entries = np.frombuffer(body, "<i8", length // 8, INDEX_HEAD.size).copy()
     return channel_id, entries.reshape(-1, 2)
 
 
-def message_at(records: ByteReader, offset: int) -> Message:
-    """Read the message whose record begins at ``offset``.
-
-    Raises
-    ------
-    BadRecord
-        If there is no whole message.
-    """
-    head = records.read(offset, HEAD.size)
-    if len(head) < HEAD.size:
+def message_at(records: Bytes, offset: int) -> Message:
+    """Read the message whose record begins at ``offset``."""
+    record = record_at(records, offset)
+    if record.opcode != Opcode.MESSAGE or record.end - record.body > LARGEST:
         raise BadRecord("no message where the index says")
-    opcode, length = HEAD.unpack(head)
-    if opcode != Opcode.MESSAGE or not MESSAGE_HEAD.size <= length <= LARGEST:
-        raise BadRecord("no message where the index says")
-    body = memoryview(records.read(offset + HEAD.size, length))
-    if len(body) < length:
+    body = memoryview(records[record.body : record.end])
+    if not MESSAGE_HEAD.size <= len(body) == record.end - record.body:
         raise BadRecord("a message that is cut off")
     channel_id, sequence, log_time, publish_time = MESSAGE_HEAD.unpack_from(body)
     return Message(channel_id, sequence, log_time, publish_time, body[MESSAGE_HEAD.size :])
 
 
-def place_at(records: ByteReader, offset: int) -> Place:
-    """Read the head of the record at ``offset``; it may claim to go beyond the end.
-
-    Raises
-    ------
-    BadRecord
-        If not even a head fits in.
-    """
-    head = records.peek(offset, HEAD.size)
+def record_at(records: Bytes, offset: int) -> Record:
+    """Read the head of the record at ``offset``; it may claim to go beyond the end."""
+    head = records[offset : offset + HEAD.size]
     if len(head) < HEAD.size:
         raise BadRecord("the file is cut off")
     opcode, length = HEAD.unpack(head)
-    return Place(opcode, offset, offset + HEAD.size, offset + HEAD.size + length)
+    return Record(opcode, offset, offset + HEAD.size, offset + HEAD.size + length)
 
 
-def walk(records: ByteReader) -> Iterator[Place]:
-    """Yield the places of the records in a chunk, as far as they are whole.
+def walk(records: Bytes, offset: int = 0) -> Iterator[Record]:
+    """Yield the records of a chunk from ``offset`` on, as far as they are whole.
 
     Zeros end them, too: a million would be as many records of no kind and no length.
     """
-    offset = 0
-    while offset + HEAD.size <= records.size:
-        place = place_at(records, offset)
-        if place.opcode == 0 or place.end > records.size:
+    size = len(records)
+    while offset + HEAD.size <= size:
+        record = record_at(records, offset)
+        if record.opcode == 0 or record.end > size:
             return
-        yield place
-        offset = place.end
+        yield record
+        offset = record.end

@@ -1,54 +1,73 @@
-"""The walk from record to record through a file's data section, across damage.
+"""The walk from record to record through a file, across damage.
 
-The walk finds what is really there. Chunks are stepped over by the lengths in their own heads or,
-where those are damaged, by the lengths in the summary. After a record that makes no sense, the
-walk continues at the next one that does.
+A record is taken when the next one adds up as well. Else one of the two is damaged, or bytes are
+missing: the next record that makes sense is looked for from just behind the head of the one in
+doubt, for its end may be false. Of a chunk its checksum decides.
 """
 
 from __future__ import annotations
 
+import re
+import struct
 from array import array
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
-from typing import Final
+from typing import Any, Final
 
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from roadeval.logs.container.readers import FileReader
+from roadeval.logs.container.chunks import COMPRESSIONS, DOUBTED, ChunkReader, crc_of
 from roadeval.logs.container.records import (
     HEAD,
-    INDEX_HEAD,
     LARGEST,
-    LONGEST_CHUNK_HEAD,
     MAGIC,
     MESSAGE_HEAD,
     PADDING,
     PRIVATE,
     Chunk,
     Entries,
+    FileBytes,
     Message,
-    Place,
+    Record,
     message_at,
     parse,
+    parse_chunk,
     parse_message_index,
-    place_at,
+    record_at,
 )
-from roadeval.logs.container.recovery.damaged_chunks import by_own_head, by_summary, is_within
-from roadeval.logs.container.recovery.next_record import RecordFinder
-from roadeval.logs.container.summary import SUMMARY_RECORDS, Summary
+from roadeval.logs.container.summary import SUMMARY_RECORDS, Summary, read_summary
 from roadeval.logs.errors import BadRecord
 
-_DEFINITIONS: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
-_SKIPPED: Final = (Opcode.ATTACHMENT, Opcode.METADATA)
+END: Final = -1
+"""In place of an opcode: the end of the file."""
+BORDER: Final = -2
+"""In place of an opcode: the eight bytes at which a log begins or ends."""
+DAY: Final = 86_400 * 10**9
+"""A message logged more than so many nanoseconds from all the recent ones is none."""
+BLOCK: Final = 1 << 20
+"""Bytes to look through at a time."""
+TRIED: Final = 256
+"""Bytes for which a place counts at which no record begins, besides those that one there claims."""
+_CANDIDATE: Final = re.compile(
+    rb"(?=[\x02-\x0f].{4}\x00{4}|\x89MCAP0\r\n\x01|\x06\xff{8})", re.DOTALL
+)
+"""The head of a record that is shorter than 4 GiB or was never ended, or a log's first bytes."""
+_LAST_RECORD: Final = re.compile(
+    re.escape(HEAD.pack(Opcode.FOOTER, 20)) + rb".{20}" + re.escape(MAGIC), re.DOTALL
+)
+_NOT_IN_CHUNKS: Final = (Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.DATA_END, Opcode.FOOTER)
+"""Records that are never found inside a chunk, unlike messages and their descriptions."""
+_AFTER_DATA: Final = tuple(bytes([kind]) for kind in (*SUMMARY_RECORDS, Opcode.FOOTER))
 RECENT: Final = 8
 """Messages with whose log times another one's is compared."""
 
-IsWhole = Callable[[Channel, Schema | None, Message], bool]
-"""Whether a message, with its channel and schema, is as long as its own fields say."""
+StampOf = Callable[[Channel, Schema | None, Message], int | None]
+"""Return the header stamp of a message, None if it is not as long as its own fields say."""
 
 
 @dataclass(slots=True)
@@ -64,241 +83,453 @@ class Gap:
 
 
 class Scan:
-    """The data section of a file.
+    """What there is in a file.
 
-    Attributes
+    Parameters
     ----------
-    chunks
-        In the order of the file.
-    indexes
-        For each chunk, its messages by channel, or None where its message indexes are missing
-        or damaged.
-    loose
-        Log times and offsets, in turn, of the messages outside chunks, by channel.
-    schemas, channels
-        Those defined outside chunks.
-    gaps
-        What made no sense.
-    data_end, after_data
-        Where the data section ends, None if the file ends before; and what comes after it begins.
-    data_crc
-        Its checksum, 0 if not given.
+    strict
+        Whether to verify each chunk before it is believed: where bytes are missing, a wrong length
+        can end by chance where a later record begins.
     """
 
-    def __init__(self, source: FileReader, summary: Summary, is_whole: IsWhole) -> None:
+    def __init__(
+        self, source: FileBytes, reader: ChunkReader, stamp_of: StampOf, *, strict: bool = False
+    ) -> None:
+        self.summary = read_summary(source)
         self.chunks: list[Chunk] = []
+        """In the order of the file."""
         self.indexes: list[dict[int, Entries] | None] = []
+        """For each chunk, its messages by channel; None where its message indexes are damaged."""
         self.loose: dict[int, array[int]] = {}
-        self.schemas: dict[int, Schema] = dict(summary.schemas)
-        self.channels: dict[int, Channel] = dict(summary.channels)
+        """Log times and offsets, in turn, of the messages outside chunks, by channel."""
+        self.schemas = dict(self.summary.schemas)
+        self.channels = dict(self.summary.channels)
+        self.conflicts: list[tuple[int, Schema | Channel]] = []
+        """Other descriptions than these outside chunks, with their offsets."""
         self.gaps: list[Gap] = []
         self.data_end: int | None = None
         self.after_data: int | None = None
+        """Where the data section ends, None if the file ends before; and what comes after it."""
         self.data_crc = 0
-        self._source = source
-        self._summary_start = None if summary.problem else summary.start
-        self._known = summary.chunks if summary.checked else {}
-        self._known_offsets = sorted(self._known)
-        self._first_ns, self._final_ns = _time_range(summary)
-        self._is_whole = is_whole
-        self.recent_ns: deque[int] = deque(maxlen=RECENT)
-        self._finder = RecordFinder(source, self.channels, self.recent_ns)
-        # The message right before the walk's position, and its channel; None after another record.
-        self._last_message: tuple[Place, int] | None = None
-        self._run()
+        """Its checksum, 0 if not given."""
+        self.next_log: int | None = None
+        """Where another log begins in the same file."""
+        self._source, self._reader, self._stamp_of = source, reader, stamp_of
+        self._strict = strict
+        self._recent_ns: deque[int] = deque(maxlen=RECENT)
+        self._finder = RecordFinder(source, reader, self.summary, self.channels, self._recent_ns)
+        self._walk()
 
-    def _run(self) -> None:
-        offset = len(MAGIC)
-        if self._source.read(0, offset) != MAGIC:
-            self._gap(0, offset, "the file does not begin as it should", lossy=False)
-        while offset < self._source.size and self.data_end is None:
-            if offset == self._summary_start:
-                self._gap(offset, offset, "the record that ends the data is missing", lossy=False)
-                self.data_end = self.after_data = offset
-                break
+    @property
+    def is_shifted(self) -> bool:
+        """Whether bytes may be missing or inserted, so that lengths may end at a wrong record."""
+        if self.summary.moved or not self.chunks:
+            return bool(self.chunks)
+        broken = any(gap.lossy and gap.end < len(self._source) for gap in self.gaps)
+        return broken and not (self.summary.in_place and self.summary.chunks)
+
+    def _walk(self) -> None:
+        record = Record(BORDER, 0, 0, len(MAGIC))
+        if self._source[0 : len(MAGIC)] != MAGIC:
+            self._gap(0, len(MAGIC), "the file does not begin as it should", lossy=False)
+        while record.opcode != END:
             try:
-                offset = self._visit(self._place(offset))
+                following = self._following(record)
             except BadRecord as error:
-                offset = self._recover(offset, str(error))
-        ends_in_gap = any(gap.lossy and gap.end == self._source.size for gap in self.gaps)
-        if self.data_end is None and not ends_in_gap:
-            size = self._source.size
+                following = self._resync(record, str(error))
+            else:
+                self._take(record)
+            if record.opcode == BORDER and record.offset and following.opcode == Opcode.HEADER:
+                self.next_log = record.offset
+                return
+            record = following
+        size = len(self._source)
+        if self.data_end is None and not any(gap.lossy and gap.end == size for gap in self.gaps):
             self._gap(size, size, "the file was never finished; what came after is not in it")
 
-    def _place(self, offset: int) -> Place:
-        index = self._known.get(offset)
-        if index is not None:
-            return Place(Opcode.CHUNK, offset, offset + HEAD.size, index.end)
-        place = place_at(self._source, offset)
-        if place.opcode >= PRIVATE and self._finder.begins(place.end):
-            return place
-        if place.opcode > Opcode.DATA_END or place.opcode == 0:
-            raise BadRecord(f"a record of unknown kind {place.opcode}")
-        if place.end > self._source.size and place.opcode != Opcode.CHUNK:
-            raise BadRecord("a record that goes on beyond the end of the file")
-        if place.end > self._next_known(offset):
-            raise BadRecord("a record that goes on into the next chunk")
-        return place
+    def _following(self, record: Record) -> Record:
+        """Read the record behind one; refuse where that shows that either is damaged."""
+        is_chunk = record.opcode == Opcode.CHUNK
+        if is_chunk and (record.content.cut or (self._strict and not self._is_proven(record))):
+            raise BadRecord("a chunk that is not whole")
+        if self.summary.problem or record.end != self.summary.start:
+            return self._finder.record(record.end)
+        if record.opcode != Opcode.DATA_END:
+            reason = "the record that ends the data is missing"
+            self._gap(record.end, record.end, reason, lossy=False)
+            self.data_end = self.after_data = record.end
+        return Record(END, record.end, record.end, record.end)
 
-    def _next_known(self, offset: int) -> float:
-        """Where the next chunk begins, by the summary."""
-        index = bisect_right(self._known_offsets, offset)
-        return self._known_offsets[index] if index < len(self._known_offsets) else inf
+    def _resync(self, record: Record, reason: str) -> Record:
+        """Find where the walk continues, where a record is in doubt or what follows it.
 
-    def _visit(self, place: Place) -> int:
-        """Take in a record; return where the next one begins."""
-        end, message = place.end, None
-        if place.opcode == Opcode.MESSAGE:
-            message = place, self._message(place)
-        elif place.opcode == Opcode.CHUNK:
-            end = self._chunk(place)
-        elif place.opcode == Opcode.MESSAGE_INDEX:
-            self._message_index(place)
-        elif place.opcode in _DEFINITIONS:
-            self._define(place)
-        elif place.opcode == Opcode.DATA_END:
-            self._data_end(place)
-        elif not self._is_skipped(place):
-            raise BadRecord("a record that should not be here")
-        self._last_message = message
-        return end
+        ::
 
-    def _message(self, place: Place) -> int:
-        """Note where a message outside chunks lies; return its channel."""
-        if not MESSAGE_HEAD.size <= place.end - place.body <= LARGEST:
-            raise BadRecord("a message of a length that cannot be")
-        known = self._known.get(self.chunks[-1].offset) if self.chunks else None
-        if known is not None and known.has_index_at(place.offset):
-            raise BadRecord("a message where a message index should be")
-        head = self._source.peek(place.body, MESSAGE_HEAD.size)
-        channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
-        if not self._first_ns <= log_time <= self._final_ns:
-            raise BadRecord("a message of a time outside the log's")
-        self.loose.setdefault(channel_id, array("Q")).extend((log_time, place.offset))
-        self._saw(log_time, log_time)
-        return int(channel_id)
+            ... | record | damaged ...... | next         the record is whole, and taken
+            ... | record, of a wrong length . | next     it is not, and left out
+            ... | record ...... | next .... |            bytes are missing in it: it is left out
+        """
+        is_chunk, proven = record.opcode == Opcode.CHUNK, self._is_proven(record)
+        following = None
+        if proven or not is_chunk:
+            following = self._finder.hidden_chunk(record.end)
+        if following is None:
+            following = self._finder.next(record.end if proven else record.body, record)
+        if is_chunk and not proven:
+            record = self._wreck(record, following.offset)
+        kept = proven or is_chunk or following.offset > record.end - PADDING
+        if record.opcode == Opcode.MESSAGE:
+            kept = kept and self._is_whole(record)
+        if kept:
+            self._take(record)
+        begin = record.end if kept else record.offset
+        if following.offset > begin or not kept:
+            if self.indexes and record.opcode in (Opcode.CHUNK, Opcode.MESSAGE_INDEX):
+                self.indexes[-1] = None
+            if self.data_end is None or following.opcode in (Opcode.CHUNK, Opcode.MESSAGE):
+                listed = self.summary.checked and self.summary.chunks and not self.loose
+                self._gap(begin, following.offset, reason, lossy=not listed)
+        return following
 
-    def _chunk(self, place: Place) -> int:
-        index = self._known.get(place.offset)
-        head = bytes(self._source.peek(place.body, LONGEST_CHUNK_HEAD))
-        if index is None:
-            chunk = by_own_head(place, head, self._source.size, self._finder.is_likely)
-        else:
-            chunk = by_summary(place, head, index)
-            outer = self._source.read(place.offset, HEAD.size)
-            if chunk.repaired or outer != HEAD.pack(Opcode.CHUNK, place.end - place.body):
-                reason = "the head of a chunk is damaged; the summary tells what it said"
-                self._gap(place.offset, place.body, reason, lossy=False)
-        end = chunk.data_offset + chunk.data_size
+    def _is_proven(self, record: Record) -> bool:
+        """Whether a record surely ends where it says."""
+        if record.opcode == Opcode.ATTACHMENT:
+            crc = crc_of(self._source.part(record.body, record.end - 4))
+            return crc.to_bytes(4, "little") == self._source[record.end - 4 : record.end]
+        if record.opcode == Opcode.CHUNK:
+            return not record.content.cut and self._reader.is_sound(record.content)
+        return record.opcode == BORDER
+
+    def _is_whole(self, record: Record) -> bool:
+        """Whether a message is as long as its own fields say."""
+        channel = self.channels.get(record.content[0])
+        if channel is None:
+            return False
+        message = message_at(self._source, record.offset)
+        return self._stamp_of(channel, self.schemas.get(channel.schema_id), message) is not None
+
+    def _wreck(self, record: Record, end: int) -> Record:
+        """Return what is left of a chunk that is not whole, where the next record begins."""
+        chunk: Chunk = record.content
+        left = chunk._replace(data_size=max(end - chunk.data_offset, 0), cut=False, repaired=True)
+        if end != record.end and self._reader.is_sound(left):
+            return record_of(left)
+        if chunk.cut and end == record.end:
+            return record
+        left = chunk._replace(data_size=min(chunk.data_size, left.data_size), cut=False)
+        with suppress(BadRecord):
+            self._reader.read(left)
+        return record_of(left)
+
+    def _take(self, record: Record) -> None:
+        """Note what a record says."""
+        opcode, content = record.opcode, record.content
+        if opcode == Opcode.MESSAGE:
+            channel_id, log_time = content
+            self.loose.setdefault(channel_id, array("Q")).extend((log_time, record.offset))
+            self._saw(log_time, log_time)
+        elif opcode == Opcode.CHUNK:
+            self._take_chunk(content)
+        elif opcode == Opcode.MESSAGE_INDEX and self.indexes:
+            self._take_index(*content)
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            known: dict[int, Any] = self.schemas if opcode == Opcode.SCHEMA else self.channels
+            if known.setdefault(content.id, content) != content and self.data_end is None:
+                self.conflicts.append((record.offset, content))
+        elif opcode == Opcode.STATISTICS and self.summary.statistics is None:
+            self.summary.statistics = content
+        elif opcode == Opcode.DATA_END:
+            self.data_end, self.after_data = record.offset, record.end
+            self.data_crc = content.data_section_crc
+
+    def _take_chunk(self, chunk: Chunk) -> None:
+        if chunk.repaired:
+            reason = "the head of a chunk is damaged; what it said was found out otherwise"
+            self._gap(chunk.offset, chunk.data_offset, reason, lossy=False)
         self.chunks.append(chunk)
         self.indexes.append({})
         if chunk.cut:
-            self._gap(place.offset, self._source.size, "the file ends inside a chunk")
+            self._gap(chunk.offset, chunk.data_end, "the file ends inside a chunk")
         else:
             self._saw(chunk.start, chunk.end)
-        return end
 
-    def _message_index(self, place: Place) -> None:
-        if place.end - place.body > LARGEST:
-            raise BadRecord("a message index of a length that cannot be")
-        body = bytes(self._source.peek(place.body, place.end - place.body))
-        channel_id, entries = parse_message_index(body)
-        if entries.nbytes + INDEX_HEAD.size != len(body) and not self._finder.begins(place.end):
-            raise BadRecord("a message index of the wrong length")
-        index = self.indexes[-1] if self.indexes else None
-        if index is None:
+    def _take_index(self, channel_id: int, entries: Entries) -> None:
+        """File a message index, unless it does not agree with its chunk."""
+        chunk, index = self.chunks[-1], self.indexes[-1]
+        if index is None or not len(entries):
             return
-        if channel_id in index or not is_within(entries, self.chunks[-1]):
+        times, offsets = entries[:, 0].view("u8"), entries[:, 1].view("u8")
+        is_within = chunk.start <= times.min() and times.max() <= chunk.end
+        if channel_id in index or not is_within or offsets.max() >= chunk.size:
             self.indexes[-1] = None
         else:
             index[channel_id] = entries
 
-    def _define(self, place: Place) -> None:
-        if place.end - place.body > LARGEST:
-            raise BadRecord("a definition of a length that cannot be")
-        record = parse(place.opcode, self._source.peek(place.body, place.end - place.body))
-        if not self._finder.begins(place.end):
-            raise BadRecord("a definition of the wrong length")
-        known = self.schemas if isinstance(record, Schema) else self.channels
-        if known.setdefault(record.id, record) != record:
-            # Outside chunks no checksum tells which of the two is right.
-            self._gap(
-                place.offset, place.end, "a topic is described here in another way than before"
-            )
-
-    def _data_end(self, place: Place) -> None:
-        after = place.end < self._source.size and place_at(self._source, place.end).opcode
-        if place.end < self._source.size and after not in (*SUMMARY_RECORDS, Opcode.FOOTER):
-            raise BadRecord("an end of the data where there is none")
-        body = self._source.peek(place.body, place.end - place.body)
-        self.data_crc = parse(Opcode.DATA_END, body).data_section_crc
-        self.data_end, self.after_data = place.offset, place.end
-
-    def _is_skipped(self, place: Place) -> bool:
-        is_header = place.opcode == Opcode.HEADER and place.offset == len(MAGIC)
-        private = place.opcode >= PRIVATE and not self._finder.is_message(place)
-        return is_header or private or (place.opcode in _SKIPPED and self._finder.begins(place.end))
-
-    def _recover(self, offset: int, reason: str) -> int:
-        """Find where the walk can continue after ``offset``, and note the gap between.
-
-        Either the record at ``offset`` is damaged, or the length of the message before it is, so
-        that ``offset`` lies in the midst of a record::
-
-            ... | message | damaged ...... | record        the message is whole
-                          ^ begin = offset ^ end
-
-            ... | message, of a wrong length | record      it is not: it is taken back
-                ^ begin                      ^ end
-
-        The message before it is the last thing that was noted, so that taking it back undoes one
-        step of the walk.
-        """
-        last, self._last_message = self._last_message, None
-        if self.indexes:
-            self.indexes[-1] = None
-        chunk = self._finder.disguised_chunk(offset)
-        if chunk is not None:
-            return self._chunk(chunk)
-        begin, seek = offset, offset + 1
-        if last is not None and self._is_intact(*last):
-            # A length that is too long by less than the padding does not show in the message.
-            seek = offset - PADDING + 1
-        elif last is not None:
-            message, channel_id = last
-            del self.loose[channel_id][-2:]
-            self.recent_ns.pop()
-            begin, seek = message.offset, message.offset + 1
-        end = self._finder.next(seek, int(min(self._next_known(offset), self._source.size)))
-        lossy = end > offset and (not self._known or bool(self.loose))
-        self._gap(begin, end, reason, lossy=lossy)
-        return end
-
-    def _is_intact(self, place: Place, channel_id: int) -> bool:
-        """Whether a message is as long as its own fields say."""
-        channel = self.channels.get(channel_id)
-        if channel is None:
-            return False
-        try:
-            message = message_at(self._source, place.offset)
-            return self._is_whole(channel, self.schemas.get(channel.schema_id), message)
-        except BadRecord:
-            return False
-
     def _gap(self, offset: int, end: int, reason: str, *, lossy: bool = True) -> None:
-        before = self.recent_ns[-1] if self.recent_ns else None
+        before = self._recent_ns[-1] if self._recent_ns else None
         self.gaps.append(Gap(offset, end, reason, before, None, lossy))
 
     def _saw(self, first_ns: int, last_ns: int) -> None:
-        for gap in self.gaps:
-            if gap.after_ns is None:
-                gap.after_ns = first_ns
-        self.recent_ns.append(last_ns)
+        for gap in reversed(self.gaps):
+            if gap.after_ns is not None:
+                break
+            gap.after_ns = first_ns
+        self._recent_ns.append(last_ns)
 
 
-def _time_range(summary: Summary) -> tuple[float, float]:
-    """Log times of the first and the last message, by the summary if that can be trusted."""
-    statistics = summary.statistics
-    if not summary.checked or statistics is None or not statistics.message_count:
-        return -inf, inf
-    return statistics.message_start_time, statistics.message_end_time
+class RecordFinder:
+    """Reads the record at a byte, if its parts agree, and looks for the next one that does.
+
+    Parameters
+    ----------
+    channels, recent_ns
+        Numbers of the known channels, and log times of the last messages, as the walk through the
+        file finds them: both grow while this object is used.
+    """
+
+    def __init__(
+        self,
+        source: FileBytes,
+        reader: ChunkReader,
+        summary: Summary,
+        channels: Collection[int],
+        recent_ns: Collection[int],
+    ) -> None:
+        self._source, self._reader, self._summary = source, reader, summary
+        self._channels, self._recent_ns = channels, recent_ns
+        self._listings = {chunk.listing for chunk in summary.chunks.values() if summary.checked}
+        self._known = summary.chunks if summary.in_place else {}
+        self._borders = sorted(self._known)
+        if self._known and summary.start is not None:
+            self._borders.append(summary.start)
+        self._tries_left = DOUBTED + 4 * len(source)
+
+    def record(self, offset: int, *, chained: bool = True) -> Record:
+        """Read the record that begins here.
+
+        Parameters
+        ----------
+        chained
+            Whether lengths that contradict each other may be judged by what follows them.
+        """
+        size = len(self._source)
+        if offset >= size - len(MAGIC):
+            if offset == size:
+                return Record(END, offset, offset, offset)
+            if self._source[offset:size] == MAGIC:
+                return Record(BORDER, offset, offset, size)
+        record = record_at(self._source, offset)
+        opcode, _, body, end, _ = record
+        if opcode == MAGIC[0] and self._source[offset : offset + len(MAGIC)] == MAGIC:
+            return Record(BORDER, offset, offset, offset + len(MAGIC))
+        if opcode == Opcode.CHUNK or offset in self._known:
+            return self._chunk(record, chained=chained)
+        if opcode == Opcode.ATTACHMENT:
+            return record._replace(end=self._attachment_end(record, chained=chained))
+        if end > size:
+            raise BadRecord("a record that goes on beyond the end of the file")
+        if end > self._border(offset):
+            raise BadRecord("a record that goes on into the next chunk")
+        return Record(opcode, offset, body, end, self._content(record))
+
+    def _border(self, offset: int) -> float:
+        """Where the next chunk or the summary begins, by the summary."""
+        index = bisect_right(self._borders, offset)
+        return self._borders[index] if index < len(self._borders) else inf
+
+    def _content(self, record: Record) -> Any:
+        """Read what a record says that is no chunk and no attachment."""
+        opcode, _, body, end, _ = record
+        if opcode == Opcode.MESSAGE:
+            return self._message(record)
+        if opcode >= PRIVATE and not self._is_likely_message(record):
+            return None
+        if end - body > LARGEST:
+            raise BadRecord("a record of a length that cannot be")
+        if opcode == Opcode.MESSAGE_INDEX:
+            return parse_message_index(self._source[body:end])
+        self._check_place(record)
+        return parse(opcode, self._source[body:end])
+
+    def _message(self, record: Record) -> tuple[int, int]:
+        """Read the channel and the log time of a message outside chunks."""
+        if not MESSAGE_HEAD.size <= record.end - record.body <= LARGEST:
+            raise BadRecord("a message of a length that cannot be")
+        chunk = self._borders[bisect_right(self._borders, record.offset) - 1] if self._known else 0
+        if record.offset < self._summary.index_ends.get(chunk, 0):
+            raise BadRecord("a message where a message index should be")
+        head = self._source[record.body : record.body + MESSAGE_HEAD.size]
+        channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
+        counted = self._summary.statistics if self._summary.checked else None
+        if counted is None or not counted.message_count:
+            return channel_id, log_time
+        if not counted.message_start_time <= log_time <= counted.message_end_time:
+            raise BadRecord("a message of a time outside the log's")
+        return channel_id, log_time
+
+    def _is_likely_message(self, record: Record) -> bool:
+        """Whether this is a message of a known channel, logged within a day of a recent one."""
+        head = self._source[record.body : record.body + MESSAGE_HEAD.size]
+        if not MESSAGE_HEAD.size == len(head) <= record.end - record.body <= LARGEST:
+            return False
+        channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
+        near = not self._recent_ns or any(abs(log_time - time) < DAY for time in self._recent_ns)
+        return near and (channel_id in self._channels or not self._channels)
+
+    def _check_place(self, record: Record) -> None:
+        """Refuse what begins or ends a part of the file where there is none."""
+        before = self._source[max(record.offset - len(MAGIC), 0) : record.offset]
+        after = bytes(self._source[record.end : record.end + len(MAGIC)])
+        misplaced = {
+            Opcode.HEADER: record.offset > len(MAGIC) and before != MAGIC,
+            Opcode.FOOTER: after != MAGIC,
+            Opcode.DATA_END: after[:1] not in (b"", MAGIC[:1], *_AFTER_DATA),
+        }
+        if any(record.opcode == opcode and is_so for opcode, is_so in misplaced.items()):
+            raise BadRecord("a record that should not be here")
+
+    def _attachment_end(self, record: Record, *, chained: bool) -> int:
+        """Where an attachment ends, by its own length, that of its data, or the summary."""
+        at, own = record.body + 16, inf
+        with suppress(struct.error):
+            for _ in range(2):
+                at += 4 + struct.unpack("<I", self._source[at : at + 4])[0]
+            own = at + 8 + struct.unpack("<Q", self._source[at : at + 8])[0] + 4
+        border = min(self._border(record.offset), len(self._source))
+        if own <= record.end <= border:
+            return record.end
+        known = self._summary.attachments.get(record.offset, 0)
+        for end in (int(each) for each in (known, own, record.end) if chained and each <= border):
+            with suppress(BadRecord):
+                if end > record.body and self.record(end, chained=False):
+                    return end
+        raise BadRecord("an attachment whose lengths contradict each other")
+
+    def _chunk(self, record: Record, *, chained: bool) -> Record:
+        """Read a chunk's head, which gives its length twice, and the summary a third time."""
+        size, heads = len(self._source), self._heads(record)
+        own = heads[0] if heads else None
+        if own is not None and not own.repaired:
+            if record.end > size:
+                return self._cut(own)
+            if record.end <= self._border(record.offset) or self._reader.is_sound(own):
+                return record_of(own)
+        for chunk in heads:
+            if self._reader.is_sound(chunk):
+                return record_of(chunk._replace(repaired=True))
+        for chunk in heads if chained else []:
+            with suppress(BadRecord):
+                if self.record(chunk.data_end, chained=False):
+                    return record_of(chunk._replace(repaired=True))
+        if own is not None and min(own.data_end, record.end) > size:
+            return self._cut(own._replace(repaired=False))
+        raise BadRecord("a chunk whose lengths contradict each other")
+
+    def _heads(self, record: Record) -> list[Chunk]:
+        """Return what a chunk's head may be: the first is not repaired if nothing contradicts."""
+        listed, found = self._known.get(record.offset), list[Chunk]()
+        with suppress(BadRecord):
+            own = parse_chunk(self._source, record)
+            agrees = own.data_end == record.end and record.opcode == Opcode.CHUNK
+            agrees = agrees and (listed is None or own.listing == listed.listing)
+            by_record = own._replace(data_size=record.end - own.data_offset, repaired=True)
+            found = [own._replace(repaired=not agrees), by_record]
+        if listed is not None:
+            crc = int.from_bytes(self._source[record.body + 24 : record.body + 28], "little")
+            found.append(listed._replace(crc=crc or None, repaired=True))
+        return [chunk for chunk in found if chunk.data_size >= 0]
+
+    def _cut(self, chunk: Chunk) -> Record:
+        data_size = len(self._source) - chunk.data_offset
+        if data_size < 0:
+            raise BadRecord("a chunk without a head")
+        return record_of(chunk._replace(data_size=data_size, cut=True))
+
+    def hidden_chunk(self, offset: int) -> Record | None:
+        """Find a chunk here whose kind or lengths are damaged, by its checksum."""
+        with suppress(BadRecord):
+            chunk = parse_chunk(self._source, record_at(self._source, offset))
+            if chunk.compression in COMPRESSIONS:
+                anything = Record(Opcode.CHUNK, offset, offset, len(self._source))
+                for end in (chunk.data_end, self.next(chunk.data_offset, anything).offset):
+                    found = chunk._replace(data_size=end - chunk.data_offset, repaired=True)
+                    if found.data_size > 0 and self._reader.is_sound(found):
+                        return record_of(found)
+        return None
+
+    def next(self, begin: int, doubted: Record) -> Record:
+        """Find the next record that makes sense at or after ``begin``, or the end of the file.
+
+        Parameters
+        ----------
+        doubted
+            The record in which or behind which the damage is. What lies in a chunk are no records
+            of the file, and what lies in an attachment may be those of another log.
+        """
+        size, log_end = len(self._source), 0
+        kinds = {doubted.opcode, *self._source[doubted.end : doubted.end + 1]}
+        for offset in self._candidates(begin):
+            if self._source[offset : offset + len(MAGIC)] == MAGIC:
+                if Opcode.ATTACHMENT in kinds:
+                    log_end = max(log_end, self._end_of_log(offset))
+                elif self._is_another_log(offset):
+                    return Record(BORDER, offset, offset, offset + len(MAGIC))
+                continue
+            with suppress(BadRecord):
+                claimed = record_at(self._source, offset).end - offset
+                self._tries_left -= TRIED + (claimed if claimed <= size - offset else 0)
+                if self._tries_left < 0:
+                    break
+                record = self.record(offset)
+                if self._is_believed(record, doubted, log_end):
+                    return record
+        return Record(END, size, size, size)
+
+    def _candidates(self, begin: int) -> Iterator[int]:
+        """Yield the bytes at or after ``begin`` where a record may begin."""
+        for at in range(begin, len(self._source), BLOCK):
+            block = self._source[at : at + BLOCK + HEAD.size]
+            found = {at + match.start() for match in _CANDIDATE.finditer(block)}
+            found.update(border for border in self._borders if at <= border < at + BLOCK)
+            yield from sorted(each for each in found if each < at + BLOCK)
+
+    def _is_believed(self, record: Record, doubted: Record, log_end: int) -> bool:
+        """Whether it is more than chance that this looks like a record of the log."""
+        opcode, content = record.opcode, record.content
+        if opcode in (END, BORDER, Opcode.HEADER) or record.offset < log_end:
+            return opcode == Opcode.CHUNK and content.listing in self._listings
+        in_chunk = doubted.opcode == Opcode.CHUNK and record.offset < doubted.end
+        if opcode == Opcode.CHUNK:
+            known = content.compression in COMPRESSIONS
+            return known and (not in_chunk or self._reader.is_sound(content))
+        if in_chunk and opcode not in _NOT_IN_CHUNKS:
+            return False
+        if opcode == Opcode.MESSAGE_INDEX and content[1].nbytes + 6 == record.end - record.body:
+            return True
+        return (opcode != Opcode.MESSAGE or self._is_likely_message(record)) and self._is_followed(
+            record
+        )
+
+    def _is_followed(self, record: Record) -> bool:
+        with suppress(BadRecord):
+            return bool(self.record(record.end, chained=False))
+        return False
+
+    def _is_another_log(self, offset: int) -> bool:
+        """Whether these are the first bytes of a log behind this one, and none that were moved."""
+        if self._source[offset - len(MAGIC) : offset] == MAGIC:
+            return True
+        begins = self._source[0 : len(MAGIC)] == MAGIC
+        return begins and (not self._summary.checked or offset == self._summary.moved)
+
+    def _end_of_log(self, offset: int) -> int:
+        for at in range(offset, len(self._source), BLOCK):
+            found = _LAST_RECORD.search(self._source[at : at + BLOCK + 64])
+            if found is not None:
+                return at + found.end()
+        return len(self._source)
+
+
+def record_of(chunk: Chunk) -> Record:
+    """Return the record that a chunk is."""
+    return Record(Opcode.CHUNK, chunk.offset, chunk.offset + HEAD.size, chunk.data_end, chunk)

@@ -3,129 +3,152 @@
 from __future__ import annotations
 
 import zlib
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from typing import Final
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final
 
 from mcap.opcode import Opcode
-from mcap.records import Channel, Footer, Schema, Statistics
+from mcap.records import AttachmentIndex, Channel, ChunkIndex, Footer, Schema, Statistics
 
-from roadeval.logs.container.chunks import crc_of
-from roadeval.logs.container.readers import FileReader, PartReader
 from roadeval.logs.container.records import (
+    CHUNK_HEAD,
     HEAD,
     LARGEST,
     MAGIC,
     PRIVATE,
-    ChunkIndex,
+    Bytes,
+    Chunk,
     parse,
-    parse_chunk_index,
     walk,
 )
 from roadeval.logs.errors import BadRecord
 
-FOOTER_SIZE: Final = HEAD.size + 20 + len(MAGIC)
 SUMMARY_RECORDS: Final = (
-    Opcode.SCHEMA,
-    Opcode.CHANNEL,
-    Opcode.STATISTICS,
-    Opcode.CHUNK_INDEX,
-    Opcode.ATTACHMENT_INDEX,
-    Opcode.METADATA_INDEX,
-    Opcode.SUMMARY_OFFSET,
+    *(Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS, Opcode.CHUNK_INDEX),
+    *(Opcode.ATTACHMENT_INDEX, Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET),
 )
 """The records that can stand in a summary."""
-_KEPT: Final = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.CHUNK_INDEX, Opcode.STATISTICS)
+_FOOTER_SIZE: Final = HEAD.size + 20 + len(MAGIC)
 _CHECKED: Final = HEAD.size + 16
 """Bytes of the footer that its own checksum covers."""
+_DATA_END: Final = HEAD.pack(Opcode.DATA_END, 4)
+_NEAR: Final = 16 << 20
+"""Bytes at the file's end among which a summary is looked for that is not in its place."""
+_TRIES: Final = 16
+"""Places that are tried; more than one is there only if messages hold such bytes."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Summary:
-    """The contents of the summary.
-
-    Attributes
-    ----------
-    chunks
-        Chunk indexes by the offset of their chunk.
-    start
-        Where it begins, and the data ends, as the end of the file says; None if that is missing.
-    checked
-        Whether its checksum is given, and right.
-    problem
-        Why the summary cannot be relied on, or empty. Then all else is empty, but for ``start`` and
-        for what `statistics_after` finds.
-    """
+    """The contents of the summary; nothing where it cannot be relied on."""
 
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
-    chunks: dict[int, ChunkIndex] = field(default_factory=dict)
+    chunks: dict[int, Chunk] = field(default_factory=dict)
+    """The chunks' heads but for their checksums, by offset."""
+    index_ends: dict[int, int] = field(default_factory=dict)
+    """Where the message indexes of a chunk end, by the chunk's offset."""
+    attachments: dict[int, int] = field(default_factory=dict)
+    """Where attachments begin and end."""
     statistics: Statistics | None = None
     start: int | None = None
+    """Where it should begin, and the data end, as the file's end says; None if that is missing."""
     checked: bool = False
+    """Whether its checksum is given, and right."""
+    moved: int = 0
+    """By how many bytes it lies further back than it should; negative where bytes are missing."""
     problem: str = ""
+    """Why it cannot be relied on, or that it is not in its place."""
+
+    @property
+    def in_place(self) -> bool:
+        """Whether its checksum is right where it should be, so that its offsets hold."""
+        return self.checked and not self.moved
+
+    def fill(self, body: memoryview) -> None:
+        """Take in the records of the summary, or raise `BadRecord`."""
+        end = 0
+        for record in walk(body):
+            end = record.end
+            if record.opcode in SUMMARY_RECORDS:
+                self._take(parse(record.opcode, body[record.body : end]))
+            elif record.opcode < PRIVATE:
+                raise BadRecord("its summary is not where it should be")
+        if end != len(body):
+            raise BadRecord("its summary does not add up")
+
+    def _take(self, record: Any) -> None:
+        if isinstance(record, Schema):
+            self.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            self.channels[record.id] = record
+        elif isinstance(record, ChunkIndex):
+            chunk = _chunk_of(record)
+            self.chunks[chunk.offset] = chunk
+            self.index_ends[chunk.offset] = chunk.data_end + record.message_index_length
+        elif isinstance(record, AttachmentIndex):
+            self.attachments[record.offset] = record.offset + record.length
+        elif isinstance(record, Statistics):
+            self.statistics = record
 
 
-def read_summary(source: FileReader) -> Summary:
-    """Read the summary, if it can be relied on."""
-    footer_at = source.size - FOOTER_SIZE
-    tail = source.read(max(footer_at, 0), FOOTER_SIZE)
-    if len(tail) < FOOTER_SIZE or not tail.endswith(MAGIC) or tail[0] != Opcode.FOOTER:
+def read_summary(source: Bytes) -> Summary:
+    """Read the summary, if it can be relied on, wherever before the file's end it lies."""
+    footer_at = len(source) - _FOOTER_SIZE
+    tail = bytes(source[max(footer_at, 0) : len(source)])
+    if len(tail) < _FOOTER_SIZE or tail[0] != Opcode.FOOTER or not tail.endswith(MAGIC):
         return Summary(problem="the file does not end as it should")
     footer: Footer = parse(Opcode.FOOTER, tail[HEAD.size : -len(MAGIC)])
     if footer.summary_start == 0:
         return Summary(start=footer_at)
-    try:
-        found = _collect(_checked(source, footer, tail[:_CHECKED]))
-    except BadRecord as error:
-        return Summary(start=footer.summary_start, problem=str(error))
-    return replace(found, start=footer.summary_start, checked=footer.summary_crc != 0)
-
-
-def statistics_after(source: FileReader, offset: int) -> Statistics | None:
-    """Find the counts of messages among the records behind the data, whose checksum is wrong."""
-    part = PartReader(source, offset, source.size - offset)
-    with suppress(BadRecord):
-        for place in walk(part):
-            if place.opcode == Opcode.STATISTICS:
-                found: Statistics = parse(
-                    place.opcode, part.peek(place.body, place.end - place.body)
-                )
-                return found
-    return None
-
-
-def _checked(source: FileReader, footer: Footer, head: bytes) -> PartReader:
-    """Return the part of the file where the footer says the summary is, its checksum verified."""
-    size = source.size - FOOTER_SIZE - footer.summary_start
-    if not 0 <= size <= LARGEST:
-        raise BadRecord("its summary is not where it should be")
-    part = PartReader(source, footer.summary_start, size)
-    if footer.summary_crc and zlib.crc32(head, crc_of(part)) != footer.summary_crc:
-        raise BadRecord("the checksum of its summary is wrong")
-    return part
-
-
-def _collect(part: PartReader) -> Summary:
-    summary, statistics, end = Summary(), None, 0
-    for place in walk(part):
-        end = place.end
-        if place.opcode not in SUMMARY_RECORDS and place.opcode < PRIVATE:
-            raise BadRecord("its summary is not where it should be")
-        if place.opcode not in _KEPT:
-            continue
-        body = part.peek(place.body, place.end - place.body)
-        if place.opcode == Opcode.CHUNK_INDEX:
-            index = parse_chunk_index(body)
-            summary.chunks[index.chunk.offset] = index
-            continue
-        record = parse(place.opcode, body)
-        if isinstance(record, Schema):
-            summary.schemas[record.id] = record
-        elif isinstance(record, Channel):
-            summary.channels[record.id] = record
+    problem = ""
+    for start in _starts(source, footer.summary_start, footer_at):
+        found = Summary(start=footer.summary_start, checked=footer.summary_crc != 0)
+        found.moved = start - footer.summary_start
+        found.problem = "its summary is not where it should be" if found.moved else ""
+        try:
+            found.fill(_checked(source, start, footer_at, footer.summary_crc, tail[:_CHECKED]))
+        except BadRecord as error:
+            problem = problem or str(error)
         else:
-            statistics = record
-    if end != part.size:
-        raise BadRecord("its summary does not add up")
-    return replace(summary, statistics=statistics)
+            return found
+    return Summary(start=footer.summary_start, problem=problem)
+
+
+def _starts(source: Bytes, start: int, footer_at: int) -> Iterator[int]:
+    """Yield where the summary may begin: where the footer says, or behind an end of the data."""
+    yield start
+    near = max(footer_at - _NEAR, 0)
+    before = bytes(source[near:footer_at])
+    at = len(before)
+    for _ in range(_TRIES):
+        at = before.rfind(_DATA_END, 0, at)
+        if at < 0:
+            return
+        yield near + at + len(_DATA_END) + 4
+
+
+def _checked(source: Bytes, start: int, end: int, crc: int, footer: bytes) -> memoryview:
+    if not 0 <= end - start <= LARGEST:
+        raise BadRecord("its summary is not where it should be")
+    body = memoryview(source[start:end])
+    if crc and zlib.crc32(footer, zlib.crc32(body)) != crc:
+        raise BadRecord("the checksum of its summary is wrong")
+    return body
+
+
+def _chunk_of(index: ChunkIndex) -> Chunk:
+    """Return a chunk's head as the summary has it: all of it but the checksum."""
+    head = HEAD.size + CHUNK_HEAD.size + len(index.compression.encode()) + 8
+    if index.chunk_length != head + index.compressed_size:
+        raise BadRecord("a chunk index that does not add up")
+    return Chunk(
+        index.chunk_start_offset,
+        index.message_start_time,
+        index.message_end_time,
+        index.uncompressed_size,
+        None,
+        index.compression,
+        index.chunk_start_offset + head,
+        index.compressed_size,
+    )

@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple
 
 from mcap.records import Schema
 
-from roadeval.logs.container.readers import Buffer
+from roadeval.logs.container.records import Buffer
 from roadeval.logs.errors import BadMessage
 
 
@@ -94,6 +94,9 @@ def fields_of(schema: Schema | None) -> Fields | None:
     return found.fields if found else None
 
 
+LONGEST_TEXT: Final = 1 << 16
+"""Bytes of a schema that the libraries are given: their time grows with the square of it."""
+
 Decode = Callable[[Buffer], Any]
 """From a message's bytes to an object that has its fields as attributes."""
 
@@ -137,7 +140,7 @@ def decode_by_library(factory: Any, encoding: str, schema: Schema | None) -> Dec
     encoding
         The channel's message encoding.
     """
-    if schema is None or not schema.data:
+    if schema is None or not 0 < len(schema.data) <= LONGEST_TEXT:
         return None
     try:
         with redirect_stderr(io.StringIO()):  # the ROS parsers print what they stumble on

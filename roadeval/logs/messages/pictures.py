@@ -9,14 +9,13 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, Final, NamedTuple
 
 from mcap.records import Channel, Schema
 
 from roadeval.data import Rgb
-from roadeval.logs.container.readers import Buffer
-from roadeval.logs.container.records import Message
+from roadeval.logs.container.records import Buffer, Message
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.messages import encodings
 from roadeval.logs.messages.encoding import KINDS, Encoding, MessageReader, TopicKind, parts_of
@@ -206,21 +205,32 @@ def decoder_for(channel: Channel, schema: Schema | None) -> Decoder:
     return Decoder(picture, stamp)
 
 
-def message_is_whole(channel: Channel, schema: Schema | None, message: Message) -> bool:
-    """Whether a message is as long as its own fields say, as far as its encoding shows it."""
+def message_stamp(channel: Channel, schema: Schema | None, message: Message) -> int | None:
+    """Return a message's stamp; None if its fields contradict its length or cannot be read."""
     reader = _reader(channel, schema)
-    if reader is not None and reader.is_whole is not None:
-        return reader.is_whole(message.data)
     try:
-        decoder_for(channel, schema).picture(message.data)
+        decoder = decoder_for(channel, schema)
+        if reader is None or reader.is_whole is None:
+            return decoder.picture(message.data).stamp_ns
+        return decoder.stamp(message.data) if reader.is_whole(message.data) else None
     except BadMessage:
-        return False
-    return True
+        return None
 
 
 def _reader(channel: Channel, schema: Schema | None) -> MessageReader | None:
-    encoding = message_encodings().get(channel.message_encoding)
-    return encoding.reader(schema) if encoding else None
+    parts = () if schema is None else (schema.name, schema.encoding, schema.data)
+    return _reader_for(channel.message_encoding, *parts)
+
+
+@lru_cache(maxsize=64)
+def _reader_for(message_encoding: str, *parts: Any) -> MessageReader | None:
+    """Return what reads the messages of a schema, whichever channels and files share it."""
+    encoding = message_encodings().get(message_encoding)
+    if encoding is None:
+        return None
+    name, schema_encoding, data = parts or ("", "", b"")
+    schema = Schema(id=1, name=name, encoding=schema_encoding, data=data) if parts else None
+    return encoding.reader(schema)
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from roadeval.images import (
     eight_bits,
     without_colours,
 )
-from roadeval.logs.container.readers import Buffer
+from roadeval.logs.container.records import Buffer
 from roadeval.logs.errors import BadMessage, DamagedMessage
 from roadeval.logs.messages.pictures import (
     CompressedPicture,

@@ -112,12 +112,15 @@ def _gaps(log_times: npt.NDArray[np.int64]) -> tuple[tuple[int, int], ...]:
 
 def _with_picture(topic: TopicInfo, reader: TopicReader) -> TopicInfo:
     """Add what the first messages show; without a schema, they alone show whether it is images."""
-    problem = ""
-    for position in range(min(PROBES, len(reader))):
+    problem, tried = "", 0
+    for position in range(len(reader)):
         try:
             return replace(topic, **_look(reader, position))
         except (FrameError, BadMessage) as error:
             problem = problem or str(error)
+        tried += not reader.is_lost(position)
+        if tried == PROBES:
+            break
     return replace(topic, problem=problem) if topic.schema else replace(topic, kind=TopicKind.OTHER)
 
 

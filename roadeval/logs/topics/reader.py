@@ -169,6 +169,11 @@ class TopicReader:
         """Return where a message lies, for messages to people."""
         return self.name
 
+    def is_lost(self, position: int) -> bool:
+        """Whether a message lies in a chunk that was found to be unreadable."""
+        source = self.channels[self._numbers[position]]
+        return bool(source.container.is_bad(int(self._chunks[position])))
+
     def expected(self) -> int:
         """How many messages there should be, by the files' own statistics."""
         return sum(s.container.expected.get(s.channel_id, 0) for s in self.channels)

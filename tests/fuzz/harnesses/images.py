@@ -19,7 +19,7 @@ from roadeval.logs.messages.pictures import (
     RawPicture,
     codec_of,
     decoder_for,
-    message_is_whole,
+    message_stamp,
 )
 from roadeval.logs.messages.pixels import FORMATS, to_labels, to_rgb
 from tests.fixtures.flavours import FLAVOURS, NoEncoderError, file_of, scenes
@@ -48,7 +48,7 @@ def check(data: bytes) -> None:
         _decode(raw(Choices(data)))
     else:
         kind = kinds()[sum(chosen) % len(kinds())]
-        message_is_whole(kind.channel, kind.schema, Message(1, 0, 0, 0, memoryview(data)))
+        message_stamp(kind.channel, kind.schema, Message(1, 0, 0, 0, memoryview(data)))
         with suppress(BadMessage):
             kind.decoder.stamp(data)
         with suppress(BadMessage):

@@ -10,12 +10,12 @@ from mcap.opcode import Opcode
 
 from roadeval.logs.container.chunks import ChunkReader
 from roadeval.logs.container.damage import damage_of
-from roadeval.logs.container.file import Container
-from roadeval.logs.container.readers import ByteReader, FileReader, PartReader
+from roadeval.logs.container.file import containers_in
 from roadeval.logs.container.records import (
     MAGIC,
+    Bytes,
+    FileBytes,
     Message,
-    Place,
     message_at,
     parse,
     parse_chunk,
@@ -48,13 +48,14 @@ def fields(record: Any) -> dict[str, Any]:
     return {key: plain(value) for key, value in named.items()}
 
 
-def records(source: ByteReader, chunks: ChunkReader) -> Iterator[tuple[str, dict[str, Any]]]:
+def records(source: Bytes, chunks: ChunkReader) -> Iterator[tuple[str, dict[str, Any]]]:
     """Every record as the suite lists them: chunks unpacked, message indexes left out."""
     for place in walk(source):
-        body = source.read(place.body, place.end - place.body)
+        body = source[place.body : place.end]
         if place.opcode == Opcode.CHUNK:
-            in_file = Place(place.opcode, *(offset + len(MAGIC) for offset in place[1:]))
-            yield from records(chunks.read(parse_chunk(in_file, body)), chunks)
+            chunk = parse_chunk(source, place)
+            in_file = chunk._replace(data_offset=chunk.data_offset + len(MAGIC))
+            yield from records(chunks.read(in_file), chunks)
         elif place.opcode == Opcode.MESSAGE:
             yield "Message", fields(message_at(source, place.offset))
         elif place.opcode != Opcode.MESSAGE_INDEX and place.opcode <= Opcode.DATA_END:
@@ -96,8 +97,8 @@ def suite(request: pytest.FixtureRequest, tmp_path: Path) -> Suite:
 def test_every_file_reads_as_expected(suite: Suite) -> None:
     assert suite
     for path, expected in suite:
-        source = FileReader(path)
-        inner = PartReader(source, len(MAGIC), source.size - 2 * len(MAGIC))
+        source = FileBytes(path.open("rb"))
+        inner = source.part(len(MAGIC), len(source) - len(MAGIC))
         found = list(records(inner, ChunkReader(source)))
         source.close()
         assert found == expected, path.name
@@ -105,7 +106,7 @@ def test_every_file_reads_as_expected(suite: Suite) -> None:
 
 def test_every_message_is_found_and_nothing_is_called_damaged(suite: Suite) -> None:
     for path, expected in suite:
-        container = Container(path, lambda *_: True, lambda *_: True)
+        (container,) = containers_in(path, lambda *_: True, lambda *_: 0)
         found = [
             fields(container.message(chunk, offset))
             for log in container.logs.values()

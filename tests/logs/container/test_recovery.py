@@ -44,7 +44,7 @@ LOSSY = {
     "trunc_midchunk": (36, 36, r"ends inside a chunk \(byte {at}, after 3.500 s\)"),
     "trunc_nofooter": (40, 40, r"never finished.*byte {at}, after 3.900 s"),
     "trunc_unchunked": (28, 28, r"beyond the end of the file \(byte {at}, after 2.700 s\)"),
-    "zero_hole": (38, 38, r"cannot uncompress \(byte {at}, 0.600 to 0.700 s\).*38 of 40"),
+    "zero_hole": (38, 38, r"summary lists is not there \(byte {at}, 0.600 to 0.700 s\).*38 of 40"),
 }
 NO_FRAMES = {
     "magic_only": "never finished",

@@ -6,8 +6,7 @@ from typing import Any, Final
 
 from mcap.records import Schema
 
-from roadeval.logs.container.readers import Buffer
-from roadeval.logs.container.records import LARGEST, PADDING
+from roadeval.logs.container.records import LARGEST, PADDING, Buffer
 from roadeval.logs.errors import BadMessage
 from roadeval.logs.messages.encoding import (
     Encoding,

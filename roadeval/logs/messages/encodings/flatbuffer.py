@@ -9,7 +9,7 @@ from typing import Any
 
 from mcap.records import Schema
 
-from roadeval.logs.container.readers import Buffer
+from roadeval.logs.container.records import Buffer
 from roadeval.logs.messages.encoding import Encoding, Fields, MessageReader, fields_of, parts_of
 
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 from mcap.records import Schema
 
-from roadeval.logs.container.readers import Buffer
+from roadeval.logs.container.records import Buffer
 from roadeval.logs.messages.encoding import Encoding, MessageReader, TopicKind
 
 

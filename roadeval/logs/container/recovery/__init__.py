@@ -1,1 +1,0 @@
-"""Recovery of the readable part of a damaged file, such as one whose recorder was killed."""
