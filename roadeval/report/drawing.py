@@ -373,7 +373,8 @@ def _rows(chart: Chart, values: Span) -> Iterator[MarkRow]:
     last = len(chart.names) - chart.sums
     for place, name in enumerate(chart.names):
         marks = [mark for each in chart.series if (mark := _mark(chart, each, place, values))]
-        share = values.percent(chart.share[place]) if chart.share else None
+        known = chart.share and math.isfinite(chart.share[place])
+        share = values.percent(chart.share[place]) if known else None
         yield MarkRow(name, marks, share, sums=place == last)
 
 

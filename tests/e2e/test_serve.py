@@ -5,6 +5,7 @@ import re
 import signal
 import urllib.error
 import urllib.request
+from contextlib import suppress
 from pathlib import Path
 from threading import Thread
 
@@ -68,7 +69,8 @@ def listening(process):
     processes, sockets = [process], set()
     for each in processes:
         for task in Path(f"/proc/{each}/task").iterdir():
-            processes += map(int, (task / "children").read_text().split())
+            with suppress(FileNotFoundError):  # a thread that has ended
+                processes += map(int, (task / "children").read_text().split())
         links = [str(each.readlink()) for each in Path(f"/proc/{each}/fd").iterdir()]
         sockets |= {link[8:-1] for link in links if link.startswith("socket:[")}
     rows = [
