@@ -114,25 +114,6 @@ def _paper() -> Pipeline:
 class RunConfig(LogConfig):
     """Every option of a run.
 
-    Parameters
-    ----------
-    preset
-        The preset that it started from.
-    pipeline
-        The chain of stages of the variants ``filtered`` and ``unfiltered``, and their settings.
-    extra
-        Further variants.
-    drives
-        What is asked of some logs instead; later ones override earlier ones.
-    training, evaluation
-        How every variant is trained and scored.
-    output
-        Where the results are written.
-    run
-        How the run is executed.
-    fleet
-        How many drives are replayed together.
-
     Raises
     ------
     ConfigError
@@ -140,14 +121,22 @@ class RunConfig(LogConfig):
     """
 
     preset: str = "paper"
+    """The preset that it started from."""
     pipeline: Pipeline = field(default_factory=_paper)
+    """The chain of stages of the variants ``filtered`` and ``unfiltered``, and their settings."""
     extra: tuple[Variant, ...] = ()
+    """Further variants."""
     drives: tuple[DriveSettings, ...] = ()
+    """What is asked of some logs instead; later ones override earlier ones."""
     training: TrainingSettings = field(default_factory=TrainingSettings)
     evaluation: EvaluationSettings = field(default_factory=EvaluationSettings)
+    """How every variant is trained and scored."""
     output: OutputSettings = field(default_factory=OutputSettings)
+    """Where the results are written."""
     run: ExecutionSettings = field(default_factory=ExecutionSettings)
+    """How the run is executed."""
     fleet: FleetSettings = field(default_factory=FleetSettings)
+    """How many drives are replayed together."""
 
     def __post_init__(self) -> None:
         names = {variant.name for variant in self.variants()}

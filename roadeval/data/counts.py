@@ -46,7 +46,7 @@ class Tally:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What became of the pixels from one mask to another.
+    """Pixels that one mask repairs and spoils against another.
 
     ``repaired`` are newly right, ``spoiled`` newly wrong, of the ``labelled`` ones.
     """

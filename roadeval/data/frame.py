@@ -37,43 +37,29 @@ class Moment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One camera image with its times and, if the log has one, its truth.
-
-    Parameters
-    ----------
-    number
-        Position in the image topic by log time, from 0, before any range or stride.
-    stamp_ns, log_time_ns
-        Header stamp and log time.
-    image
-        ``(H, W, 3)`` uint8 RGB.
-    payload
-        The image as the log holds it (for a compressed image the JPEG or PNG file itself).
-    media_type
-        ``image/jpeg`` or ``image/png`` if ``payload`` is such a file, else None.
-    truth
-        ``(H, W)`` uint8 road truth (0, 1, 255), or None for an unlabelled frame.
-    shadow_truth
-        ``(H, W)`` uint8 (0, 1, 255) mask of truly shadowed pixels, or None.
-    external
-        Another system's road masks, from the log itself or from elsewhere, by variant name.
-    probabilities
-        How probable road is to such a system, where its masks are thresholds on that.
-    camera
-        The image topic.
-    """
+    """One camera image with its times and, if the log has one, its truth."""
 
     number: int
+    """Position in the image topic by log time, from 0, before any range or stride."""
     stamp_ns: int
     log_time_ns: int
+    """Header stamp and log time."""
     image: Rgb
+    """``(H, W, 3)`` uint8 RGB."""
     payload: bytes | memoryview
+    """The image as the log holds it (for a compressed image the JPEG or PNG file itself)."""
     media_type: str | None = None
+    """``image/jpeg`` or ``image/png`` if ``payload`` is such a file, else None."""
     truth: Truth | None = None
+    """``(H, W)`` uint8 road truth (0, 1, 255), or None for an unlabelled frame."""
     shadow_truth: Truth | None = None
+    """``(H, W)`` uint8 (0, 1, 255) mask of truly shadowed pixels, or None."""
     external: Mapping[str, Mask] = field(default_factory=dict)
+    """Another system's road masks, from the log itself or from elsewhere, by variant name."""
     probabilities: Mapping[str, Probability] = field(default_factory=dict)
+    """How probable road is to such a system, where its masks are thresholds on that."""
     camera: str = ""
+    """The image topic."""
 
     @property
     def moment(self) -> Moment:

@@ -40,32 +40,23 @@ class LabelClass:
 
 @dataclass(frozen=True, slots=True)
 class LayerSpec:
-    """The description of a layer, known before the first frame.
-
-    Parameters
-    ----------
-    name
-        Last part of the entity path, as ``ndi`` in ``/filtered/ndi``.
-    kind
-        How the array is to be read.
-    title
-        A few words for a person, as ``NDI (Eq. 6)``.
-    classes
-        For `LABELS` and `MASK`: the values that occur.
-    value_range
-        For `SCALAR`: the closed range of meaning; values outside are clipped for display.
-    exact
-        Whether the recording must give back the same array (masks, labels), or, for a scalar
-        map, the nearest of 255 levels over ``value_range``. A layer that is not exact may be
-        recorded lossily and at half resolution.
-    """
+    """The description of a layer, known before the first frame."""
 
     name: str
+    """Last part of the entity path, as ``ndi`` in ``/filtered/ndi``."""
     kind: LayerKind
+    """How the array is to be read."""
     title: str
+    """A few words for a person, as ``NDI (Eq. 6)``."""
     classes: tuple[LabelClass, ...] = ()
+    """For `LABELS` and `MASK`: the values that occur."""
     value_range: tuple[float, float] = (0.0, 1.0)
+    """For `SCALAR`: the closed range of meaning; values outside are clipped for display."""
     exact: bool = True
+    """Whether the recording must give back the same array (masks, labels), or, for a scalar map,
+    the nearest of 255 levels over ``value_range``. A layer that is not exact may be recorded
+    lossily and at half resolution.
+    """
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,31 +14,22 @@ from roadeval.data.packed import Packed, TruthBits
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Output:
-    """What a stage makes of a frame.
-
-    Parameters
-    ----------
-    layers
-        Named arrays to record.
-    image
-        ``(H, W, 3)`` uint8 RGB that replaces the image for the stages after it, if any.
-    mask
-        Its road mask, if it makes one; also among its layers, under the stage's name.
-    regions
-        Sets of pixels to count separately, by name.
-    facts
-        Numbers about the frame, by name, as ``components`` and ``max_gain``.
-    probability
-        How probable road is, ``(H, W)`` uint16 codes 0..65535 that span 0..1, where the mask is a
-        threshold on it.
-    """
+    """What a stage makes of a frame."""
 
     layers: tuple[Layer, ...] = ()
+    """Named arrays to record."""
     image: Rgb | None = None
+    """``(H, W, 3)`` uint8 RGB that replaces the image for the stages after it, if any."""
     mask: Packed | None = None
+    """Its road mask, if it makes one; also among its layers, under the stage's name."""
     regions: Mapping[str, Packed] = field(default_factory=dict)
+    """Sets of pixels to count separately, by name."""
     facts: Mapping[str, float] = field(default_factory=dict)
+    """Numbers about the frame, by name, as ``components`` and ``max_gain``."""
     probability: Probability | None = None
+    """How probable road is, ``(H, W)`` uint16 codes 0..65535 that span 0..1, where the mask is a
+    threshold on it.
+    """
 
 
 @dataclass(frozen=True, slots=True, eq=False)

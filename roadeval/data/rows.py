@@ -14,15 +14,10 @@ Cells = npt.NDArray[Any]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """Rows of a table.
-
-    Parameters
-    ----------
-    columns
-        ``(n,)`` each, by name: text, int64 or float64; an undefined number is NaN.
-    """
+    """Rows of a table."""
 
     columns: Mapping[str, Cells]
+    """``(n,)`` each, by name: text, int64 or float64; an undefined number is NaN."""
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))

@@ -17,40 +17,27 @@ from roadeval.evaluation.frame_counts import Window
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """The claim that a rate of one mask is lower than that of another.
-
-    Parameters
-    ----------
-    name
-        Its key in ``summary.json``.
-    rate
-        Which rate.
-    better, worse
-        Variant and stage of the masks.
-    """
+    """The claim that a rate of one mask is lower than that of another."""
 
     name: str
+    """Its key in ``summary.json``."""
     rate: str
+    """Which rate."""
     better: tuple[str, str]
     worse: tuple[str, str]
+    """Variant and stage of the masks."""
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """In how many windows a claim is borne out.
-
-    Parameters
-    ----------
-    held, windows
-        Of the full windows in which both rates are defined.
-    short_held, short
-        The same of windows with fewer frames, as the last one may be.
-    """
+    """In how many windows a claim is borne out."""
 
     held: int
     windows: int
+    """Of the full windows in which both rates are defined."""
     short_held: int
     short: int
+    """The same of windows with fewer frames, as the last one may be."""
 
 
 _WITH: Final = (FILTERED, FINAL_STAGE)

@@ -20,23 +20,17 @@ FourCounts = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameCounts:
-    """The counts of one stage of one variant, frame by frame.
-
-    Parameters
-    ----------
-    variant, stage
-        Whose mask.
-    positions
-        ``(n,)`` int64: places among the evaluated frames, rising. A mask that the log itself
-        carries may be missing on some.
-    counts
-        ``(n, 4)`` int64: TP, TN, FP, FN.
-    """
+    """The counts of one stage of one variant, frame by frame."""
 
     variant: str
     stage: str
+    """Whose mask."""
     positions: npt.NDArray[np.int64]
+    """``(n,)`` int64: places among the evaluated frames, rising. A mask that the log itself carries
+    may be missing on some.
+    """
     counts: FourCounts
+    """``(n, 4)`` int64: TP, TN, FP, FN."""
 
     @property
     def rates(self) -> npt.NDArray[np.float64]:
@@ -165,32 +159,22 @@ def means(rates: npt.NDArray[np.float64]) -> dict[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """One stage of one variant over consecutive evaluated frames.
-
-    Parameters
-    ----------
-    number
-        From 0.
-    first_frame, last_frame
-        Frame numbers of the window's ends, both inclusive.
-    frames
-        Evaluated frames that have this mask; the last window may hold fewer than the others.
-    variant, stage
-        Whose mask.
-    rates
-        Mean of the frames' rates, an undefined one left out (the paper's average).
-    pooled
-        The rates of the summed counts.
-    """
+    """One stage of one variant over consecutive evaluated frames."""
 
     number: int
+    """From 0."""
     first_frame: int
     last_frame: int
+    """Frame numbers of the window's ends, both inclusive."""
     frames: int
+    """Evaluated frames that have this mask; the last window may hold fewer than the others."""
     variant: str
     stage: str
+    """Whose mask."""
     rates: dict[str, float]
+    """Mean of the frames' rates, an undefined one left out (the paper's average)."""
     pooled: dict[str, float]
+    """The rates of the summed counts."""
 
 
 def cut(mask: FrameCounts, frame_numbers: Sequence[int], size: int) -> Iterator[Window]:

@@ -33,26 +33,21 @@ _LUMA: Final = np.array([0.299, 0.587, 0.114], np.float32)
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """The light of a frame.
-
-    Parameters
-    ----------
-    luminance, contrast
-        Mean and standard deviation of the image's brightness, from 0 to 1.
-    shadow
-        The share of the lower half that is darker than `DARK` times its brightness at the quantile
-        `BRIGHT`.
-    sun
-        How much bluer the dark grey pixels of the lower half are than the lit grey ones: the
-        difference of the medians of ``ln B - ln R``. In the sun a shadow is lit by the blue sky
-        alone; under clouds all light has one colour, and it is about 0 or less. NaN where too few
-        pixels are dark, or lit, and grey.
-    """
+    """The light of a frame."""
 
     luminance: float
     contrast: float
+    """Mean and standard deviation of the image's brightness, from 0 to 1."""
     shadow: float
+    """The share of the lower half that is darker than `DARK` times its brightness at the quantile
+    `BRIGHT`.
+    """
     sun: float
+    """How much bluer the dark grey pixels of the lower half are than the lit grey ones: the
+    difference of the medians of ``ln B - ln R``. In the sun a shadow is lit by the blue sky alone;
+    under clouds all light has one colour, and it is about 0 or less. NaN where too few pixels are
+    dark, or lit, and grey.
+    """
 
 
 def light_of(image: Rgb) -> Light:

@@ -23,49 +23,35 @@ class Shown(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """A number that is computed from the counts of one mask.
-
-    Parameters
-    ----------
-    name
-        Column of the tables, as ``ERR``.
-    title
-        A few words for a person, as ``error rate``.
-    formula
-        In ``TP``, ``TN``, ``FP``, ``FN`` and ``N``.
-    function
-        Computes it of a frame's counts, and elementwise where each count is an array. Undefined
-        is NaN, as `ratio` does it.
-    higher_is_better
-        The direction of improvement.
-    order
-        Its place among the columns; the paper's metrics bear their equations' numbers.
-    rank
-        Its place where people read it, the lowest first; of equal ones by ``order``.
-    meaning
-        What it counts, in plain words; empty where the title says it.
-    unit
-        Of the value in tables.
-    mirrors
-        The metric that tells the same, as ``FNR`` for ``TPR = 1 - FNR``, and is shown in its stead.
-    shown
-        Where people see it: everywhere by default, one that mirrors another in files alone.
-    tabled
-        Whether it is a column of the tables. One that is not is computed of sums alone.
-    """
+    """A number that is computed from the counts of one mask."""
 
     name: str
+    """Column of the tables, as ``ERR``."""
     title: str
+    """A few words for a person, as ``error rate``."""
     formula: str
+    """In ``TP``, ``TN``, ``FP``, ``FN`` and ``N``."""
     function: Callable[[Counts], float]
+    """Computes it of a frame's counts, and elementwise where each count is an array. Undefined is
+    NaN, as `ratio` does it.
+    """
     higher_is_better: bool
+    """The direction of improvement."""
     order: int
+    """Its place among the columns; the paper's metrics bear their equations' numbers."""
     rank: int = 10
+    """Its place where people read it, the lowest first; of equal ones by ``order``."""
     meaning: str = ""
+    """What it counts, in plain words; empty where the title says it."""
     unit: str = "fraction"
+    """Of the value in tables."""
     mirrors: str | None = None
+    """The metric that tells the same, as ``FNR`` for ``TPR = 1 - FNR``, and is shown in its stead.
+    """
     shown: Shown | None = None
+    """Where people see it: everywhere by default, one that mirrors another in files alone."""
     tabled: bool = True
+    """Whether it is a column of the tables. One that is not is computed of sums alone."""
 
     @property
     def in_words(self) -> str:

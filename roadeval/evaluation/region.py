@@ -30,24 +30,16 @@ class LabelledFrame:
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A region.
-
-    Parameters
-    ----------
-    name
-        As ``true_shadow``, in the column ``region`` of ``regions.csv``.
-    title
-        A few words for a person, as ``inside true shadow``.
-    order
-        Its place among the regions.
-    find
-        Computes the region, ``(H, words)``; None where the frame has none.
-    """
+    """A region."""
 
     name: str
+    """As ``true_shadow``, in the column ``region`` of ``regions.csv``."""
     title: str
+    """A few words for a person, as ``inside true shadow``."""
     order: int
+    """Its place among the regions."""
     find: Callable[[LabelledFrame], Bits | None]
+    """Computes the region, ``(H, words)``; None where the frame has none."""
 
     def found(self, labelled: LabelledFrame) -> Mapping[str, Bits]:
         """Return the region by its name, or nothing."""
@@ -62,23 +54,17 @@ class Region:
 
 @dataclass(frozen=True, slots=True)
 class RegionFamily:
-    """Regions that are found together.
-
-    Parameters
-    ----------
-    order
-        Their place among the regions.
-    found
-        Computes the regions, ``(H, words)`` each, by name.
-    titles
-        Returns the titles of those of some names that belong to the family, in order. The second
-        argument is the images' height in pixels, 0 if it is not known.
-    whole
-        Whether the regions, none of which overlap, together are the whole frame: the counts are
-        checked against that.
-    """
+    """Regions that are found together."""
 
     order: int
+    """Their place among the regions."""
     found: Callable[[LabelledFrame], Mapping[str, Bits]]
+    """Computes the regions, ``(H, words)`` each, by name."""
     titles: Titles
+    """Returns the titles of those of some names that belong to the family, in order. The second
+    argument is the images' height in pixels, 0 if it is not known.
+    """
     whole: bool = False
+    """Whether the regions, none of which overlap, together are the whole frame: the counts are
+    checked against that.
+    """

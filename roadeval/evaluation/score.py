@@ -188,16 +188,12 @@ _LINEAR: Final = 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BlindPrior:
-    """Where the road was in the training frames.
-
-    Parameters
-    ----------
-    road
-        ``(H, W)`` float32: the share of the training frames in which a pixel was road, among
-        those that label it; 0 where none does.
-    """
+    """Where the road was in the training frames."""
 
     road: npt.NDArray[np.float32]
+    """``(H, W)`` float32: the share of the training frames in which a pixel was road, among those
+    that label it; 0 where none does.
+    """
     _masks: dict[tuple[int, int], Packed] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod

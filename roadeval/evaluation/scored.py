@@ -98,18 +98,12 @@ def windows(rows: Rows, size: int) -> Iterator[Window]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Causes:
-    """Each frame's error rate, taken apart.
-
-    Parameters
-    ----------
-    frames
-        ``(n,)`` int64, rising.
-    parts
-        ``(n,)`` float64 each, by the stage or `FILTER` that caused it, in order.
-    """
+    """Each frame's error rate, taken apart."""
 
     frames: Ints
+    """``(n,)`` int64, rising."""
     parts: dict[str, Floats]
+    """``(n,)`` float64 each, by the stage or `FILTER` that caused it, in order."""
 
     def of(self, frame: int) -> dict[str, float]:
         """Return the parts of a frame's error rate."""

@@ -57,23 +57,16 @@ def at_levels(counts: Sums) -> Sums:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Thresholds:
-    """The outcomes at each threshold, from the highest to the lowest that occurs.
-
-    Parameters
-    ----------
-    codes
-        ``(n,)`` int64: road is what has at least this code, or is at least of this level.
-    tp, fp
-        ``(n,)`` int64: road and non-road pixels that are called road.
-    road, other
-        All road and non-road pixels.
-    """
+    """The outcomes at each threshold, from the highest to the lowest that occurs."""
 
     codes: Sums
+    """``(n,)`` int64: road is what has at least this code, or is at least of this level."""
     tp: Sums
     fp: Sums
+    """``(n,)`` int64: road and non-road pixels that are called road."""
     road: int
     other: int
+    """All road and non-road pixels."""
 
     @classmethod
     def of(cls, counts: npt.NDArray[Any]) -> Thresholds:

@@ -43,21 +43,14 @@ _LOCAL: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Engine:
-    """Worker processes.
-
-    Parameters
-    ----------
-    executor
-        Takes tasks.
-    workers
-        How many work at once, as far as that is known.
-    dashboard
-        Address of a page that shows them at work, if there is one.
-    """
+    """Worker processes."""
 
     executor: Executor
+    """Takes tasks."""
     workers: int | None
+    """How many work at once, as far as that is known."""
     dashboard: str | None = None
+    """Address of a page that shows them at work, if there is one."""
 
 
 @contextmanager

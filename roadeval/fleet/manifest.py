@@ -38,25 +38,17 @@ _LISTS: Final = ("labels.road", "labels.ignore")
 
 @dataclass(frozen=True, slots=True)
 class ManifestEntry:
-    """An entry of a manifest.
-
-    Parameters
-    ----------
-    path
-        Of one drive or several, as it is written.
-    group, tags
-        What is known of them.
-    settings
-        What is asked of them in place of what is asked of all; None if nothing is.
-    where
-        Begins a message about the entry.
-    """
+    """An entry of a manifest."""
 
     path: str
+    """Of one drive or several, as it is written."""
     group: str | None
     tags: Mapping[str, str]
+    """What is known of them."""
     settings: DriveSettings | None
+    """What is asked of them in place of what is asked of all; None if nothing is."""
     where: str
+    """Begins a message about the entry."""
 
 
 def is_manifest(path: Path) -> bool:

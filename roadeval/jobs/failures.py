@@ -14,18 +14,12 @@ KEPT: Final = 5
 
 @dataclass(frozen=True, slots=True)
 class Failures:
-    """The frames on which a stage has failed so far; any thread may add to them.
-
-    Parameters
-    ----------
-    reasons
-        By the frame's number: which stage failed, and why.
-    tracebacks
-        By such a reason.
-    """
+    """The frames on which a stage has failed so far; any thread may add to them."""
 
     reasons: dict[int, str] = field(default_factory=dict)
+    """By the frame's number: which stage failed, and why."""
     tracebacks: dict[str, str] = field(default_factory=dict)
+    """By such a reason."""
 
     def add(self, number: int, error: StageError) -> None:
         """Note that a stage failed on a frame. The error itself would hold the frame's images."""

@@ -25,36 +25,25 @@ FEWEST: Final = "worst:10"
 
 @dataclass(frozen=True, slots=True)
 class FleetFrame:
-    """A frame among the worst of a fleet.
-
-    Parameters
-    ----------
-    rank
-        1 is the worst.
-    drive, frame, stamp_ns
-        Which.
-    variant, stage
-        Whose final mask.
-    rates
-        ERR, FPR and FNR of it.
-    light
-        As it was measured, by the columns' names; None where it could not be.
-    picture
-        The file of its errors.
-    recording
-        The drive's recording; None where it was not kept.
-    """
+    """A frame among the worst of a fleet."""
 
     rank: int
+    """1 is the worst."""
     drive: str
     frame: int
     stamp_ns: int
+    """Which."""
     variant: str
     stage: str
+    """Whose final mask."""
     rates: dict[str, float | None]
+    """ERR, FPR and FNR of it."""
     light: dict[str, float | None]
+    """As it was measured, by the columns' names; None where it could not be."""
     picture: Path
+    """The file of its errors."""
     recording: Path | None
+    """The drive's recording; None where it was not kept."""
 
 
 def worst_frames(fleet: Fleet, count: int | None = None) -> list[FleetFrame]:

@@ -22,32 +22,22 @@ LISTED: Final = 10
 
 @dataclass(frozen=True, slots=True)
 class WorstFrame:
-    """A bad frame, and why it is one.
-
-    Parameters
-    ----------
-    rank
-        1 is the worst.
-    frame, stamp_ns
-        Which.
-    variant, stage
-        Whose final mask.
-    rates
-        Of the final mask, as short tables show them.
-    parts
-        How ERR came about, see `roadeval.evaluation.scored.causes`.
-    notes
-        What the recording says about it.
-    """
+    """A bad frame, and why it is one."""
 
     rank: int
+    """1 is the worst."""
     frame: int
     stamp_ns: int
+    """Which."""
     variant: str
     stage: str
+    """Whose final mask."""
     rates: dict[str, float]
+    """Of the final mask, as short tables show them."""
     parts: dict[str, float]
+    """How ERR came about, see `roadeval.evaluation.scored.causes`."""
     notes: tuple[str, ...]
+    """What the recording says about it."""
 
 
 def worst_frames(

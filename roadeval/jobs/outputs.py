@@ -26,21 +26,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """The files and folders of a run.
-
-    Parameters
-    ----------
-    recording
-        None where nothing is recorded.
-    reports
-        The folder of tables and figures.
-    mcap
-        The log of masks; None where nobody asked for it.
-    """
+    """The files and folders of a run."""
 
     recording: Path | None
+    """None where nothing is recorded."""
     reports: Path
+    """The folder of tables and figures."""
     mcap: Path | None
+    """The log of masks; None where nobody asked for it."""
 
     @classmethod
     def of(cls, settings: OutputSettings, drive: str) -> Outputs:

@@ -18,7 +18,7 @@ Replay = Callable[[Callable[[Progress], None]], object]
 
 
 class CancelledReplayError(RoadevalError):
-    """Nobody waits for the replay any more."""
+    """The replay was cancelled."""
 
 
 @dataclass(slots=True)

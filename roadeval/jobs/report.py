@@ -32,18 +32,12 @@ PICTURED: Final = 60
 
 @dataclass(frozen=True, slots=True)
 class PageSettings:
-    """The settings of a page.
-
-    Parameters
-    ----------
-    pictures
-        Frames with pictures; by default as many as keep the page of a drive below 10 MB.
-    assets
-        Whether script, style and pictures lie in a folder beside it.
-    """
+    """The settings of a page."""
 
     pictures: int | None = None
+    """Frames with pictures; by default as many as keep the page of a drive below 10 MB."""
     assets: bool = False
+    """Whether script, style and pictures lie in a folder beside it."""
 
 
 def write_report(

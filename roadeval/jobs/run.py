@@ -32,53 +32,37 @@ from roadeval.version import VERSION
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """A prepared run: its frames, the chains that run on them, and the score so far.
-
-    Parameters
-    ----------
-    log
-        The open log.
-    config
-        Every option.
-    selection
-        The topics that are replayed, and why.
-    frames
-        The frames that are read, and the account of them.
-    variants
-        The variants whose chains run.
-    model, schedule
-        What they learnt, and which frames are not evaluated because of it.
-    chains
-        The variants' chains, ready to run, by name.
-    repeats
-        The same for each further seed of the training, by the seed.
-    layouts
-        Every variant that is scored, those included whose masks the log carries.
-    methods
-        What stages tell of themselves beside their settings, by variant and stage. It is read
-        before the first frame: a file that they name may be gone after the last.
-    board
-        The score so far.
-    beside
-        The training frames of a model file that show a place of this drive, so far.
-    failures
-        The frames on which a stage failed, so far.
-    """
+    """A prepared run: its frames, the chains that run on them, and the score so far."""
 
     log: logs.Log
+    """The open log."""
     config: RunConfig
+    """Every option."""
     selection: logs.Selection
+    """The topics that are replayed, and why."""
     frames: logs.FrameStream
+    """The frames that are read, and the account of them."""
     variants: tuple[Variant, ...]
+    """The variants whose chains run."""
     model: Model
     schedule: Schedule
+    """What they learnt, and which frames are not evaluated because of it."""
     chains: Mapping[str, Chain]
+    """The variants' chains, ready to run, by name."""
     repeats: Mapping[int, Mapping[str, Chain]]
+    """The same for each further seed of the training, by the seed."""
     layouts: tuple[VariantLayout, ...]
+    """Every variant that is scored, those included whose masks the log carries."""
     methods: Mapping[str, Mapping[str, Any]]
+    """What stages tell of themselves beside their settings, by variant and stage. It is read before
+    the first frame: a file that they name may be gone after the last.
+    """
     board: Scoreboard
+    """The score so far."""
     beside: set[int] = field(default_factory=set)
+    """The training frames of a model file that show a place of this drive, so far."""
     failures: Failures = field(default_factory=Failures)
+    """The frames on which a stage failed, so far."""
 
     @property
     def key(self) -> Key:

@@ -90,58 +90,38 @@ class BulletList(Block):
 
 @dataclass(frozen=True, slots=True)
 class Cell(Block):
-    """A table's cell.
-
-    Parameters
-    ----------
-    text
-        What it says.
-    bold
-        Whether it is bold.
-    dot
-        Colour of a dot before it.
-    opens
-        Address below that of a served page at which its frame is opened in the viewer; or empty.
-    leads
-        Address below that of a served page to which it leads; or empty.
-    """
+    """A table's cell."""
 
     text: str
+    """What it says."""
     bold: bool = False
+    """Whether it is bold."""
     dot: str | None = None
+    """Colour of a dot before it."""
     opens: str = ""
+    """Address below that of a served page at which its frame is opened in the viewer; or empty."""
     leads: str = ""
+    """Address below that of a served page to which it leads; or empty."""
 
 
 @dataclass(frozen=True, slots=True)
 class Table(Block):
-    """A table.
-
-    Parameters
-    ----------
-    columns
-        Titles.
-    rows
-        As many cells each as there are columns.
-    text_columns
-        Positions of the columns of words, which are aligned left; numbers are aligned right.
-    breaks
-        Rows above which a thin rule is drawn.
-    groups
-        Titles above several columns, each with its number of columns; together all columns.
-    caption
-        Printed above the table.
-    small
-        Whether it is set in small type.
-    """
+    """A table."""
 
     columns: Sequence[str]
+    """Titles."""
     rows: Sequence[Sequence[Cell | str]]
+    """As many cells each as there are columns."""
     text_columns: Sequence[int] = (0,)
+    """Positions of the columns of words, which are aligned left; numbers are aligned right."""
     breaks: Sequence[int] = ()
+    """Rows above which a thin rule is drawn."""
     groups: Sequence[tuple[str, int]] = ()
+    """Titles above several columns, each with its number of columns; together all columns."""
     caption: str = ""
+    """Printed above the table."""
     small: bool = False
+    """Whether it is set in small type."""
 
 
 @dataclass(frozen=True, slots=True)

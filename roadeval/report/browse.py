@@ -11,21 +11,14 @@ from roadeval.report.chart import Chart
 
 @dataclass(frozen=True, slots=True)
 class Picture(Block):
-    """A picture of a strip.
-
-    Parameters
-    ----------
-    name
-        The same in every frame, as ``filtered: errors``; who looks at one goes on with it.
-    title
-        What it shows, in a few words.
-    image
-        Its file.
-    """
+    """A picture of a strip."""
 
     name: str
+    """The same in every frame, as ``filtered: errors``; who looks at one goes on with it."""
     title: str
+    """What it shows, in a few words."""
     image: ImageFile
+    """Its file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,27 +31,18 @@ class PictureRow(Block):
 
 @dataclass(frozen=True, slots=True)
 class Strip(Block):
-    """A frame with its pictures.
-
-    Parameters
-    ----------
-    frame
-        Its number.
-    sentences
-        What is known of it.
-    rates
-        Of each variant's final mask; None without truth.
-    rows
-        Its pictures.
-    command
-        Opens it in the viewer; empty where there is none.
-    """
+    """A frame with its pictures."""
 
     frame: int
+    """Its number."""
     sentences: Sequence[str]
+    """What is known of it."""
     rates: Table | None
+    """Of each variant's final mask; None without truth."""
     rows: Sequence[PictureRow]
+    """Its pictures."""
     command: str = ""
+    """Opens it in the viewer; empty where there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,42 +63,28 @@ class FrameRow(Block):
 
 @dataclass(frozen=True, slots=True)
 class FrameBrowser(Block):
-    """The frames of a drive.
-
-    Parameters
-    ----------
-    rates
-        Titles of groups of columns.
-    variants
-        Titles of the columns in each group.
-    rows
-        The frames, in the drive's order.
-    conditions
-        What a frame can be, in words.
-    strips
-        Frames with pictures, in the drive's order; none where they are asked for one by one.
-    charts
-        Rates along the drive.
-    first
-        The frame that is shown at first; None where there is no picture.
-    compared
-        Names of two pictures that are laid over each other at first.
-    command
-        Opens a frame in the viewer, with ``{}`` for its number; empty where nothing does.
-    note
-        What to know of the table.
-    """
+    """The frames of a drive."""
 
     rates: Sequence[str]
+    """Titles of groups of columns."""
     variants: Sequence[str]
+    """Titles of the columns in each group."""
     rows: Sequence[FrameRow]
+    """The frames, in the drive's order."""
     conditions: Sequence[str]
+    """What a frame can be, in words."""
     strips: Sequence[Strip]
+    """Frames with pictures, in the drive's order; none where they are asked for one by one."""
     charts: Sequence[Chart]
+    """Rates along the drive."""
     first: int | None
+    """The frame that is shown at first; None where there is no picture."""
     compared: tuple[str, str]
+    """Names of two pictures that are laid over each other at first."""
     command: str = ""
+    """Opens a frame in the viewer, with ``{}`` for its number; empty where nothing does."""
     note: str = ""
+    """What to know of the table."""
 
 
 @dataclass(frozen=True, slots=True)

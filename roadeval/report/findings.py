@@ -21,25 +21,17 @@ Totals = Mapping[str, Mapping[str, Mapping[str, Any]]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairedComparison:
-    """One variant's final mask against another's, frame by frame.
-
-    Parameters
-    ----------
-    treated, control
-        Variants; differences are the first minus the second.
-    differences
-        By rate, as in ``summary.json``.
-    frames
-        Indexed by ``frame``: ``stamp_ns``, the differences by rate, ``wrong`` (net pixels).
-    pixels
-        Newly right, newly wrong and labelled pixels of the frames sampled; None if not known.
-    """
+    """One variant's final mask against another's, frame by frame."""
 
     treated: str
     control: str
+    """Variants; differences are the first minus the second."""
     differences: Mapping[str, Mapping[str, Any]]
+    """By rate, as in ``summary.json``."""
     frames: pd.DataFrame
+    """Indexed by ``frame``: ``stamp_ns``, the differences by rate, ``wrong`` (net pixels)."""
     pixels: tuple[int, int, int] | None = None
+    """Newly right, newly wrong and labelled pixels of the frames sampled; None if not known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,37 +45,25 @@ class ErrorHeatmap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NotableFrame:
-    """A frame worth looking at.
-
-    Parameters
-    ----------
-    frame, stamp_ns
-        Which.
-    rates
-        Of each variant's final mask, as short tables show them.
-    parts
-        The parts of the ERR of ``variant``, by stage, see `Findings.error_parts`.
-    variant
-        Whose failure or change it is.
-    change
-        The filter's change of ERR, or None.
-    notes
-        The recording's own sentences.
-    images
-        The camera, the truth and the errors; none where the recording is not at hand.
-    layers
-        A row a variant: its layers in the order of the stages.
-    """
+    """A frame worth looking at."""
 
     frame: int
     stamp_ns: int
+    """Which."""
     variant: str
+    """Whose failure or change it is."""
     rates: Mapping[str, Mapping[str, float]]
+    """Of each variant's final mask, as short tables show them."""
     parts: Mapping[str, float] = field(default_factory=dict)
+    """The parts of the ERR of ``variant``, by stage, see `Findings.error_parts`."""
     change: float | None = None
+    """The filter's change of ERR, or None."""
     notes: Sequence[str] = ()
+    """The recording's own sentences."""
     images: Sequence[LayerImage] = ()
+    """The camera, the truth and the errors; none where the recording is not at hand."""
     layers: Sequence[Sequence[LayerImage]] = ()
+    """A row a variant: its layers in the order of the stages."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,87 +80,60 @@ class Commands:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Findings:
-    """Everything that a report of one drive shows.
-
-    Parameters
-    ----------
-    source
-        The recording or folder, as it was named.
-    complete
-        Whether the run reached its end.
-    commands
-        What to type for more; None where the report is not made at a terminal.
-    viewable
-        Whether ``commands`` open frames in the viewer: the recording is there.
-    pictured
-        Number of frames with pictures, of those evaluated, or without truth of all.
-    summary
-        As ``summary.json``; of an incomplete run, what its tables allow to compute.
-    properties
-        The recording's own, about its origin.
-    finals
-        Each scored variant's final stage.
-    windows
-        As ``windows.csv``, or longer windows for a long drive.
-    window_size
-        Evaluated frames in a window.
-    paired
-        Filtered against unfiltered first, if both were run; then against the baseline.
-    regions
-        See `roadeval.evaluation.analysis.by_region`.
-    overlap
-        IoU, F1 and precision by variant and stage, pooled.
-    changes
-        ``variant``, ``before``, ``after``, and ``repaired`` and ``spoiled`` as shares of labelled
-        pixels.
-    error_parts
-        The parts of each variant's mean ERR by stage, see `roadeval.evaluation.scored.causes`.
-    heatmaps
-        One a variant.
-    oracles
-        See `roadeval.evaluation.analysis.oracles`; empty if the run counted none.
-    beyond
-        Boundary F and flicker of each final mask, as in ``summary.json``.
-    levels
-        As ``probabilities.csv``; empty where no stage says how probable road is.
-    sampled
-        Frames that ``heatmaps`` and ``changes`` were counted on; 0 if there are none.
-    examples
-        Frames for figure 2.
-    thumbnails
-        A few frames, evenly over the drive.
-    worst, helped, harmed
-        Frames to look at.
-    coverage
-        Without truth: indexed by frame, a variant a column: the share of the image called road.
-    """
+    """Everything that a report of one drive shows."""
 
     source: str
+    """The recording or folder, as it was named."""
     complete: bool
+    """Whether the run reached its end."""
     commands: Commands | None
+    """What to type for more; None where the report is not made at a terminal."""
     viewable: bool
+    """Whether ``commands`` open frames in the viewer: the recording is there."""
     pictured: int
+    """Number of frames with pictures, of those evaluated, or without truth of all."""
     summary: Mapping[str, Any]
+    """As ``summary.json``; of an incomplete run, what its tables allow to compute."""
     properties: Mapping[str, Any]
+    """The recording's own, about its origin."""
     finals: Mapping[str, str]
+    """Each scored variant's final stage."""
     windows: Rows
+    """As ``windows.csv``, or longer windows for a long drive."""
     window_size: int
+    """Evaluated frames in a window."""
     paired: Sequence[PairedComparison]
+    """Filtered against unfiltered first, if both were run; then against the baseline."""
     regions: pd.DataFrame
+    """See `roadeval.evaluation.analysis.by_region`."""
     overlap: Mapping[str, Mapping[str, Mapping[str, float]]]
+    """IoU, F1 and precision by variant and stage, pooled."""
     changes: pd.DataFrame
+    """``variant``, ``before``, ``after``, and ``repaired`` and ``spoiled`` as shares of labelled
+    pixels.
+    """
     error_parts: Mapping[str, Mapping[str, float]]
+    """The parts of each variant's mean ERR by stage, see `roadeval.evaluation.scored.causes`."""
     heatmaps: Sequence[ErrorHeatmap]
+    """One a variant."""
     oracles: pd.DataFrame
+    """See `roadeval.evaluation.analysis.oracles`; empty if the run counted none."""
     beyond: Mapping[str, Mapping[str, Any]]
+    """Boundary F and flicker of each final mask, as in ``summary.json``."""
     levels: Rows
+    """As ``probabilities.csv``; empty where no stage says how probable road is."""
     sampled: int
+    """Frames that ``heatmaps`` and ``changes`` were counted on; 0 if there are none."""
     examples: Sequence[ExampleFrame]
+    """Frames for figure 2."""
     thumbnails: Sequence[LayerImage]
+    """A few frames, evenly over the drive."""
     worst: Sequence[NotableFrame]
     helped: Sequence[NotableFrame]
     harmed: Sequence[NotableFrame]
+    """Frames to look at."""
     coverage: pd.DataFrame
+    """Without truth: indexed by frame, a variant a column: the share of the image called road."""
 
     @property
     def drive(self) -> str:

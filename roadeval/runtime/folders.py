@@ -36,18 +36,12 @@ _REPLACED: Final = ".replaced"
 
 @dataclass(frozen=True, slots=True)
 class Content:
-    """What belongs to a folder's content; all else in it is of others, and stays.
-
-    Parameters
-    ----------
-    seal
-        The file without which nobody takes the folder for whole.
-    names
-        Returns the names of the files that belong to the content of a folder.
-    """
+    """What belongs to a folder's content; all else in it is of others, and stays."""
 
     seal: str
+    """The file without which nobody takes the folder for whole."""
     names: Callable[[Path], frozenset[str]]
+    """Returns the names of the files that belong to the content of a folder."""
 
 
 class NewFolder:

@@ -39,46 +39,30 @@ PAGE: Final = "text/html; charset=utf-8"
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is asked for.
-
-    Parameters
-    ----------
-    parts
-        Of the path below the token, without empty ones.
-    acts
-        Whether it asks that something be done (POST), not only for something to see.
-    folder
-        Whether the path ends with a slash.
-    """
+    """What is asked for."""
 
     parts: tuple[str, ...]
+    """Of the path below the token, without empty ones."""
     acts: bool
+    """Whether it asks that something be done (POST), not only for something to see."""
     folder: bool
+    """Whether the path ends with a slash."""
 
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """What is answered.
-
-    Parameters
-    ----------
-    content
-        The body.
-    media
-        Its media type.
-    status
-        The status.
-    headers
-        More than every answer has.
-    kept
-        Whether the browser may keep it: under this address there will never be anything else.
-    """
+    """What is answered."""
 
     content: bytes
+    """The body."""
     media: str = TEXT
+    """Its media type."""
     status: HTTPStatus = HTTPStatus.OK
+    """The status."""
     headers: Mapping[str, str] = field(default_factory=dict)
+    """More than every answer has."""
     kept: bool = False
+    """Whether the browser may keep it: under this address there will never be anything else."""
 
     @property
     def succeeded(self) -> bool:

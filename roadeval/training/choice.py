@@ -31,24 +31,16 @@ class Readable(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chosen:
-    """The frames that train, and what that means for the others.
-
-    Parameters
-    ----------
-    held
-        The training frames, decoded.
-    gap
-        Numbers of the frames beside them that are not evaluated.
-    first
-        Number of the first frame to evaluate; None if there is none.
-    undecodable
-        How many of the frames chosen do not train, for they cannot be decoded.
-    """
+    """The frames that train, and what that means for the others."""
 
     held: HeldFrames
+    """The training frames, decoded."""
     gap: frozenset[int]
+    """Numbers of the frames beside them that are not evaluated."""
     first: int | None
+    """Number of the first frame to evaluate; None if there is none."""
     undecodable: int = 0
+    """How many of the frames chosen do not train, for they cannot be decoded."""
 
 
 def candidates_of(

@@ -70,18 +70,12 @@ def fingerprint(image: Rgb) -> Fingerprint:
 
 @dataclass(frozen=True, slots=True)
 class Alike:
-    """Which training frames a frame is like.
-
-    Parameters
-    ----------
-    same
-        Whether it shows the same picture as one of them.
-    beside
-        Places of those that show the same place.
-    """
+    """Which training frames a frame is like."""
 
     same: bool = False
+    """Whether it shows the same picture as one of them."""
     beside: frozenset[int] = frozenset()
+    """Places of those that show the same place."""
 
 
 class Likeness:

@@ -49,42 +49,32 @@ class ModelError(RoadevalError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
-    """The result of training.
-
-    Parameters
-    ----------
-    parameters
-        By variant, then by stage: what the stage learnt.
-    settings
-        By variant: the settings that training depended on (filters, and stages that learn).
-    source
-        ``truth`` or ``patch``; ``none`` where nothing was learnt at all.
-    digests
-        The hashes of the frames that trained it (`roadeval.data.Frame.digest`). They are never
-        evaluated.
-    pixels
-        Number of training pixels.
-    prior
-        ``(H, W)`` float32: the share of training frames in which a pixel was road, which is
-        what the blind baseline thresholds; None without truth.
-    warnings
-        What a user should know before believing a result.
-    fingerprints
-        ``(n, SIDE * SIDE)`` float16: the pictures of the training frames, see
-        `roadeval.training.likeness`; None in files of version 2.
-    losses
-        What of the drives was lost when it was trained; a file does not keep it.
-    """
+    """The result of training."""
 
     parameters: Mapping[str, Mapping[str, Any]]
+    """By variant, then by stage: what the stage learnt."""
     settings: Mapping[str, Mapping[str, Any]]
+    """By variant: the settings that training depended on (filters, and stages that learn)."""
     source: str
+    """``truth`` or ``patch``; ``none`` where nothing was learnt at all."""
     digests: frozenset[str]
+    """The hashes of the frames that trained it (`roadeval.data.Frame.digest`). They are never
+    evaluated.
+    """
     pixels: int
+    """Number of training pixels."""
     prior: npt.NDArray[np.float32] | None = None
+    """``(H, W)`` float32: the share of training frames in which a pixel was road, which is what the
+    blind baseline thresholds; None without truth.
+    """
     warnings: tuple[str, ...] = field(default=())
+    """What a user should know before believing a result."""
     fingerprints: npt.NDArray[np.float16] | None = None
+    """``(n, SIDE * SIDE)`` float16: the pictures of the training frames, see
+    `roadeval.training.likeness`; None in files of version 2.
+    """
     losses: tuple[str, ...] = ()
+    """What of the drives was lost when it was trained; a file does not keep it."""
 
     def __post_init__(self) -> None:
         if self.fingerprints is not None:

@@ -18,30 +18,23 @@ class Use:
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """What each frame of a run is used for.
-
-    Parameters
-    ----------
-    digests
-        Hashes of the frames that trained the model.
-    gap
-        Numbers of the frames after them that are left out as well.
-    first
-        Number of the first frame to evaluate, where it is known beforehand.
-    sizes
-        Bytes that the training frames take as logged, where they are known: a frame of another
-        size is none of them, and need not be hashed.
-    likeness
-        The pictures of the training frames, where these come from a file: a frame that shows the
-        same is not evaluated. In the log that trains its own model a frame after the training
-        frames is another one, however alike.
-    """
+    """What each frame of a run is used for."""
 
     digests: frozenset[str]
+    """Hashes of the frames that trained the model."""
     gap: frozenset[int] = frozenset()
+    """Numbers of the frames after them that are left out as well."""
     first: int | None = None
+    """Number of the first frame to evaluate, where it is known beforehand."""
     sizes: frozenset[int] | None = None
+    """Bytes that the training frames take as logged, where they are known: a frame of another size
+    is none of them, and need not be hashed.
+    """
     likeness: Likeness | None = None
+    """The pictures of the training frames, where these come from a file: a frame that shows the
+    same is not evaluated. In the log that trains its own model a frame after the training frames is
+    another one, however alike.
+    """
 
     def use(self, frame: Frame) -> Use:
         """Return what a decoded frame is used for."""

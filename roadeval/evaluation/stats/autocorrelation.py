@@ -51,53 +51,37 @@ _SKEWNESS_ERROR: Final = 6.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Models:
-    """The grid of models for series of a length, and what each expects of them.
-
-    Parameters
-    ----------
-    coefficients, shares
-        ``(g,)``: of the autoregression, and its share of the variance.
-    precisions
-        ``(g, m)``: one over the variances of the cosine coefficients, in the series' variance.
-    log_factor
-        ``(g,)``: the logarithm of the weight before any series is seen, times the factor of the
-        likelihood that depends on the model alone.
-    of_mean
-        ``(g,)``: variance of the mean, in the series' variance.
-    """
+    """The grid of models for series of a length, and what each expects of them."""
 
     coefficients: Series
     shares: Series
+    """``(g,)``: of the autoregression, and its share of the variance."""
     precisions: Series
+    """``(g, m)``: one over the variances of the cosine coefficients, in the series' variance."""
     log_factor: Series
+    """``(g,)``: the logarithm of the weight before any series is seen, times the factor of the
+    likelihood that depends on the model alone.
+    """
     of_mean: Series
+    """``(g,)``: variance of the mean, in the series' variance."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeanDistribution:
-    """Distribution of the mean of a process, given a series that is a stretch of it.
-
-    Parameters
-    ----------
-    mean
-        Of the series.
-    errors, weights
-        ``(g,)``: the mean's standard error under each model, and the models' weights; sum 1.
-    degrees
-        Degrees of freedom of Student's distribution.
-    frames
-        Independent values that would determine the mean as well.
-    scale, skewness
-        Standard error and skewness of the mean, for the transformation.
-    """
+    """Distribution of the mean of a process, given a series that is a stretch of it."""
 
     mean: float
+    """Of the series."""
     errors: Series
     weights: Series
+    """``(g,)``: the mean's standard error under each model, and the models' weights; sum 1."""
     degrees: int
+    """Degrees of freedom of Student's distribution."""
     frames: float
+    """Independent values that would determine the mean as well."""
     scale: float
     skewness: float
+    """Standard error and skewness of the mean, for the transformation."""
 
     def p_value(self, value: float = 0.0) -> float:
         """Return the two-sided p-value of the hypothesis that the process' mean is ``value``."""

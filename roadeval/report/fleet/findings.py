@@ -30,38 +30,27 @@ class WorstFrame:
 
 @dataclass(frozen=True, slots=True)
 class FleetFindings:
-    """The data that the report of a fleet is made of.
-
-    Parameters
-    ----------
-    name, folder
-        Of the fleet.
-    summary
-        The content of ``fleet.json``.
-    drives
-        Rows of ``drives`` by the drives' identity.
-    names
-        The drives' names for people, by their identity; no two are equal.
-    effects
-        Rows of ``effects`` of the final masks' ERR, by base and variant.
-    scores
-        Rows of ``scores`` of the first variant's final mask, over all labelled pixels.
-    worst
-        The worst frames over all drives.
-    inspect
-        Returns the command that opens one of them, by its rank; None where the report is not made
-        at a terminal.
-    """
+    """The data that the report of a fleet is made of."""
 
     name: str
     folder: str
+    """Of the fleet."""
     summary: Mapping[str, Any]
+    """The content of ``fleet.json``."""
     drives: Mapping[str, Row]
+    """Rows of ``drives`` by the drives' identity."""
     names: Mapping[str, str]
+    """The drives' names for people, by their identity; no two are equal."""
     effects: Mapping[tuple[str, str], Sequence[Row]]
+    """Rows of ``effects`` of the final masks' ERR, by base and variant."""
     scores: Sequence[Row]
+    """Rows of ``scores`` of the first variant's final mask, over all labelled pixels."""
     worst: Sequence[WorstFrame] = field(default_factory=tuple)
+    """The worst frames over all drives."""
     inspect: Callable[[int], str] | None = None
+    """Returns the command that opens one of them, by its rank; None where the report is not made at
+    a terminal.
+    """
 
     def pages(self) -> dict[str, str]:
         """Return where each drive's own page lies below that of a served fleet.

@@ -23,21 +23,14 @@ _PAPER = (PageBreak, TableOfContents)
 
 @dataclass(slots=True)
 class Section:
-    """A heading of the first level with all that follows it.
-
-    Parameters
-    ----------
-    name
-        Of the place, for links; no two are equal.
-    title
-        Of the heading; empty for what stands before the first one.
-    blocks
-        What follows, with the names of the headings among them.
-    """
+    """A heading of the first level with all that follows it."""
 
     name: str
+    """Of the place, for links; no two are equal."""
     title: str
+    """Of the heading; empty for what stands before the first one."""
     blocks: list[tuple[Block, str]] = field(default_factory=list)
+    """What follows, with the names of the headings among them."""
 
     @property
     def parts(self) -> list[tuple[str, str]]:

@@ -32,27 +32,20 @@ _MEDIA: Final = {"svg": "image/svg+xml", "png": "image/png", "jpg": "image/jpeg"
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a page finds what belongs to it.
-
-    Parameters
-    ----------
-    pictures, code
-        Begin of the addresses of pictures, and of style and script; None: inside the page.
-    frames
-        Address of a frame, with ``{}`` for its number, where a server gives it; None: all that
-        the page shows is on it.
-    home, home_title
-        Address of the page above, or empty, and what it is called.
-    forms
-        Whether a form of the page may ask its server to open the viewer, as without a script.
-    """
+    """Where a page finds what belongs to it."""
 
     pictures: str | None = None
     code: str | None = None
+    """Begin of the addresses of pictures, and of style and script; None: inside the page."""
     frames: str | None = None
+    """Address of a frame, with ``{}`` for its number, where a server gives it; None: all that the
+    page shows is on it.
+    """
     home: str = ""
     home_title: str = "All results"
+    """Address of the page above, or empty, and what it is called."""
     forms: bool = False
+    """Whether a form of the page may ask its server to open the viewer, as without a script."""
 
     @property
     def policy(self) -> str:

@@ -26,59 +26,39 @@ ROWS: Final = 2000
 
 @dataclass(frozen=True, slots=True)
 class FrameFacts:
-    """A frame in the table.
-
-    Parameters
-    ----------
-    frame, stamp_ns
-        Which.
-    rates
-        Of each variant's final mask, as short tables show them; none without truth.
-    conditions
-        What is true of it, in words.
-    notes
-        Sentences about it.
-    """
+    """A frame in the table."""
 
     frame: int
     stamp_ns: int
+    """Which."""
     rates: Mapping[str, Mapping[str, float]]
+    """Of each variant's final mask, as short tables show them; none without truth."""
     conditions: Sequence[str] = ()
+    """What is true of it, in words."""
     notes: Sequence[str] = ()
+    """Sentences about it."""
 
 
 @dataclass(frozen=True, slots=True)
 class BrowsedFrames:
-    """What the section is made of.
-
-    Parameters
-    ----------
-    frames
-        The frames of the drive, in order.
-    variants
-        Those that were scored.
-    pictured
-        Frames whose pictures can be had.
-    strips
-        Frames with their pictures.
-    charts
-        Rates along the drive.
-    inspect
-        Returns the command that opens a frame; None where there is none.
-    masks
-        Names of the pictures of final masks, which are compared where there is no truth.
-    left_out
-        Variants whose layers had no room.
-    """
+    """What the section is made of."""
 
     frames: Sequence[FrameFacts]
+    """The frames of the drive, in order."""
     variants: Sequence[str]
+    """Those that were scored."""
     pictured: frozenset[int]
+    """Frames whose pictures can be had."""
     strips: Sequence[Strip]
+    """Frames with their pictures."""
     charts: Sequence[Chart]
+    """Rates along the drive."""
     inspect: Callable[[int], str] | None
+    """Returns the command that opens a frame; None where there is none."""
     masks: Sequence[str] = ()
+    """Names of the pictures of final masks, which are compared where there is no truth."""
     left_out: Sequence[str] = ()
+    """Variants whose layers had no room."""
 
 
 def section(browsed: BrowsedFrames) -> Iterator[Block]:

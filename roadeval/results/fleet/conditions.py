@@ -21,22 +21,15 @@ from roadeval.results.tables import read_parquet
 
 @dataclass(frozen=True, slots=True)
 class DriveJudgement:
-    """A condition judged on a drive.
-
-    Parameters
-    ----------
-    drive, condition
-        Which.
-    holds
-        Whether it holds; None where it was not judged.
-    sentence
-        What was found, or why it was not judged.
-    """
+    """A condition judged on a drive."""
 
     drive: str
     condition: str
+    """Which."""
     holds: bool | None
+    """Whether it holds; None where it was not judged."""
     sentence: str
+    """What was found, or why it was not judged."""
 
 
 def check_conditions(conditions: Sequence[Condition]) -> None:

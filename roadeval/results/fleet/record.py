@@ -39,25 +39,18 @@ Cells = Sequence[Any]
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """The record of a drive in a fleet's folder.
-
-    Parameters
-    ----------
-    drive
-        Its name in the fleet.
-    asked
-        Digest of what was asked: settings, model and version.
-    stamp
-        What tells cheaply whether its log has changed, as sizes and times of files; None where it
-        could not be looked at.
-    rows
-        Its rows of each table in `roadeval.results.schema.OF_DRIVES`.
-    """
+    """The record of a drive in a fleet's folder."""
 
     drive: str
+    """Its name in the fleet."""
     asked: str
+    """Digest of what was asked: settings, model and version."""
     stamp: Mapping[str, Any] | None
+    """What tells cheaply whether its log has changed, as sizes and times of files; None where it
+    could not be looked at.
+    """
     rows: Mapping[str, Sequence[Cells]] = field(default_factory=dict)
+    """Its rows of each table in `roadeval.results.schema.OF_DRIVES`."""
 
     def value(self, column: str) -> Any:
         """Return a value of the drive's own row in ``drives``."""
