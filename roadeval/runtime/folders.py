@@ -167,15 +167,17 @@ def _is_in_use(target: Path) -> bool:
 
 def _copy_rights(source: Path, to: Path) -> None:
     there = source.stat()
-    with suppress(OSError):
+    with suppress(OSError, AttributeError):  # Windows has no such function
         os.chown(to, there.st_uid, there.st_gid)
     to.chmod(stat.S_IMODE(there.st_mode))
 
 
 def _exchange(one: Path, other: Path) -> None:
     """Exchange the names of two folders in one step; an OSError where that cannot be done."""
-    renameat2 = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
-    if sys.platform != "linux" or renameat2 is None:
+    renameat2 = None
+    if sys.platform == "linux":
+        renameat2 = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    if renameat2 is None:
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
     here, exchange = -100, 2  # AT_FDCWD and RENAME_EXCHANGE in the kernel's headers
     if renameat2(here, os.fsencode(one), here, os.fsencode(other), exchange):

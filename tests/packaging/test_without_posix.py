@@ -81,3 +81,23 @@ def test_a_run_finds_its_workers_where_the_number_of_processors_is_unknown(monke
         reports=tmp_path / "reports",
     )
     assert outcome.summary["frames"]["evaluated"] == 2
+
+
+def test_a_second_run_on_an_output_needs_nothing_of_posix(monkeypatch, tmp_path):
+    def run():
+        config = roadeval.configure({"output": {"record": "none"}})
+        return roadeval.replay(drive, config, reports=tmp_path / "reports").files
+
+    def no_library(*_, **__):
+        raise TypeError("bad argument type for built-in operation")
+
+    drive = write_log(tmp_path / "drive.mcap", numbers=range(12))
+    first = run()
+    (tmp_path / "reports" / "mine.txt").write_text("stays")
+    monkeypatch.delattr("os.chown")
+    monkeypatch.setattr("ctypes.CDLL", no_library)
+    monkeypatch.setattr("sys.platform", "win32")
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    assert run() == first
+    assert all(path.is_file() for path in first)
+    assert (tmp_path / "reports" / "mine.txt").read_text() == "stays"
