@@ -22,10 +22,12 @@ import roadeval
 from roadeval.results import schema
 
 UNRESOLVED: Final = (
-    r".*(array\[int\]|Series\[float\]|DataclassInstance|PydanticDataclass|ForwardRef)"
+    r".*(array\[int\]|Series\[float\]|DataclassInstance|PydanticDataclass|ForwardRef|"
+    r"(Frame|Label|Mask|Topic)Settings)"
 )
-"""Annotations that type checkers understand and Python 3.11 cannot evaluate, and those of named
-tuples' constructors, which do not know the module that they were written in."""
+"""Annotations that type checkers understand and Python 3.11 cannot evaluate, and those of
+constructors, inherited or of named tuples, which do not know the module that they were written
+in."""
 
 
 def prepare(package: ModuleType) -> None:
