@@ -5,21 +5,17 @@ from __future__ import annotations
 import platform
 from collections import Counter
 from collections.abc import Iterator
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from typing import Any, Final
 
 from roadeval.config import RunConfig
 from roadeval.data import BASELINE, Role
 from roadeval.evaluation.effects import as_parts
+from roadeval.jobs.identity import computing
 from roadeval.jobs.run import Run
 from roadeval.results.sentences import verdict
 from roadeval.version import VERSION
 
-PACKAGES: Final = (
-    *("mcap", "numpy", "opencv-python-headless", "pillow", "scikit-learn", "scipy"),
-    *("simplejpeg", "isal", "rerun-sdk", "pandas", "matplotlib"),
-)
-"""The packages whose version can change a number or a file."""
 JOURNEY: Final = 3
 """So many training frames that show places of a drive tell that it is the same journey."""
 FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
@@ -49,14 +45,9 @@ def of(run: Run) -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of roadeval, Python and the packages that matter."""
-    found = {"roadeval": VERSION, "python": platform.python_version()}
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            continue
-    return found
+    """Return the versions of roadeval, Python, what computes, and what writes files."""
+    writing = {name: version(name) for name in ("rerun-sdk", "pandas", "matplotlib")}
+    return {"roadeval": VERSION, "python": platform.python_version(), **computing(), **writing}
 
 
 def warnings(run: Run) -> tuple[str, ...]:

@@ -14,12 +14,12 @@ from pkgutil import iter_modules
 from types import ModuleType
 from typing import Any, Final
 
-_NAMED: Final = re.compile(
-    r"""(?:^|[;:])[ \t]*from[ \t]+([^\W\d]\w*)|(?:import_module|__import__)\(\s*["']([^\W\d]\w*)""",
+_IMPORTS: Final = re.compile(
+    r"""(?:^|[;:])[ \t]*(?:from[ \t]+(\w+)|import[ \t]+([\w., \t]+))"""
+    r"""|(?:import_module|__import__)\(\s*["'](\w+)""",
     re.MULTILINE,
 )
-_LISTED: Final = re.compile(r"(?:^|[;:])[ \t]*import[ \t]+([\w., \t]+)", re.MULTILINE)
-"""Statements that import; a line of a text that looks like one costs nothing but a look."""
+"""What imports; a line of a text that looks like it costs a look and nothing else."""
 
 
 def by_name(things: Iterable[Any]) -> dict[str, Any]:
@@ -146,11 +146,9 @@ def _imported(path: Path) -> Iterator[str]:
     """Yield the names of the top-level modules that a source file may import."""
     if path.suffix != ".py":
         return
-    text = path.read_text(errors="replace")
-    for pair in _NAMED.findall(text):
-        yield from filter(None, pair)
-    for name in ",".join(_LISTED.findall(text)).split(","):
-        yield from re.findall(r"\w+", name)[:1]
+    for found in _IMPORTS.findall(path.read_text(errors="replace")):
+        for name in "".join(found).split(","):
+            yield from re.findall(r"\w+", name)[:1]
 
 
 def _digest(path: Path) -> str:

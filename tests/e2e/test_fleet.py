@@ -156,14 +156,6 @@ def test_a_drive_whose_results_have_gone_is_replayed_alone(drives, ran, tmp_path
     assert tables(folder) == before
 
 
-def test_a_drive_whose_log_has_changed_is_replayed(tmp_path):
-    log = write(tmp_path / "logs" / "a.mcap", 0)
-    run(log.parent, tmp_path / "f")
-    write(log, 50)
-    again, submitted = run(log.parent, tmp_path / "f")
-    assert (again.replayed, submitted) == (1, ["a"])
-
-
 def test_what_failed_is_tried_again_when_asked(drives, ran, tmp_path):
     folder = copied(ran, tmp_path)
     _, submitted = run(drives, folder, keep="worst:1", retry_failed=True)

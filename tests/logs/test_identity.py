@@ -49,7 +49,7 @@ def test_other_content_of_the_same_size_has_another(at):
 def test_what_the_chunks_hold_is_not_read():
     file = Counted(log().getvalue())
     assert identity_of(file)
-    assert file.taken < 5_000 < len(file.getvalue()) // 40
+    assert file.taken < len(file.getvalue()) // 20
 
 
 def damaged(file, place):
