@@ -1,4 +1,4 @@
-"""Result side by side: from recordings, results folders and fleets to a comparison."""
+"""Results side by side: from recordings, results folders and fleets to a comparison."""
 
 from __future__ import annotations
 
@@ -20,8 +20,6 @@ from roadeval.evaluation.effects import TESTED
 from roadeval.evaluation.pairing import Side, one_drive
 from roadeval.evaluation.settings import settings_of
 from roadeval.jobs.result import Result
-from roadeval.report.chart import Chart, looks
-from roadeval.report.charts.rates import over_windows
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.comparison import as_dict, judged, warnings
 from roadeval.results.rows import as_arrays, window_rows
@@ -31,6 +29,7 @@ from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     from roadeval.report.blocks import Document
+    from roadeval.report.chart import Chart
     from roadeval.report.sections.browse import BrowsedFrames
 
 Inspect = Callable[[Path, int], str]
@@ -55,6 +54,8 @@ class Compared:
     def over_drive(self) -> list[Chart]:
         """Return ERR over the one drive that is compared, of the masks that all results have."""
         from roadeval.jobs.page_comparison import looks_of, masks_of, table_of
+        from roadeval.report.chart import looks
+        from roadeval.report.charts.rates import over_windows
 
         frames = {side.label: side.rows(side.parts[0], "frames") for side in self.sides}
         masks = masks_of(self.sides, frames)

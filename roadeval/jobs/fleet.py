@@ -35,9 +35,9 @@ from roadeval.jobs.fleet_work import (
 )
 from roadeval.jobs.identity import software
 from roadeval.results.fleet.conditions import check_conditions
-from roadeval.results.fleet.folder import FleetWriter
 from roadeval.results.fleet.record import DAMAGED, FAILED, recording_path
 from roadeval.results.fleet.tables import Member
+from roadeval.results.fleet.writing import FleetWriter
 from roadeval.runtime.discovery import code_of
 from roadeval.runtime.paths import AnyPath, Paths, listed
 from roadeval.version import VERSION

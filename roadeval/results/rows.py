@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -22,13 +22,16 @@ from roadeval.data import (
     Transition,
 )
 from roadeval.evaluation.effects import final_stages
-from roadeval.evaluation.frame_counts import Window
-from roadeval.evaluation.maps import HeatMap, Name
-from roadeval.evaluation.scoreboard import DriveSums
-from roadeval.evaluation.thresholds import Sums, at_levels
+from roadeval.evaluation.thresholds import at_levels
 from roadeval.results.fleet.record import DAMAGED, SCORED, UNSCORED
 from roadeval.results.schema import ALL, KEY, TABLES, Kind
 from roadeval.runtime.text import visible
+
+if TYPE_CHECKING:
+    from roadeval.evaluation.frame_counts import Window
+    from roadeval.evaluation.maps import HeatMap, Name
+    from roadeval.evaluation.scoreboard import DriveSums
+    from roadeval.evaluation.thresholds import Sums
 
 Row = tuple[str | int | float, ...]
 """A row's cells in the order of its table's columns, without the key."""

@@ -8,9 +8,9 @@ from roadeval.evaluation.comparison import compare, variants_as_sides
 from roadeval.evaluation.effects import as_parts, drive_effects
 from roadeval.evaluation.pairing import Side
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.fleet.folder import FleetWriter
 from roadeval.results.fleet.record import Record
 from roadeval.results.fleet.tables import Member
+from roadeval.results.fleet.writing import FleetWriter
 from roadeval.results.rows import Key, cells, effect_rows, score_rows
 from roadeval.results.sentences import degree, sentence, verdict
 from tests.evaluation.making import APart, a_table, autoregression, rows_of
