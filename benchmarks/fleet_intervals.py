@@ -1,7 +1,7 @@
 """How often a fleet's intervals hold, and what they find: ``python -m benchmarks.fleet_intervals``.
 
 Fleets are made up, so that the truth is known, and given to the function that `roadeval` uses. The
-table is the one that `roadeval.evaluation.stats.drives` quotes and explains.
+table is that of INTERVALS.md.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """How often intervals hold, and what they find: ``python -m benchmarks.intervals``.
 
 Drives are made up, so that the truth is known, and given to the functions that `roadeval` uses. The
-table is the one that `roadeval.evaluation.stats.difference` quotes. Below it is a null run: five
+table is that of INTERVALS.md. Below it is a null run: five
 variants that are as good as the base, and how many drives have a false finding among them.
 """
 

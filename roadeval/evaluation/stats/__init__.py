@@ -1,7 +1,11 @@
 """The statistics: differences with intervals, within a drive and over drives, and corrections."""
 
-from roadeval.evaluation.stats.corrections import benjamini_hochberg
-from roadeval.evaluation.stats.difference import Difference, holm, within_drive
+from roadeval.evaluation.stats.difference import (
+    Difference,
+    benjamini_hochberg,
+    holm,
+    within_drive,
+)
 from roadeval.evaluation.stats.drives import (
     STUDENT_FROM,
     DriveMean,

@@ -6,57 +6,9 @@ this kind may lie from that; the p-value of no difference comes from the same di
 an interval excludes 0 exactly where the p-value is below one minus the confidence. Over several
 drives `roadeval.evaluation.stats.drives` makes the same `Difference`.
 
-How often an interval that claims 95 % holds the true mean, in percent of made-up drives, and what
-it finds: how often it leaves out 0 if the true mean is one and two standard deviations of a frame's
-difference. "naive" takes frames for independent; "two" is the wider of two that are easier to
-explain (``benchmarks/intervals.py``, which prints all this); "width" is ours, the median, in
-standard deviations.
-
-=================  ======  =====  ====  =======  ====  =======  =====
-drives             frames  naive   two    finds  ours    finds  width
-=================  ======  =====  ====  =======  ====  =======  =====
-independent            60     95    98  100/100    99  100/100   0.66
-independent            91     94    98  100/100    98  100/100   0.50
-independent          3000     96    98  100/100    96  100/100   0.07
-AR 0.5                 60     74    97   92/100    97   95/100   1.05
-AR 0.5                 91     72    97   97/100    96  100/100   0.79
-AR 0.5                600     73    97  100/100    95  100/100   0.28
-AR 0.8                 60     48    94    54/86    96    45/84   2.13
-AR 0.8                 91     48    95    68/98    95    64/97   1.56
-AR 0.8                190     48    96   94/100    95   97/100   0.94
-AR 0.9                 60     35    92    30/56    95    25/62   3.37
-AR 0.9                 91     33    92    40/71    95    33/70   2.74
-AR 0.9                190     31    95    69/98    96    66/97   1.57
-AR 0.9                600     38    97   98/100    95  100/100   0.75
-AR 0.95                60     20    88    24/43    90    24/58   3.43
-AR 0.95                91     21    92    26/45    94    22/55   3.69
-AR 0.95               190     24    95    45/77    96    37/76   2.48
-AR 0.95               600     21    96   85/100    95   88/100   1.12
-AR 0.95              3000     22    96  100/100    95  100/100   0.46
-AR 0.8, Laplace        91     48    95    67/98    95    64/97   1.56
-AR 0.8, Laplace       600     46    98  100/100    95  100/100   0.49
-AR 0.8, t3             91     45    95    73/98    94    69/93   1.49
-AR 0.8, t3            600     49    97  100/100    93   99/100   0.48
-slow 0.95 + noise      91     34    81    70/99    82    64/97   1.37
-slow 0.95 + noise     190     34    86   81/100    89    72/99   1.30
-slow 0.95 + noise     600     32    92   98/100    94   99/100   0.73
-slow 0.95 + noise    3000     33    95  100/100    94  100/100   0.32
-slow 0.98 + noise     190     21    75    72/98    81    64/95   1.55
-slow 0.98 + noise     600     23    88   83/100    90    75/99   1.19
-slow 0.98 + noise    3000     22    93  100/100    94  100/100   0.52
-two memories          190     26    80    74/99    74    81/99   0.89
-two memories          600     24    87   90/100    85   86/100   0.96
-bursts                 91     36    78    73/89    88    85/98   2.23
-bursts                190     36    86    91/99    96   99/100   1.72
-bursts                600     38    93  100/100    96  100/100   0.70
-bursts               3000     39    96  100/100    93  100/100   0.26
-bursts, reversed       91     34    77    66/84    88    36/58   2.13
-bursts, reversed      190     37    87    77/97    95    38/68   1.69
-=================  ======  =====  ====  =======  ====  =======  =====
-
-Drift is not allowed for where noise hides it on a short drive, or where it takes longer than the
-drive: there three or four of five intervals hold rather than nineteen of twenty. The model's
-settings were chosen with drives of these kinds in sight, so others may hold a little less often.
+How often its intervals hold, and what they find, is in ``benchmarks/INTERVALS.md``. Drift is not
+allowed for where noise hides it on a short drive, or where it takes longer than the drive: there
+three or four of five intervals hold rather than nineteen of twenty.
 """
 
 from __future__ import annotations
@@ -64,13 +16,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from typing import Literal
 
 import numpy as np
 
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats.autocorrelation import Series, mean_distribution
-from roadeval.evaluation.stats.corrections import holm_p_values
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,3 +127,58 @@ def holm(family: Sequence[Difference]) -> list[Difference]:
         each if p is None else replace(each, p_holm=p, comparisons=comparisons)
         for each, p in zip(family, holm_p_values(values), strict=True)
     ]
+
+
+# --- Multiple-comparison corrections of p-values --------------------------------------------------
+
+
+def holm_p_values(values: Sequence[float | None]) -> list[float | None]:
+    """Correct p-values so that a false finding among them is rare.
+
+    If nothing is true in a family, the probability that any corrected value is below ``a`` is at
+    most ``a``, however the comparisons depend on each other [1]_.
+
+    Parameters
+    ----------
+    values
+        None for what was not tested, which is not counted and stays None.
+
+    References
+    ----------
+    .. [1] S. Holm, A Simple Sequentially Rejective Multiple Test Procedure, Scandinavian Journal
+       of Statistics 6, 1979, 65-70.
+    """
+    tested = {place: p for place, p in enumerate(values) if p is not None}
+    corrected: list[float | None] = [None] * len(values)
+    least = 0.0
+    for rank, place in enumerate(sorted(tested, key=tested.__getitem__)):
+        least = max(least, min((len(tested) - rank) * tested[place], 1.0))
+        corrected[place] = least
+    return corrected
+
+
+def benjamini_hochberg(values: Sequence[float | None]) -> list[float | None]:
+    """Correct p-values so that few of the findings are false.
+
+    Of those whose corrected value is at most ``q``, a share of at most ``q`` is false on average:
+    ``min over j >= i of p_(j) m / j``, for the i-th smallest of m [1]_. That holds where the tests
+    are independent, as those of different drives are, or depend on each other positively.
+
+    Parameters
+    ----------
+    values
+        None for what was not tested, which is not counted and stays None.
+
+    References
+    ----------
+    .. [1] Y. Benjamini, Y. Hochberg, Controlling the False Discovery Rate, Journal of the Royal
+       Statistical Society B 57, 1995, 289-300.
+    """
+    tested = {place: p for place, p in enumerate(values) if p is not None}
+    order = sorted(tested, key=tested.__getitem__)
+    scaled = [tested[place] * len(order) / rank for rank, place in enumerate(order, start=1)]
+    least = list(accumulate(reversed(scaled), min))[::-1]
+    corrected: list[float | None] = [None] * len(values)
+    for place, p in zip(order, least, strict=True):
+        corrected[place] = min(p, 1.0)
+    return corrected

@@ -3,53 +3,7 @@
 The unit is the group of drives: a group's drives are averaged first, and every group counts alike.
 Below 30 groups p-value and interval are those of the exact sign-flip test, from there on Student's.
 
-How often each 95 % interval holds, in percent of 1000 made-up fleets
-(``benchmarks/fleet_intervals.py``, which prints this). Drives' effects have a standard deviation of
-1, and errors of their own, in that unit, one for all or from 0.1 to 3. "n" is the number of groups.
-In groups, two drives share half of the variance, and errors are 0.1 to 1. "t" is Student's
-interval; "at .5" and "at 1" are how often ours finds a true mean of that size; "width" is its
-median.
-
-======  ================  === === ==== ===== ==== =====
-effect  drives              n   t ours at .5 at 1 width
-======  ================  === === ==== ===== ==== =====
-normal  errors 0.3          6  96   97    11   35  2.57
-normal  errors 0.3         10  95   96    28   77  1.47
-normal  errors 0.3         30  96   96    71  100  0.78
-normal  errors 0.3        200  95   95   100  100  0.29
-normal  errors 0.1 to 3     6  96   97     9   23  3.48
-normal  errors 0.1 to 3    10  96   96    17   52  1.96
-normal  errors 0.1 to 3    30  95   95    44   93  1.10
-normal  errors 0.1 to 3   200  96   96   100  100  0.42
-normal  groups of 1 to 7    6  96   97    14   45  2.13
-normal  groups of 1 to 7   10  95   95    36   91  1.18
-normal  groups of 1 to 7   30  95   95    86  100  0.65
-normal  groups of 1 to 7  200  94   94   100  100  0.24
-t3      errors 0.3          6  96   97    18   53  2.12
-t3      errors 0.3         10  96   96    43   86  1.19
-t3      errors 0.3         30  95   95    79   98  0.69
-t3      errors 0.3        200  96   96   100  100  0.27
-t3      errors 0.1 to 3     6  97   97    12   33  3.33
-t3      errors 0.1 to 3    10  96   94    22   59  1.86
-t3      errors 0.1 to 3    30  97   97    49   94  1.06
-t3      errors 0.1 to 3   200  95   95    99  100  0.41
-t3      groups of 1 to 7    6  97   98    20   58  1.88
-t3      groups of 1 to 7   10  96   95    48   91  1.05
-t3      groups of 1 to 7   30  95   95    89   99  0.58
-t3      groups of 1 to 7  200  96   96   100  100  0.23
-skewed  errors 0.3          6  91   95     7   52  2.20
-skewed  errors 0.3         10  92   92    23   97  1.28
-skewed  errors 0.3         30  93   93    78  100  0.74
-skewed  errors 0.3        200  95   95   100  100  0.29
-skewed  errors 0.1 to 3     6  95   95     6   31  3.44
-skewed  errors 0.1 to 3    10  95   94    15   57  1.92
-skewed  errors 0.1 to 3    30  95   95    43   93  1.09
-skewed  errors 0.1 to 3   200  96   96   100  100  0.42
-skewed  groups of 1 to 7    6  94   96    11   65  1.91
-skewed  groups of 1 to 7   10  93   93    37   97  1.11
-skewed  groups of 1 to 7   30  94   94    90  100  0.62
-skewed  groups of 1 to 7  200  96   96   100  100  0.24
-======  ================  === === ==== ===== ==== =====
+How often its intervals hold, and what they find, is in ``benchmarks/INTERVALS.md``.
 
 From ten groups on, the sign-flip test and Student's hold equally often. With six, sign flip's
 interval reaches from the least to the greatest mean, which is wider, finds less, and holds more
