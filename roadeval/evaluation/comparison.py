@@ -23,16 +23,15 @@ from roadeval.evaluation.effects import TESTED
 from roadeval.evaluation.frame_counts import FourCounts, means
 from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.pairing import (
-    Because,
-    LeftOut,
+    Kind,
     MaskPair,
     Match,
+    Note,
     Part,
     Side,
     common_masks,
     match_drives,
 )
-from roadeval.evaluation.regions import titles
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import (
     Difference,
@@ -45,17 +44,19 @@ from roadeval.evaluation.stats import (
     strata,
     within_drive,
 )
+from roadeval.evaluation.where import (
+    Disagreement,
+    MovedFrame,
+    disagreements,
+    moved_frames,
+    parts_of,
+    region_counts,
+)
 
 Mask = tuple[str, str]
 """Variant and stage."""
-MOVED: Final = 5
-"""Frames named of those that changed most, in each direction; and of those that two masks disagree
-on."""
 FALSE: Final = 0.05
 """The share of the drives called changed that may be false, on average."""
-SHADOWS: Final = ("true_shadow", "shadow")
-SHADED: Final = 1 / 3
-"""The share of the frames that are called those with most shadow."""
 _OF_THE_LOG: Final = ("topics.", "labels.", "frames.every", "frames.scale")
 """Settings that change the frames and their truth, and not the method."""
 
@@ -162,113 +163,6 @@ class RegionChange:
 
 
 @dataclass(frozen=True, slots=True)
-class MovedFrame:
-    """A frame whose final ERR changed much: that of the base and of the new result."""
-
-    result: str
-    variant: str
-    frame: int
-    stamp_ns: int
-    base: float
-    new: float
-    change: float
-
-
-@dataclass(frozen=True, slots=True)
-class Disagreement:
-    """A frame on which two final masks disagree much."""
-
-    result: str
-    variant: str
-    frame: int
-    stamp_ns: int
-    base_right: float
-    new_right: float
-    """Shares of its labelled pixels that the base's mask, or the new one's, alone has right."""
-
-
-@dataclass(frozen=True, slots=True)
-class FramesLeftOut:
-    """Frames that a result evaluated, and that another lacks or trained on."""
-
-    result: str
-    other: str
-    frames: int
-
-
-@dataclass(frozen=True, slots=True)
-class VariantLeftOut:
-    """A variant that two results have, but on no frame both."""
-
-    base: str
-    new: str
-    variant: str
-
-
-@dataclass(frozen=True, slots=True)
-class SameLogs:
-    """Drives that have other names in two results, and are the same by their logs."""
-
-    base: str
-    new: str
-    drives: int
-
-
-@dataclass(frozen=True, slots=True)
-class SettingsDiffer:
-    """Settings that two results do not share: both values by the setting's name."""
-
-    base: str
-    new: str
-    settings: Mapping[str, tuple[Any, Any]]
-
-
-@dataclass(frozen=True, slots=True)
-class TruthDiffers:
-    """Frames whose truth is another in two results, and whether their settings explain that."""
-
-    base: str
-    new: str
-    frames: int
-    settings_differ: bool
-
-
-@dataclass(frozen=True, slots=True)
-class LogUnknown:
-    """A result that does not know which log it is of, so that nothing is subtracted."""
-
-    result: str
-
-
-@dataclass(frozen=True, slots=True)
-class DrivesDiffer:
-    """Two results of different drives, so that nothing is subtracted."""
-
-    result: str
-    other: str
-
-
-@dataclass(frozen=True, slots=True)
-class EndMissing:
-    """A result whose run was stopped: it holds a part of the drive."""
-
-    result: str
-
-
-Note = (
-    FramesLeftOut
-    | VariantLeftOut
-    | LeftOut
-    | SameLogs
-    | SettingsDiffer
-    | TruthDiffers
-    | LogUnknown
-    | DrivesDiffer
-    | EndMissing
-)
-
-
-@dataclass(frozen=True, slots=True)
 class Comparison:
     """Results compared with the first of them."""
 
@@ -277,7 +171,7 @@ class Comparison:
     ``changes`` are ``levels``."""
     results: tuple[ComparedResult, ...]
     """The base first."""
-    changed_settings: tuple[SettingsDiffer, ...]
+    changed_settings: tuple[Note, ...]
     """All settings that a new result does not share with the base."""
     changes: tuple[Change, ...]
     """Each mask of each new result, on the frames that it shares with the base."""
@@ -401,12 +295,12 @@ def _side_by_side(
             own.add(part, part.group or part.drive, side.rows(part, "frames"))
     rows = tuple(row for own in levels for row in own.rows())
     counted = zip(sides, (own.frames for own in levels), strict=True)
-    apart = next(
-        (sides[0], new) for new, match in zip(sides[1:], matches, strict=True) if not match.pairs
-    )
+    other = next(new for new, match in zip(sides[1:], matches, strict=True) if not match.pairs)
+    apart = sides[0], other
     unknown = [s.label for s in apart if any(part.digest is None for part in s.scored)]
-    labels = [side.label for side in apart]
-    note = LogUnknown(unknown[0]) if unknown else DrivesDiffer(*labels)
+    note = Note(Kind.OTHER_DRIVES, sides[0].label, other.label)
+    if unknown:
+        note = Note(Kind.LOG_UNKNOWN, unknown[0])
     results = tuple(_result(*each) for each in counted)
     return Comparison(False, results, (), rows, rows, (), (), (), (), (), (note,), settings)
 
@@ -532,7 +426,7 @@ class _Against:
         self.levels: Final = _Levels(new.label)
         self._left = [0, 0]
         self._relabelled = 0
-        self._apart: Final[list[LeftOut]] = []
+        self._apart: Final[list[str]] = []
         self._uncommon: Final[dict[str, None]] = {}
         self._masks: Final[defaultdict[Mask, list[_OnDrive]]] = defaultdict(list)
         self._regions: Final[defaultdict[Mask, list[_OnDrive]]] = defaultdict(list)
@@ -566,9 +460,7 @@ class _Against:
         masks = common_masks(before, after, self._new.label if self._across else None)
         self.base_frames += len(np.unique(before["frame"]))
         if not masks:
-            self._apart.append(
-                LeftOut(new.name, self._new.label, self._base.label, Because.NO_FRAME)
-            )
+            self._apart.append(new.name)
             return
         for place, rows in enumerate((before, after)):
             common = [(mask.before, mask.after)[place]["frame"] for mask in masks]
@@ -593,7 +485,7 @@ class _Against:
             self._add_regions(new, group, mask, *regions)
         if not self._several:
             first = next((mask for mask in masks if mask.final), masks[-1])
-            self.moved = tuple(_moved(self._new.label, first))
+            self.moved = tuple(moved_frames(self._new.label, first))
             if self._across:
                 table, names = new.rows("disagreements"), (self._base.label, self._new.label)
                 self.disagreements = tuple(disagreements(table, masks[0].after, *names))
@@ -620,7 +512,7 @@ class _Against:
         before = region_counts(base, called, mask.base_stage, mask.before)
         after = region_counts(new, mask.variant, mask.stage, mask.after)
         tested = () if self._several else (TESTED,)
-        for region, title, *counts in _parts(before, after, mask):
+        for region, title, *counts in parts_of(before, after, mask):
             made = self._on_drive(part, group, (counts[0], counts[1]), tested)
             self._regions[mask.variant, region].append(replace(made, title=title))
 
@@ -690,10 +582,10 @@ class _Against:
         better = METRICS[rate].higher_is_better
         return over_drives(drives, self._settings.confidence, higher_is_better=better)
 
-    def changed_settings(self) -> Iterator[SettingsDiffer]:
+    def changed_settings(self) -> Iterator[Note]:
         """Yield the settings that are others in the new result, if there are any."""
         if differing := self._differing():
-            yield SettingsDiffer(self._base.label, self._new.label, differing)
+            yield Note(Kind.SETTINGS, self._base.label, self._new.label, settings=differing)
 
     def _differing(self) -> dict[str, tuple[Any, Any]]:
         """Return both values of the settings that both know and do not share."""
@@ -708,21 +600,22 @@ class _Against:
     def notes(self) -> Iterator[Note]:
         """Yield what was left out, and what makes the two less comparable than they look."""
         base, new = self._base.label, self._new.label
-        if self._several and self._match.by_log:
-            yield SameLogs(base, new, self._match.by_log)
         yield from self._match.left_out
-        yield from self._apart
+        if apart := self._apart:
+            yield Note(Kind.NO_FRAME, new, base, len(apart), tuple(apart))
+        if self._several and self._match.by_log:
+            yield Note(Kind.SAME_LOGS, base, new, self._match.by_log)
         for label, other, frames in zip((base, new), (new, base), self._left, strict=True):
             if frames:
-                yield FramesLeftOut(label, other, frames)
+                yield Note(Kind.FRAMES, label, other, frames)
         for variant in self._uncommon:
             if all(variant != mask[0] for mask in self._masks):
-                yield VariantLeftOut(base, new, variant)
+                yield Note(Kind.VARIANT, base, new, names=(variant,))
         of_the_log = {k: v for k, v in self._differing().items() if k.startswith(_OF_THE_LOG)}
         if of_the_log:
-            yield SettingsDiffer(base, new, of_the_log)
+            yield Note(Kind.SETTINGS, base, new, settings=of_the_log)
         if self._relabelled:
-            yield TruthDiffers(base, new, self._relabelled, bool(of_the_log))
+            yield Note(Kind.TRUTH, base, new, self._relabelled, settings=of_the_log)
 
 
 def _drive_mean(own: _OnDrive, rate: str) -> DriveMean:
@@ -732,116 +625,3 @@ def _drive_mean(own: _OnDrive, rate: str) -> DriveMean:
 def _surest(row: DriveChange) -> tuple[float, float, str]:
     known = 2.0 if row.q is None else row.q
     return known, -abs(np.nan_to_num(row.difference.mean)), row.drive
-
-
-def _moved(result: str, mask: MaskPair) -> Iterator[MovedFrame]:
-    """Yield the frames whose ERR changed most."""
-    place = list(METRICS).index(TESTED)
-    before, after = (rates[:, place] for rates in mask.rates)
-    stamps, changes = mask.after["stamp_ns"], after - before
-    for harmed in (True, False):
-        for frame in scored.most_changed(stamps, changes, MOVED, harmed=harmed).tolist():
-            was, change = float(before[frame]), float(changes[frame])
-            yield MovedFrame(
-                result=result,
-                variant=mask.variant,
-                frame=int(mask.after["frame"][frame]),
-                stamp_ns=int(stamps[frame]),
-                base=was,
-                new=was + change,
-                change=change,
-            )
-
-
-# --- Where it changed -----------------------------------------------------------------------------
-
-
-def region_counts(regions: Rows, variant: str, stage: str, frames: Rows) -> dict[str, FourCounts]:
-    """Return a mask's counts by region, ``(n, 4)`` each; 0 on a frame that the table lacks.
-
-    Parameters
-    ----------
-    regions
-        The rows of ``regions.csv``.
-    variant, stage
-        Whose mask.
-    frames
-        The mask's rows of ``frames.csv``, in any order.
-    """
-    numbers = frames["frame"]
-    own = regions.take((regions["variant"] == variant) & (regions["stage"] == stage))
-    own = own.take(np.isin(own["frame"], numbers))
-    order = np.argsort(numbers)
-    found = {}
-    for name in own.distinct("region"):
-        rows = own.take(own["region"] == name)
-        found[name] = np.zeros((len(numbers), 4), np.int64)
-        found[name][order[np.searchsorted(numbers[order], rows["frame"])]] = scored.counts(rows)
-    return found
-
-
-def _parts(
-    base: Mapping[str, FourCounts], new: Mapping[str, FourCounts], mask: MaskPair
-) -> Iterator[tuple[str, str, FourCounts, FourCounts]]:
-    """Yield a mask's regions and shades: name, title, and the counts of both there.
-
-    A region that is not the same pixels in both, as the shadow that another filter found, is left
-    out: its ERR would tell of other places. So is one without a labelled pixel.
-    """
-    for name, title in titles([*base]).items():
-        if name in new and _same_pixels(base[name], new[name]):
-            known = base[name].any(axis=1)
-            if known.any():
-                yield name, title, base[name][known], new[name][known]
-    # True shadow counts where the log has it, else what both results detected alike.
-    alike = [
-        name
-        for name in SHADOWS
-        if name in base and name in new and _same_pixels(base[name], new[name])
-    ]
-    if not alike:
-        return
-    share = base[alike[0]].sum(axis=1) / np.maximum(mask.before["N"], 1)
-    much = share >= max(np.sort(share)[-max(round(SHADED * len(share)), 1)], 1e-9)
-    if much.any() and not much.all():
-        before, after = mask.counts
-        yield "frames_with_shadow", "frames with most shadow", before[much], after[much]
-        yield "other_frames", "the other frames", before[~much], after[~much]
-
-
-def _same_pixels(base: FourCounts, new: FourCounts) -> bool:
-    """Whether two regions may be the same pixels: of each frame as many, and as much road."""
-    same = np.array_equal(base.sum(axis=1), new.sum(axis=1))
-    return same and np.array_equal(base[:, [0, 3]].sum(axis=1), new[:, [0, 3]].sum(axis=1))
-
-
-def disagreements(table: Rows, frames: Rows, base: str, new: str) -> Iterator[Disagreement]:
-    """Yield the frames on which two variants of a run disagree most; of neighbours only one.
-
-    Parameters
-    ----------
-    table
-        The rows of ``disagreements.csv``.
-    frames
-        Rows with the frames' stamps.
-    base, new
-        The variants.
-    """
-    pairs = ((base, new, "repaired", "spoiled"), (new, base, "spoiled", "repaired"))
-    stamps = dict(zip(frames["frame"].tolist(), frames["stamp_ns"].tolist(), strict=True))
-    for one, other, new_right, base_right in pairs:
-        own = table.take((table["from_variant"] == one) & (table["to_variant"] == other))
-        own = own.take(np.isin(own["frame"], [*stamps]) & (own["N"] > 0))
-        if not len(own):
-            continue
-        mine, theirs = own[new_right] / own["N"], own[base_right] / own["N"]
-        times = np.array([stamps[number] for number in own["frame"].tolist()], np.int64)
-        for place in scored.most_changed(times, mine + theirs, MOVED, harmed=True).tolist():
-            yield Disagreement(
-                result=new,
-                variant=new,
-                frame=int(own["frame"][place]),
-                stamp_ns=int(times[place]),
-                base_right=float(theirs[place]),
-                new_right=float(mine[place]),
-            )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, Protocol
 
@@ -88,29 +88,48 @@ class Side:
 # --- Drives ---------------------------------------------------------------------------------------
 
 
-class Because(StrEnum):
-    """Why a drive of one result is not compared with another result."""
+class Kind(StrEnum):
+    """What a note on a comparison tells."""
 
     ABSENT = "absent"
-    """The other has no such drive."""
+    """Drives that the other result does not have."""
     UNSCORED = "unscored"
-    """It is not scored in both."""
+    """Drives that are not scored in both."""
     OTHER_LOG = "other_log"
-    """The drive of this name is of another log there."""
-    LOG_UNKNOWN = "log_unknown"
-    """A result does not say which log it is of."""
+    """Drives whose name belongs to another log in the other result."""
     NO_FRAME = "no_frame"
-    """Both have evaluated it, but no frame both."""
+    """Drives that both have evaluated, but on no frame both."""
+    LOG_UNKNOWN = "log_unknown"
+    """Drives of unknown logs, or a result of one: nothing is subtracted."""
+    OTHER_DRIVES = "other_drives"
+    """Two results without a drive in common: nothing is subtracted."""
+    SAME_LOGS = "same_logs"
+    """Drives that have other names, and are the same by their logs."""
+    FRAMES = "frames"
+    """Frames that a result evaluated, and that the other lacks or trained on."""
+    VARIANT = "variant"
+    """A variant that both have, but on no frame both."""
+    SETTINGS = "settings"
+    """Settings that both results do not share."""
+    TRUTH = "truth"
+    """Frames whose truth is another; ``settings`` may explain that."""
+    END_MISSING = "end_missing"
+    """A result whose run was stopped: it holds a part of the drive."""
 
 
 @dataclass(frozen=True, slots=True)
-class LeftOut:
-    """A drive that is not compared with another result."""
+class Note:
+    """What was left out of a comparison, or makes results less comparable than they look."""
 
-    drive: str
+    kind: Kind
     result: str
-    other: str
-    because: Because
+    other: str = ""
+    count: int = 0
+    """Frames or drives that it is about."""
+    names: tuple[str, ...] = ()
+    """Drives, or the variant, that it is about."""
+    settings: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
+    """Both values by the setting's name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,7 +140,8 @@ class Match:
     """Those that both have scored, in the base's order."""
     by_log: int
     """How many of them have other names, and are the same by their log."""
-    left_out: Sequence[LeftOut]
+    left_out: Sequence[Note]
+    """All others, by the result that has them and by the reason."""
 
 
 def match_drives(base: Side, new: Side) -> Match:
@@ -136,25 +156,23 @@ def match_drives(base: Side, new: Side) -> Match:
     for part in new.parts:
         if part.drive not in names:
             logs[part.digest].append(part)
-    pairs, left, taken = [], [], set()
+    pairs, taken = [], set()
+    left: defaultdict[tuple[Kind, str, str], list[str]] = defaultdict(list)
     for part in base.parts:
         other = there.get(part.drive)
         if other is None and part.digest and logs[part.digest]:
             other = logs[part.digest].popleft()
-        if other is None:
-            left.append(LeftOut(part.name, base.label, new.label, Because.ABSENT))
-            continue
-        taken.add(other.drive)
+        if other is not None:
+            taken.add(other.drive)
         if reason := _why_not(part, other):
-            left.append(LeftOut(part.name, base.label, new.label, reason))
-        else:
+            left[reason, base.label, new.label].append(part.name)
+        elif other is not None:
             pairs.append((part, other))
-    left += (
-        LeftOut(part.name, new.label, base.label, Because.ABSENT)
-        for part in new.parts
-        if part.drive not in taken
-    )
-    return Match(pairs, sum(one.drive != other.drive for one, other in pairs), left)
+    for part in new.parts:
+        if part.drive not in taken:
+            left[Kind.ABSENT, new.label, base.label].append(part.name)
+    notes = [Note(*key, len(names), tuple(names)) for key, names in left.items()]
+    return Match(pairs, sum(one.drive != other.drive for one, other in pairs), notes)
 
 
 def one_drive(sides: Sequence[Side]) -> list[Side] | None:
@@ -168,12 +186,14 @@ def one_drive(sides: Sequence[Side]) -> list[Side] | None:
     return [replace(side, parts=[part]) for side, part in zip(sides, parts, strict=True)]
 
 
-def _why_not(base: Part, new: Part) -> Because | None:
+def _why_not(base: Part, new: Part | None) -> Kind | None:
+    if new is None:
+        return Kind.ABSENT
     if not (base.scored and new.scored):
-        return Because.UNSCORED
+        return Kind.UNSCORED
     if base.digest is None or new.digest is None:
-        return Because.LOG_UNKNOWN
-    return Because.OTHER_LOG if base.digest != new.digest else None
+        return Kind.LOG_UNKNOWN
+    return Kind.OTHER_LOG if base.digest != new.digest else None
 
 
 # --- Frames ---------------------------------------------------------------------------------------

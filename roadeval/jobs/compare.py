@@ -14,10 +14,10 @@ from roadeval.data import BASELINE
 from roadeval.data.rows import joined
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import comparison, scored
-from roadeval.evaluation.comparison import Comparison, EndMissing
+from roadeval.evaluation.comparison import Comparison
 from roadeval.evaluation.conditions import Condition, Judgement, judge
 from roadeval.evaluation.effects import TESTED
-from roadeval.evaluation.pairing import Side, one_drive
+from roadeval.evaluation.pairing import Kind, Note, Side, one_drive
 from roadeval.evaluation.settings import settings_of
 from roadeval.jobs.result import Result
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
@@ -123,8 +123,10 @@ def compare(
     settings = settings_of(opened[0].summary)
     found = comparison.compare(sides, settings, across_variants=across)
     labelled = [*zip(sides, opened, strict=True)]
-    cut = [EndMissing(side.label) for side, each in labelled if not each.complete]
-    found = replace(found, notes=(*dict.fromkeys(cut), *found.notes))
+    cut = dict.fromkeys(
+        each.name if across else side.label for side, each in labelled if not each.complete
+    )
+    found = replace(found, notes=(*(Note(Kind.END_MISSING, name) for name in cut), *found.notes))
     alone = sides if across and len(whole.scored) == 1 else one_drive(sides)
     recordings = {side.label: each.recording for side, each in labelled if each.recording}
     return Compared(found, judge(found, conditions, settings), tuple(alone or ()), recordings)

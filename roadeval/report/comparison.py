@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
 from itertools import pairwise
-from typing import Final
+from typing import Any, Final
 
 from roadeval.data.words import DASH, interval, listing, number, percent, points, timestamp
 from roadeval.evaluation.comparison import (
     Change,
     ComparedResult,
     Comparison,
-    Disagreement,
     DriveChange,
-    MovedFrame,
     RegionChange,
 )
 from roadeval.evaluation.conditions import Judgement
 from roadeval.evaluation.effects import TESTED
 from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
 from roadeval.evaluation.stats import Difference
+from roadeval.evaluation.where import Disagreement, MovedFrame
 from roadeval.report.blocks import (
     Block,
     BulletList,
@@ -51,11 +52,15 @@ from roadeval.runtime.text import as_markdown
 Inspect = Callable[[str, int], str]
 Row = Change | MovedFrame | RegionChange | Disagreement | DriveChange
 """Something about a variant of a new result."""
+Columns = dict[str, Callable[[Any], Cell | str]]
+"""What a row has in each column, by their titles."""
 OTHERS: Final = tuple(name for name in SHORT if name != TESTED)
 """The rates of short tables without ERR, which has columns of its own."""
 NAMED: Final = 20
 """Drives that a table of changed ones names, of each mask."""
-_COMMAND: Final = ("in the viewer",)
+_COMMAND: Final = "in the viewer"
+_WORDS: Final = ("result", "variant", "stage", "drive", "region, or frames", "stamp", _COMMAND)
+"""The columns that hold words."""
 _REGIONS: Final = "ERR of the final masks, percent: means over the frames that label any of it."
 _FRAMES: Final = "Percent of the labelled pixels that one of the two final masks has right alone."
 _LEFT_OUT: Final = (
@@ -109,8 +114,8 @@ def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
     lines += [*(f"- {as_markdown(sentence)}" for sentence in told_where(comparison)), ""]
     for title, table in (
         ("Drives that changed:", _drives_table([r for r in comparison.drives if r.changed])),
-        ("Frames on which they disagree most:", _disagreement_table(comparison)),
-        ("Frames that changed most:", _moved_table(comparison)),
+        ("Frames on which they disagree most:", _disagreement_table(comparison.disagreements)),
+        ("Frames that changed most:", _moved_table(comparison.moved)),
     ):
         if table.rows:
             lines += [title, "", *markdown_table(table), ""]
@@ -160,7 +165,7 @@ def _blocks(
     yield from _where(comparison)
     if comparison.moved:
         yield Heading("Frames that changed most", 2)
-        yield _moved_table(comparison, inspect)
+        yield _moved_table(comparison.moved, inspect)
 
 
 def _legend(comparison: Comparison) -> Iterator[str]:
@@ -192,62 +197,57 @@ def _rates_table(comparison: Comparison) -> Table:
 
 
 def _changes_table(rows: Sequence[Change]) -> Table:
-    names = _naming_columns(rows)
-    counted = ("drives",) if any(row.drives > 1 for row in rows) else ()
-    return Table(
-        [*names, "stage", *counted, "base", "new", "difference", "interval", *OTHERS],
-        [
-            [
-                *_named(row, names),
-                row.stage,
-                *(number(row.drives) for _ in counted),
-                percent(row.base[TESTED]),
-                percent(row.new[TESTED]),
-                Cell(points(row.difference[TESTED].mean), bold=row.final),
-                _interval(row.difference[TESTED]),
-                *(points(row.difference[rate].mean) for rate in OTHERS),
-            ]
-            for row in rows
-        ],
-        text_columns=range(len(names) + 1),
-        breaks=_breaks(rows),
-        groups=[("", len(names) + 1 + len(counted)), (TESTED, 4), ("difference", len(OTHERS))],
-        small=True,
-    )
+    counted: Columns = {"drives": lambda row: number(row.drives)}
+    columns: Columns = {
+        "stage": lambda row: row.stage,
+        **(counted if any(row.drives > 1 for row in rows) else {}),
+        "base": lambda row: percent(row.base[TESTED]),
+        "new": lambda row: percent(row.new[TESTED]),
+        "difference": lambda row: Cell(points(row.difference[TESTED].mean), bold=row.final),
+        "interval": lambda row: _interval(row.difference[TESTED]),
+        **{rate: partial(_other, rate=rate) for rate in OTHERS},
+    }
+    table = _table(rows, columns)
+    named = len(table.columns) - 4 - len(OTHERS)
+    groups = [("", named), (TESTED, 4), ("difference", len(OTHERS))]
+    return replace(table, groups=groups)
+
+
+def _other(row: Change, rate: str) -> str:
+    return points(row.difference[rate].mean)
 
 
 def _levels_table(rows: Sequence[Change]) -> Table:
-    shown = (*SHORT, *SHORT_OVERLAP)
+    columns: Columns = {
+        "stage": lambda row: row.stage,
+        "frames": lambda row: number(row.frames),
+        **{rate: partial(_level, rate=rate) for rate in (*SHORT, *SHORT_OVERLAP)},
+    }
+    return _table(rows, columns)
+
+
+def _level(row: Change, rate: str) -> str:
+    return percent(row.new[rate])
+
+
+def _table(rows: Sequence[Row], columns: Columns, caption: str = "") -> Table:
+    """Tabulate rows: what names one, without the result where the variants are that, and columns.
+
+    A rule stands where another result begins.
+    """
+    names: Columns = {"result": lambda row: row.result, "variant": lambda row: row.variant}
+    if all(row.result == row.variant for row in rows):
+        del names["result"]
+    made = names | columns
+    results = [row.result for row in rows]
     return Table(
-        ["result", "variant", "stage", "frames", *shown],
-        [
-            [
-                *(row.result, row.variant, row.stage),
-                number(row.frames),
-                *(percent(row.new[rate]) for rate in shown),
-            ]
-            for row in rows
-        ],
-        text_columns=range(3),
-        breaks=_breaks(rows),
+        [*made],
+        [[cell(row) for cell in made.values()] for row in rows],
+        text_columns=[place for place, title in enumerate(made) if title in _WORDS],
+        breaks=[place for place, (a, b) in enumerate(pairwise(results), 1) if a != b],
+        caption=caption,
         small=True,
     )
-
-
-def _naming_columns(rows: Sequence[Row]) -> tuple[str, ...]:
-    """Return the columns that name a row; without the result's, where the variants are that."""
-    alone = all(row.result == row.variant for row in rows)
-    return ("variant",) if alone else ("result", "variant")
-
-
-def _named(row: Row, names: Sequence[str]) -> list[str]:
-    return [{"result": row.result, "variant": row.variant}[name] for name in names]
-
-
-def _breaks(rows: Sequence[Row]) -> list[int]:
-    """Return the rows at which another result begins."""
-    results = [row.result for row in rows]
-    return [place for place, (above, own) in enumerate(pairwise(results), 1) if above != own]
 
 
 def _interval(change: Difference) -> str:
@@ -309,25 +309,16 @@ def _plot(comparison: Comparison, own: Sequence[DriveChange]) -> Iterator[Block]
 
 def _drives_table(rows: Sequence[DriveChange]) -> Table:
     """Tabulate drives that changed, the surest first."""
-    names = _naming_columns(rows)
-    return Table(
-        [*names, "drive", "frames", "base", "new", "difference", "interval", "q"],
-        [
-            [
-                *_named(row, names),
-                row.drive,
-                number(row.frames),
-                percent(row.base),
-                percent(row.new),
-                Cell(points(row.difference.mean), bold=True),
-                interval(row.difference.low, row.difference.high),
-                DASH if row.q is None else q_value(row.q),
-            ]
-            for row in rows[:NAMED]
-        ],
-        text_columns=range(len(names) + 1),
-        small=True,
-    )
+    columns: Columns = {
+        "drive": lambda row: row.drive,
+        "frames": lambda row: number(row.frames),
+        "base": lambda row: percent(row.base),
+        "new": lambda row: percent(row.new),
+        "difference": lambda row: Cell(points(row.difference.mean), bold=True),
+        "interval": lambda row: interval(row.difference.low, row.difference.high),
+        "q": lambda row: DASH if row.q is None else q_value(row.q),
+    }
+    return _table(rows[:NAMED], columns)
 
 
 # --- Where ----------------------------------------------------------------------------------------
@@ -342,75 +333,42 @@ def _where(comparison: Comparison) -> Iterator[Block]:
         yield Text(f"{legend} {_LEFT_OUT}".strip(), "note")
     if comparison.disagreements:
         yield Heading("Frames on which they disagree most", 2)
-        yield _disagreement_table(comparison)
+        yield _disagreement_table(comparison.disagreements)
 
 
 def _region_table(rows: Sequence[RegionChange]) -> Table:
-    names = _naming_columns(rows)
-    return Table(
-        [*names, "region, or frames", "frames", "base", "new", "difference", "interval"],
-        [
-            [
-                *_named(row, names),
-                row.title,
-                str(row.frames),
-                percent(row.base),
-                percent(row.new),
-                Cell(points(row.difference.mean), bold=True),
-                _interval(row.difference),
-            ]
-            for row in rows
-        ],
-        text_columns=range(len(names) + 1),
-        breaks=_breaks(rows),
-        caption=_REGIONS,
-        small=True,
-    )
+    columns: Columns = {
+        "region, or frames": lambda row: row.title,
+        "frames": lambda row: str(row.frames),
+        "base": lambda row: percent(row.base),
+        "new": lambda row: percent(row.new),
+        "difference": lambda row: Cell(points(row.difference.mean), bold=True),
+        "interval": lambda row: _interval(row.difference),
+    }
+    return _table(rows, columns, _REGIONS)
 
 
-def _disagreement_table(comparison: Comparison) -> Table:
+def _disagreement_table(rows: Sequence[Disagreement]) -> Table:
     """Tabulate the frames on which final masks disagree most, and which of them is right."""
-    rows = comparison.disagreements
-    names = _naming_columns(rows)
-    return Table(
-        [*names, "frame", "stamp", "disagree", "base right", "new right"],
-        [
-            [
-                *_named(row, names),
-                str(row.frame),
-                timestamp(row.stamp_ns),
-                Cell(percent(row.base_right + row.new_right), bold=True),
-                percent(row.base_right),
-                percent(row.new_right),
-            ]
-            for row in rows
-        ],
-        text_columns=[*range(len(names)), len(names) + 1],
-        breaks=_breaks(rows),
-        caption=_FRAMES,
-        small=True,
-    )
+    columns: Columns = {
+        "frame": lambda row: str(row.frame),
+        "stamp": lambda row: timestamp(row.stamp_ns),
+        "disagree": lambda row: Cell(percent(row.base_right + row.new_right), bold=True),
+        "base right": lambda row: percent(row.base_right),
+        "new right": lambda row: percent(row.new_right),
+    }
+    return _table(rows, columns, _FRAMES)
 
 
-def _moved_table(comparison: Comparison, inspect: Inspect | None = None) -> Table:
+def _moved_table(rows: Sequence[MovedFrame], inspect: Inspect | None = None) -> Table:
     """Tabulate the frames whose error rate changed most, with what opens each of the new result."""
-    rows = comparison.moved
-    names = _naming_columns(rows)
-    return Table(
-        [*names, "frame", "stamp", "ERR base", "new", "difference", *_COMMAND[: bool(inspect)]],
-        [
-            [
-                *_named(row, names),
-                str(row.frame),
-                timestamp(row.stamp_ns),
-                percent(row.base),
-                percent(row.new),
-                Cell(points(row.change), bold=True),
-                *([inspect(row.result, row.frame)] if inspect else []),
-            ]
-            for row in rows
-        ],
-        text_columns=[*range(len(names)), len(names) + 1, len(names) + 5],
-        breaks=_breaks(rows),
-        small=True,
-    )
+    columns: Columns = {
+        "frame": lambda row: str(row.frame),
+        "stamp": lambda row: timestamp(row.stamp_ns),
+        "ERR base": lambda row: percent(row.base),
+        "new": lambda row: percent(row.new),
+        "difference": lambda row: Cell(points(row.change), bold=True),
+    }
+    if inspect:
+        columns[_COMMAND] = lambda row: inspect(row.result, row.frame)
+    return _table(rows, columns)

@@ -7,23 +7,10 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from roadeval.data.words import percent, plain_points
-from roadeval.evaluation.comparison import (
-    FALSE,
-    Change,
-    Comparison,
-    DrivesDiffer,
-    EndMissing,
-    FramesLeftOut,
-    LogUnknown,
-    Note,
-    SameLogs,
-    SettingsDiffer,
-    TruthDiffers,
-    VariantLeftOut,
-)
+from roadeval.evaluation.comparison import FALSE, Change, Comparison
 from roadeval.evaluation.conditions import Judgement
 from roadeval.evaluation.effects import TESTED
-from roadeval.evaluation.pairing import Because, LeftOut
+from roadeval.evaluation.pairing import Kind, Note
 from roadeval.results.sentences import sentence, stands
 
 FORMAT: Final = {"name": "roadeval-comparison", "version": 2}
@@ -34,10 +21,6 @@ NAMED: Final = 5
 def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dict[str, Any]:
     """Return the content of a comparison's JSON file: its facts, and the sentences on them."""
     facts = asdict(comparison)
-    notes = [
-        {"kind": type(note).__name__, **fact}
-        for note, fact in zip(comparison.notes, facts.pop("notes"), strict=True)
-    ]
     drives = [
         {**fact, "changed": row.changed}
         for row, fact in zip(comparison.drives, facts.pop("drives"), strict=True)
@@ -50,7 +33,6 @@ def as_dict(comparison: Comparison, judgements: Sequence[Judgement] = ()) -> dic
         **facts,
         "drives": drives,
         "false_discovery_rate": FALSE,
-        "notes": notes,
         "warnings": warnings(comparison),
         "conditions": [
             {**(fact := asdict(each)).pop("condition"), **fact, "sentence": judged(each)}
@@ -68,7 +50,7 @@ def changed_settings(comparison: Comparison, most: int | None = None) -> list[st
     for each in comparison.changed_settings:
         named = [f"{name} {_value(a)} to {_value(b)}" for name, (a, b) in each.settings.items()]
         more = f"; and {len(named) - most} more" if most and len(named) > most else ""
-        of = f" in {each.new}" if len(comparison.results) > 2 else ""
+        of = f" in {each.other}" if len(comparison.results) > 2 else ""
         lines.append(f"Changed settings{of}: {'; '.join(named[:most])}{more}.")
     return lines
 
@@ -146,68 +128,51 @@ def changed_drives(comparison: Comparison) -> list[str]:
 
 def warnings(comparison: Comparison) -> list[str]:
     """Return what was left out and what makes results less comparable than they look."""
-    drives: dict[tuple[str, str, Because], list[str]] = {}
-    told = []
-    for each in comparison.notes:
-        if isinstance(each, LeftOut):
-            drives.setdefault((each.result, each.other, each.because), []).append(each.drive)
-        else:
-            told.append(note(each))
-    return [*(_left_out(names, *key) for key, names in drives.items()), *told]
+    return [_told(each) for each in comparison.notes]
 
 
-def _left_out(names: Sequence[str], result: str, other: str, because: Because) -> str:
-    reason = {
-        Because.ABSENT: f"not in {other}",
-        Because.UNSCORED: "not scored in both",
-        Because.OTHER_LOG: f"of another log in {other}",
-        Because.LOG_UNKNOWN: "log unknown",
-        Because.NO_FRAME: f"no evaluated frame in common with {other}",
-    }[because]
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    count = "1 drive is" if len(names) == 1 else f"{len(names)} drives are"
-    return f"{count} left out of {result} ({reason}): {', '.join(names[:NAMED])}{more}"
-
-
-def note(told: Note) -> str:
-    """Return a note on a comparison as a clause."""
-    match told:
-        case FramesLeftOut(result, other, frames):
-            said = (
-                f"{frames} frames that {result} evaluated are left out against {other}, which "
-                "lacks them or trained on them"
-            )
-        case VariantLeftOut(base, new, variant):
-            said = f"{variant} is left out: {base} and {new} share no frame of it"
-        case LeftOut(drive, result, other, because):
-            said = _left_out([drive], result, other, because)
-        case SameLogs(base, new, drives):
-            said = (
-                f"{drives} drives have other names in {base} and {new}, and are taken for the same "
-                "by the SHA-256 of their logs"
-            )
-        case SettingsDiffer(base, new, settings):
-            both = (f"`{name}` {_value(a)} and {_value(b)}" for name, (a, b) in settings.items())
-            said = (
-                f"{base} and {new} were replayed with different settings ({', '.join(both)}): "
-                "part of the change may be theirs"
-            )
-        case TruthDiffers(base, new, frames, settings_differ):
-            guess = "" if settings_differ else " (other labels or topics?)"
-            said = (
-                f"the truth differs on {frames} frames between {base} and {new}{guess}: part of "
-                "the change may be the truth's"
-            )
-        case LogUnknown(result):
-            said = f"{result} does not say which log it is of: nothing is subtracted"
-        case EndMissing(result):
-            said = f"{result} is a partial recording: the end of its drive is missing"
-        case DrivesDiffer(result, other):
-            said = (
-                f"{result} and {other} are of different drives: side by side only, for a "
-                "difference would mix the scene with the method"
-            )
-    return said
+def _told(note: Note) -> str:
+    one, other, count = note.result, note.other, note.count
+    drives = "1 drive is" if count == 1 else f"{count} drives are"
+    more = f" and {count - NAMED} more" if count > NAMED else ""
+    names = f"{', '.join(note.names[:NAMED])}{more}"
+    settings = ", ".join(
+        f"`{name}` {_value(a)} and {_value(b)}" for name, (a, b) in note.settings.items()
+    )
+    guess = "" if note.settings else " (other labels or topics?)"
+    if note.kind is Kind.LOG_UNKNOWN and not note.names:
+        return f"{one} does not say which log it is of: nothing is subtracted"
+    return {
+        Kind.ABSENT: f"{drives} left out of {one} (not in {other}): {names}",
+        Kind.UNSCORED: f"{drives} left out of {one} (not scored in both): {names}",
+        Kind.OTHER_LOG: f"{drives} left out of {one} (of another log in {other}): {names}",
+        Kind.NO_FRAME: (
+            f"{drives} left out of {one} (no evaluated frame in common with {other}): {names}"
+        ),
+        Kind.LOG_UNKNOWN: f"{drives} left out of {one} (log unknown): {names}",
+        Kind.SAME_LOGS: (
+            f"{count} drives have other names in {one} and {other}, and are taken for the same by "
+            "the SHA-256 of their logs"
+        ),
+        Kind.FRAMES: (
+            f"{count} frames that {one} evaluated are left out against {other}, which lacks them "
+            "or trained on them"
+        ),
+        Kind.VARIANT: f"{names} is left out: {one} and {other} share no frame of it",
+        Kind.SETTINGS: (
+            f"{one} and {other} were replayed with different settings ({settings}): part of the "
+            "change may be theirs"
+        ),
+        Kind.TRUTH: (
+            f"the truth differs on {count} frames between {one} and {other}{guess}: part of the "
+            "change may be the truth's"
+        ),
+        Kind.OTHER_DRIVES: (
+            f"{one} and {other} are of different drives: side by side only, for a difference "
+            "would mix the scene with the method"
+        ),
+        Kind.END_MISSING: f"{one} is a partial recording: the end of its drive is missing",
+    }[note.kind]
 
 
 def judged(judgement: Judgement) -> str:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from roadeval.evaluation.pairing import (
-    Because,
+    Kind,
     Side,
     common_masks,
     match_drives,
@@ -26,7 +26,7 @@ def pairs_of(found):
 
 
 def why(found):
-    return [(each.drive, each.result, each.because) for each in found.left_out]
+    return [(*each.names, each.result, each.kind) for each in found.left_out]
 
 
 def test_drives_of_one_name_are_one_and_those_of_one_log_too():
@@ -35,32 +35,28 @@ def test_drives_of_one_name_are_one_and_those_of_one_log_too():
         a_result("new", ("moved", "2"), ("a", "1"), ("other", "9")),
     )
     assert (pairs_of(found), found.by_log) == ([("a", "a"), ("b", "moved")], 1)
-    assert why(found) == [("c", "base", Because.ABSENT), ("other", "new", Because.ABSENT)]
+    assert why(found) == [("c", "base", Kind.ABSENT), ("other", "new", Kind.ABSENT)]
 
 
 def test_a_log_that_is_in_a_result_twice_is_matched_twice_and_no_more():
     base = a_result("base", ("a", "f"), ("b", "f"), ("c", "f"))
     found = match_drives(base, a_result("new", ("x", "f"), ("y", "f")))
     assert pairs_of(found) == [("a", "x"), ("b", "y")]
-    assert why(found) == [("c", "base", Because.ABSENT)]
+    assert why(found) == [("c", "base", Kind.ABSENT)]
 
 
 def test_one_name_with_another_log_is_no_match():
     found = match_drives(a_result("base", ("a", "1")), a_result("new", ("a", "2")))
     assert not found.pairs
-    assert why(found) == [("a", "base", Because.OTHER_LOG)]
+    assert why(found) == [("a", "base", Kind.OTHER_LOG)]
 
 
 def test_drives_without_a_digest_or_a_score_are_no_match():
     one, other = a_result("base", ("a", None)), a_result("new", ("b", None))
     assert not match_drives(one, other).pairs
-    assert why(match_drives(one, a_result("new", ("a", "1")))) == [
-        ("a", "base", Because.LOG_UNKNOWN)
-    ]
+    assert why(match_drives(one, a_result("new", ("a", "1")))) == [("a", "base", Kind.LOG_UNKNOWN)]
     failed = a_result("base", ("a", "1"), scored=False)
-    assert why(match_drives(failed, a_result("new", ("a", "1")))) == [
-        ("a", "base", Because.UNSCORED)
-    ]
+    assert why(match_drives(failed, a_result("new", ("a", "1")))) == [("a", "base", Kind.UNSCORED)]
 
 
 def test_one_drive_of_several_is_found_where_only_that_is_compared():

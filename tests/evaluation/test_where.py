@@ -4,14 +4,10 @@ import numpy as np
 import pytest
 
 from roadeval.data import Rows
-from roadeval.evaluation.comparison import (
-    compare,
-    disagreements,
-    region_counts,
-    variants_as_sides,
-)
+from roadeval.evaluation.comparison import compare, variants_as_sides
 from roadeval.evaluation.pairing import Side
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.where import disagreements, region_counts
 from tests.evaluation.making import APart, a_table, rows_of
 
 SETTINGS = EvaluationSettings()
@@ -95,6 +91,20 @@ def test_of_two_results_the_same_variant_is_compared():
         ("first", pytest.approx(0.05)),
         ("second", 0),
     ]
+
+
+def test_over_several_drives_a_region_is_that_of_the_drives():
+    def a_result(wrong):
+        parts = []
+        for place in range(6):
+            frames = rows_of(a_table({("first", "post"): [10] * 12}))
+            lit = regions({("first", "lit"): [wrong + place] * 12})
+            parts.append(APart({"frames": frames, "regions": lit}, f"{place}", f"d{place}"))
+        return Side(str(wrong), parts)
+
+    (row,) = compare([a_result(20), a_result(30)], SETTINGS).regions
+    assert (row.frames, row.difference.unit, row.difference.units) == (72, "drives", 6)
+    assert (row.base, row.difference.mean) == (pytest.approx(0.225), pytest.approx(0.1))
 
 
 def test_a_region_of_other_pixels_is_left_out():

@@ -4,16 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from roadeval.evaluation.comparison import (
-    Disagreement,
-    LogUnknown,
-    MovedFrame,
-    SettingsDiffer,
-    compare,
-)
+from roadeval.evaluation.comparison import compare
 from roadeval.evaluation.conditions import Condition, judge
-from roadeval.evaluation.pairing import Side
+from roadeval.evaluation.pairing import Kind, Note, Side
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.where import Disagreement, MovedFrame
 from roadeval.report.blocks import BulletList, Cell, Figure, Heading, Table, Text
 from roadeval.report.chart import Chart, ChartKind, Series, looks
 from roadeval.report.comparison import document, markdown
@@ -29,13 +24,14 @@ LIMITS = tuple(
     for text in ("post.filtered.ERR > 1pp", "post.filtered.FPR > 50%")
 )
 FAILED, KEPT = map(judged, LIMITS)
+PRESETS = {"preset": ("paper", "gated")}
 
 
 def a_comparison(change=CHANGE, **more):
     known = {
         "changes": (change,),
         "moved": (MovedFrame("new|er", "filtered", 7, 0, 0.1, 0.4, 0.3),),
-        "notes": (LogUnknown("the <gap>"),),
+        "notes": (Note(Kind.LOG_UNKNOWN, "the <gap>"),),
     }
     return making.a_comparison(CHANGE, **known | more)
 
@@ -86,7 +82,7 @@ def test_a_rule_stands_where_another_result_begins_and_its_name_only_where_it_is
 
 
 def test_it_opens_with_the_changed_settings():
-    changed = (SettingsDiffer("base", "new|er", {"preset": ("paper", "gated")}),)
+    changed = (Note(Kind.SETTINGS, "base", "new|er", settings=PRESETS),)
     comparison = a_comparison(changed_settings=changed)
     first, second = (note.text for note in blocks(Text, comparison)[:2])
     assert first == "Changed settings: preset paper to gated."
@@ -108,7 +104,7 @@ def test_different_drives_are_laid_side_by_side():
         "FNR": "11.20",
         "IoU": "11.20",
     }
-    assert table.text_columns == range(3)
+    assert table.text_columns == [0, 1, 2]
     words = text(pdf(document(comparison, (), [])))
     assert "Different drives, side by side: no difference is given." in words
     assert "11.20" in words

@@ -4,23 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.evaluation.comparison import (
-    DriveChange,
-    DrivesDiffer,
-    FramesLeftOut,
-    LogUnknown,
-    SameLogs,
-    SettingsDiffer,
-    TruthDiffers,
-    VariantLeftOut,
-)
+from roadeval.evaluation.comparison import DriveChange
 from roadeval.evaluation.conditions import Condition
-from roadeval.evaluation.pairing import Because, LeftOut
+from roadeval.evaluation.pairing import Kind, Note
 from roadeval.results.comparison import as_dict, changed_settings, judged, verdict, warnings, where
 from roadeval.results.sentences import sentence
 from tests.evaluation.making import a_change, a_comparison, a_difference
 
 WORSE = a_difference(1.2, 0.5, 2)
+OF_THE_LOG = {"frames.scale": (1.0, 0.5), "labels.road": ([], [3])}
 
 
 def test_the_verdict_is_the_sentence_on_the_final_mask_and_leaves_the_baseline_out():
@@ -50,7 +42,7 @@ def test_of_different_drives_there_is_no_difference_to_tell():
 def test_changed_settings_are_told_of_each_result_and_some_of_many():
     chains = ["svm"], ["trees", "post"]
     settings = {"preset": ("paper", "gated"), "chain": chains, "svm.c": (1, 2)}
-    changed = (SettingsDiffer("base", "new", settings),)
+    changed = (Note(Kind.SETTINGS, "base", "new", settings=settings),)
     found = a_comparison(a_change(WORSE), changed_settings=changed)
     assert changed_settings(found) == [
         "Changed settings: preset paper to gated; chain svm to trees, post; svm.c 1 to 2."
@@ -78,36 +70,39 @@ def test_drives_that_changed_are_counted_by_direction():
     ("note", "told"),
     [
         (
-            FramesLeftOut("a", "b", 2),
+            Note(Kind.FRAMES, "a", "b", 2),
             "2 frames that a evaluated are left out against b, which lacks them or trained on them",
         ),
         (
-            SettingsDiffer("a", "b", {"frames.scale": (1.0, 0.5), "labels.road": ([], [3])}),
+            Note(Kind.SETTINGS, "a", "b", settings=OF_THE_LOG),
             "a and b were replayed with different settings (`frames.scale` 1 and 0.5, "
             "`labels.road` not given and 3): part of the change may be theirs",
         ),
         (
-            TruthDiffers("a", "b", 2, settings_differ=False),
+            Note(Kind.TRUTH, "a", "b", 2),
             "the truth differs on 2 frames between a and b (other labels or topics?): part of the "
             "change may be the truth's",
         ),
         (
-            TruthDiffers("a", "b", 2, settings_differ=True),
+            Note(Kind.TRUTH, "a", "b", 2, settings=OF_THE_LOG),
             "the truth differs on 2 frames between a and b: part of the change may be the truth's",
         ),
-        (VariantLeftOut("a", "b", "net"), "net is left out: a and b share no frame of it"),
         (
-            SameLogs("a", "b", 3),
+            Note(Kind.VARIANT, "a", "b", names=("net",)),
+            "net is left out: a and b share no frame of it",
+        ),
+        (
+            Note(Kind.SAME_LOGS, "a", "b", 3),
             "3 drives have other names in a and b, and are taken for the same by the SHA-256 of "
             "their logs",
         ),
         (
-            LeftOut("street", "a", "b", Because.ABSENT),
+            Note(Kind.ABSENT, "a", "b", 1, ("street",)),
             "1 drive is left out of a (not in b): street",
         ),
-        (LogUnknown("a"), "a does not say which log it is of: nothing is subtracted"),
+        (Note(Kind.LOG_UNKNOWN, "a"), "a does not say which log it is of: nothing is subtracted"),
         (
-            DrivesDiffer("a", "b"),
+            Note(Kind.OTHER_DRIVES, "a", "b"),
             "a and b are of different drives: side by side only, for a difference would mix the "
             "scene with the method",
         ),
@@ -117,14 +112,17 @@ def test_each_note_is_told(note, told):
     assert warnings(a_comparison(notes=(note,))) == [told]
 
 
-def test_drives_left_out_for_one_reason_are_told_together_and_five_are_named():
-    notes = [LeftOut(f"d{place}", "a", "b", Because.UNSCORED) for place in range(7)]
-    notes.append(LeftOut("other", "a", "b", Because.OTHER_LOG))
-    assert warnings(a_comparison(notes=(*notes, LogUnknown("a")))) == [
-        "7 drives are left out of a (not scored in both): d0, d1, d2, d3, d4 and 2 more",
-        "1 drive is left out of a (of another log in b): other",
-        "a does not say which log it is of: nothing is subtracted",
+def test_five_of_the_drives_left_out_for_a_reason_are_named():
+    note = Note(Kind.UNSCORED, "a", "b", 7, tuple(f"d{place}" for place in range(7)))
+    assert warnings(a_comparison(notes=(note,))) == [
+        "7 drives are left out of a (not scored in both): d0, d1, d2, d3, d4 and 2 more"
     ]
+
+
+@pytest.mark.parametrize("kind", Kind)
+def test_every_kind_of_note_has_its_sentence(kind):
+    (told,) = warnings(a_comparison(notes=(Note(kind, "one", "other", 1, ("name",)),)))
+    assert "one" in told
 
 
 @pytest.mark.parametrize(
@@ -147,13 +145,12 @@ def test_a_judged_condition_is_told_with_the_numbers_that_it_rests_on(text, told
 
 def test_the_file_holds_the_facts_beside_the_sentences():
     change = a_change(WORSE)
-    found = a_comparison(change, notes=(FramesLeftOut("base", "new", 2),))
+    found = a_comparison(change, notes=(Note(Kind.FRAMES, "base", "new", 2),))
     judgements = [Condition.parse("post.filtered.ERR > 1pp surely").judge(change)]
     content = as_dict(found, judgements)
     assert content["verdict"] == verdict(found)
-    assert content["notes"] == [
-        {"kind": "FramesLeftOut", "result": "base", "other": "new", "frames": 2}
-    ]
+    (note,) = content["notes"]
+    assert (note["kind"], note["result"], note["other"]) == ("frames", "base", "new")
     assert content["warnings"] == warnings(found)
     (condition,) = content["conditions"]
     assert condition.pop("sentence") == judged(judgements[0])

@@ -5,8 +5,9 @@ import io
 from rich.console import Console
 
 from roadeval.cli.screens.compare import DRIVES, show
-from roadeval.evaluation.comparison import DriveChange, SettingsDiffer
+from roadeval.evaluation.comparison import DriveChange
 from roadeval.evaluation.conditions import Condition
+from roadeval.evaluation.pairing import Kind, Note
 from tests.evaluation.making import a_change, a_comparison, a_difference
 
 FEW = a_difference(1)
@@ -32,7 +33,7 @@ def test_the_variants_of_a_single_result_stand_together():
 
 
 def test_the_screen_begins_with_the_changed_settings_and_ends_with_the_verdict():
-    changed = (SettingsDiffer("base", "new", {"preset": ("paper", "gated")}),)
+    changed = (Note(Kind.SETTINGS, "base", "new", settings={"preset": ("paper", "gated")}),)
     told = shown(a_change(SURE), changed_settings=changed)
     assert told.startswith("Changed settings: preset paper to gated.\nnew against base\n")
     assert told.endswith("on frames \nlike these by 1.0 to 2.0 pp.\n")
