@@ -30,7 +30,13 @@ from roadeval.evaluation import counts, maps, metrics, regions
 from roadeval.evaluation.edges_and_flicker import boundary_f
 from roadeval.evaluation.maps import Name
 from roadeval.evaluation.region import LabelledFrame
-from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.settings import (
+    DEGRADED_ERR,
+    DEGRADED_MARGIN,
+    FAILED_ERR,
+    FAILED_FNR,
+    EvaluationSettings,
+)
 from roadeval.evaluation.thresholds import histogram
 
 K = TypeVar("K", str, int)
@@ -81,7 +87,7 @@ def score_frame(
         variants,
         errors={v.variant: counts.error_map(v.final(), frame.truth) for v in variants},
         tallies=tallies,
-        health={name: judge(own, blind, settings) for name, own in finals.items()},
+        health={name: judge(own, blind) for name, own in finals.items()},
         truth_bits=truth,
         changes=maps.changes(list(masks), bits, truth),
         contours=boundary_f(final_bits, truth, settings.boundary_width),
@@ -167,16 +173,16 @@ def _masks(
 Rates = Mapping[str, float]
 
 
-def judge(rates: Rates, blind: Rates | None, settings: EvaluationSettings) -> Health:
+def judge(rates: Rates, blind: Rates | None) -> Health:
     """Return a variant's health by its final mask's rates and the baseline's, if there is one.
 
     An undefined rate counts neither for nor against it. The thresholds and their reasons stand in
-    `EvaluationSettings`.
+    `roadeval.evaluation.settings`.
     """
-    if rates["ERR"] >= settings.failed_err or rates["FNR"] >= settings.failed_fnr:
+    if rates["ERR"] >= FAILED_ERR or rates["FNR"] >= FAILED_FNR:
         return Health.FAILED
-    worse = blind is not None and rates["ERR"] - blind["ERR"] > settings.degraded_margin
-    if worse or rates["ERR"] >= settings.degraded_err:
+    worse = blind is not None and rates["ERR"] - blind["ERR"] > DEGRADED_MARGIN
+    if worse or rates["ERR"] >= DEGRADED_ERR:
         return Health.DEGRADED
     return Health.OK
 

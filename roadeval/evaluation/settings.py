@@ -2,12 +2,26 @@
 
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 from roadeval.errors import RoadevalError
+
+FAILED_ERR: Final = 0.25
+"""A frame with at least this ERR has failed: a quarter of its pixels are wrong."""
+FAILED_FNR: Final = 0.9
+"""A frame with at least this FNR has failed, however little road there is: next to nothing of the
+road was found."""
+DEGRADED_ERR: Final = 0.15
+"""A frame with at least this ERR is degraded. The ``blind`` baseline makes about half of it on an
+ordinary street."""
+DEGRADED_MARGIN: Final = 0.02
+"""A frame whose ERR exceeds that of ``blind`` by more than this is degraded too: there, not looking
+at the image would have been better."""
+NOTEWORTHY: Final = 0.05
+"""The least change of ERR by the filter, or excess over ``blind``, that is noted."""
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid"))
@@ -21,19 +35,6 @@ class EvaluationSettings:
     place an edge with a few pixels of freedom, so errors there mean less."""
     bands: Annotated[int, Field(ge=1, le=50)] = 5
     """Equal stripes of image rows, ``band_0`` at the top: how far away an error lies."""
-    failed_err: Annotated[float, Field(gt=0, le=1)] = 0.25
-    """A frame with at least this ERR has failed: a quarter of its pixels are wrong."""
-    failed_fnr: Annotated[float, Field(gt=0, le=1)] = 0.9
-    """A frame with at least this FNR has failed, however little road there is: next to nothing of
-    the road was found."""
-    degraded_err: Annotated[float, Field(gt=0, le=1)] = 0.15
-    """A frame with at least this ERR is degraded. The ``blind`` baseline makes about half of it on
-    an ordinary street."""
-    degraded_margin: Annotated[float, Field(ge=0, le=1)] = 0.02
-    """A frame whose ERR exceeds that of ``blind`` by more than this is degraded too: there, not
-    looking at the image would have been better."""
-    noteworthy: Annotated[float, Field(ge=0, le=1)] = 0.05
-    """The least change of ERR by the filter, or excess over ``blind``, that is noted."""
     confidence: Annotated[float, Field(gt=0.5, lt=1)] = 0.95
     """Of the interval around a difference."""
     least_frames: Annotated[int, Field(ge=4, le=1_000_000_000)] = 10

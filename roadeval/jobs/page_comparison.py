@@ -15,6 +15,7 @@ from roadeval.evaluation import scored
 from roadeval.evaluation.comparison import Comparison
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.pairing import Side
+from roadeval.evaluation.settings import NOTEWORTHY
 from roadeval.jobs.page_frames import BYTES, PICTURED, fitting
 from roadeval.jobs.report_frames import rates_by_frame
 from roadeval.jobs.result import DriveResult
@@ -76,7 +77,7 @@ def browsed(
     masks = [mask for mask in masks if mask.name in table.distinct("variant")]
     if not masks:
         return None
-    facts = list(_facts(table, masks, comparison.settings.noteworthy))
+    facts = list(_facts(table, masks))
     album = _Album(masks, recordings, facts, inspect)
     wanted = dict.fromkeys(
         [each.frame for each in comparison.moved]
@@ -138,14 +139,14 @@ def table_of(masks: Sequence[ComparedMask], frames: Mapping[str, Rows]) -> Rows:
     return whole.take(np.argsort(whole["frame"], kind="stable"))
 
 
-def _facts(table: Rows, masks: Sequence[ComparedMask], noteworthy: float) -> Iterator[FrameFacts]:
+def _facts(table: Rows, masks: Sequence[ComparedMask]) -> Iterator[FrameFacts]:
     """Yield each frame with the masks' rates, and whether the first of them got worse or better."""
     base, new = masks[0].name, masks[1].name
     for frame, stamp, rates in rates_by_frame(table, [*SHORT]):
         said = []
         if base in rates and new in rates:
             change = rates[new]["ERR"] - rates[base]["ERR"]
-            if abs(change) >= noteworthy:
+            if abs(change) >= NOTEWORTHY:
                 said = [f"{new} {'worse' if change > 0 else 'better'}"]
         yield FrameFacts(frame, stamp, rates, said)
 

@@ -11,7 +11,7 @@ from roadeval.data import BASELINE, FILTERED, UNFILTERED, Health
 from roadeval.evaluation import analysis, scored
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.score import judge
-from roadeval.evaluation.settings import EvaluationSettings, settings_of
+from roadeval.evaluation.settings import NOTEWORTHY
 from roadeval.jobs.report_frames import LAYERS, FramePicker, evenly, rates_by_frame
 from roadeval.jobs.result import DriveResult
 from roadeval.report.browse import Strip
@@ -59,7 +59,6 @@ def facts_of(result: DriveResult) -> Iterator[FrameFacts]:
         stamps = result.recording.stamps if result.recording else {}
         yield from (FrameFacts(number, stamps[number], {}) for number in result.pictured)
         return
-    settings = settings_of(result.summary)
     dark = _much_shadow(result)
     for frame, stamp, rates in rates_by_frame(scored.finals(frames), [*SHORT]):
         blind = rates.get(BASELINE)
@@ -68,8 +67,8 @@ def facts_of(result: DriveResult) -> Iterator[FrameFacts]:
             frame,
             stamp,
             rates,
-            [*_conditions(others, blind, settings), *(["much shadow"] if frame in dark else [])],
-            notes({name: _with_mirrors(each) for name, each in others.items()}, blind, settings),
+            [*_conditions(others, blind), *(["much shadow"] if frame in dark else [])],
+            [*notes({name: _with_mirrors(each) for name, each in others.items()}, blind)],
         )
 
 
@@ -80,18 +79,17 @@ def _with_mirrors(rates: Mapping[str, float]) -> dict[str, float]:
 def _conditions(
     rates: Mapping[str, Mapping[str, float]],
     blind: Mapping[str, float] | None,
-    settings: EvaluationSettings,
 ) -> Iterator[str]:
     """Yield what is true of a frame, in words: the first variant's health, and the filter."""
     first = next(iter(rates), None)
     if first is None:
         return
-    health = judge(rates[first], blind, settings)
+    health = judge(rates[first], blind)
     if health is not Health.OK:
         yield f"{first} {health}"
     if FILTERED in rates and UNFILTERED in rates:
         change = rates[FILTERED]["ERR"] - rates[UNFILTERED]["ERR"]
-        if abs(change) >= settings.noteworthy:
+        if abs(change) >= NOTEWORTHY:
             yield "the filter harms" if change > 0 else "the filter helps"
     if blind is not None and rates[first]["ERR"] > blind["ERR"]:
         yield f"{first} worse than {BASELINE}"

@@ -94,7 +94,7 @@ def _process(
         for name, mask in frame.external.items()
     ]
     result = run.board.score(frame, use.role, tuple(variants))
-    result = replace(result, notes=notes.of_tallies(result.tallies, run.config.evaluation))
+    result = replace(result, notes=notes.of_tallies(result.tallies))
     own = csv_lines(run.key, frame_rows(result))
     encoded = encoder.encode(result, position - 1, own)
     # Results wait for their turn, and would wait with some 15 bytes a pixel.

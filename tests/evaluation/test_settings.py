@@ -12,7 +12,7 @@ def test_settings_of_another_version_are_read_as_far_as_they_are_known():
     assert settings_of({}) == EvaluationSettings()
 
 
-@pytest.mark.parametrize("given", [{"failed_err": 2}, {"window": None}, 5, None])
+@pytest.mark.parametrize("given", [{"confidence": 2}, {"window": None}, 5, None])
 def test_damaged_settings_of_a_summary_are_told(given):
     with pytest.raises(RoadevalError, match=r"`run.evaluation` is not what it must be"):
         settings_of({"run": {"evaluation": given}})

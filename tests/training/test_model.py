@@ -79,7 +79,7 @@ def test_settings_of_stages_that_learn_nothing_do_not_matter(path):
     ("name", "stage", "setting"),
     [
         ("paper", "svm", {"threshold": 0.3}),
-        ("paper", "similarity", {"quantile": 0.5, "ridge": 4.0}),
+        ("paper", "similarity", {"quantile": 0.5}),
         ("robust", "trees", {"threshold": 0.3}),
     ],
 )

@@ -16,7 +16,7 @@ from typing import Annotated, Final, Literal
 import cv2
 import numpy as np
 import numpy.typing as npt
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Mask, Rgb
@@ -24,7 +24,8 @@ from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View
 
 EXPOSED: Final = LayerSpec("exposed", LayerKind.RGB, "Exposure by the reference patch", exact=False)
-Gain = Annotated[float, Field(gt=0, le=255)]
+GAINS: Final = (0.25, 6.0)
+"""Lowest and highest gain: a white or a black patch says nothing about the light."""
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
@@ -36,18 +37,8 @@ class ExposureSettings:
     channels: Literal["each", "alike"] = "each"
     """``each`` channel gets a gain of its own, so that the road turns grey under any light and
     camera; ``alike``: all get the one of the brightness."""
-    least: Gain = 0.25
-    """Lowest gain: a white patch says nothing about the light."""
-    greatest: Gain = 6.0
-    """Highest gain: a black patch says nothing about the light."""
     patch: ReferencePatch = ReferencePatch()
     """The reference patch."""
-
-    @model_validator(mode="after")
-    def _ordered(self) -> ExposureSettings:
-        if self.least > self.greatest:
-            raise ValueError("least must not be above greatest")
-        return self
 
 
 def gains(image: Rgb, settings: ExposureSettings) -> npt.NDArray[np.float64]:
@@ -58,7 +49,7 @@ def gains(image: Rgb, settings: ExposureSettings) -> npt.NDArray[np.float64]:
     if settings.channels == "alike":
         medians = np.full(3, medians.mean())
     gain = settings.level / np.maximum(medians, 1.0)
-    return np.asarray(np.clip(gain, settings.least, settings.greatest))
+    return np.asarray(np.clip(gain, *GAINS))
 
 
 @lru_cache(maxsize=16)

@@ -60,6 +60,14 @@ LEAST: Final = 30
 """Candidates of either kind, of those sampled, that there must be to learn from."""
 NOTHING: Final = -20.0
 """The log-odds of every candidate where there was too little to learn from."""
+PLANES: Final = 128
+"""Planes of the feature map on which the odds are learnt. What a frame costs grows with them."""
+PENALTY: Final = 0.01
+"""Of the squared weights, a training pixel."""
+GREATEST_GAIN: Final = 8.0
+"""Greatest gain of a channel."""
+SOFTNESS: Final = 3
+"""Side of the square that the gains are averaged over, so that edges stay soft."""
 _ROUNDS: Final = 25
 EDGE: Final = 2
 """Pixels of the working image beside the shadow that are neither it nor lit."""
@@ -94,11 +102,6 @@ class GatedSettings:
     place: Share = 0.05
     """Candidates lie where at least this share of the training pixels is road: sky, trees and
     houses are elsewhere."""
-    planes: Annotated[int, Field(ge=1, le=4096)] = 128
-    """Planes of the feature map on which the odds are learnt. What a frame costs grows with them.
-    """
-    penalty: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.01
-    """Of the squared weights, a training pixel."""
     odds: Annotated[float, Field(gt=0, le=1e6)] = 0.1
     """Factor of the odds that a candidate is shaded road. The more, the more dark road comes back,
     and the more is brightened that is none. A classifier on colours takes all of that for road,
@@ -108,10 +111,6 @@ class GatedSettings:
     window: Annotated[int, Field(ge=1, le=99)] = 1
     """Side of the square over which a candidate's own colour is averaged: texture finer than it
     stays."""
-    greatest: Annotated[float, Field(ge=1, le=255)] = 8.0
-    """Greatest gain of a channel."""
-    softness: Annotated[int, Field(ge=1, le=99)] = 3
-    """Side of the square that the gains are averaged over, so that edges stay soft."""
 
 
 # --- Dark pixels where road may be ----------------------------------------------------------------
@@ -235,9 +234,9 @@ def fit(sample: TrainingSet, settings: GatedSettings) -> ShadedRoad:
     if min(road.sum(), (~road).sum()) < LEAST:
         none = np.zeros((1, FEATURES), np.float32)
         return ShadedRoad(place, none, none[:, 0], none[:, 0], NOTHING)
-    planes, bias = draw_planes(values, settings.planes, sample.seed)
+    planes, bias = draw_planes(values, PLANES, sample.seed)
     mapped = np.maximum(values @ planes.T + bias, 0).astype(np.float64)
-    weights, offset = logistic(mapped, road, settings.penalty)
+    weights, offset = logistic(mapped, road, PENALTY)
     return ShadedRoad(place, planes, bias, weights.astype(np.float32), offset)
 
 
@@ -353,17 +352,16 @@ def gains(seen: Look, shaded: Values, settings: GatedSettings) -> Values:
 
     It is ``(L / S)^p``: L is the mean colour of lit road, S that of the candidates around the
     pixel, and p the probability that it is road in the shade. L / S is the ratio of illumination
-    if it is. No gain is less than 1 or more than ``greatest``; averaged over a square in the end.
+    if it is. No gain is less than 1 or more than `GREATEST_GAIN`. In the end they are averaged over
+    a square.
     """
     dark = seen.candidates.astype(np.float32)
     side = (settings.window, settings.window)
     around = cv2.blur(seen.image.astype(np.float32) * dark[..., None], side)
     own = around / np.maximum(cv2.blur(dark, side), 1e-6)[..., None]
     ratio = np.log((seen.lit + OFFSET).astype(np.float32)) - np.log(own + OFFSET)
-    np.clip(ratio, 0, np.log(settings.greatest), out=ratio)
-    soft: Values = cv2.blur(
-        np.exp(ratio * shaded[..., None]), (settings.softness, settings.softness)
-    )
+    np.clip(ratio, 0, np.log(GREATEST_GAIN), out=ratio)
+    soft: Values = cv2.blur(np.exp(ratio * shaded[..., None]), (SOFTNESS, SOFTNESS))
     return soft
 
 
@@ -454,13 +452,13 @@ def _masks(seen: Look, shaded: Values) -> dict[str, Mask]:
     }
 
 
-def layers(settings: GatedSettings) -> tuple[LayerSpec, ...]:
+def layers(_settings: GatedSettings) -> tuple[LayerSpec, ...]:
     """Return the layers of the filter, in the order of its steps."""
     gain = LayerSpec(
         "gain",
         LayerKind.SCALAR,
         "Greatest gain of a channel",
-        value_range=(1.0, settings.greatest),
+        value_range=(1.0, GREATEST_GAIN),
         exact=False,
     )
     return CANDIDATES, SHADED, SHADOW, gain, COMPENSATED

@@ -57,6 +57,10 @@ FULL: Final = 65535
 """The code of probability 1."""
 IN_LIGHT, IN_SHADE = 2 / 3, 1 / 3
 """The network's weight."""
+RATE: Final = 0.1
+"""Share of what is left to mend that a tree mends."""
+SHARE: Final = 0.33
+"""Of the features, drawn anew for each node, among which it chooses."""
 FARTHEST: Final = 3.0
 """Of the distances from the patch as they are shown."""
 
@@ -87,12 +91,8 @@ class TreesSettings:
     """How many. What a decision costs grows with them."""
     leaves: Annotated[int, Field(ge=2, le=LEAVES)] = 31
     """Of a tree, at most."""
-    rate: Annotated[float, Field(gt=0, le=1)] = 0.1
-    """Share of what is left to mend that a tree mends."""
     least: Annotated[int, Field(ge=1, le=10_000)] = 50
     """Training pixels of a leaf, mirrored ones included, at least."""
-    share: Annotated[float, Field(gt=0, le=1)] = 0.33
-    """Of the features, drawn anew for each node, among which it chooses."""
     hidden: Annotated[int, Field(ge=1, le=1024)] = 64
     """Planes of the network. What a decision costs grows with them, too."""
     passes: Annotated[int, Field(ge=1, le=1000)] = 12
@@ -212,7 +212,7 @@ def _grown(values: Values, sample: TrainingSet, settings: TreesSettings) -> Blen
     road = np.concatenate([sample.road, sample.road])
     weights = None if sample.share is None else balanced_back(road, sample.share)
     s, seed = settings, sample.seed
-    growth = Growth(s.trees, s.leaves, s.rate, s.least, s.share)
+    growth = Growth(s.trees, s.leaves, RATE, s.least, SHARE)
     forest = grow(values, road, weights, growth, seed)
     network = train(values, road, weights, seed, planes=s.hidden, passes=s.passes, noise=s.noise)
     return Blend(forest, network)

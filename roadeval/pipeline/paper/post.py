@@ -21,6 +21,9 @@ from roadeval.kernels import KERNELS
 from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View
 
+LINE: Final = 3
+"""Side of the square that erodes the result for its boundary (Eq. 22), which gives a line one pixel
+wide."""
 POST: Final = mask_spec("post", "Road (Eq. 17-23)")
 BOUNDARY: Final = LayerSpec(
     "boundary",
@@ -32,14 +35,12 @@ BOUNDARY: Final = LayerSpec(
     ),
 )
 
-Odd = Annotated[int, Field(ge=1, le=999)]
-
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class PostSettings:
     """Settings of phase 4."""
 
-    element: Odd | None = None
+    element: Annotated[int, Field(ge=1, le=999)] | None = None
     """Side of the structuring element B in pixels, odd; none: the odd number nearest to 1 % of the
     image's width, at least 3."""
     shape: Literal["square", "ellipse"] = "square"
@@ -55,13 +56,10 @@ class PostSettings:
     patch before the vehicle (``patch``; the largest where none has any), or ``all`` of them."""
     fill: bool = True
     """Whether the holes of what is kept are filled (Eq. 23)."""
-    boundary_element: Odd = 3
-    """Side of the square that erodes the result for its boundary (Eq. 22); 3 gives a line one pixel
-    wide."""
     patch: ReferencePatch = ReferencePatch()
     """The reference patch."""
 
-    @field_validator("element", "boundary_element")
+    @field_validator("element")
     @classmethod
     def _odd(cls, side: int | None) -> int | None:
         if side is not None and side % 2 == 0:
@@ -155,7 +153,7 @@ def post_process(mask: Packed, settings: PostSettings) -> Packed:
 
 def bind(settings: PostSettings, _parameters: None) -> Callable[[View], Output]:
     """Return phase 4 as a pure function of the mask before it."""
-    edge = structuring_element(settings.boundary_element, "square")
+    edge = structuring_element(LINE, "square")
 
     def run(view: View) -> Output:
         if view.mask is None:

@@ -18,6 +18,10 @@ from roadeval.pipeline.parameters import check_arrays, check_covariance, check_r
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
 from roadeval.runtime.extensions import special
 
+RIDGE: Final = 1.0
+"""Added to the covariance's diagonal, in squared grey levels: a grey camera's covariance is
+singular. 1 is about the variance that 8-bit JPEG coding alone adds; much below 0.001 a singular
+covariance's inverse is lost in rounding."""
 SIMILARITY: Final = mask_spec("similarity", "Similar to road (Eq. 2)")
 
 
@@ -28,10 +32,6 @@ class SimilaritySettings:
     quantile: Annotated[float, Field(gt=0, lt=1)] = 0.95
     """A pixel is road where ``d^2`` is at most this quantile of the chi-squared distribution with 3
     degrees of freedom: the share of normally distributed road colours kept."""
-    ridge: Annotated[float, Field(ge=1e-3, allow_inf_nan=False)] = 1.0
-    """Added to the covariance's diagonal, in squared grey levels: a grey camera's covariance is
-    singular. 1 is about the variance that 8-bit JPEG coding alone adds; much below 0.001 a
-    singular covariance's inverse is lost in rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +78,7 @@ def bind(settings: SimilaritySettings, road: RoadColour) -> Callable[[View], Out
     ``d = sqrt((x - m)^T S^-1 (x - m))`` with S regularised. The printed Eq. 2 is no distance
     (its brackets are misplaced).
     """
-    factors = whitening(road.covariance + settings.ridge * np.eye(3))
+    factors = whitening(road.covariance + RIDGE * np.eye(3))
     greatest = limit(settings.quantile)
     spec = _distance(settings)
 
@@ -110,5 +110,5 @@ STAGE: Final = Stage(
     layers=layers,
     fit=fit,
     parameters=RoadColour,
-    inference_only=("quantile", "ridge"),
+    inference_only=("quantile",),
 )

@@ -48,8 +48,6 @@ class SvmSettings:
     solution for classes that overlap."""
     gamma: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.5
     """Width of the RBF kernel ``exp(-gamma |x - y|^2)``, in standardised colours."""
-    standardise: bool = True
-    """Whether colours are brought to mean 0 and deviation 1 over the training set."""
     threshold: Annotated[float, Field(allow_inf_nan=False)] = 0.0
     """A pixel is road where the decision function is above this."""
 
@@ -83,12 +81,13 @@ class SupportVectors:
 
 
 def fit(sample: TrainingSet, settings: SvmSettings) -> SupportVectors:
-    """Solve the dual (Eq. 14) for the training set's colours with scikit-learn's libsvm."""
+    """Solve the dual (Eq. 14) for the training set's colours with scikit-learn's libsvm.
+
+    Colours are brought to mean 0 and deviation 1 over the training set.
+    """
     colours = sample.colours().astype(np.float64)
-    mean, scale = np.zeros(3), np.ones(3)
-    if settings.standardise:
-        mean, scale = colours.mean(axis=0), colours.std(axis=0)
-        scale = np.where(scale > 0, scale, 1.0)
+    mean, scale = colours.mean(axis=0), colours.std(axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
     features = (colours - mean) / scale
     try:
         solution = _by_libsvm(features, sample.road, settings)

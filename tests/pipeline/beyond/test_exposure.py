@@ -56,9 +56,9 @@ def test_the_median_is_what_counts_not_what_stands_on_the_road():
     assert run(image).facts["red_gain"] == 2.0
 
 
-@pytest.mark.parametrize(("grey", "gain"), [(0, 6.0), (1, 6.0), (255, 0.5)])
+@pytest.mark.parametrize(("grey", "gain"), [(0, 6.0), (1, 6.0), (255, 0.25)])
 def test_gains_are_bounded(grey, gain):
-    assert run(scene((grey,) * 3), least=0.5).facts["red_gain"] == gain
+    assert run(scene((grey,) * 3), level=48.0).facts["red_gain"] == gain
 
 
 def test_the_same_scene_under_another_exposure_gives_nearly_the_same_image():
@@ -71,12 +71,6 @@ def test_the_same_scene_under_another_exposure_gives_nearly_the_same_image():
 
 def test_one_pixel_is_its_own_patch():
     assert run(np.full((1, 1, 3), 48, np.uint8)).image.tolist() == [[[96, 96, 96]]]
-
-
-def test_bounds_out_of_order_are_refused():
-    with pytest.raises(ValueError, match="least must not be above greatest"):
-        ExposureSettings(least=3.0, greatest=2.0)
-    assert ExposureSettings(least=2.0, greatest=2.0).least == 2.0
 
 
 def test_it_prepares_the_image_in_every_variant_and_makes_no_mask():

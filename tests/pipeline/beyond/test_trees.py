@@ -58,10 +58,10 @@ def test_the_arrays_say_what_scikit_learns_trees_say(leaves, weighted):
     values, road = features_and_road(count=1000)
     values = values.round(1)  # so few that scikit-learn's own bins are the same in each version
     weights = balanced_back(road, 0.2) if weighted else None
-    growth = Growth(SMALL.trees, leaves, SMALL.rate, SMALL.least, share=1.0)
+    growth = Growth(SMALL.trees, leaves, trees.RATE, SMALL.least, share=1.0)
     found = grow(values, road, weights, growth, 0).sums(np.ascontiguousarray(values.T))
     boosting = HistGradientBoostingClassifier(
-        learning_rate=SMALL.rate,
+        learning_rate=trees.RATE,
         max_iter=SMALL.trees,
         max_leaf_nodes=leaves,
         min_samples_leaf=SMALL.least,

@@ -277,10 +277,9 @@ def test_every_step_can_be_left_out():
         np.testing.assert_array_equal(post_process(road, **nothing | step), expected)
 
 
-@pytest.mark.parametrize("key", ["element", "boundary_element"])
-def test_an_even_side_is_refused(key):
+def test_an_even_side_is_refused():
     with pytest.raises(ValueError, match="must be odd"):
-        PostSettings(**{key: 4})
+        PostSettings(element=4)
 
 
 def test_the_boundary_layer_is_of_the_result():
@@ -302,12 +301,3 @@ def test_opencvs_own_border_would_differ():
     road = np.ones((4, 4), np.uint8)
     assert cv2.erode(road, np.ones((3, 3), np.uint8)).all()
     assert erode(road, post.structuring_element(3, "square")).sum() == 4
-
-
-def test_the_boundarys_width_is_a_setting():
-    road = (np.random.default_rng(2).random((30, 40)) > 0.01).astype(np.uint8)
-    output = post.bind(PostSettings(boundary_element=7), None)(seen(road))
-    layers = {layer.spec.name: layer.array for layer in output.layers}
-    expected = boundary(layers["post"], post.structuring_element(7, "square"))
-    assert expected.sum() > boundary(layers["post"], np.array([1, 1])).sum()
-    np.testing.assert_array_equal(layers["boundary"], expected)

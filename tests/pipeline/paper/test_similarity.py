@@ -8,11 +8,9 @@ from scipy.stats import chi2
 from sklearn.covariance import EmpiricalCovariance
 
 from roadeval.pipeline.paper import similarity
-from roadeval.pipeline.paper.similarity import RoadColour, SimilaritySettings
+from roadeval.pipeline.paper.similarity import RIDGE, RoadColour, SimilaritySettings
 from roadeval.pipeline.stage import TrainingSet, View
 from tests.pipeline.images import IMAGES, noise
-
-RIDGE = SimilaritySettings().ridge
 
 
 def sample(colours, road):
@@ -108,10 +106,11 @@ def test_a_road_of_a_single_colour_has_the_ridge_for_its_covariance(colours):
     assert mask.tolist() == [[1, 1, 0]]
 
 
-def test_a_grey_cameras_singular_covariance_still_has_distances():
+def test_a_grey_cameras_singular_covariance_still_has_distances(monkeypatch):
+    monkeypatch.setattr(similarity, "RIDGE", 1e-3)
     grey = np.repeat(np.arange(60, 200, dtype=np.uint8)[:, None], 3, axis=1)
-    road = similarity.fit(sample(grey, np.full(len(grey), True)), SimilaritySettings(ridge=1e-3))
-    distance, _ = run(grey[None], road, SimilaritySettings(ridge=1e-3))
+    road = similarity.fit(sample(grey, np.full(len(grey), True)), SimilaritySettings())
+    distance, _ = run(grey[None], road, SimilaritySettings())
     levels = grey[:, 0] - grey[:, 0].mean()
     np.testing.assert_allclose(distance[0], np.abs(levels) / grey[:, 0].std(), rtol=1e-4)
 
