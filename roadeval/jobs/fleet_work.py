@@ -48,7 +48,7 @@ from roadeval.runtime.claims import alone
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import own_names, put
 from roadeval.training import TrainingError, learning, save_model
-from roadeval.training.held import HeldFrames
+from roadeval.training.learning import HeldFrames
 
 MODELS: Final = "models"
 TRAINING_DRIVES: Final = 20

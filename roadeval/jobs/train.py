@@ -13,7 +13,7 @@ from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.runtime.paths import AnyPath, Paths, listed
 from roadeval.training import Model, TrainingError, learning, save_model
-from roadeval.training.held import HeldFrames
+from roadeval.training.learning import HeldFrames
 
 
 def train(

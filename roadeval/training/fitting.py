@@ -5,26 +5,31 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import IGNORE, ROAD, Frame, Rgb, Truth
+from roadeval.data import IGNORE, NON_ROAD, ROAD, Frame, Rgb, Truth
 from roadeval.errors import RoadevalError
+from roadeval.pipeline.beyond.exposure import ExposureSettings, expose, gains
+from roadeval.pipeline.beyond.features import reach
+from roadeval.pipeline.beyond.scene import scene_of, stretched
 from roadeval.pipeline.chain import Pipeline
+from roadeval.pipeline.reference_patch import patch_mask
 from roadeval.pipeline.stage import StageError, TrainingSet, View
 from roadeval.runtime.threads import ordered
-from roadeval.training.likeness import fingerprint
 from roadeval.training.model import Model
-from roadeval.training.sampling import sample
-from roadeval.training.selfsupervision import patch_truth
+from roadeval.training.schedule import fingerprint
 from roadeval.training.settings import TrainingSettings
 
 COLLAPSED: Final = 0.001
 """A classifier that calls less than this share of its training frames road, or more than the
 rest of it, has collapsed."""
+WIDTH: Final = 160
+"""Columns of the working image on which paths are sought from the reference patch."""
 _AT_ONCE: Final = 2
 """Variants that are fitted together; each holds its filtered images meanwhile."""
 
@@ -167,3 +172,69 @@ def _collapsed(
         for name, share in ((name, float(np.mean(values))) for name, values in shares.items())
         if not COLLAPSED <= share <= 1 - COLLAPSED
     ]
+
+
+Indices = npt.NDArray[np.intp]
+
+
+# --- Which pixels train ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pixels:
+    """Where the sampled pixels lie, ``(n,)`` each, and which are road, ``(n,)`` bool."""
+
+    frame: Indices
+    row: Indices
+    column: Indices
+    road: npt.NDArray[np.bool_]
+
+
+def sample(truths: Sequence[Truth], settings: TrainingSettings) -> Pixels:
+    """Draw pixels of both classes from the truths of the training frames.
+
+    Each frame gives at most ``pixels_per_class`` of either class; then the class that has more
+    is thinned to the size of the other, so that the sample is balanced however little road (or
+    sky) a frame shows. Ignored pixels are never drawn. The same truths and settings give the
+    same pixels.
+    """
+    rng = np.random.default_rng(settings.seed)
+    share = max(1, min(settings.pixels_per_class, settings.max_pixels // (2 * len(truths))))
+    classes = [_draw(truths, value, share, rng) for value in (ROAD, NON_ROAD)]
+    size = min(*(len(drawn) for drawn in classes), settings.max_pixels // 2)
+    road, other = (drawn[np.sort(rng.permutation(len(drawn))[:size])] for drawn in classes)
+    places = np.concatenate([road, other])
+    return Pixels(places[:, 0], places[:, 1], places[:, 2], np.arange(len(places)) < len(road))
+
+
+def _draw(
+    truths: Sequence[Truth], value: int, share: int, rng: np.random.Generator
+) -> npt.NDArray[np.intp]:
+    drawn = []
+    for index, truth in enumerate(truths):
+        flat = np.flatnonzero(truth == value)
+        chosen = rng.choice(flat, min(share, len(flat)), replace=False)
+        rows, columns = np.unravel_index(np.sort(chosen), truth.shape)
+        drawn.append(np.stack([np.full(len(chosen), index), rows, columns], axis=1))
+    return np.concatenate(drawn).astype(np.intp)
+
+
+# --- A truth for logs that have none --------------------------------------------------------------
+
+
+def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
+    """Guess the truth of an ``(H, W, 3)`` uint8 RGB image from its reference patch.
+
+    The ground right in front of a vehicle is road, and so is what can be reached from there without
+    crossing much of an edge, as a kerb, a wall or another vehicle has.
+    Road (1) is the patch, and what lies below the horizon row and nearer to it than
+    ``settings.far``, see `reach`; all else is not (0). The patch sets the exposure, whatever the
+    pipeline sees. Returns ``(H, W)`` uint8.
+    """
+    height, width = image.shape[:2]
+    exposure = ExposureSettings(patch=settings.patch)
+    exposed = expose(image, gains(image, exposure), exposure.level)
+    near = stretched(reach(scene_of(exposed, WIDTH, settings.patch)), image.shape) < settings.far
+    near[: round(settings.horizon * height)] = False
+    near |= patch_mask(height, width, settings.patch) > 0
+    return np.where(near, np.uint8(ROAD), np.uint8(NON_ROAD))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, get_args, get_type_hints
 from zipfile import ZipFile
 
 import numpy as np
@@ -23,20 +23,16 @@ from roadeval.pipeline.parameters import check_arrays, check_range
 from roadeval.pipeline.stage import Stage
 from roadeval.pipeline.stages import STAGES
 from roadeval.runtime.files import check_input, put
-from roadeval.training.arrays import arrays_of, from_arrays
-from roadeval.training.likeness import SIDE
+from roadeval.runtime.text import visible
+from roadeval.training.schedule import SIDE
+from roadeval.version import VERSION as ROADEVAL
 
 FORMAT: Final = "roadeval-model"
 VERSION: Final = 7
-"""Of the file; raised when what a stage has learnt means something else, or something is added. In
-2 the machine of ``context`` knows the column below a pixel, in 3 there are fingerprints, in 4
-the trees of ``robust`` in its place, in 5 these say how many features they know, in 6 the
-stage ``exposure`` compresses what is bright, in 7 there is a network beside the trees."""
-CHANGED: Final = {"exposure": 6}
-"""Stages that change the image in another way since a version: what was learnt before does not fit
-them."""
-OLDEST: Final = 2
-"""The earliest version that is read."""
+"""Of the file, the only one that is read; raised when what a stage has learnt means something else,
+or something is added."""
+WROTE: Final = {1: "0.1.0", 2: "0.1.0", 3: "0.2.0"}
+"""The version of roadeval by that of the file, where the file does not say it."""
 GREATEST_SIZE: Final = 1 << 29
 """Bytes that a model's arrays may take; those of `roadeval train` take a few million."""
 OWN: Final = ("prior", "fingerprints")
@@ -67,12 +63,11 @@ class Model:
     """``(H, W)`` float32: the share of training frames in which a pixel was road, which is what the
     blind baseline thresholds; None without truth.
     """
-    warnings: tuple[str, ...] = field(default=())
+    warnings: tuple[str, ...] = ()
     """What a user should know before believing a result."""
     fingerprints: npt.NDArray[np.float16] | None = None
     """``(n, SIDE * SIDE)`` float16: the pictures of the training frames, see
-    `roadeval.training.likeness`; None in files of version 2.
-    """
+    `roadeval.training.schedule`; None where nothing was learnt at all."""
     losses: tuple[str, ...] = ()
     """What of the drives was lost when it was trained; a file does not keep it."""
 
@@ -87,8 +82,7 @@ class Model:
         """Raise a `ModelError` for a variant that this model was not made for.
 
         Settings that what is learnt does not depend on may differ, and a variant that learns
-        nothing needs no model. A setting that the model's version did not have yet is taken for
-        its default, which does what was done before.
+        nothing needs no model.
         """
         if not pipeline.learning():
             return
@@ -100,8 +94,7 @@ class Model:
             )
         # Through JSON, as the file has been: tuples and lists are the same there.
         wanted = json.loads(json.dumps(pipeline.relevant()))
-        usual = json.loads(json.dumps(Pipeline.default(pipeline.chain).relevant()))
-        made_for = _completed(self.settings[variant], usual)
+        made_for = self.settings[variant]
         for name in sorted({*made_for, *wanted}):
             if made_for.get(name) != wanted.get(name):
                 raise ModelError(
@@ -115,14 +108,6 @@ class Model:
                     f"{path}: the model file is incomplete: {name} of variant {variant} has "
                     "learnt nothing; train it again"
                 )
-
-
-def _completed(made_for: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings by stage, with the usual ones where a stage has none of that name."""
-    return {
-        name: {**usual.get(name, {}), **own} if isinstance(own, dict) else own
-        for name, own in made_for.items()
-    }
 
 
 def _difference(made_for: Any, wanted: Any) -> str:
@@ -147,6 +132,7 @@ def save_model(model: Model, path: Path) -> None:
     header = {
         "format": FORMAT,
         "version": VERSION,
+        "roadeval": ROADEVAL,
         "settings": model.settings,
         "source": model.source,
         "digests": sorted(model.digests),
@@ -182,28 +168,26 @@ def load_model(path: Path, stages: Iterable[Stage[Any, Any]] = ()) -> Model:
     header, arrays = _content(path)
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise ModelError(f"{path}: not a model file; make one with 'roadeval train'")
-    version = header.get("version")
-    if isinstance(version, int) and version < OLDEST:
-        raise ModelError(f"{path}: made by an earlier version of roadeval; train it again")
-    if not isinstance(version, int) or version not in range(OLDEST, VERSION + 1):
-        raise ModelError(
-            f"{path}: model format {version}, and this version reads {OLDEST} to {VERSION}; train "
-            "it again, or install a later version of roadeval"
-        )
+    if header.get("version") != VERSION:
+        raise ModelError(f"{path}: {_another_format(header)}")
     try:
-        model = _model(header, arrays, {**STAGES, **{stage.name: stage for stage in stages}})
+        return _model(header, arrays, {**STAGES, **{stage.name: stage for stage in stages}})
     except ValueError as error:
-        why = "a damaged model file"
-        if version != VERSION:  # a stage may be gone since, or learn something else
-            why = "made by an earlier version of roadeval, or damaged"
-        raise ModelError(f"{path}: {why}: {_line(error)}; train it again") from error
-    for stage, since in CHANGED.items():
-        if version < since and any(stage in settings for settings in model.settings.values()):
-            raise ModelError(
-                f"{path}: made by an earlier version of roadeval, whose stage {stage} changed the "
-                "image in another way; train it again"
-            )
-    return model
+        raise ModelError(f"{path}: a damaged model file: {_line(error)}; train it again") from error
+
+
+def _another_format(header: Mapping[str, Any]) -> str:
+    """Return which version of roadeval wrote a file of another format, and what to do."""
+    version = header.get("version")
+    later = isinstance(version, int) and version > VERSION
+    writer = header.get("roadeval")
+    if not isinstance(writer, str):
+        writer = WROTE.get(version) if isinstance(version, int) else None
+    age = "a later" if later else "an earlier"
+    made = f"made by roadeval {visible(writer)}" if writer else f"made by {age} version of roadeval"
+    if later:
+        return f"{made}: update roadeval, or train it again"
+    return f"{made}, whose format is read no more: train it again"
 
 
 def kept_model(path: Path, stages: tuple[Stage[Any, Any], ...] = ()) -> Model:
@@ -268,7 +252,7 @@ def _model(
     given: dict[str, Any] = {name: content.get(name) for name in names}
     header = _Header(**given)
     parts: dict[str, dict[str, dict[str, Any]]] = {variant: {} for variant in header.settings}
-    if "fingerprints" not in arrays and content["version"] > OLDEST:
+    if "fingerprints" not in arrays:
         raise ValueError("fingerprints are missing")
     for name in arrays.keys() - {*OWN}:
         variant, _, rest = name.partition("/")
@@ -305,3 +289,64 @@ def _line(error: ValueError) -> str:
         return str(error)
     problem = error.errors(include_url=False)[0]
     return f"{'.'.join(map(str, problem['loc']))}: {problem['msg'].lower()}"
+
+
+# --- What a stage has learnt as named arrays, and back --------------------------------------------
+
+
+def arrays_of(learnt: Any) -> dict[str, npt.NDArray[Any]]:
+    """Return the fields of a dataclass as arrays by name.
+
+    Those of a field that is a dataclass, too, are ``field/name``; a part that is None has none.
+    """
+    found: dict[str, npt.NDArray[Any]] = {}
+    parts = _parts(type(learnt))
+    for field in dataclasses.fields(learnt):
+        value = getattr(learnt, field.name)
+        if field.name not in parts:
+            found[field.name] = np.asarray(value)
+        elif value is not None:
+            found |= {f"{field.name}/{name}": array for name, array in arrays_of(value).items()}
+    return found
+
+
+def from_arrays(kind: type[Any], arrays: Mapping[str, npt.NDArray[Any]]) -> Any:
+    """Return the dataclass whose arrays these are, see `arrays_of`.
+
+    Raises
+    ------
+    ValueError
+        If an array is missing, or is not known, or the dataclass refuses what it is given.
+    """
+    parts = _parts(kind)
+    names = {field.name for field in dataclasses.fields(kind)}
+    own = names - parts.keys()
+    whole = {name for name in arrays if name.partition("/")[0] not in parts or name in parts}
+    if wrong := own ^ whole:
+        raise ValueError(f"missing or unknown arrays: {', '.join(sorted(wrong))}")
+    values: dict[str, Any] = {}
+    for name in names:
+        if name not in parts:
+            array = arrays[name]
+            values[name] = array if array.ndim else array.item()
+            continue
+        of_part, optional = parts[name]
+        start = f"{name}/"
+        inner = {key.removeprefix(start): arrays[key] for key in arrays if key.startswith(start)}
+        values[name] = from_arrays(of_part, inner) if inner or not optional else None
+    return kind(**values)
+
+
+def _parts(kind: type[Any]) -> dict[str, tuple[type[Any], bool]]:
+    """Return those fields of a dataclass that are dataclasses, and whether each may be None."""
+    try:
+        hints = get_type_hints(kind)
+    except NameError:  # of names that type checkers alone import: a user's stage may have such
+        return {}
+    found = {}
+    for field in dataclasses.fields(kind):
+        choices = get_args(hints[field.name]) or (hints[field.name],)
+        for choice in choices:
+            if dataclasses.is_dataclass(choice) and isinstance(choice, type):
+                found[field.name] = choice, type(None) in choices
+    return found

@@ -2,8 +2,9 @@
 
 import pytest
 
+import roadeval
 from roadeval.cli.app import main
-from tests.compatibility.make import RECORDING, RESULTS, unpack, versions
+from tests.compatibility.make import MODEL, RECORDING, RESULTS, unpack, versions
 
 
 @pytest.fixture(scope="module", params=versions())
@@ -22,6 +23,13 @@ def test_its_version_is_named_and_the_way_out(made, name, command, capsys):
     assert line.startswith(f"roadeval: error: {folder / name}")
     assert line.endswith(told)
     assert line.count("\n") == 1
+
+
+def test_the_version_that_wrote_a_model_is_named(made):
+    version, folder = made
+    told = f"made by roadeval {version}, whose format is read no more: train it again"
+    with pytest.raises(roadeval.RoadevalError, match=told):
+        roadeval.load_model(folder / MODEL)
 
 
 def test_both_versions_are_there():

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from roadeval.training.arrays import arrays_of, from_arrays
+from roadeval.training.model import arrays_of, from_arrays
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import pytest
 from roadeval.config import configure
 from roadeval.data import Frame, Role
 from roadeval.errors import RoadevalError
-from roadeval.training import TrainingError, TrainingSettings, held, learning, save_model
+from roadeval.training import TrainingError, TrainingSettings, learning, save_model
 from roadeval.training.learning import from_drives, from_file, from_log, spread, train_on
 from roadeval.training.schedule import Schedule, Use
 from tests.training.making import frame, pipelines
@@ -162,13 +162,13 @@ def test_who_insists_on_truth_is_not_given_the_patch():
 
 def test_training_frames_are_bounded_in_memory(monkeypatch):
     # A frame of 24x32 takes three images of 2304 bytes, a truth of 768, and its payload of 2304.
-    monkeypatch.setattr(held, "GREATEST_MEMORY", 3 * 9984)
+    monkeypatch.setattr(learning, "GREATEST_MEMORY", 3 * 9984)
     assert not learn(log(6), frames=3)[0].warnings
     frames = log(6)
     model, schedule = learn(frames, frames=5, gap=1)
     assert roles(frames, schedule) == "tttgee"
     assert "trained on 3 of 5 frames: training holds its frames decoded" in model.warnings[0]
-    monkeypatch.setattr(held, "GREATEST_MEMORY", 9000)
+    monkeypatch.setattr(learning, "GREATEST_MEMORY", 9000)
     with pytest.raises(TrainingError, match=r"more than 0 of them would take .*`frames.scale`"):
         learn(log(6), frames=3)
 

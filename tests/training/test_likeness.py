@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from roadeval import logs
-from roadeval.training.likeness import BESIDE, SAME, SIDE, Alike, Likeness, fingerprint
+from roadeval.training.schedule import BESIDE, SAME, SIDE, Alike, Likeness, fingerprint
 from tests.e2e.commands import DEMO
 from tests.fixtures.shared import SHARED
 
