@@ -17,8 +17,7 @@ import roadeval
 from benchmarks.timing import Cost, Meter
 from roadeval import logs
 from roadeval.config import RunConfig
-from roadeval.data import FrameResult
-from roadeval.data.packed import Packed
+from roadeval.data import FrameResult, Packed
 from roadeval.jobs import summary
 from roadeval.jobs.processing import process
 from roadeval.jobs.progress import ignore

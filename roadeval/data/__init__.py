@@ -5,7 +5,7 @@ otherwise, or `Packed`. Times are integer nanoseconds since the Unix epoch, or w
 log uses.
 """
 
-from roadeval.data.counts import OUTCOMES, Change, Counts, Tally, Transition
+from roadeval.data.arrays import Packed, TruthBits, everywhere, ones, pack, unpack
 from roadeval.data.frame import (
     IGNORE,
     NON_ROAD,
@@ -29,23 +29,25 @@ from roadeval.data.layer import (
     LayerSpec,
     mask_spec,
 )
-from roadeval.data.names import (
+from roadeval.data.result import (
     BASELINE,
     CAMERA,
     FILTERED,
     FINAL_STAGE,
+    OUTCOMES,
     RESERVED,
     UNFILTERED,
-    is_plain,
-)
-from roadeval.data.packed import Packed, TruthBits, everywhere, ones, pack, unpack
-from roadeval.data.result import (
+    Change,
+    Counts,
     FrameResult,
     Health,
     Output,
     StageResult,
+    Tally,
+    Transition,
     VariantLayout,
     VariantResult,
+    is_plain,
 )
 from roadeval.data.rows import Rows
 

@@ -1,11 +1,16 @@
-"""The kinds of arrays that the kernels take and return, and the outcomes that some hold."""
+"""The kinds of arrays that the kernels take and return, and masks packed as bits."""
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final, Self
 
 import numpy as np
 import numpy.typing as npt
+
+from roadeval.data.frame import NON_ROAD, ROAD, Truth
 
 Image = npt.NDArray[np.uint8]
 """``(H, W, 3)`` RGB."""
@@ -56,3 +61,90 @@ FN: Final = 3
 IGNORED: Final = 4
 """How a pixel came out, where a plane holds that of each. These stand in recordings, and do not
 change."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Packed:
+    """A mask as `Bits`, and its ``width`` in pixels."""
+
+    bits: Bits
+    width: int
+
+    @classmethod
+    def of(cls, mask: npt.NDArray[np.uint8] | npt.NDArray[np.bool_]) -> Self:
+        """Pack an ``(H, W)`` mask, nonzero inside."""
+        return cls(pack(mask), mask.shape[1])
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width in pixels."""
+        return len(self.bits), self.width
+
+    def pixels(self) -> Plane:
+        """Return ``(H, W)`` uint8, 0 or 1."""
+        return unpack(self.bits, self.width)
+
+    def area(self) -> int:
+        """Count the pixels inside."""
+        return ones(self.bits)
+
+
+def pack(mask: npt.NDArray[np.uint8] | npt.NDArray[np.bool_]) -> Bits:
+    """Pack an ``(H, W)`` mask, nonzero inside, into ``(H, ceil(W / 64))`` uint64."""
+    packed = np.packbits(mask, axis=1, bitorder="little")
+    if packed.shape[1] % 8:
+        packed = np.pad(packed, ((0, 0), (0, -packed.shape[1] % 8)))
+    return np.ascontiguousarray(packed).view(np.uint64)
+
+
+def ones(bits: Bits) -> int:
+    """Count the set bits."""
+    return int(np.bitwise_count(bits).sum())
+
+
+@lru_cache(maxsize=8)
+def everywhere(shape: tuple[int, int]) -> Bits:
+    """Return the mask that holds every pixel of an image of ``shape`` (H, W): shared, read-only."""
+    bits = pack(np.ones(shape, np.uint8))
+    bits.flags.writeable = False
+    return bits
+
+
+def unpack(bits: Bits, width: int) -> Plane:
+    """Return the ``(H, width)`` uint8 mask, 0 or 1, that was packed."""
+    return np.unpackbits(bits.view(np.uint8), axis=1, count=width, bitorder="little")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TruthBits:
+    """A truth as `Bits`: ``shape`` (H, W), the ``road`` and the ``other`` (non-road) pixels."""
+
+    shape: tuple[int, int]
+    road: Bits
+    other: Bits
+
+    @classmethod
+    def of(cls, truth: Truth) -> TruthBits:
+        """Pack an ``(H, W)`` uint8 truth (0, 1, 255)."""
+        height, width = truth.shape
+        return cls((height, width), pack(truth == ROAD), pack(truth == NON_ROAD))
+
+    @property
+    def labelled(self) -> Bits:
+        """The pixels that are not ignored."""
+        return self.road | self.other
+
+    def bits_of(self, masks: Iterable[Packed]) -> Bits:
+        """Stack the bits of masks of the truth's shape: ``(K, H, words)``.
+
+        Raises
+        ------
+        ValueError
+            If one has another shape.
+        """
+        bits = []
+        for mask in masks:
+            if mask.shape != self.shape:
+                raise ValueError(f"shape {mask.shape} differs from the truth's {self.shape}")
+            bits.append(mask.bits)
+        return np.array(bits, np.uint64).reshape(len(bits), *self.road.shape)

@@ -42,8 +42,8 @@ class Frame:
     number: int
     """Position in the image topic by log time, from 0, before any range or stride."""
     stamp_ns: int
+    """Header stamp."""
     log_time_ns: int
-    """Header stamp and log time."""
     image: Rgb
     """``(H, W, 3)`` uint8 RGB."""
     payload: bytes | memoryview

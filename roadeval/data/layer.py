@@ -10,10 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import colours
-from roadeval.data.arrays import FN, FP, IGNORED, TN, TP
+from roadeval.data.arrays import FN, FP, IGNORED, TN, TP, Packed
 from roadeval.data.colours import CLEAR, with_opacity
 from roadeval.data.frame import IGNORE, NON_ROAD, ROAD
-from roadeval.data.packed import Packed
 
 
 class LayerKind(StrEnum):

@@ -1,15 +1,103 @@
-"""Results of a frame: what each variant's stages computed, and its score."""
+"""Results of a frame: what each variant's stages computed, its score, and the names they bear."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import Final
 
-from roadeval.data.counts import Change, Tally, Transition
+from roadeval.data.arrays import Packed, TruthBits
 from roadeval.data.frame import Frame, Histogram, Mask, Probability, Rgb, Role
 from roadeval.data.layer import Layer, LayerSpec
-from roadeval.data.packed import Packed, TruthBits
+
+CAMERA: Final = "camera"
+FILTERED: Final = "filtered"
+UNFILTERED: Final = "unfiltered"
+"""The names of the two variants that come by default: with the chain's filters, and without."""
+BASELINE: Final = "blind"
+"""The variant name of the baseline that never looks at the image."""
+FINAL_STAGE: Final = "post"
+"""The stage whose mask is the pipeline's answer, and under which the baseline is filed."""
+
+RESERVED: Final = frozenset(
+    {
+        *("blind", "camera", "counts", "facts", "frame", "metrics", "notes", "results"),
+        *("roadeval", "state", "timing", "true_shadow", "truth"),
+    }
+)
+"""Names that no variant may bear: the tables or the recording use them for something else."""
+
+_PLAIN: Final = re.compile(r"[A-Za-z0-9_-]{1,200}")
+"""No longer than the name of a file can be, with an ending."""
+OUTCOMES: Final = ("TP", "TN", "FP", "FN")
+"""The columns of `Counts` in tables, in the order of its fields."""
+
+
+def is_plain(name: str) -> bool:
+    """Return whether a name of a variant, stage or region is one that results can hold.
+
+    It is a column's cell, a part of a path in the recording, and a word in figures and tables.
+    """
+    return _PLAIN.fullmatch(name) is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """Pixels by outcome; road is the positive class, ignored pixels are in none (section 5)."""
+
+    tp: int = 0
+    tn: int = 0
+    fp: int = 0
+    fn: int = 0
+
+    @property
+    def n(self) -> int:
+        """Road and non-road pixels of the truth, N in Eq. 24-25."""
+        return self.tp + self.tn + self.fp + self.fn
+
+    def __add__(self, other: Counts) -> Counts:
+        return Counts(
+            self.tp + other.tp, self.tn + other.tn, self.fp + other.fp, self.fn + other.fn
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """The counts of one stage of one variant on one frame, whole and by region.
+
+    ``rates`` are the fractions of Eq. 24-29 by name; an undefined one is NaN.
+    """
+
+    variant: str
+    stage: str
+    counts: Counts
+    regions: Mapping[str, Counts] = field(default_factory=dict)
+    rates: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """Pixels that one mask repairs and spoils against another.
+
+    ``repaired`` are newly right, ``spoiled`` newly wrong, of the ``labelled`` ones.
+    """
+
+    repaired: int = 0
+    spoiled: int = 0
+    labelled: int = 0
+
+    def __add__(self, other: Change) -> Change:
+        return Change(
+            self.repaired + other.repaired,
+            self.spoiled + other.spoiled,
+            self.labelled + other.labelled,
+        )
+
+
+Transition = tuple[str, str, str, str]
+"""From one mask to another: variant and stage before, variant and stage after."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from roadeval.data import Counts
-from roadeval.data.counts import OUTCOMES
+from roadeval.data import OUTCOMES, Counts
 from roadeval.evaluation import effects, metrics
 from roadeval.evaluation.regions import partitions
 

@@ -8,9 +8,8 @@ from math import isqrt
 
 import numpy as np
 
-from roadeval.data import ERRORS, Layer, Mask, Truth, TruthBits
+from roadeval.data import ERRORS, Layer, Mask, Truth, TruthBits, everywhere
 from roadeval.data.arrays import Bits, Reach, Sums
-from roadeval.data.packed import everywhere
 from roadeval.kernels import KERNELS
 
 

@@ -7,9 +7,8 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping
 from typing import Any, Final
 
-from roadeval.data import FrameResult, Role, TruthBits
+from roadeval.data import FrameResult, Packed, Role, TruthBits, ones
 from roadeval.data.arrays import Bits
-from roadeval.data.packed import Packed, ones
 from roadeval.evaluation.counts import disk, grow, square
 
 

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import FILTERED, UNFILTERED, Counts, Tally
-from roadeval.data.counts import OUTCOMES
+from roadeval.data import FILTERED, OUTCOMES, UNFILTERED, Counts, Tally
 from roadeval.evaluation import metrics
 
 FourCounts = npt.NDArray[np.int64]

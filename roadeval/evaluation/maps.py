@@ -10,9 +10,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import Change, Layer, Transition, TruthBits
+from roadeval.data import Change, Layer, Transition, TruthBits, everywhere, ones
 from roadeval.data.arrays import Bits
-from roadeval.data.packed import everywhere, ones
 from roadeval.evaluation.counts import flat
 from roadeval.kernels import KERNELS
 

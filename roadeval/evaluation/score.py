@@ -18,14 +18,15 @@ from roadeval.data import (
     Frame,
     FrameResult,
     Health,
+    Packed,
     Role,
     Tally,
     Truth,
     TruthBits,
     VariantResult,
+    ones,
 )
 from roadeval.data.arrays import Bits, Sums
-from roadeval.data.packed import Packed, ones
 from roadeval.evaluation import counts, maps, metrics, regions
 from roadeval.evaluation.edges_and_flicker import boundary_f
 from roadeval.evaluation.maps import Name

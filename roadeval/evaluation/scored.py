@@ -13,8 +13,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import FILTERED, UNFILTERED, Counts, Rows
-from roadeval.data.counts import OUTCOMES
+from roadeval.data import FILTERED, OUTCOMES, UNFILTERED, Counts, Rows
 from roadeval.evaluation import effects, metrics
 from roadeval.evaluation.frame_counts import FourCounts, FrameCounts, Window, cut, sum_up
 

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from roadeval.config import OF_A_LOG, DriveSettings, RunConfig, read_tables
-from roadeval.data.names import is_plain
+from roadeval.data import is_plain
 from roadeval.fleet.errors import FleetError
 from roadeval.fleet.urls import shown
 from roadeval.runtime.documents import read_toml

@@ -15,6 +15,7 @@ from roadeval.data import (
     LayerSpec,
     Mask,
     Output,
+    Packed,
     Probability,
     Rgb,
     StageResult,
@@ -23,7 +24,6 @@ from roadeval.data import (
     VariantResult,
     mask_spec,
 )
-from roadeval.data.packed import Packed
 from roadeval.errors import RoadevalError
 from roadeval.images import eight_bits
 from roadeval.pipeline.chain import Chain

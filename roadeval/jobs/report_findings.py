@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, FILTERED, UNFILTERED, Rows, TruthBits
-from roadeval.data.packed import Packed
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, Packed, Rows, TruthBits
 from roadeval.evaluation import analysis, counts, maps, scored
 from roadeval.evaluation.settings import settings_of
 from roadeval.jobs.report_frames import FramePicker, evenly, variants_but_baseline

@@ -15,9 +15,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial.chebyshev import chebpts1, chebvander
 
-from roadeval.data import Mask
+from roadeval.data import Mask, ones
 from roadeval.data.arrays import Floats, Planes, Words
-from roadeval.data.packed import ones
 from roadeval.kernels import KERNELS
 
 Colours = npt.NDArray[np.uint8]

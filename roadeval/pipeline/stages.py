@@ -22,8 +22,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from roadeval.data import Layer, LayerKind, LayerSpec, is_plain, mask_spec
-from roadeval.data.packed import Packed
+from roadeval.data import Layer, LayerKind, LayerSpec, Packed, is_plain, mask_spec
 from roadeval.errors import RoadevalError
 from roadeval.pipeline import beyond, paper
 from roadeval.pipeline.stage import Output, Stage, StageError, TrainingSet, View

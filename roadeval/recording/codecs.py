@@ -27,8 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval import images
-from roadeval.data import LayerKind, LayerSpec
-from roadeval.data.packed import Packed
+from roadeval.data import LayerKind, LayerSpec, Packed
 from roadeval.images import MAX_PIXELS, Limits
 from roadeval.recording import png
 from roadeval.recording.layout import CAMERA, Layout

@@ -13,6 +13,7 @@ from roadeval.data import (
     BASELINE,
     ERRORS,
     FINAL_STAGE,
+    OUTCOMES,
     RESERVED,
     TRUTH,
     LabelClass,
@@ -22,7 +23,6 @@ from roadeval.data import (
     is_plain,
 )
 from roadeval.data.colours import CLEAR, SHADOW, with_opacity
-from roadeval.data.counts import OUTCOMES
 from roadeval.data.layer import IGNORED_CLASS
 from roadeval.errors import RoadevalError
 from roadeval.runtime.documents import read_json

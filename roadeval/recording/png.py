@@ -22,8 +22,8 @@ import numpy.typing as npt
 from isal import igzip_lib
 from isal.isal_zlib import crc32
 
+from roadeval.data import Packed
 from roadeval.data.colours import ColourWithOpacity
-from roadeval.data.packed import Packed
 from roadeval.kernels import KERNELS
 
 Bytes = npt.NDArray[np.uint8]

@@ -16,6 +16,7 @@ from roadeval.data import (
     Frame,
     Mask,
     Output,
+    Packed,
     Rows,
     StageResult,
     Tally,
@@ -23,7 +24,6 @@ from roadeval.data import (
     VariantResult,
 )
 from roadeval.data.arrays import Bits
-from roadeval.data.packed import Packed
 from roadeval.evaluation import metrics
 from roadeval.evaluation.comparison import Change, ComparedResult, Comparison
 from roadeval.evaluation.pairing import Side

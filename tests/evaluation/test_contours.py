@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
-from roadeval.data import IGNORE, TruthBits
-from roadeval.data.packed import pack
+from roadeval.data import IGNORE, TruthBits, pack
 from roadeval.evaluation import edges_and_flicker as contours
 from roadeval.evaluation.counts import disk
 from tests.evaluation.making import pixels, unpacked

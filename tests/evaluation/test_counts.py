@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from sklearn.metrics import confusion_matrix
 
-from roadeval.data import Counts, TruthBits
-from roadeval.data.packed import Packed
+from roadeval.data import Counts, Packed, TruthBits
 from roadeval.evaluation import counts
 from roadeval.evaluation.counts import error_map
 from tests.evaluation.making import pixels

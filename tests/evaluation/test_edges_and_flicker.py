@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from roadeval.data import IGNORE, FrameResult, Role, TruthBits
-from roadeval.data.packed import Packed
+from roadeval.data import IGNORE, FrameResult, Packed, Role, TruthBits
 from roadeval.evaluation.edges_and_flicker import EdgesAndFlicker, Flicker
 from tests.evaluation.making import a_frame, a_variant, pixels
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from roadeval.data import IGNORE, Change, TruthBits
-from roadeval.data.packed import Packed
+from roadeval.data import IGNORE, Change, Packed, TruthBits
 from roadeval.evaluation import maps
 from roadeval.evaluation.counts import error_map
 from roadeval.evaluation.maps import HeatMap, Maps

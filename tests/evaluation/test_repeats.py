@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.data import Role
-from roadeval.data.packed import Packed
+from roadeval.data import Packed, Role
 from roadeval.evaluation.score import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings

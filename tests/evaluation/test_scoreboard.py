@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from roadeval.data import Change, Counts, Health, Role
-from roadeval.data.packed import Packed
+from roadeval.data import Change, Counts, Health, Packed, Role
 from roadeval.evaluation.score import BlindPrior, CountsNotConservedError, check_conserved
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings

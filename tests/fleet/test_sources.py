@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from roadeval.config import DriveSettings
-from roadeval.data.names import is_plain
+from roadeval.data import is_plain
 from roadeval.errors import RoadevalError
 from roadeval.fleet import find_drives
 from roadeval.fleet.entry import identity

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roadeval import kernels
-from roadeval.data.packed import Packed, pack, unpack
+from roadeval.data import Packed, pack, unpack
 from roadeval.kernels import plain
 from roadeval.pipeline.paper import shadow, similarity
 from tests.pipeline.images import IMAGES, images, noise

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from roadeval.data.packed import Packed
+from roadeval.data import Packed
 from roadeval.pipeline.paper import shadow
 from roadeval.pipeline.stage import Output, View
 from roadeval.pipeline.stages import STAGES

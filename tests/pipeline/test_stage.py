@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from roadeval.data.packed import Packed
+from roadeval.data import Packed
 from roadeval.pipeline.stage import Output, View
 from tests.pipeline.images import noise
 

@@ -20,6 +20,7 @@ from roadeval.data import (
     LayerKind,
     LayerSpec,
     Output,
+    Packed,
     Role,
     StageResult,
     Tally,
@@ -27,7 +28,6 @@ from roadeval.data import (
     VariantResult,
     mask_spec,
 )
-from roadeval.data.packed import Packed
 from roadeval.evaluation.metrics import METRICS
 from roadeval.recording import Layout, Recorder, Recording
 from roadeval.recording.read.rrd_file import RrdFile

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from roadeval import images
-from roadeval.data.packed import Packed
+from roadeval.data import Packed
 from roadeval.recording import png as pngs
 
 ROAD = [(0, 0, 0, 0), (0, 158, 115, 160)]

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from roadeval.data import FrameResult, Role
-from roadeval.data.packed import Packed
+from roadeval.data import FrameResult, Packed, Role
 from roadeval.evaluation.score import BlindPrior
 from roadeval.evaluation.scoreboard import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings

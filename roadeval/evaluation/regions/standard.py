@@ -8,9 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from roadeval.data import TruthBits
+from roadeval.data import Packed, TruthBits, everywhere
 from roadeval.data.arrays import Bits
-from roadeval.data.packed import Packed, everywhere
 from roadeval.evaluation.counts import grow, square
 from roadeval.evaluation.region import LabelledFrame, Region, RegionFamily, fixed
 

@@ -173,7 +173,7 @@ ROUNDS: Final = 3
 SCALE: Final = 10_000
 """Of costs as whole numbers: the least has two digits."""
 LENGTH: Final = 10 * SCALE
-"""Of a straight step of cost 1, see `roadeval.kernels.plain.geodesics`."""
+"""Of a straight step of cost 1, see `roadeval.kernels.plain`."""
 FLOOR: Final = 0.005
 """Cost of a step on the smoothest ground, so that a longer path costs more."""
 GREATEST: Final = 6.5
@@ -200,7 +200,7 @@ def distance(cost: Values, patch: Mask) -> Values:
     """Return the geodesic distance of each pixel from a patch, in pixels.
 
     It is ``min over paths of the integral of 0.005 + c`` (Toivanen 1996, see
-    `roadeval.kernels.plain.geodesics`) for a cost c of each pixel, ``(h, w)`` float32, of which
+    `roadeval.kernels.plain`) for a cost c of each pixel, ``(h, w)`` float32, of which
     what is beyond `GREATEST` does not count.
     """
     whole = np.minimum(cost + np.float32(FLOOR), np.float32(GREATEST)) * np.float32(SCALE)

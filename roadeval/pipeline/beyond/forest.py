@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from roadeval.data.arrays import Flags, Floats, Indices, Masks, Values
 from roadeval.kernels import KERNELS
-from roadeval.kernels.plain.trees import LEAVES
+from roadeval.kernels.plain import LEAVES
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.runtime.extensions import whole
 

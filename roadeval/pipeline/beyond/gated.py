@@ -31,9 +31,8 @@ import numpy.typing as npt
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Rgb, Truth, colours
+from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Packed, Rgb, Truth, colours
 from roadeval.data.arrays import Floats, Values
-from roadeval.data.packed import Packed
 from roadeval.pipeline.beyond.features import paths
 from roadeval.pipeline.beyond.scene import Scene, enlarged, mean, reduced, stretched
 from roadeval.pipeline.paper.shadow import SHADOW_COLOUR

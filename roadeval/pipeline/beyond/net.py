@@ -7,8 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from roadeval.data import Layer, LayerKind, LayerSpec, mask_spec
-from roadeval.data.packed import Packed
+from roadeval.data import Layer, LayerKind, LayerSpec, Packed, mask_spec
 from roadeval.networks import NetSettings, Network, NetworkError
 from roadeval.pipeline.stage import Output, Stage, StageError, View
 

@@ -25,10 +25,9 @@ import numpy as np
 from pydantic import ConfigDict, Field, field_validator
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.data import Layer, LayerKind, LayerSpec, Rgb, mask_spec
+from roadeval.data import Layer, LayerKind, LayerSpec, Packed, Rgb, mask_spec
 from roadeval.data.arrays import Flags, Floats, Values
-from roadeval.data.packed import Packed
-from roadeval.kernels.plain.trees import LEAVES
+from roadeval.kernels.plain import LEAVES
 from roadeval.pipeline.beyond.features import (
     GROUPS,
     REACH,

@@ -1,6 +1,6 @@
 """Phase 4, post-processing (section 3.4): morphology, the largest region, its holes (Eq. 17-23).
 
-Masks are packed here, 64 pixels a word: see `roadeval.data.packed`.
+Masks are packed here, 64 pixels a word: see `roadeval.data.arrays`.
 """
 
 from __future__ import annotations
@@ -14,9 +14,8 @@ import numpy as np
 from pydantic import ConfigDict, Field, field_validator
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, colours, mask_spec
+from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Packed, colours, mask_spec
 from roadeval.data.arrays import Reach
-from roadeval.data.packed import Packed
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
 from roadeval.pipeline.stage import Output, Stage, View

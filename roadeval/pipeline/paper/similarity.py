@@ -11,8 +11,7 @@ import numpy.typing as npt
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.data import Layer, LayerKind, LayerSpec, mask_spec
-from roadeval.data.packed import Packed
+from roadeval.data import Layer, LayerKind, LayerSpec, Packed, mask_spec
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.parameters import check_arrays, check_covariance, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View

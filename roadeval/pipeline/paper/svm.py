@@ -12,9 +12,8 @@ import numpy.typing as npt
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass as validated
 
-from roadeval.data import Layer, LayerSpec, mask_spec
+from roadeval.data import Layer, LayerSpec, Packed, mask_spec
 from roadeval.data.arrays import Floats
-from roadeval.data.packed import Packed
 from roadeval.pipeline.colour_table import (
     EPS,
     LEVELS,

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from roadeval.data import Counts
-from roadeval.data.counts import OUTCOMES
+from roadeval.data import OUTCOMES, Counts
 from roadeval.evaluation import metrics
 from roadeval.evaluation.comparison import Change
 from roadeval.evaluation.conditions import Condition, ConditionError

@@ -10,8 +10,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
 
-from roadeval.data import Counts
-from roadeval.data.counts import OUTCOMES
+from roadeval.data import OUTCOMES, Counts
 from roadeval.evaluation import metrics
 from roadeval.evaluation.effects import TESTED, Effect, corrected
 from roadeval.evaluation.metrics import METRICS

@@ -16,12 +16,12 @@ from roadeval.data import (
     FrameResult,
     Layer,
     Output,
+    Packed,
     Role,
     StageResult,
     Tally,
     VariantResult,
 )
-from roadeval.data.packed import Packed
 from roadeval.logs import SidecarWriter
 
 MASK = np.array([[0, 1]], np.uint8)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from roadeval.data.packed import Packed
+from roadeval.data import Packed
 from roadeval.pipeline.paper import post
 from roadeval.pipeline.paper.post import PostSettings
 from roadeval.pipeline.reference_patch import ReferencePatch

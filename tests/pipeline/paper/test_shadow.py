@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 from skimage.filters import threshold_otsu
 
-from roadeval.data.packed import Packed
+from roadeval.data import Packed
 from roadeval.kernels import KERNELS, plain
 from roadeval.pipeline.paper import shadow
 from roadeval.pipeline.paper.shadow import ShadowSettings

@@ -1,0 +1,512 @@
+"""The kernels as NumPy and OpenCV expressions: their definition, and used where none compile.
+
+The sections are those of the C files in the folder ``c``.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import pack, unpack
+from roadeval.data.arrays import (
+    FN,
+    FP,
+    IGNORED,
+    Bits,
+    CodeTable,
+    Costs,
+    Distances,
+    Image,
+    Indices,
+    Labels,
+    Masks,
+    Matrix,
+    Plane,
+    Planes,
+    Reach,
+    Runs,
+    Sums,
+    Values,
+    Vector,
+    Words,
+)
+
+_AROUND: Final[dict[str, Any]] = {"borderType": cv2.BORDER_CONSTANT, "borderValue": 0}
+"""Nothing is set around a mask."""
+FAR: Final = 1 << 30
+"""Distance of what no path reaches; no distance is greater."""
+STRAIGHT: Final = 5
+ASLANT: Final = 7
+"""Length of a step to a neighbour by a side and by a corner: 7/5 is the root of 2, less 1 %."""
+LABEL_BITS: Final = (2, 4, 8)
+"""Those that a label of a PNG file may have; with one it is a mask."""
+LEAVES: Final = 32
+"""Of a tree, at most."""
+
+
+# --- Colours of pixels: looked up in tables, and their distance from a mean (Eq. 2) ---------------
+
+
+def look_up_sum_min(planes: Planes, table: CodeTable) -> tuple[Plane, Sums]:
+    """Look every pixel up by the sum and the minimum of its channels.
+
+    Parameters
+    ----------
+    planes
+        Red, green and blue, ``(H, W)`` uint8 each.
+    table
+        ``(766, 256)`` uint8, indexed by ``R + G + B`` and ``min(R, G, B)``.
+
+    Returns
+    -------
+    codes, histogram
+        ``(H, W)`` uint8, and ``(256,)`` int64: how often each code occurs.
+    """
+    codes = table[np.sum(planes, axis=0, dtype=np.int64), np.min(planes, axis=0)]
+    return codes, np.bincount(codes.ravel(), minlength=256)
+
+
+def mahalanobis(
+    planes: Planes, mean: Vector, whitening: Matrix, greatest: float
+) -> tuple[Values, Plane]:
+    """Distance of Eq. 2, ``|W (x - m)|``, of every pixel.
+
+    Parameters
+    ----------
+    planes
+        Red, green and blue, ``(H, W)`` uint8 each.
+    mean, whitening
+        m, ``(3,)``, a colour in 0..255, and W, ``(3, 3)`` lower triangular: ``W^T W`` is the
+        inverse covariance.
+    greatest
+        Of the square, up to which a pixel is near: a finite number.
+
+    Returns
+    -------
+    distance, near
+        ``(H, W)`` float32, computed in that precision; and ``(H, W)`` uint8, 1 near and 0 far,
+        decided in float64.
+    """
+    near = _squared(planes, mean, whitening) <= greatest
+    single = mean.astype(np.float32), whitening.astype(np.float32)
+    distance: Values = np.sqrt(_squared(planes, *single))
+    return distance, near.astype(np.uint8)
+
+
+def _squared(
+    planes: Planes, mean: npt.NDArray[np.floating], whitening: npt.NDArray[np.floating]
+) -> npt.NDArray[np.floating]:
+    """Compute ``|W (x - m)|^2`` in the precision of m and W."""
+    r, g, b = (plane.astype(mean.dtype) - level for plane, level in zip(planes, mean, strict=True))
+    first, second, third = whitening
+    u = first[0] * r
+    v = second[0] * r + second[1] * g
+    w = third[0] * r + third[1] * g + third[2] * b
+    squared: npt.NDArray[np.floating] = u * u + v * v + w * w
+    return squared
+
+
+def look_up_colours(planes: Planes, road: Words, left: Words) -> Plane:
+    """Look every pixel up in a table over all colours, a bit each.
+
+    Parameters
+    ----------
+    planes
+        Red, green and blue, ``(H, W)`` uint8 each.
+    road, left
+        ``(2^18,)`` uint64 by the upper six bits of red, green and blue; of a word's bits the lower
+        two of each tell which: similar colours, as an image has them side by side, share it.
+        ``left`` may be empty.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(H, W)`` uint8: the bit in ``road``, and twice that in ``left``.
+    """
+    r, g, b = (plane.astype(np.int64) for plane in planes)
+    word = (r >> 2) << 12 | (g >> 2) << 6 | b >> 2
+    bit = ((r & 3) << 4 | (g & 3) << 2 | b & 3).astype(np.uint64)
+    found: Plane = (road[word] >> bit & np.uint64(1)).astype(np.uint8)
+    if len(left):
+        found |= (left[word] >> bit & np.uint64(1)).astype(np.uint8) << 1
+    return found
+
+
+# --- Masks of a bit a pixel: counted, dilated and eroded ------------------------------------------
+
+
+def count_bits(masks: Bits, classes: Bits, regions: Bits) -> Sums:
+    """Count pixels in a mask, of a class and in a region: the set bits of three words' conjunction.
+
+    ``masks``, ``classes`` and ``regions`` are ``(M, n)``, ``(C, n)`` and ``(R, n)`` uint64; the
+    counts are ``(M, C, R)`` int64.
+    """
+    both = classes[:, None] & regions[None]
+    counts = [np.bitwise_count(both & mask).sum(axis=2, dtype=np.int64) for mask in masks]
+    return np.array(counts, np.int64).reshape(len(masks), *both.shape[:2])
+
+
+def dilate(bits: Bits, reach: Reach, width: int) -> Bits:
+    """Dilate a mask of ``width`` pixels a row by an element; nothing around it is set."""
+    return pack(cv2.dilate(unpack(bits, width), _element(reach), **_AROUND))
+
+
+def erode(bits: Bits, reach: Reach, width: int) -> Bits:
+    """Erode a mask of ``width`` pixels a row by an element; nothing around it is set."""
+    return pack(cv2.erode(unpack(bits, width), _element(reach), **_AROUND))
+
+
+def _element(reach: Reach) -> Plane:
+    side = 2 * max(len(reach) - 1, int(reach.max())) + 1
+    rows, columns = np.abs(np.indices((side, side)) - side // 2)
+    inside: Plane = (rows < len(reach)) & (columns <= reach[np.minimum(rows, len(reach) - 1)])
+    return inside.astype(np.uint8)
+
+
+# --- Colours of components and of their buffer rings summed up, and mapped (Eq. 10-11) ------------
+
+
+def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
+    """Sum the colours of every label's runs.
+
+    Parameters
+    ----------
+    planes
+        Red, green and blue, ``(H, W)`` uint8 each.
+    runs
+        ``(n, 4)`` int32, see `components`.
+    count
+        Number of labels, background included.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(count, 7)`` int64: pixels, sums of R, G, B, and sums of their squares.
+    """
+    y, x, label = run_pixels(runs)
+    return _sums(label, np.dstack(planes)[y, x], count)
+
+
+def ring_sums(planes: Planes, runs: Runs, ring: Bits, count: int, width: int) -> Sums:
+    """Sum the colours of every component's buffer ring (Eq. 10).
+
+    Parameters
+    ----------
+    planes
+        Red, green and blue, ``(H, W)`` uint8 each.
+    runs
+        ``(n, 4)`` int32, see `components`.
+    ring
+        ``(H, words)``: the pixels outside the shadow that some dilation reaches.
+    count
+        Number of labels, background included.
+    width
+        Number of 3x3 dilations: a ring pixel lies within this Chebyshev distance.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(count, 7)`` int64, as in `run_sums`. A pixel counts once in each component that
+        reaches it.
+    """
+    height, columns = planes[0].shape
+    y, x = np.nonzero(unpack(ring, columns))
+    padded = np.pad(paint(runs, height, columns), width)
+    window = np.lib.stride_tricks.sliding_window_view(padded, (2 * width + 1, 2 * width + 1))
+    near = window[y, x].reshape(len(y), (2 * width + 1) ** 2)
+    pixel = np.repeat(np.arange(len(y)), near.shape[1])
+    pairs = np.unique(pixel * count + near.ravel())
+    pairs = pairs[pairs % count > 0]
+    return _sums(pairs % count, np.dstack(planes)[y, x][pairs // count], count)
+
+
+def _sums(labels: npt.NDArray[np.integer], colours: npt.NDArray[np.uint8], count: int) -> Sums:
+    values = colours.astype(np.float64)
+    columns: list[npt.NDArray[np.float64]] = [np.bincount(labels, minlength=count).astype(float)]
+    # Sums of 8-bit values and of their squares stay far below 2^53: float64 adds them exactly.
+    columns += [np.bincount(labels, values[:, c], count).astype(float) for c in range(3)]
+    columns += [np.bincount(labels, values[:, c] ** 2, count).astype(float) for c in range(3)]
+    return np.stack(columns, axis=1).astype(np.int64)
+
+
+def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Matrix) -> Image:
+    """Map each component's colours to ``target + (I - source) * gain``, rounded and clipped.
+
+    ``runs`` are ``(n, 4)``, see `components`; ``source``, ``target`` and ``gain`` ``(count, 3)``
+    float64, by label and channel. Returns ``(H, W, 3)`` uint8, elsewhere as it was.
+    """
+    result = image.copy()
+    y, x, k = run_pixels(runs)
+    value = target[k] + (image[y, x] - source[k]) * gain[k]
+    result[y, x] = np.clip(np.rint(value), 0, 255).astype(np.uint8)
+    return result
+
+
+# --- Cheapest paths from some pixels to all others ------------------------------------------------
+
+
+def geodesics(cost: Costs, seeds: Plane, rounds: int) -> Distances:
+    """Compute the length of the cheapest path from the seeds to each pixel.
+
+    A path goes from neighbour to neighbour, by sides and corners. A step costs the sum of its two
+    pixels' costs times `STRAIGHT` or `ASLANT`: ten times the integral of the cost along it [1]_.
+    Rows are swept up and down by turns, paths within a row included, as raster scans do [2]_:
+    a path that turns back up or down more often than there are ``rounds`` may be missed for a
+    dearer one. Whole numbers make the order of sums irrelevant.
+
+    Parameters
+    ----------
+    cost
+        ``(H, W)`` uint16: of a step of length 1.
+    seeds
+        ``(H, W)`` uint8, nonzero where paths begin.
+    rounds
+        Of a sweep up and one down.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(H, W)`` int32, at most `FAR`.
+
+    References
+    ----------
+    .. [1] P. J. Toivanen, New geodesic distance transforms for gray-scale images, Pattern
+       Recognition Letters 17 (1996).
+    .. [2] G. Borgefors, Distance transformations in digital images, CVGIP 34 (1986).
+    """
+    costs = cost.astype(np.int64)
+    distance = np.where(seeds > 0, 0, FAR)
+    for _ in range(rounds):
+        _sweep(costs[::-1], distance[::-1])
+        _sweep(costs, distance)
+    return distance.astype(np.int32)
+
+
+def _sweep(cost: Sums, distance: Sums) -> None:
+    """Shorten paths, in place, by the steps from each row to the next and within it."""
+    for y in range(len(cost)):
+        if y > 0:
+            _step(distance[y], cost[y], distance[y - 1], cost[y - 1], STRAIGHT)
+            _step(distance[y, 1:], cost[y, 1:], distance[y - 1, :-1], cost[y - 1, :-1], ASLANT)
+            _step(distance[y, :-1], cost[y, :-1], distance[y - 1, 1:], cost[y - 1, 1:], ASLANT)
+        for way in (slice(None), slice(None, None, -1)):
+            row, price = distance[y, way], cost[y, way]
+            sums = np.concatenate([[0], np.cumsum(STRAIGHT * (price[1:] + price[:-1]))])
+            row[:] = np.minimum.accumulate(row - sums) + sums
+
+
+def _step(to: Sums, cost: Sums, start: Sums, other: Sums, length: int) -> None:
+    np.minimum(to, start + length * (cost + other), out=to)
+
+
+# --- Outcomes of a mask: pixel by pixel, and in how many frames -----------------------------------
+
+
+def outcomes(mask: Plane, truth: Plane) -> Plane:
+    """Classify each pixel of a mask, ``(H, W)`` of 0 and 1, by a truth of 0, 1 and 255 for ignored.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(H, W)`` uint8: `TN`, `TP`, `FP`, `FN` or `IGNORED`.
+    """
+    # TN 0 and TP 1 where the two agree, FP 2 and FN 3 where not; beyond 4 what is ignored.
+    return np.minimum(truth + 2 * (truth ^ mask), np.uint8(IGNORED))
+
+
+def add_outcomes(errors: Plane, totals: Image) -> None:
+    """Add to ``(3, H, W)`` uint8 ``totals``, in place, where `outcomes` are labelled, FP and FN."""
+    counted = errors != IGNORED, errors == FP, errors == FN
+    for total, found in zip(totals, counted, strict=True):
+        np.add(total, found, out=total)
+
+
+# --- Rows of a PNG file ---------------------------------------------------------------------------
+
+
+def filter_rows(rows: Plane, step: int) -> Plane:
+    """Subtract from each byte of a PNG file's rows its Paeth predictor (section 9 of the standard).
+
+    That is the byte to the left, above, or above the left one (the corner), whichever is nearest to
+    ``left + above - corner``; of equals the first in this order.
+
+    Parameters
+    ----------
+    rows
+        ``(H, B)`` uint8.
+    step
+        Bytes from a pixel to the next.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(H, 1 + B)`` uint8, each row after its filter's number, 4. The differences are taken
+        modulo 256; beyond the image all is 0.
+    """
+    height, size = rows.shape
+    seen = np.zeros((1 + height, step + size), np.int16)
+    seen[1:, step:] = rows
+    left, above, corner = seen[1:, :size], seen[:-1, step:], seen[:-1, :size]
+    each = np.stack([left, above, corner])
+    nearest = np.abs(left + above - corner - each).argmin(axis=0)
+    taken = np.take_along_axis(each, nearest[None], axis=0)[0].astype(np.uint8)
+    return np.insert(rows - taken, 0, np.uint8(4), axis=1)
+
+
+def label_rows(labels: Plane, bits: int) -> Plane:
+    """Pack labels, the leftmost into a byte's highest bits, without a filter.
+
+    Parameters
+    ----------
+    labels
+        ``(H, W)`` uint8; of each the lowest bits are taken.
+    bits
+        Of a label, one of `LABEL_BITS`.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(H, 1 + ceil(W * bits / 8))`` uint8, each row after its filter's number, 0.
+    """
+    single = np.unpackbits(labels[..., None], axis=2)[..., 8 - bits :]
+    return _unfiltered(single.reshape(len(labels), -1))
+
+
+def mask_rows(mask: Bits, width: int) -> Plane:
+    """Pack a mask of ``width`` pixels a row as `label_rows` packs labels, with a bit a pixel."""
+    return _unfiltered(unpack(mask, width))
+
+
+def _unfiltered(single: Plane) -> Plane:
+    return np.insert(np.packbits(single, axis=1), 0, np.uint8(0), axis=1)
+
+
+# --- Connected components of a mask, as stretches of rows (Eq. 9) ---------------------------------
+
+
+def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
+    """Label the connected components of a mask (Eq. 9).
+
+    Parameters
+    ----------
+    bits, width
+        The mask, see `roadeval.data.arrays`.
+    connectivity
+        8, or 4 where pixels that touch by a corner are not connected.
+
+    Returns
+    -------
+    runs, count
+        ``(n, 4)`` int32: row, first column, column after the last, and label of each of their
+        rows' stretches, row after row and from left to right; and how many components there are.
+        Labels count from 1, in the order of the components' first pixels.
+    """
+    count, found = cv2.connectedComponents(unpack(bits, width), connectivity=connectivity)
+    # The library numbers them by blocks of rows.
+    seen, first = np.unique(found, return_index=True)
+    order = seen[seen > 0][np.argsort(first[seen > 0])]
+    number = np.zeros(count, np.int32)
+    number[order] = np.arange(1, count)
+    return label_runs(number[found]), count - 1
+
+
+def paint(runs: Runs, height: int, width: int) -> Labels:
+    """Return the ``(height, width)`` int32 image of `components`' labels, 0 outside."""
+    labels = np.zeros((height, width), np.int32)
+    y, x, label = run_pixels(runs)
+    labels[y, x] = label
+    return labels
+
+
+def label_runs(labels: Labels) -> Runs:
+    """Return the rows' stretches of equal labels of an ``(H, W)`` int32 image, see `components`."""
+    begins = np.ones((labels.shape[0], labels.shape[1] + 1), np.bool_)
+    begins[:, 1:-1] = labels[:, 1:] != labels[:, :-1]
+    y, x = np.nonzero(begins)
+    runs = np.stack([y[:-1], x[:-1], x[1:]], axis=1)[y[:-1] == y[1:]]
+    label = labels[runs[:, 0], runs[:, 1]]
+    found: Runs = np.column_stack([runs, label])[label > 0].astype(np.int32)
+    return found
+
+
+def run_pixels(runs: Runs) -> tuple[npt.NDArray[np.int64], ...]:
+    """Row, column and label of every pixel of some runs, ``(n,)`` each."""
+    y, start, end, label = runs.T.astype(np.int64)
+    length = end - start
+    first = np.repeat(start - np.cumsum(length) + length, length)
+    return np.repeat(y, length), first + np.arange(len(first)), np.repeat(label, length)
+
+
+def keep_region(bits: Bits, width: int, patch: Plane) -> Bits:
+    """Keep one 8-connected component of a mask; an empty one stays empty.
+
+    The one with most pixels where ``patch``, ``(H, W)`` or empty, is nonzero; the largest where
+    none has any there. Of equals the first from the top.
+    """
+    count, labels = cv2.connectedComponents(unpack(bits, width))
+    if count <= 1:
+        return bits.copy()
+    votes = np.bincount(labels.ravel(), minlength=count)[1:]
+    if patch.size:
+        inside = np.bincount(labels[patch > 0], minlength=count)[1:]
+        votes = inside if inside.any() else votes
+    best = np.flatnonzero(votes == votes.max()) + 1
+    # The library numbers components by blocks of rows: of equals, the first pixel decides.
+    first = best[0] if len(best) == 1 else labels[np.isin(labels, best)][0]
+    return pack(labels == first)
+
+
+def fill_holes(bits: Bits, width: int) -> Bits:
+    """Fill what a mask encloses.
+
+    A hole is a 4-connected set of zeros that does not reach the outside of the image.
+    """
+    outside = np.pad(unpack(bits, width), 1)
+    cv2.floodFill(outside, None, (0, 0), 2, flags=4)
+    return pack(outside[1:-1, 1:-1] != 2)
+
+
+# --- The sum of decision trees --------------------------------------------------------------------
+
+
+def tree_sum(
+    features: Values, feature: Indices, threshold: Values, kept: Masks, values: Values
+) -> Values:
+    """Compute the sum of what decision trees give for each pixel.
+
+    A tree's leaves are numbered from the left. Each of its nodes whose feature is above the
+    threshold rules out the leaves on its left; the first that no node has ruled out is the
+    pixel's [1]_.
+
+    Parameters
+    ----------
+    features
+        ``(F, n)`` float32: of n pixels.
+    feature, threshold, kept
+        ``(T, N)`` each, int32, float32 and uint32, of N nodes of T trees: a feature's place, what
+        it is compared with, and a bit for each leaf that is left where it is above that. The
+        highest bit is always set.
+    values
+        ``(T, LEAVES)`` float32: what each leaf adds.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(n,)`` float32, summed in the trees' order.
+
+    References
+    ----------
+    .. [1] C. Lucchese et al., QuickScorer: A Fast Algorithm to Rank Documents with Additive
+       Ensembles of Regression Trees, SIGIR 2015.
+    """
+    total: Values = np.zeros(features.shape[1], np.float32)
+    for which, least, left, given in zip(feature, threshold, kept, values, strict=True):
+        above = features[which] > least[:, None]
+        leaves = np.bitwise_and.reduce(np.where(above, left[:, None], ~np.uint32(0)), axis=0)
+        first = np.bitwise_count((leaves & -leaves) - np.uint32(1))
+        total += given[first]
+    return total
