@@ -129,12 +129,11 @@ def _written(
         del run  # figures take the room of its frames and models
         trim()
         if config.output.figures:
-            from roadeval.report.figures import FigureData, write_figures
+            from roadeval.report.figures import write_figures
 
             with results.explained():
                 windows = as_arrays("windows", rows["windows"])
-                data = FigureData(log.name, windows, examples)
-                write_figures(results.folder, data)
+                write_figures(results.folder, log.name, windows, examples)
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
     files = [to.reports / name for name in facts["files"]] + ([to.mcap] if to.mcap else [])
     return Outcome(

@@ -10,7 +10,6 @@ import base64
 import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from io import BytesIO
 from pathlib import Path
@@ -19,7 +18,6 @@ from typing import Any, Final
 import cv2
 import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
@@ -40,9 +38,9 @@ from roadeval.data import (
     Truth,
     colours,
 )
-from roadeval.data.rows import Cells
 from roadeval.evaluation import scored
-from roadeval.report.chart import FAINT, looks
+from roadeval.report.chart import FAINT, thinned
+from roadeval.report.charts.rates import over_windows
 from roadeval.report.images import (
     EXAMPLE_WIDTH,
     ExampleFrame,
@@ -93,20 +91,21 @@ _PNG_HEADER: Final = 33
 """Bytes of a PNG's signature and first chunk."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FigureData:
-    """The results that figures are drawn from."""
-
-    drive: str
-    """Its name, for titles."""
-    windows: Rows
-    """As ``windows.csv``, any number of variants; no row without truth."""
-    examples: Sequence[ExampleFrame] = ()
-    """A few frames."""
-
-
-def write_figures(folder: Path, data: FigureData) -> list[Path]:
+def write_figures(
+    folder: Path, drive: str, windows: Rows, examples: Sequence[ExampleFrame]
+) -> list[Path]:
     """Write every figure that has something to draw as PNG and PDF; return the files.
+
+    Parameters
+    ----------
+    folder
+        Where; made if it is not there.
+    drive
+        Its name, for titles.
+    windows
+        As ``windows.csv``, any number of variants; no row without truth.
+    examples
+        A few frames, for figure 2.
 
     Raises
     ------
@@ -116,18 +115,19 @@ def write_figures(folder: Path, data: FigureData) -> list[Path]:
         If the system's folder for temporary files cannot be.
     """
     folder.mkdir(parents=True, exist_ok=True)
+
+    def drawn() -> Iterator[tuple[str, bytes]]:
+        with mpl.rc_context(RC):  # type: ignore[arg-type]
+            if examples:
+                yield "fig2_masks", svg(road_masks(drive, examples))
+            if len(windows):
+                yield "fig3a_error_rate", svg(error_rate(drive, windows))
+                yield "fig3b_fp_fn_rate", svg(fp_fn_rate(drive, windows))
+
     # Typst, which sets the reports too, makes both files of one SVG in a few hundredths of a second
     # and beside the drawing of the next figure; Matplotlib's own ways draw a figure once for each,
     # and take ten times as long.
-    return [path for files in ordered(partial(_write, folder), _drawn(data), 1) for path in files]
-
-
-def _drawn(data: FigureData) -> Iterator[tuple[str, bytes]]:
-    """Yield each figure's name and its SVG."""
-    with mpl.rc_context(RC):  # type: ignore[arg-type]
-        for name, draw in FIGURES.items():
-            if figure := draw(data):
-                yield name, svg(figure)
+    return [path for files in ordered(partial(_write, folder), drawn(), 1) for path in files]
 
 
 def _write(folder: Path, figure: tuple[str, bytes]) -> list[Path]:
@@ -179,12 +179,10 @@ def _width(text: str) -> float:
 
 # --- Figures 3a and 3b ----------------------------------------------------------------------------
 
-CROWDED: Final = 150
-"""More windows than this are drawn as means of several, with their range as a band."""
 MARKED: Final = 25
 """Up to this many points each has its marker; beyond, about as many do."""
-PALE: Final = 0.4
-"""Opacity of a last row that holds fewer frames than the others, and of the line to it."""
+CROWDED: Final = 150
+"""More windows than this are drawn as means of neighbours."""
 _LABELS: Final = {
     FILTERED: "filtered: with the shadow filter",
     UNFILTERED: "unfiltered: without it",
@@ -203,51 +201,58 @@ _BETWEEN: Final = 2 * LETTERS
 """Points that a legend has, that a line before a label takes, and that lie between columns."""
 
 
-def error_rate(data: FigureData) -> Figure | None:
+def error_rate(drive: str, windows: Rows) -> Figure:
     """Draw figure 3a of the paper: the error rate over the drive, in rows of ten frames."""
-    return _over_drive(f"Error rate on {data.drive}", data, {"ERR": "Error rate (ERR)"}, 3.9)
+    return _over_drive(f"Error rate on {drive}", windows, {"ERR": "Error rate (ERR)"})
 
 
-def fp_fn_rate(data: FigureData) -> Figure | None:
+def fp_fn_rate(drive: str, windows: Rows) -> Figure:
     """Draw figure 3b of the paper: both kinds of error over the drive, in rows of ten frames."""
     rates = {
         "FPR": "False positives (FPR)\nnon-road called road",
         "FNR": "False negatives (FNR)\nroad not found",
     }
-    title = f"False positive and false negative rate on {data.drive}"
-    return _over_drive(title, data, rates, 5.9)
+    return _over_drive(f"False positive and false negative rate on {drive}", windows, rates)
 
 
-def _over_drive(
-    title: str, data: FigureData, rates: Mapping[str, str], height: float
-) -> Figure | None:
+def _over_drive(title: str, windows: Rows, rates: Mapping[str, str]) -> Figure:
     """Draw rates of each variant's final mask, each with its label, one below the other."""
-    if not len(data.windows):
-        return None
-    final = scored.finals(data.windows)
-    rows = scored.each_window(final)
-    group = -(-len(rows) // CROWDED)
-    size, rest = rows["frames"].max(), rows["frames"][-1]
-    last, short = rows["window"][-1], ""
-    if rest < size and group > 1:
-        final, rows = final.take(final["window"] < last), rows.take(slice(-1))
-        short = f"; a last row of {rest} is left out"
-    elif rest < size:
-        short = f"; the last row, drawn pale, holds {rest}"
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    charts = over_windows(windows, [*rates])
+    figure = Figure(figsize=(WIDTH, 1.9 + 2 * len(charts)), layout="constrained")
     figure.suptitle(visible(title), x=0.012, ha="left", size=11, weight="bold", color=INK)
-    axes = figure.subplots(len(rates), 1, sharex=True, squeeze=False)[:, 0]
-    for ax, (rate, label) in zip(axes, rates.items(), strict=True):
-        _draw(ax, final, rate, group, pale=last if short else None)
+    axes = figure.subplots(len(charts), 1, sharex=True, squeeze=False)[:, 0]
+    for ax, chart, label in zip(axes, charts, rates.values(), strict=True):
         ax.set_ylabel(label)
-    _label_rows(axes[-1], rows, short)
-    handles, names = axes[0].get_legend_handles_labels()
-    names = [_fitting(name, _ROOM - _HANDLE) for name in names]
+        for series in reversed(chart.series):
+            few, look = thinned(series, CROWDED), series.look
+            ax.plot(
+                few.x,
+                few.y,
+                color=look.colour,
+                linestyle=_DASHES[look.dash],
+                linewidth=1.8,
+                marker=_MARKS[look.mark],
+                markerfacecolor="white" if look.hollow else look.colour,
+                markersize=5,
+                markevery=-(-len(few.x) // MARKED),
+                clip_on=False,
+                label=series.name,
+            )
+        highest = max([y for series in chart.series for _, y in series.points()], default=None)
+        if highest is None:
+            ax.text(0.5, 0.5, "undefined on every frame", transform=ax.transAxes, ha="center")
+        ax.set_ylim(0, max(1.08 * (highest or 0), 0.5))
+        ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
+        ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g} %"))
+    axes[-1].xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
+    axes[-1].set_xlabel("frame")
+    handles, names = (found[::-1] for found in axes[0].get_legend_handles_labels())
+    names = [_fitting(_LABELS.get(name, name), _ROOM - _HANDLE) for name in names]
     columns = int((_ROOM + _BETWEEN) / (max(map(_width, names)) + _HANDLE + _BETWEEN))
     axes[0].legend(
         handles,
         names,
-        title=_subtitle(final, rows, group),
+        title=_subtitle(windows),
         title_fontproperties={"size": 8.5},
         alignment="left",
         loc="lower left",
@@ -261,84 +266,15 @@ def _over_drive(
     return figure
 
 
-def _subtitle(final: Rows, rows: Rows, group: int) -> str:
-    stages, size = ", ".join(final.distinct("stage")), rows["frames"].max()
+def _subtitle(windows: Rows) -> str:
+    stages = ", ".join(scored.finals(windows).distinct("stage"))
+    sizes = scored.each_window(windows)["frames"]
+    size, rest = sizes.max(), sizes[-1]
     each = f"each point is the mean of {size} frames" if size > 1 else "each point is one frame"
-    if group > 1:
-        each = f"each point averages {group} rows of {size} frames, the band spans them"
-    return f"Final mask ({stages}); {each}; lower is better"
-
-
-def _draw(ax: Axes, final: Rows, rate: str, group: int, pale: int | None) -> None:
-    """Draw each variant's series; with too many rows to tell apart, their mean and range.
-
-    ``pale`` is the number of a last row that does not count as much as the others.
-    """
-    for name, look in looks(final.distinct("variant")).items():
-        own = final.of_variant(name)
-        own = own.take(np.argsort(own["window"], kind="stable"))
-        x, y = own["window"], 100 * own[rate]
-        if group > 1:
-            starts = np.arange(0, len(x), group)
-            low, high = np.fmin.reduceat(y, starts), np.fmax.reduceat(y, starts)
-            x, y = _means(x, starts), _means(y, starts)
-            ax.fill_between(x, low, high, color=look.colour, alpha=0.15, linewidth=0)
-        drawn: dict[str, Any] = {
-            "color": look.colour,
-            "linestyle": _DASHES[look.dash],
-            "linewidth": 1.8,
-            "marker": _MARKS[look.mark],
-            "markerfacecolor": "white" if look.hollow else look.colour,
-            "markersize": 5,
-            "clip_on": False,
-        }
-        order = 2 if name == BASELINE else 3
-        if len(x) > 1 and x[-1] == pale:
-            ax.plot(x[-2:], y[-2:], **drawn, alpha=PALE, markevery=[1], zorder=order - 1)
-            x, y = x[:-1], y[:-1]
-        every = -(-len(x) // MARKED)
-        ax.plot(x, y, **drawn, label=_LABELS.get(name, name), markevery=every, zorder=order)
-    values = 100 * final[rate]
-    if np.isnan(values).all():
-        ax.text(0.5, 0.5, "undefined on every frame", transform=ax.transAxes, ha="center")
-    ax.set_ylim(0, max(1.08 * np.nanmax([*values, 0.1]), 0.5))
-    ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
-    ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g} %"))
-
-
-def _means(values: Cells, starts: Cells) -> Cells:
-    """Return the mean of each run of values that are known; NaN where none is."""
-    known = ~np.isnan(values)
-    sums = np.add.reduceat(np.where(known, values, 0.0), starts)
-    counts = np.add.reduceat(known.astype(int), starts)
-    means: Cells = np.full(len(starts), np.nan)
-    return np.divide(sums, counts, out=means, where=counts > 0)
-
-
-def _label_rows(ax: Axes, rows: Rows, short: str) -> None:
-    """Write each row's frames below it; where there is no room, the first frame of some.
-
-    ``short`` says what became of a last row of fewer frames.
-    """
-    ends = [*zip(rows["first_frame"].tolist(), rows["last_frame"].tolist(), strict=True)]
-    first = [str(begin) for begin, _ in ends]
-    spans = [str(a) if a == b else f"{a}\N{EN DASH}{b}" for a, b in ends]
-    roomy = _step(spans) == 1
-    labels = spans if roomy else first
-    every = _step(labels)
-    numbers = rows["window"]
-    ax.set_xticks(numbers[::every], labels[::every])
-    margin = 0.5 if len(rows) < CROWDED else 0.005 * len(rows)
-    ax.set_xlim(numbers[0] - margin, numbers[-1] + margin)
-    size = rows["frames"].max()
-    what = f"Evaluated frames, {size} a row" if roomy else f"First frame of each row of {size}"
-    ax.set_xlabel(what + short)
-
-
-def _step(labels: Sequence[str]) -> int:
-    """Return n such that every nth label fits on 7 inches of axis at 8 points."""
-    room = max(int(7 / (0.075 * max(map(len, labels)) + 0.12)), 1)
-    return -(-len(labels) // room)
+    if len(sizes) > CROWDED:
+        each = f"each point is the mean of {-(-len(sizes) // CROWDED)} rows of {size} frames"
+    short = f", the last of {rest}" if rest < size else ""
+    return f"Final mask ({stages}); {each}{short}; lower is better"
 
 
 # --- Figure 2 -------------------------------------------------------------------------------------
@@ -350,13 +286,11 @@ GAP: Final = 0.05
 """Inches between pictures, and to what names them."""
 
 
-def road_masks(data: FigureData) -> Figure | None:
+def road_masks(drive: str, examples: Sequence[ExampleFrame]) -> Figure:
     """Draw figure 2 of the paper: the image, each variant's mask over it, and the truth over it."""
-    if not data.examples:
-        return None
-    truth = any(example.truth is not None for example in data.examples)
-    names = variants_of(data.examples)
-    rows = [_pictures(example, names, truth=truth) for example in data.examples]
+    truth = any(example.truth is not None for example in examples)
+    names = variants_of(examples)
+    rows = [_pictures(example, names, truth=truth) for example in examples]
     height, width = rows[0]["camera image"].shape[:2]
     across = (WIDTH - LEFT) / len(rows[0])
     down = (across - GAP) * height / width + GAP
@@ -366,10 +300,10 @@ def road_masks(data: FigureData) -> Figure | None:
     def write(x: float, y: float, text: str, **look: Any) -> None:
         figure.text(x / WIDTH, 1 - y / total, text, **look)
 
-    title = visible(f"Road masks on {data.drive}")
+    title = visible(f"Road masks on {drive}")
     write(0.1, 0.1, title, size=11, weight="bold", color=INK, va="top")
-    write(0.1, 0.32, _legend(data.examples, names), size=8.5, color=FAINT, va="top")
-    for number, (example, pictures) in enumerate(zip(data.examples, rows, strict=True)):
+    write(0.1, 0.32, _legend(examples, names), size=8.5, color=FAINT, va="top")
+    for number, (example, pictures) in enumerate(zip(examples, rows, strict=True)):
         top, bottom = TOP + number * down, TOP + (number + 1) * down - GAP
         name = f"frame {example.frame}"
         shown = name if _width(name) < INCH * (down - GAP) else str(example.frame)
@@ -384,13 +318,6 @@ def road_masks(data: FigureData) -> Figure | None:
                 above = {"size": LETTERS, "color": INK, "ha": "center", "va": "bottom"}
                 write((left + right) / 2, TOP - GAP, name, **above)
     return figure
-
-
-FIGURES: Final = {
-    "fig2_masks": road_masks,
-    "fig3a_error_rate": error_rate,
-    "fig3b_fp_fn_rate": fp_fn_rate,
-}
 
 
 def _pictures(example: ExampleFrame, variants: Sequence[str], *, truth: bool) -> dict[str, Rgb]:

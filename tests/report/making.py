@@ -9,10 +9,8 @@ from pypdf import PdfReader
 
 from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import Cell, Document
-from roadeval.report.figures import FigureData
 from roadeval.report.findings import Commands, Findings, PairedComparison
 from roadeval.results.rows import as_arrays
-from tests.evaluation.making import rows_of
 
 
 def a_document(*blocks, title="street"):
@@ -33,11 +31,6 @@ def text(content):
 
 NO_WINDOWS = as_arrays("windows", [])
 NO_LEVELS = as_arrays("probabilities", [])
-
-
-def figure_data(drive, windows, *more):
-    """What figures are drawn from, with the windows as a table."""
-    return FigureData(drive, rows_of(windows) if len(windows) else NO_WINDOWS, *more)
 
 
 VARIANTS = ("filtered", "unfiltered", "blind")
