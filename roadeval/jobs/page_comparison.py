@@ -20,7 +20,7 @@ from roadeval.jobs.page_frames import BYTES, PICTURED, fitting
 from roadeval.jobs.report_frames import rates_by_frame
 from roadeval.jobs.result import DriveResult
 from roadeval.recording import Recording
-from roadeval.report.browse import Strip
+from roadeval.report.blocks import Strip
 from roadeval.report.chart import Look, looks_of_results
 from roadeval.report.charts.rates import over_frames
 from roadeval.report.findings import NotableFrame

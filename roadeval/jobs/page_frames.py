@@ -14,7 +14,7 @@ from roadeval.evaluation.score import judge
 from roadeval.evaluation.settings import NOTEWORTHY
 from roadeval.jobs.report_frames import LAYERS, FramePicker, evenly, rates_by_frame
 from roadeval.jobs.result import DriveResult
-from roadeval.report.browse import Strip
+from roadeval.report.blocks import Strip
 from roadeval.report.charts.rates import over_frames
 from roadeval.report.sections.browse import SMALL, BrowsedFrames, FrameFacts, strip
 from roadeval.results.notes import notes

@@ -17,8 +17,7 @@ from roadeval.report.drive import document, page_document, with_frames
 from roadeval.report.findings import Commands
 from roadeval.report.fleet.document import document as fleet_document
 from roadeval.report.fleet.document import page_document as fleet_page_document
-from roadeval.report.page.files import Beside, write_page
-from roadeval.report.page.render import page
+from roadeval.report.page.render import Beside, page, write_page
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.fleet.folder import Fleet
 from roadeval.results.fleet.kind import is_fleet

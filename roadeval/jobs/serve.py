@@ -15,8 +15,7 @@ from roadeval.jobs.result import DriveResult
 from roadeval.jobs.served import Served, ServedDrive, moved, policy
 from roadeval.jobs.served_fleet import ServedFleet
 from roadeval.recording.screen.viewer import WindowViewer
-from roadeval.report.blocks import Document, Heading
-from roadeval.report.browse import LinkList
+from roadeval.report.blocks import Document, Heading, LinkList
 from roadeval.report.findings import Commands
 from roadeval.report.page.render import SCRIPT, STYLE, Place, code, page
 from roadeval.results.fleet.kind import is_fleet

@@ -15,8 +15,7 @@ from roadeval.jobs.page_frames import StripMaker, browsed
 from roadeval.jobs.report_findings import collect
 from roadeval.jobs.result import DriveResult
 from roadeval.recording.screen.viewer import WindowViewer
-from roadeval.report.blocks import Document, Heading
-from roadeval.report.browse import Strip
+from roadeval.report.blocks import Document, Heading, Strip
 from roadeval.report.drive import page_document
 from roadeval.report.findings import Commands
 from roadeval.report.page.render import Place, page, part

@@ -12,20 +12,15 @@ from dataclasses import dataclass, field, fields
 from typing import Any, Final
 
 from roadeval.report.chart import Chart, HeatMap, legend
-from roadeval.report.drawing import (
-    Drawing,
-    HeatDrawing,
-    drawn,
-    key_on_paper,
-    span_of_frames,
-)
+from roadeval.report.drawing import HeatDrawing, drawn, key_on_paper, span_of_frames
+from roadeval.runtime.text import as_markdown
 
-_SUFFIXES: Final = {b"<?xml": "svg", b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
+_SUFFIXES: Final = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
 
 
 @dataclass(frozen=True, slots=True)
 class ImageFile:
-    """The bytes of an SVG, PNG or JPEG file."""
+    """The bytes of a PNG or JPEG file."""
 
     content: bytes = field(repr=False)
 
@@ -50,10 +45,44 @@ class Block:
         own = {each.name: _as_json(getattr(self, each.name)) for each in fields(self)}
         return {"kind": self.kind, **own}
 
+    def parts(self) -> Iterator[Any]:
+        """Yield the image files, the charts and the blocks inside, and what is inside of those."""
+        for each in fields(self):
+            yield from _parts(getattr(self, each.name))
+
     def images(self) -> Iterator[ImageFile]:
         """Yield the image files in the block and in those it holds."""
-        for each in fields(self):
-            yield from _images(getattr(self, each.name))
+        for part in self.parts():
+            if isinstance(part, ImageFile):
+                yield part
+            elif isinstance(part, HeatMap):
+                yield ImageFile(part.picture())
+
+
+def _as_json(value: Any) -> Any:
+    match value:
+        case ImageFile():
+            return value.name
+        case Block():
+            return value.as_json()
+        case list() | tuple() | range():
+            return [_as_json(item) for item in value]
+        case _:
+            return value
+
+
+def _parts(value: Any) -> Iterator[Any]:
+    if isinstance(value, list | tuple):
+        for item in value:
+            yield from _parts(item)
+    elif isinstance(value, ImageFile | Chart | HeatMap):
+        yield value
+    elif isinstance(value, Block):
+        yield value
+        yield from value.parts()
+
+
+# --- Words and tables -----------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,10 +95,11 @@ class Heading(Block):
 
 @dataclass(frozen=True, slots=True)
 class Text(Block):
-    """A paragraph. ``style`` is ``body``, ``note`` (small and grey), ``title`` or ``verdict``."""
+    """A paragraph."""
 
     text: str
     style: str = "body"
+    """``body``, ``note`` (small and grey), ``title`` or ``verdict``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,11 +111,12 @@ class Command(Block):
 
 @dataclass(frozen=True, slots=True)
 class BulletList(Block):
-    """A titled list of sentences; ``tone`` is ``plain`` or ``warning``."""
+    """A titled list of sentences."""
 
     title: str
     items: Sequence[str]
     tone: str = "plain"
+    """``plain`` or ``warning``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,11 +124,9 @@ class Cell(Block):
     """A table's cell."""
 
     text: str
-    """What it says."""
     bold: bool = False
-    """Whether it is bold."""
     dot: str | None = None
-    """Colour of a dot before it."""
+    """The colour of a dot before the text."""
     opens: str = ""
     """Address below that of a served page at which its frame is opened in the viewer; or empty."""
     leads: str = ""
@@ -123,6 +152,19 @@ class Table(Block):
     small: bool = False
     """Whether it is set in small type."""
 
+    def markdown(self) -> list[str]:
+        """Return its lines in Markdown."""
+        places = range(len(self.columns))
+        sides = ["---" if place in self.text_columns else "---:" for place in places]
+        rows = [
+            [as_markdown(cell.text if isinstance(cell, Cell) else cell) for cell in row]
+            for row in self.rows
+        ]
+        return [f"| {' | '.join(cells)} |" for cells in (self.columns, sides, *rows)]
+
+
+# --- Pictures -------------------------------------------------------------------------------------
+
 
 @dataclass(frozen=True, slots=True)
 class Figure(Block):
@@ -134,26 +176,32 @@ class Figure(Block):
     def as_json(self) -> dict[str, Any]:
         """Return what paper needs to draw it."""
         span, keys = span_of_frames(self.charts), legend(self.charts)
-        told = [f"{chart.title}, {chart.unit}" for chart in self.charts]
+        titles = "; ".join(f"{chart.title}, {chart.unit}" for chart in self.charts)
+        charts = []
+        for drawing in (drawn(chart, span) for chart in self.charts):
+            charts.append(drawing.on_paper())
+            if isinstance(drawing, HeatDrawing):
+                charts[-1]["picture"] = ImageFile(drawing.chart.picture()).name
         return {
             "kind": self.kind,
             "caption": self.caption,
-            "alt": f"{'; '.join(told)}: {', '.join(key.name for key in keys)}".rstrip(": "),
+            "alt": f"{titles}: {', '.join(key.name for key in keys)}".rstrip(": "),
             "legend": [key_on_paper(key) for key in keys],
-            "charts": [_on_paper(drawn(chart, span)) for chart in self.charts],
+            "charts": charts,
         }
 
 
 @dataclass(frozen=True, slots=True)
 class ImageGrid(Block):
-    """Pictures of equal size in rows of ``columns``, each with a few words below it.
-
-    The first ``skip`` places of the first row stay free.
-    """
+    """Pictures of equal size in rows, each with a few words below it."""
 
     pictures: Sequence[tuple[str, ImageFile]]
     columns: int
     skip: int = 0
+    """Places of the first row that stay free."""
+
+
+# --- Arrangement ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,50 +234,112 @@ class PageBreak(Block):
 
 @dataclass(frozen=True, slots=True)
 class Document(Block):
-    """A document: its titles, its blocks, and the keywords of the file.
-
-    ``kicker`` is the line above the title, ``subtitle`` the one below; ``footer`` is printed at
-    the foot of every page.
-    """
+    """A document."""
 
     kicker: str
+    """The line above the title."""
     title: str
     subtitle: str
+    """The line below the title."""
     footer: str
+    """Printed at the foot of every page."""
     blocks: Sequence[Block]
     keywords: Sequence[str] = ()
+    """Of the file."""
 
     def files(self) -> Mapping[str, bytes]:
         """Return every image file's bytes by its name."""
         return {image.name: image.content for image in self.images()}
 
 
-def _on_paper(drawing: Drawing | HeatDrawing) -> dict[str, Any]:
-    if isinstance(drawing, HeatDrawing):
-        return drawing.on_paper() | {"picture": ImageFile(drawing.chart.picture()).name}
-    return drawing.on_paper()
+# --- What only a page has -------------------------------------------------------------------------
 
 
-def _as_json(value: Any) -> Any:
-    match value:
-        case ImageFile():
-            return value.name
-        case Block():
-            return value.as_json()
-        case list() | tuple() | range():
-            return [_as_json(item) for item in value]
-        case _:
-            return value
+@dataclass(frozen=True, slots=True)
+class Picture(Block):
+    """A picture of a strip."""
+
+    name: str
+    """The same in every frame, as ``filtered: errors``: kept when the frame changes."""
+    title: str
+    """What it shows, in a few words."""
+    image: ImageFile
 
 
-def _images(value: Any) -> Iterator[ImageFile]:
-    match value:
-        case ImageFile():
-            yield value
-        case HeatMap():
-            yield ImageFile(value.picture())
-        case Block():
-            yield from value.images()
-        case list() | tuple():
-            for item in value:
-                yield from _images(item)
+@dataclass(frozen=True, slots=True)
+class PictureRow(Block):
+    """Pictures that stand beside each other under a title."""
+
+    title: str
+    pictures: Sequence[Picture]
+
+
+@dataclass(frozen=True, slots=True)
+class Strip(Block):
+    """A frame with its pictures."""
+
+    frame: int
+    sentences: Sequence[str]
+    """What is known of it."""
+    rates: Table | None
+    """Of each variant's final mask; None without truth."""
+    rows: Sequence[PictureRow]
+    command: str = ""
+    """Opens it in the viewer; empty where there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameRow(Block):
+    """A frame in the table."""
+
+    frame: int
+    seconds: str
+    """From the first frame."""
+    cells: Sequence[str]
+    """A number for each column of rates."""
+    conditions: Sequence[int] = ()
+    """Positions in `FrameBrowser.conditions`."""
+    note: str = ""
+    pictured: bool = False
+    """Whether its pictures can be had."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameBrowser(Block):
+    """The frames of a drive."""
+
+    rates: Sequence[str]
+    """Titles of groups of columns."""
+    variants: Sequence[str]
+    """Titles of the columns in each group."""
+    rows: Sequence[FrameRow]
+    """The frames, in the drive's order."""
+    conditions: Sequence[str]
+    """What a frame can be, in words."""
+    strips: Sequence[Strip]
+    """Frames with pictures, in the drive's order; none where they are asked for one by one."""
+    charts: Sequence[Chart]
+    """Rates along the drive."""
+    first: int | None
+    """The frame that is shown at first; None where there is no picture."""
+    compared: tuple[str, str]
+    """Names of two pictures that are laid over each other at first."""
+    command: str = ""
+    """Opens a frame in the viewer, with ``{}`` for its number; empty where nothing does."""
+    note: str = ""
+    """What to know of the table."""
+
+
+@dataclass(frozen=True, slots=True)
+class LongTable(Block):
+    """A table of many rows, with a field that looks for words in them."""
+
+    table: Table
+    label: str
+
+
+@dataclass(frozen=True, slots=True)
+class LinkList(Block):
+    """Titles with the addresses that they lead to, which a server made."""
+
+    links: Sequence[tuple[str, str]]

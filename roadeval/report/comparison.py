@@ -36,7 +36,6 @@ from roadeval.report.chart import Chart
 from roadeval.report.charts import differences
 from roadeval.report.charts.differences import MEAN, ForestRow
 from roadeval.report.fleet.common import MarkedRow, q_value, strata_table
-from roadeval.report.markdown import table as markdown_table
 from roadeval.results.comparison import (
     changed_drives,
     changed_settings,
@@ -109,7 +108,7 @@ def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
         f"- {'**FAIL**' if each.holds else 'ok'}: {as_markdown(judged(each))}"
         for each in judgements
     ]
-    lines += ["", *markdown_table(_rates_table(comparison)), ""]
+    lines += ["", *_rates_table(comparison).markdown(), ""]
     lines += [line for legend in _legend(comparison) for line in (as_markdown(legend), "")]
     lines += [*(f"- {as_markdown(sentence)}" for sentence in told_where(comparison)), ""]
     for title, table in (
@@ -118,7 +117,7 @@ def markdown(comparison: Comparison, judgements: Sequence[Judgement]) -> str:
         ("Frames that changed most:", _moved_table(comparison.moved)),
     ):
         if table.rows:
-            lines += [title, "", *markdown_table(table), ""]
+            lines += [title, "", *table.markdown(), ""]
     lines += [f"- {as_markdown(warning)}" for warning in warnings(comparison)]
     lines += ["", _unit(comparison)]
     return "\n".join(lines).rstrip() + "\n"

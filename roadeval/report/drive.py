@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from roadeval.report.blocks import Block, Document
-from roadeval.report.browse import FrameBrowser
+from roadeval.report.blocks import Block, Document, FrameBrowser
 from roadeval.report.findings import Findings
 from roadeval.report.sections import (
     browse,

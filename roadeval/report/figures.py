@@ -49,7 +49,7 @@ from roadeval.report.images import (
     shrink,
     variants_of,
 )
-from roadeval.report.pdf.typeset import page_of, picture_of
+from roadeval.report.pdf.typeset import figure_as
 from roadeval.runtime.text import elided, visible
 from roadeval.runtime.threads import ordered
 
@@ -133,8 +133,8 @@ def write_figures(
 def _write(folder: Path, figure: tuple[str, bytes]) -> list[Path]:
     name, drawing = figure
     files = {
-        folder / f"{name}.png": _with_dpi(picture_of(drawing, DPI)),
-        folder / f"{name}.pdf": page_of(drawing),
+        folder / f"{name}.png": _with_dpi(figure_as("png", drawing, DPI)),
+        folder / f"{name}.pdf": figure_as("pdf", drawing),
     }
     for path, content in files.items():
         path.write_bytes(content)

@@ -9,7 +9,7 @@ import pytest
 
 from roadeval.report.blocks import Figure
 from roadeval.report.chart import Chart, ChartKind, Look, Series
-from roadeval.report.page.files import write_page
+from roadeval.report.page.render import write_page
 from roadeval.results.fleet.folder import Fleet
 from tests.e2e.commands import here
 from tests.fixtures.browser import missing, violations, wait_until

@@ -9,7 +9,7 @@ from roadeval.jobs import compare, page_comparison, page_frames
 from roadeval.jobs.page_frames import FEWEST, bytes_of, strips_of
 from roadeval.jobs.report import drive_page
 from roadeval.jobs.result import DriveResult
-from roadeval.report.browse import FrameBrowser
+from roadeval.report.blocks import FrameBrowser
 from tests.jobs.making import settings, write_log
 
 OTHERS = {name: {"chain": ["similarity", "post"]} for name in ("third", "fourth")}

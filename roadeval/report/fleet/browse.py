@@ -7,8 +7,7 @@ from typing import Final
 
 from roadeval.data.words import DASH, number, percent, points
 from roadeval.evaluation.effects import BASES
-from roadeval.report.blocks import Block, Cell, Heading, Table, Text
-from roadeval.report.browse import LongTable
+from roadeval.report.blocks import Block, Cell, Heading, LongTable, Table, Text
 from roadeval.report.fleet.drives import against, tags_in_words
 from roadeval.report.fleet.findings import FleetFindings, Row
 

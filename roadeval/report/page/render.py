@@ -10,24 +10,37 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any, Final, NoReturn
 
-from roadeval.report.blocks import Block, Cell, Document, ImageFile, Table
-from roadeval.report.browse import FrameBrowser
-from roadeval.report.chart import legend
-from roadeval.report.drawing import Drawing, HeatDrawing, drawn, span_of_frames
-from roadeval.report.page.outline import charts, sections
+from roadeval.report.blocks import (
+    Block,
+    Cell,
+    Document,
+    Heading,
+    ImageFile,
+    KeepTogether,
+    PageBreak,
+    Table,
+    TableOfContents,
+)
+from roadeval.report.chart import Chart, legend
+from roadeval.report.drawing import drawn, span_of_frames
+from roadeval.report.pdf.typeset import ReportError
+from roadeval.runtime.companions import folder_name, put_with
 from roadeval.runtime.text import visible
 
 STYLE: Final = "page.css"
 SCRIPT: Final = "page.js"
 """Names of the files with a page's style and script, where they are not inside it."""
 _SCRIPTS: Final = ("tables.js", "charts.js", "places.js", "pictures.js", "frames.js", "start.js")
-_MEDIA: Final = {"svg": "image/svg+xml", "png": "image/png", "jpg": "image/jpeg"}
+_MEDIA: Final = {"png": "image/png", "jpg": "image/jpeg"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,11 +52,10 @@ class Place:
     """Begin of the addresses of pictures, and of style and script; None: inside the page."""
     frames: str | None = None
     """Address of a frame, with ``{}`` for its number, where a server gives it; None: all that the
-    page shows is on it.
-    """
+    page shows is on it."""
     home: str = ""
+    """Address of the page above, or empty."""
     home_title: str = "All results"
-    """Address of the page above, or empty, and what it is called."""
     forms: bool = False
     """Whether a form of the page may ask its server to open the viewer, as without a script."""
 
@@ -122,25 +134,26 @@ def _hash(code: str) -> str:
 
 
 def _rendered(template: str, place: Place, document: Document | None, **values: Any) -> bytes:
-    span = span_of_frames(_all_charts(document)) if document else None
-
-    def drawing(chart: Any) -> Drawing | HeatDrawing:
-        return drawn(chart, span)
-
-    environment = _environment()
-    made = environment.get_template(template).render(
-        drawn=drawing,
-        legend=legend,
-        picture=lambda chart: ImageFile(chart.picture()),
-        source=lambda image: _source(image, place),
-        frame_link=lambda frame: _frame_link(frame, place),
-        filled=_filled,
-        unknown=_unknown,
-        is_live=place.frames is not None,
-        has_forms=place.forms,
-        # A picture inside the page is there already, and paper shows it only if it is loaded.
-        loading="eager" if place.pictures is None else "lazy",
-        **values,
+    parts = document.parts() if document else ()
+    span = span_of_frames(part for part in parts if isinstance(part, Chart))
+    own_frame = "#frame-{}" if place.frames is None else place.frames
+    made = (
+        _environment()
+        .get_template(template)
+        .render(
+            drawn=lambda chart: drawn(chart, span),
+            legend=legend,
+            picture=lambda chart: ImageFile(chart.picture()),
+            source=lambda image: _source(image, place),
+            frame_link=own_frame.format,
+            filled=_filled,
+            unknown=_unknown,
+            is_live=place.frames is not None,
+            has_forms=place.forms,
+            # A picture inside the page is there already, and paper shows it only if it is loaded.
+            loading="eager" if place.pictures is None else "lazy",
+            **values,
+        )
     )
     return str(made).encode("utf-8")
 
@@ -166,22 +179,11 @@ def _shown(value: Any) -> Any:
     return visible(value) if type(value) is str else value
 
 
-def _all_charts(document: Document) -> Iterator[Any]:
-    yield from charts(document.blocks)
-    for block in document.blocks:
-        if isinstance(block, FrameBrowser):
-            yield from block.charts
-
-
 def _source(image: ImageFile, place: Place) -> str:
     if place.pictures is not None:
         return f"{place.pictures}{image.name}"
     media = _MEDIA[image.name.rpartition(".")[2]]
     return f"data:{media};base64,{base64.b64encode(image.content).decode()}"
-
-
-def _frame_link(frame: int, place: Place) -> str:
-    return f"#frame-{frame}" if place.frames is None else place.frames.format(frame)
 
 
 # --- Tables ---------------------------------------------------------------------------------------
@@ -220,3 +222,94 @@ def _unknown(kind: str) -> NoReturn:
 def code() -> Mapping[str, bytes]:
     """Return the files of style and script, for pages that have them beside them."""
     return {STYLE: style().encode(), SCRIPT: script().encode()}
+
+
+# --- Sections -------------------------------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class Section:
+    """A heading of the first level with all that follows it."""
+
+    name: str
+    """Of the place, for links; no two are equal."""
+    title: str
+    """Of the heading; empty for what stands before the first one."""
+    blocks: list[tuple[Block, str]] = field(default_factory=list)
+    """What follows, with the names of the headings among them."""
+
+    @property
+    def parts(self) -> list[tuple[str, str]]:
+        """The names and titles of the headings below this one."""
+        return [(name, block.text) for block, name in self.blocks if isinstance(block, Heading)]
+
+
+def sections(blocks: Iterable[Block]) -> list[Section]:
+    """Return the sections of a document; blocks that were only kept together stand for themselves.
+
+    >>> [section.name for section in sections([Heading("The frames"), Heading("The frames")])]
+    ['the-frames', 'the-frames-2']
+    """
+    found = [Section("", "")]
+    taken: set[str] = set()
+    for block in _flat(blocks):
+        name = _name(block.text, taken) if isinstance(block, Heading) else ""
+        if isinstance(block, Heading) and block.level == 1:
+            found.append(Section(name, block.text))
+        else:
+            found[-1].blocks.append((block, name))
+    return [section for section in found if section.title or section.blocks]
+
+
+def _flat(blocks: Iterable[Block]) -> Iterator[Block]:
+    for block in blocks:
+        if isinstance(block, KeepTogether):
+            yield from _flat(block.blocks)
+        elif not isinstance(block, PageBreak | TableOfContents):  # a page's outline is always there
+            yield block
+
+
+def _name(text: str, taken: set[str]) -> str:
+    """Return a name of letters, digits and hyphens that nothing on the page has yet."""
+    plain = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-") or "part"
+    name, count = plain, 1
+    while name in taken:
+        count += 1
+        name = f"{plain}-{count}"
+    taken.add(name)
+    return name
+
+
+# --- Files ----------------------------------------------------------------------------------------
+
+
+class Beside(StrEnum):
+    """What lies in a folder beside a page: nothing, its pictures, or its script and style, too."""
+
+    NOTHING = "nothing"
+    PICTURES = "pictures"
+    ALL = "all"
+
+
+def write_page(path: Path, document: Document, beside: Beside = Beside.NOTHING) -> Path:
+    """Write a document as a page; what it needs is replaced with it, as one.
+
+    Raises
+    ------
+    ReportError
+        If it cannot be written.
+    """
+    files = dict(document.files() if beside is not Beside.NOTHING else {})
+    files |= code() if beside is Beside.ALL else {}
+    at = f"{folder_name(path, files)}/" if files else None
+    place = Place(
+        pictures=None if beside is Beside.NOTHING else at,
+        code=at if beside is Beside.ALL else None,
+    )
+    try:
+        put_with(path, page(document, place), files)
+    except OSError as error:
+        raise ReportError(
+            f"{path}: cannot be written ({error.strerror}); choose another place"
+        ) from error
+    return path

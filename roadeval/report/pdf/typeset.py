@@ -46,10 +46,6 @@ class Paper(StrEnum):
 
 
 _TYPST_NAMES: Final = {Paper.A4: "a4", Paper.LETTER: "us-letter"}
-_COLOURS: Final = {
-    "accent": colours.hex_of(colours.BLUE),
-    "alarm": colours.hex_of(colours.VERMILLION),
-}
 
 
 class ReportError(RoadevalError):
@@ -62,20 +58,15 @@ def pdf(document: Document, paper: Paper = Paper.A4) -> bytes:
     Fonts are Typst's own and, for the figures, DejaVu Sans; never the machine's, so that a document
     looks the same everywhere. A letter that none of them has is an empty box.
     """
-    page = {"paper": _TYPST_NAMES[paper], "colours": _COLOURS}
-    data = _visible(document.as_json() | page)
+    inks = {"accent": colours.hex_of(colours.BLUE), "alarm": colours.hex_of(colours.VERMILLION)}
+    data = _visible(document.as_json() | {"paper": _TYPST_NAMES[paper], "colours": inks})
     template = files("roadeval.report.pdf").joinpath(_TEMPLATE).read_bytes()
     return _compiled(template, {"document.json": json.dumps(data).encode(), **document.files()})
 
 
-def page_of(svg: bytes) -> bytes:
-    """Return a figure, given as SVG, as a PDF of one page of its size."""
-    return _compiled(_FIGURE, {"figure.svg": svg})
-
-
-def picture_of(svg: bytes, dots_per_inch: int) -> bytes:
-    """Return a figure, given as SVG, as a PNG."""
-    return _compiled(_FIGURE, {"figure.svg": svg}, "png", dots_per_inch)
+def figure_as(kind: Literal["pdf", "png"], svg: bytes, dots_per_inch: int | None = None) -> bytes:
+    """Return a figure, given as SVG, as a PDF of one page of its size, or as a PNG."""
+    return _compiled(_FIGURE, {"figure.svg": svg}, kind, dots_per_inch)
 
 
 def write_file(path: Path, content: bytes) -> Path:
@@ -116,7 +107,7 @@ def _compiled(
         compiled: bytes = typst.compile(
             Path(folder, _TEMPLATE),
             root=Path(folder),
-            font_paths=_fonts(),
+            font_paths=_fonts()[0],
             format=kind,
             ppi=dots_per_inch,
         )
@@ -136,34 +127,26 @@ def _explained() -> Iterator[None]:
 
 
 @cache
-def _fonts() -> Any:
-    """Return Typst's own fonts, and the DejaVu Sans that Matplotlib brings."""
+def _fonts() -> tuple[Any, TemporaryDirectory[str]]:
+    """Return Typst's own fonts and Matplotlib's DejaVu Sans, and a folder of that one alone.
+
+    Typst reads the folder as long as the process lives. Matplotlib's own folder also has a font
+    with a sign for every letter there is: a text of a figure is set in one font, and if it had but
+    one letter that DejaVu Sans lacks, as in a drive's name, all of it would be such signs.
+    """
     import typst
 
-    return typst.Fonts(include_system_fonts=False, font_paths=[_dejavu().name])
-
-
-@cache
-def _dejavu() -> TemporaryDirectory[str]:
-    """Return a folder of DejaVu Sans alone, which Typst reads as long as the process lives.
-
-    Matplotlib's own folder also has a font with a sign for every letter there is. A text of a
-    figure is set in one font, and if it had but one letter that DejaVu Sans lacks, as in a drive's
-    name, all of it would be such signs.
-    """
     # Found without the import, which takes longer than a whole report.
     found = find_spec("matplotlib")
     assert found is not None
     assert found.origin is not None
     folder = TemporaryDirectory(prefix="roadeval-")
-    for font in (
-        Path(found.origin).with_name("mpl-data").joinpath("fonts", "ttf").glob("DejaVuSans*.ttf")
-    ):
+    for font in Path(found.origin).parent.glob("mpl-data/fonts/ttf/DejaVuSans*.ttf"):
         try:
             Path(folder.name, font.name).symlink_to(font)
         except OSError:  # a system on which not everyone may link
             shutil.copy(font, folder.name)
-    return folder
+    return typst.Fonts(include_system_fonts=False, font_paths=[folder.name]), folder
 
 
 def _visible(value: Any) -> Any:

@@ -7,15 +7,21 @@ from dataclasses import dataclass
 from typing import Final
 
 from roadeval.data import BASELINE
-from roadeval.data.words import defined, listing, number, percent, points, timestamp
+from roadeval.data.words import defined, listing, number, percent
 from roadeval.evaluation.metrics import SHORT
-from roadeval.report.blocks import Block, Heading, Table
-from roadeval.report.browse import FrameBrowser, FrameRow, Picture, PictureRow, Strip
+from roadeval.report.blocks import (
+    Block,
+    FrameBrowser,
+    FrameRow,
+    Heading,
+    Picture,
+    PictureRow,
+    Strip,
+)
 from roadeval.report.chart import Chart
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import LayerImage, jpeg
-from roadeval.report.sections.common import rate_cells, variant_cell
-from roadeval.report.sections.frames import culprit
+from roadeval.report.sections.frames import rates_of, sentences_about
 
 LARGE: Final = 640
 SMALL: Final = 300
@@ -54,7 +60,7 @@ class BrowsedFrames:
     charts: Sequence[Chart]
     """Rates along the drive."""
     inspect: Callable[[int], str] | None
-    """Returns the command that opens a frame; None where there is none."""
+    """Return the command that opens a frame; None where there is none."""
     masks: Sequence[str] = ()
     """Names of the pictures of final masks, which are compared where there is no truth."""
     left_out: Sequence[str] = ()
@@ -167,35 +173,13 @@ def strip(
     layers
         Pixels across the pictures of layers, at most.
     """
-    names = [*variants]
-    rates = Table(
-        ["final mask, %", *SHORT],
-        [
-            [variant_cell(name, names), *rate_cells(each, bold=name == frame.variant)]
-            for name, each in frame.rates.items()
-        ],
-        small=True,
-    )
     return Strip(
         frame.frame,
-        list(_sentences(frame)),
-        rates if frame.rates else None,
+        [*sentences_about(frame)],
+        rates_of(frame, variants) if frame.rates else None,
         list(_rows(frame, layers)),
         command,
     )
-
-
-def _sentences(frame: NotableFrame) -> Iterator[str]:
-    yield f"Stamp {timestamp(frame.stamp_ns)}"
-    if len(frame.parts) > 1:
-        first, *rest = frame.parts
-        terms = [f"{first} {percent(frame.parts[first])}"]
-        terms += [f"{name} {points(frame.parts[name])}" for name in rest]
-        yield (
-            f"ERR of {frame.variant}: {', '.join(terms)} pp. Most of it comes from "
-            f"{culprit(frame)}."
-        )
-    yield from frame.notes
 
 
 def _rows(frame: NotableFrame, layers: int) -> Iterator[PictureRow]:

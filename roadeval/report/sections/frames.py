@@ -65,18 +65,13 @@ def _frames(
 
 
 def _frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
-    rates = Table(
-        ["final mask, %", *SHORT],
-        [
-            [
-                variant_cell(name, [*findings.finals]),
-                *rate_cells(rates, bold=name == frame.variant),
-            ]
-            for name, rates in frame.rates.items()
-        ],
-        small=True,
-    )
-    sentences = [Text(sentence, "note") for sentence in _sentences(frame)]
+    stamp, *facts = sentences_about(frame)
+    if frame.change is not None:
+        facts = [f"The filter changes ERR by {points(frame.change)} pp."]
+    elif frame.notes:
+        facts[-len(frame.notes) :] = [" ".join(frame.notes)]
+    sentences = [Text(sentence, "note") for sentence in (stamp, *facts)]
+    rates = rates_of(frame, [*findings.finals])
     yield TwoColumns([Text(f"Frame {frame.frame}", "title"), *sentences], [rates], 0.55)
     if frame.images:
         pictures = [(image.title, jpeg(image, LARGE)) for image in frame.images]
@@ -90,22 +85,23 @@ def _frame(findings: Findings, frame: NotableFrame) -> Iterator[Block]:
         yield Command(findings.commands.inspect(frame.frame))
 
 
-def _sentences(frame: NotableFrame) -> Iterator[str]:
+def rates_of(frame: NotableFrame, variants: Sequence[str]) -> Table:
+    """Tabulate the rates of each variant's final mask; ``variants`` are all that were scored."""
+    rows = [
+        [variant_cell(name, variants), *rate_cells(rates, bold=name == frame.variant)]
+        for name, rates in frame.rates.items()
+    ]
+    return Table(["final mask, %", *SHORT], rows, small=True)
+
+
+def sentences_about(frame: NotableFrame) -> Iterator[str]:
+    """Yield when it was, which stage its error comes from, and its notes."""
     yield f"Stamp {timestamp(frame.stamp_ns)}"
-    if frame.change is not None:
-        yield f"The filter changes ERR by {points(frame.change)} pp."
-        return
     if len(frame.parts) > 1:
         first, *rest = frame.parts
         terms = [f"{first} {percent(frame.parts[first])}"]
         terms += [f"{name} {points(frame.parts[name])}" for name in rest]
-        sum_ = ", ".join(terms)
-        yield f"ERR of {frame.variant}: {sum_} pp. Most of it comes from {culprit(frame)}."
-    if frame.notes:
-        yield " ".join(frame.notes)
-
-
-def culprit(frame: NotableFrame) -> str:
-    """Return the stage with the greatest part in a frame's error."""
-    name = max(frame.parts, key=lambda part: frame.parts[part])
-    return "the shadow filter" if name == FILTER else name
+        culprit = max(frame.parts, key=lambda part: frame.parts[part])
+        of = "the shadow filter" if culprit == FILTER else culprit
+        yield f"ERR of {frame.variant}: {', '.join(terms)} pp. Most of it comes from {of}."
+    yield from frame.notes

@@ -13,28 +13,25 @@ from roadeval.report.blocks import (
     Cell,
     Command,
     Figure,
+    FrameBrowser,
+    FrameRow,
     Heading,
     ImageFile,
     ImageGrid,
     KeepTogether,
+    LinkList,
+    LongTable,
     PageBreak,
+    Picture,
+    PictureRow,
+    Strip,
     Table,
     TableOfContents,
     Text,
     TwoColumns,
 )
-from roadeval.report.browse import (
-    FrameBrowser,
-    FrameRow,
-    LinkList,
-    LongTable,
-    Picture,
-    PictureRow,
-    Strip,
-)
 from roadeval.report.chart import Chart, ChartKind, Look, Series
-from roadeval.report.page.files import Beside, write_page
-from roadeval.report.page.render import page
+from roadeval.report.page.render import Beside, page, write_page
 from tests.report.making import a_document
 
 JPEG = ImageFile(b"\xff\xd8\xff\xe0 not much of a picture")
@@ -168,7 +165,6 @@ def test_pictures_have_words_for_who_does_not_see_them():
 @pytest.mark.parametrize(
     ("content", "media"),
     [
-        (b"<?xml version='1.0'?><svg/>", "image/svg+xml"),
         (b"\x89PNG...", "image/png"),
         (b"\xff\xd8\xff...", "image/jpeg"),
     ],
