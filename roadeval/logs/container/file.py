@@ -17,6 +17,7 @@ from mcap.records import Channel, Schema
 from roadeval.logs.container.chunks import IN_MEMORY, ChunkReader
 from roadeval.logs.container.records import (
     HEAD,
+    MESSAGE,
     MESSAGE_HEAD,
     PRIVATE,
     Buffer,
@@ -29,7 +30,7 @@ from roadeval.logs.container.records import (
     parse,
     walk,
 )
-from roadeval.logs.container.scan import DAY, Scan, StampOf
+from roadeval.logs.container.scan import Scan, StampOf
 from roadeval.logs.errors import BadRecord
 
 BLOCK: Final = 1 << 20
@@ -269,7 +270,7 @@ class Container:
                 self._records_left -= allowed - usual
                 break
             end = after
-            if opcode == Opcode.MESSAGE and after - body >= MESSAGE_HEAD.size:
+            if opcode == MESSAGE and after - body >= MESSAGE_HEAD.size:
                 head = records[body : body + MESSAGE_HEAD.size]
                 channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
                 found.setdefault(channel_id, array("Q")).extend((log_time, offset))
@@ -314,37 +315,36 @@ class Container:
             other = known.setdefault(record.id, record)
             if other == record:
                 continue
-            fit = self._fit(record, logs)
+            fit = self._fit(other, logs)
             known[record.id] = record
             own_fit = self._fit(record, logs)
             if own_fit < fit or (own_fit == fit and not checked):
                 known[record.id] = other
             changed |= known[record.id] is record
-            told, names = "a topic is described here in another way than before", ("before", "here")
+            told, names = "a topic is described here in another way than before", ("that", "this")
             if checked:
                 told = "the summary describes topics in another way than the data"
-                names = "by the summary", "by the data"
-            believed = f"{told}; it is read as described {names[known[record.id] is record]}"
-            doubt = "either may be wrong" if fit == own_fit else "so its messages can be decoded"
-            self.redefined[offset] = f"{believed}; {doubt}"
+                names = "the summary", "the data"
+            name = names[known[record.id] is record]
+            doubt = "either may be wrong" if fit == own_fit else "messages fit it better"
+            self.redefined[offset] = f"{told}; {name} is believed; {doubt}"
         return changed
 
     def _fit(self, record: Schema | Channel, logs: Mapping[int, ChannelLog]) -> tuple[int, int]:
-        """Count the messages that a description decodes: with a likely stamp, and at all."""
-        near = decoded = 0
+        """Count the messages that a description decodes; with it, how near to the log time they are."""
+        decoded = nearness = 0
         for channel_id, log in logs.items():
             channel = self.channels.get(channel_id)
-            which = channel.schema_id if channel and isinstance(record, Schema) else channel_id
-            if channel is None or which != record.id:
+            schema = self.schemas.get(channel.schema_id) if channel else None
+            if channel is None or record not in (channel, schema):
                 continue
-            schema = self.schemas.get(channel.schema_id)
-            for chunk, entries in log.blocks[:TRIED]:
+            for chunk, entries in log.blocks[:TRIED] if self._wanted(channel, schema) else ():
                 log_time, offset = entries[0].tolist()
                 with suppress(BadRecord):
                     stamp = self._stamp_of(channel, schema, self.message(chunk, offset))
-                    decoded += stamp is not None
-                    near += stamp is not None and abs(stamp - log_time) < DAY
-        return near, decoded
+                    if stamp is not None:
+                        decoded, nearness = decoded + 1, nearness - abs(stamp - log_time)
+        return decoded, nearness
 
 
 def _definitions(records: Bytes) -> Iterator[Any]:

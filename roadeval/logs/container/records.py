@@ -35,6 +35,8 @@ LARGEST: Final = 1 << 28
 """Bytes of a message or definition; one that claims more is damaged."""
 LONGEST_NAME: Final = 64
 """No compression has a longer name; a chunk that claims so is damaged."""
+CHUNK, MESSAGE, MESSAGE_INDEX = Opcode.CHUNK, Opcode.MESSAGE, Opcode.MESSAGE_INDEX
+"""Kinds that are asked for at every record: an enumeration takes ten times as long to ask."""
 PRIVATE: Final = 0x80
 """Opcodes from here on belong to applications."""
 PADDING: Final = 4
@@ -72,9 +74,7 @@ class FileBytes:
         return self._size
 
     def __getitem__(self, part: slice, /) -> Buffer:
-        start, stop = part.start, min(part.stop, self._size)
-        if start >= stop:
-            return memoryview(b"")
+        start, stop = min(part.start, self._size), min(part.stop, self._size)
         at, end = start - self._window_at, stop - self._window_at
         if at < 0 or end > len(self._window):
             if stop - start > GLANCE:
@@ -82,7 +82,7 @@ class FileBytes:
             walks_on = 0 <= at <= len(self._window) + GLANCE
             window = min(WINDOW if walks_on else GLANCE, self._size - start)
             self._window, self._window_at = memoryview(self._read(start, window)), start
-            at, end = 0, stop - start
+            at, end = 0, max(stop - start, 0)
         return self._window[at:end]
 
     def _read(self, offset: int, length: int) -> bytes:
@@ -207,18 +207,18 @@ def parse_message_index(body: Buffer) -> tuple[int, Entries]:
     channel_id, length = INDEX_HEAD.unpack_from(body) if len(body) >= INDEX_HEAD.size else (0, 1)
     if length % 16 or INDEX_HEAD.size + length > len(body):
         raise BadRecord("a message index whose lengths contradict each other")
-    # A copy, so that it does not hold the file's window.
-    entries = np.frombuffer(body, "<i8", length // 8, INDEX_HEAD.size).copy()
-    return channel_id, entries.reshape(-1, 2)
+    entries = bytes(body[INDEX_HEAD.size : INDEX_HEAD.size + length])
+    return channel_id, np.frombuffer(entries, "<i8").reshape(-1, 2)
 
 
 def message_at(records: Bytes, offset: int) -> Message:
     """Read the message whose record begins at ``offset``."""
-    record = record_at(records, offset)
-    if record.opcode != Opcode.MESSAGE or record.end - record.body > LARGEST:
+    head = records[offset : offset + HEAD.size]
+    opcode, length = HEAD.unpack(head) if len(head) == HEAD.size else (0, 0)
+    if opcode != MESSAGE or not MESSAGE_HEAD.size <= length <= LARGEST:
         raise BadRecord("no message where the index says")
-    body = memoryview(records[record.body : record.end])
-    if not MESSAGE_HEAD.size <= len(body) == record.end - record.body:
+    body = memoryview(records[offset + HEAD.size : offset + HEAD.size + length])
+    if len(body) < length:
         raise BadRecord("a message that is cut off")
     channel_id, sequence, log_time, publish_time = MESSAGE_HEAD.unpack_from(body)
     return Message(channel_id, sequence, log_time, publish_time, body[MESSAGE_HEAD.size :])

@@ -23,10 +23,13 @@ from mcap.records import Channel, Schema
 
 from roadeval.logs.container.chunks import COMPRESSIONS, DOUBTED, ChunkReader, crc_of
 from roadeval.logs.container.records import (
+    CHUNK,
     HEAD,
     LARGEST,
     MAGIC,
+    MESSAGE,
     MESSAGE_HEAD,
+    MESSAGE_INDEX,
     PADDING,
     PRIVATE,
     Chunk,
@@ -47,6 +50,8 @@ END: Final = -1
 """In place of an opcode: the end of the file."""
 BORDER: Final = -2
 """In place of an opcode: the eight bytes at which a log begins or ends."""
+_FIRST: Final = MAGIC[0]
+_ATTACHMENT: Final = Opcode.ATTACHMENT
 DAY: Final = 86_400 * 10**9
 """A message logged more than so many nanoseconds from all the recent ones is none."""
 BLOCK: Final = 1 << 20
@@ -60,7 +65,7 @@ _CANDIDATE: Final = re.compile(
 _LAST_RECORD: Final = re.compile(
     re.escape(HEAD.pack(Opcode.FOOTER, 20)) + rb".{20}" + re.escape(MAGIC), re.DOTALL
 )
-_NOT_IN_CHUNKS: Final = (Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.DATA_END, Opcode.FOOTER)
+_NOT_IN_CHUNKS: Final = (CHUNK, MESSAGE_INDEX, Opcode.DATA_END, Opcode.FOOTER)
 """Records that are never found inside a chunk, unlike messages and their descriptions."""
 _AFTER_DATA: Final = tuple(bytes([kind]) for kind in (*SUMMARY_RECORDS, Opcode.FOOTER))
 RECENT: Final = 8
@@ -107,6 +112,7 @@ class Scan:
         self.conflicts: list[tuple[int, Schema | Channel]] = []
         """Other descriptions than these outside chunks, with their offsets."""
         self.gaps: list[Gap] = []
+        self._open_gaps: list[Gap] = []
         self.data_end: int | None = None
         self.after_data: int | None = None
         """Where the data section ends, None if the file ends before; and what comes after it."""
@@ -116,6 +122,7 @@ class Scan:
         """Where another log begins in the same file."""
         self._source, self._reader, self._stamp_of = source, reader, stamp_of
         self._strict = strict
+        self._stop = None if self.summary.problem else self.summary.start
         self._recent_ns: deque[int] = deque(maxlen=RECENT)
         self._finder = RecordFinder(source, reader, self.summary, self.channels, self._recent_ns)
         self._walk()
@@ -149,10 +156,11 @@ class Scan:
 
     def _following(self, record: Record) -> Record:
         """Read the record behind one; refuse where that shows that either is damaged."""
-        is_chunk = record.opcode == Opcode.CHUNK
-        if is_chunk and (record.content.cut or (self._strict and not self._is_proven(record))):
+        if record.opcode == CHUNK and (
+            record.content.cut or (self._strict and not self._is_proven(record))
+        ):
             raise BadRecord("a chunk that is not whole")
-        if self.summary.problem or record.end != self.summary.start:
+        if record.end != self._stop:
             return self._finder.record(record.end)
         if record.opcode != Opcode.DATA_END:
             reason = "the record that ends the data is missing"
@@ -169,7 +177,7 @@ class Scan:
             ... | record, of a wrong length . | next     it is not, and left out
             ... | record ...... | next .... |            bytes are missing in it: it is left out
         """
-        is_chunk, proven = record.opcode == Opcode.CHUNK, self._is_proven(record)
+        is_chunk, proven = record.opcode == CHUNK, self._is_proven(record)
         following = None
         if proven or not is_chunk:
             following = self._finder.hidden_chunk(record.end)
@@ -178,25 +186,25 @@ class Scan:
         if is_chunk and not proven:
             record = self._wreck(record, following.offset)
         kept = proven or is_chunk or following.offset > record.end - PADDING
-        if record.opcode == Opcode.MESSAGE:
+        if record.opcode == MESSAGE:
             kept = kept and self._is_whole(record)
         if kept:
             self._take(record)
         begin = record.end if kept else record.offset
         if following.offset > begin or not kept:
-            if self.indexes and record.opcode in (Opcode.CHUNK, Opcode.MESSAGE_INDEX):
+            if self.indexes and record.opcode in (CHUNK, MESSAGE_INDEX):
                 self.indexes[-1] = None
-            if self.data_end is None or following.opcode in (Opcode.CHUNK, Opcode.MESSAGE):
+            if self.data_end is None or following.opcode in (CHUNK, MESSAGE):
                 listed = self.summary.checked and self.summary.chunks and not self.loose
                 self._gap(begin, following.offset, reason, lossy=not listed)
         return following
 
     def _is_proven(self, record: Record) -> bool:
         """Whether a record surely ends where it says."""
-        if record.opcode == Opcode.ATTACHMENT:
+        if record.opcode == _ATTACHMENT:
             crc = crc_of(self._source.part(record.body, record.end - 4))
             return crc.to_bytes(4, "little") == self._source[record.end - 4 : record.end]
-        if record.opcode == Opcode.CHUNK:
+        if record.opcode == CHUNK:
             return not record.content.cut and self._reader.is_sound(record.content)
         return record.opcode == BORDER
 
@@ -224,13 +232,15 @@ class Scan:
     def _take(self, record: Record) -> None:
         """Note what a record says."""
         opcode, content = record.opcode, record.content
-        if opcode == Opcode.MESSAGE:
+        if opcode == MESSAGE:
             channel_id, log_time = content
-            self.loose.setdefault(channel_id, array("Q")).extend((log_time, record.offset))
+            if channel_id not in self.loose:
+                self.loose[channel_id] = array("Q")
+            self.loose[channel_id].extend((log_time, record.offset))
             self._saw(log_time, log_time)
-        elif opcode == Opcode.CHUNK:
+        elif opcode == CHUNK:
             self._take_chunk(content)
-        elif opcode == Opcode.MESSAGE_INDEX and self.indexes:
+        elif opcode == MESSAGE_INDEX and self.indexes:
             self._take_index(*content)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             known: dict[int, Any] = self.schemas if opcode == Opcode.SCHEMA else self.channels
@@ -268,12 +278,11 @@ class Scan:
     def _gap(self, offset: int, end: int, reason: str, *, lossy: bool = True) -> None:
         before = self._recent_ns[-1] if self._recent_ns else None
         self.gaps.append(Gap(offset, end, reason, before, None, lossy))
+        self._open_gaps.append(self.gaps[-1])
 
     def _saw(self, first_ns: int, last_ns: int) -> None:
-        for gap in reversed(self.gaps):
-            if gap.after_ns is not None:
-                break
-            gap.after_ns = first_ns
+        while self._open_gaps:
+            self._open_gaps.pop().after_ns = first_ns
         self._recent_ns.append(last_ns)
 
 
@@ -296,12 +305,17 @@ class RecordFinder:
         recent_ns: Collection[int],
     ) -> None:
         self._source, self._reader, self._summary = source, reader, summary
+        self._size = len(source)
         self._channels, self._recent_ns = channels, recent_ns
         self._listings = {chunk.listing for chunk in summary.chunks.values() if summary.checked}
         self._known = summary.chunks if summary.in_place else {}
         self._borders = sorted(self._known)
         if self._known and summary.start is not None:
             self._borders.append(summary.start)
+        self._first_ns, self._last_ns = 0, 1 << 64
+        if summary.checked and summary.statistics and summary.statistics.message_count:
+            self._first_ns = summary.statistics.message_start_time
+            self._last_ns = summary.statistics.message_end_time
         self._tries_left = DOUBTED + 4 * len(source)
 
     def record(self, offset: int, *, chained: bool = True) -> Record:
@@ -312,23 +326,22 @@ class RecordFinder:
         chained
             Whether lengths that contradict each other may be judged by what follows them.
         """
-        size = len(self._source)
-        if offset >= size - len(MAGIC):
-            if offset == size:
+        if offset >= self._size - len(MAGIC):
+            if offset == self._size:
                 return Record(END, offset, offset, offset)
-            if self._source[offset:size] == MAGIC:
-                return Record(BORDER, offset, offset, size)
+            if self._source[offset : self._size] == MAGIC:
+                return Record(BORDER, offset, offset, self._size)
         record = record_at(self._source, offset)
         opcode, _, body, end, _ = record
-        if opcode == MAGIC[0] and self._source[offset : offset + len(MAGIC)] == MAGIC:
+        if opcode == _FIRST and self._source[offset : offset + len(MAGIC)] == MAGIC:
             return Record(BORDER, offset, offset, offset + len(MAGIC))
-        if opcode == Opcode.CHUNK or offset in self._known:
+        if opcode == CHUNK or offset in self._known:
             return self._chunk(record, chained=chained)
-        if opcode == Opcode.ATTACHMENT:
+        if opcode == _ATTACHMENT:
             return record._replace(end=self._attachment_end(record, chained=chained))
-        if end > size:
+        if end > self._size:
             raise BadRecord("a record that goes on beyond the end of the file")
-        if end > self._border(offset):
+        if self._borders and end > self._border(offset):
             raise BadRecord("a record that goes on into the next chunk")
         return Record(opcode, offset, body, end, self._content(record))
 
@@ -340,13 +353,13 @@ class RecordFinder:
     def _content(self, record: Record) -> Any:
         """Read what a record says that is no chunk and no attachment."""
         opcode, _, body, end, _ = record
-        if opcode == Opcode.MESSAGE:
+        if opcode == MESSAGE:
             return self._message(record)
         if opcode >= PRIVATE and not self._is_likely_message(record):
             return None
         if end - body > LARGEST:
             raise BadRecord("a record of a length that cannot be")
-        if opcode == Opcode.MESSAGE_INDEX:
+        if opcode == MESSAGE_INDEX:
             return parse_message_index(self._source[body:end])
         self._check_place(record)
         return parse(opcode, self._source[body:end])
@@ -355,15 +368,13 @@ class RecordFinder:
         """Read the channel and the log time of a message outside chunks."""
         if not MESSAGE_HEAD.size <= record.end - record.body <= LARGEST:
             raise BadRecord("a message of a length that cannot be")
-        chunk = self._borders[bisect_right(self._borders, record.offset) - 1] if self._known else 0
-        if record.offset < self._summary.index_ends.get(chunk, 0):
-            raise BadRecord("a message where a message index should be")
+        if self._known:
+            chunk = self._borders[bisect_right(self._borders, record.offset) - 1]
+            if record.offset < self._summary.index_ends.get(chunk, 0):
+                raise BadRecord("a message where a message index should be")
         head = self._source[record.body : record.body + MESSAGE_HEAD.size]
         channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
-        counted = self._summary.statistics if self._summary.checked else None
-        if counted is None or not counted.message_count:
-            return channel_id, log_time
-        if not counted.message_start_time <= log_time <= counted.message_end_time:
+        if not self._first_ns <= log_time <= self._last_ns:
             raise BadRecord("a message of a time outside the log's")
         return channel_id, log_time
 
@@ -380,10 +391,11 @@ class RecordFinder:
         """Refuse what begins or ends a part of the file where there is none."""
         before = self._source[max(record.offset - len(MAGIC), 0) : record.offset]
         after = bytes(self._source[record.end : record.end + len(MAGIC)])
+        elsewhere = self._summary.in_place and record.end != self._summary.start
         misplaced = {
             Opcode.HEADER: record.offset > len(MAGIC) and before != MAGIC,
-            Opcode.FOOTER: after != MAGIC,
-            Opcode.DATA_END: after[:1] not in (b"", MAGIC[:1], *_AFTER_DATA),
+            Opcode.FOOTER: elsewhere or after != MAGIC,
+            Opcode.DATA_END: elsewhere or after[:1] not in (b"", MAGIC[:1], *_AFTER_DATA),
         }
         if any(record.opcode == opcode and is_so for opcode, is_so in misplaced.items()):
             raise BadRecord("a record that should not be here")
@@ -395,7 +407,7 @@ class RecordFinder:
             for _ in range(2):
                 at += 4 + struct.unpack("<I", self._source[at : at + 4])[0]
             own = at + 8 + struct.unpack("<Q", self._source[at : at + 8])[0] + 4
-        border = min(self._border(record.offset), len(self._source))
+        border = min(self._border(record.offset), self._size)
         if own <= record.end <= border:
             return record.end
         known = self._summary.attachments.get(record.offset, 0)
@@ -407,8 +419,10 @@ class RecordFinder:
 
     def _chunk(self, record: Record, *, chained: bool) -> Record:
         """Read a chunk's head, which gives its length twice, and the summary a third time."""
-        size, heads = len(self._source), self._heads(record)
+        size, heads = self._size, self._heads(record)
         own = heads[0] if heads else None
+        if heads and self._known and not self._listings & {head.listing for head in heads}:
+            raise BadRecord("a chunk that the summary does not list")
         if own is not None and not own.repaired:
             if record.end > size:
                 return self._cut(own)
@@ -430,17 +444,17 @@ class RecordFinder:
         listed, found = self._known.get(record.offset), list[Chunk]()
         with suppress(BadRecord):
             own = parse_chunk(self._source, record)
-            agrees = own.data_end == record.end and record.opcode == Opcode.CHUNK
+            agrees = own.data_end == record.end and record.opcode == CHUNK
             agrees = agrees and (listed is None or own.listing == listed.listing)
             by_record = own._replace(data_size=record.end - own.data_offset, repaired=True)
             found = [own._replace(repaired=not agrees), by_record]
-        if listed is not None:
+        if listed is not None and (not found or found[0].repaired):
             crc = int.from_bytes(self._source[record.body + 24 : record.body + 28], "little")
-            found.append(listed._replace(crc=crc or None, repaired=True))
+            found.insert(0, listed._replace(crc=crc or None, repaired=True))
         return [chunk for chunk in found if chunk.data_size >= 0]
 
     def _cut(self, chunk: Chunk) -> Record:
-        data_size = len(self._source) - chunk.data_offset
+        data_size = self._size - chunk.data_offset
         if data_size < 0:
             raise BadRecord("a chunk without a head")
         return record_of(chunk._replace(data_size=data_size, cut=True))
@@ -450,10 +464,11 @@ class RecordFinder:
         with suppress(BadRecord):
             chunk = parse_chunk(self._source, record_at(self._source, offset))
             if chunk.compression in COMPRESSIONS:
-                anything = Record(Opcode.CHUNK, offset, offset, len(self._source))
+                anything = Record(CHUNK, offset, offset, self._size)
                 for end in (chunk.data_end, self.next(chunk.data_offset, anything).offset):
                     found = chunk._replace(data_size=end - chunk.data_offset, repaired=True)
-                    if found.data_size > 0 and self._reader.is_sound(found):
+                    ours = not self._known or found.listing in self._listings
+                    if ours and found.data_size > 0 and self._reader.is_sound(found):
                         return record_of(found)
         return None
 
@@ -466,11 +481,11 @@ class RecordFinder:
             The record in which or behind which the damage is. What lies in a chunk are no records
             of the file, and what lies in an attachment may be those of another log.
         """
-        size, log_end = len(self._source), 0
+        size, log_end = self._size, 0
         kinds = {doubted.opcode, *self._source[doubted.end : doubted.end + 1]}
         for offset in self._candidates(begin):
             if self._source[offset : offset + len(MAGIC)] == MAGIC:
-                if Opcode.ATTACHMENT in kinds:
+                if _ATTACHMENT in kinds:
                     log_end = max(log_end, self._end_of_log(offset))
                 elif self._is_another_log(offset):
                     return Record(BORDER, offset, offset, offset + len(MAGIC))
@@ -487,7 +502,7 @@ class RecordFinder:
 
     def _candidates(self, begin: int) -> Iterator[int]:
         """Yield the bytes at or after ``begin`` where a record may begin."""
-        for at in range(begin, len(self._source), BLOCK):
+        for at in range(begin, self._size, BLOCK):
             block = self._source[at : at + BLOCK + HEAD.size]
             found = {at + match.start() for match in _CANDIDATE.finditer(block)}
             found.update(border for border in self._borders if at <= border < at + BLOCK)
@@ -497,18 +512,18 @@ class RecordFinder:
         """Whether it is more than chance that this looks like a record of the log."""
         opcode, content = record.opcode, record.content
         if opcode in (END, BORDER, Opcode.HEADER) or record.offset < log_end:
-            return opcode == Opcode.CHUNK and content.listing in self._listings
-        in_chunk = doubted.opcode == Opcode.CHUNK and record.offset < doubted.end
-        if opcode == Opcode.CHUNK:
-            known = content.compression in COMPRESSIONS
-            return known and (not in_chunk or self._reader.is_sound(content))
+            return opcode == CHUNK and content.listing in self._listings
+        in_chunk = doubted.opcode == CHUNK and record.offset < doubted.end
+        if opcode == CHUNK:
+            ours = content.listing in self._listings
+            if not self._listings:
+                ours = content.compression in COMPRESSIONS
+            return ours and (not in_chunk or self._reader.is_sound(content))
         if in_chunk and opcode not in _NOT_IN_CHUNKS:
             return False
-        if opcode == Opcode.MESSAGE_INDEX and content[1].nbytes + 6 == record.end - record.body:
+        if opcode == MESSAGE_INDEX and content[1].nbytes + 6 == record.end - record.body:
             return True
-        return (opcode != Opcode.MESSAGE or self._is_likely_message(record)) and self._is_followed(
-            record
-        )
+        return (opcode != MESSAGE or self._is_likely_message(record)) and self._is_followed(record)
 
     def _is_followed(self, record: Record) -> bool:
         with suppress(BadRecord):
@@ -523,13 +538,13 @@ class RecordFinder:
         return begins and (not self._summary.checked or offset == self._summary.moved)
 
     def _end_of_log(self, offset: int) -> int:
-        for at in range(offset, len(self._source), BLOCK):
+        for at in range(offset, self._size, BLOCK):
             found = _LAST_RECORD.search(self._source[at : at + BLOCK + 64])
             if found is not None:
                 return at + found.end()
-        return len(self._source)
+        return self._size
 
 
 def record_of(chunk: Chunk) -> Record:
     """Return the record that a chunk is."""
-    return Record(Opcode.CHUNK, chunk.offset, chunk.offset + HEAD.size, chunk.data_end, chunk)
+    return Record(CHUNK, chunk.offset, chunk.offset + HEAD.size, chunk.data_end, chunk)

@@ -208,11 +208,10 @@ def decoder_for(channel: Channel, schema: Schema | None) -> Decoder:
 def message_stamp(channel: Channel, schema: Schema | None, message: Message) -> int | None:
     """Return a message's stamp; None if its fields contradict its length or cannot be read."""
     reader = _reader(channel, schema)
+    if reader is not None and reader.is_whole is not None and not reader.is_whole(message.data):
+        return None
     try:
-        decoder = decoder_for(channel, schema)
-        if reader is None or reader.is_whole is None:
-            return decoder.picture(message.data).stamp_ns
-        return decoder.stamp(message.data) if reader.is_whole(message.data) else None
+        return decoder_for(channel, schema).picture(message.data).stamp_ns
     except BadMessage:
         return None
 
