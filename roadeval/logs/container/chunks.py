@@ -56,14 +56,23 @@ class ChunkReader:
             self._cache.move_to_end(chunk.offset)
             return self._cache[chunk.offset]
         try:
-            records = _before_damage(self._source, chunk) if chunk.cut else self._whole(chunk)
+            records = self.remains(chunk) if chunk.cut else self._whole(chunk)
         except BadRecord as error:
             if not self._keep_corrupt:
                 self.bad[chunk.offset] = str(error)
                 raise
             self.kept[chunk.offset] = f"{error}, used all the same"
-            records = _before_damage(self._source, chunk)
+            records = self.remains(chunk)
         return self._keep(chunk, records)
+
+    def remains(self, chunk: Chunk) -> FileBytes:
+        """Uncompress a chunk as far as it goes."""
+
+        def good() -> Iterator[bytes]:
+            with suppress(BadRecord):
+                yield from _blocks(self._source, chunk)
+
+        return _spooled(good())
 
     def is_sound(self, chunk: Chunk) -> bool:
         """Whether the content of a chunk is what its head says.
@@ -145,20 +154,11 @@ def _uncompressed(data: bytes, compression: str, size: int) -> bytes:
     return data
 
 
-def _before_damage(source: FileBytes, chunk: Chunk) -> FileBytes:
-    """Uncompress a chunk as far as it goes."""
-
-    def good() -> Iterator[bytes]:
-        with suppress(BadRecord):
-            yield from _blocks(source, chunk)
-
-    return _spooled(good())
-
-
 def _spooled(blocks: Iterator[bytes]) -> FileBytes:
     """Hold the records of a chunk: in a temporary file if they are many."""
     file = tempfile.SpooledTemporaryFile(max_size=IN_MEMORY)  # noqa: SIM115
-    file.writelines(blocks)
+    for block in blocks:  # `writelines` would hold them all in memory
+        file.write(block)
     return FileBytes(cast("IO[bytes]", file))
 
 

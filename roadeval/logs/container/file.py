@@ -7,6 +7,7 @@ from array import array
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -223,6 +224,9 @@ class Container:
             for number in set(range(len(self.chunks))) - self._looked:
                 found[number] = self._index(number, look=True)
             logs = self._file(found)
+        if logs.keys() - self.channels.keys():
+            self._define_by_remains()
+            logs = self._file(found)
         return self._file(found) if self._redefine(logs) else logs
 
     def _is_as_counted(self, logs: Mapping[int, ChannelLog]) -> bool:
@@ -293,6 +297,15 @@ class Container:
             known: dict[int, Any] = self.schemas if opcode == Opcode.SCHEMA else self.channels
             known.setdefault(record.id, record)
 
+    def _define_by_remains(self) -> None:
+        """Learn the channels that are described in damaged chunks alone."""
+        for chunk in self.chunks:
+            if chunk.offset in self.reader.bad:
+                records = self.reader.remains(chunk)
+                for opcode, _, body, end, _ in islice(walk(records), RECORDS):
+                    if opcode in _DEFINITIONS:
+                        self._define(opcode, records[body:end])
+
     def _redefine(self, logs: Mapping[int, ChannelLog]) -> bool:
         """Where a topic is described twice, choose by its messages; return whether any was changed.
 
@@ -331,7 +344,7 @@ class Container:
         return changed
 
     def _fit(self, record: Schema | Channel, logs: Mapping[int, ChannelLog]) -> tuple[int, int]:
-        """Count the messages that a description decodes; with it, how near to the log time they are."""
+        """Count the messages that a description decodes, and sum up how near their stamps are."""
         decoded = nearness = 0
         for channel_id, log in logs.items():
             channel = self.channels.get(channel_id)

@@ -326,24 +326,32 @@ class RecordFinder:
         chained
             Whether lengths that contradict each other may be judged by what follows them.
         """
-        if offset >= self._size - len(MAGIC):
-            if offset == self._size:
-                return Record(END, offset, offset, offset)
-            if self._source[offset : self._size] == MAGIC:
-                return Record(BORDER, offset, offset, self._size)
-        record = record_at(self._source, offset)
-        opcode, _, body, end, _ = record
+        if offset > self._size - HEAD.size:
+            return self._tail(offset)
+        opcode, length = HEAD.unpack(self._source[offset : offset + HEAD.size])
+        body = offset + HEAD.size
+        end = body + length
         if opcode == _FIRST and self._source[offset : offset + len(MAGIC)] == MAGIC:
             return Record(BORDER, offset, offset, offset + len(MAGIC))
         if opcode == CHUNK or offset in self._known:
-            return self._chunk(record, chained=chained)
+            return self._chunk(Record(opcode, offset, body, end), chained=chained)
         if opcode == _ATTACHMENT:
-            return record._replace(end=self._attachment_end(record, chained=chained))
+            return self._attachment(Record(opcode, offset, body, end), chained=chained)
         if end > self._size:
             raise BadRecord("a record that goes on beyond the end of the file")
         if self._borders and end > self._border(offset):
             raise BadRecord("a record that goes on into the next chunk")
-        return Record(opcode, offset, body, end, self._content(record))
+        if opcode == MESSAGE:
+            return Record(opcode, offset, body, end, self._message(offset, body, end))
+        return Record(opcode, offset, body, end, self._content(Record(opcode, offset, body, end)))
+
+    def _tail(self, offset: int) -> Record:
+        """Read what is shorter than any record: the last eight bytes, or none."""
+        if offset == self._size:
+            return Record(END, offset, offset, offset)
+        if self._source[offset : self._size] == MAGIC:
+            return Record(BORDER, offset, offset, self._size)
+        raise BadRecord("the file is cut off")
 
     def _border(self, offset: int) -> float:
         """Where the next chunk or the summary begins, by the summary."""
@@ -351,10 +359,8 @@ class RecordFinder:
         return self._borders[index] if index < len(self._borders) else inf
 
     def _content(self, record: Record) -> Any:
-        """Read what a record says that is no chunk and no attachment."""
+        """Read what a record says that is no chunk, no attachment and no message."""
         opcode, _, body, end, _ = record
-        if opcode == MESSAGE:
-            return self._message(record)
         if opcode >= PRIVATE and not self._is_likely_message(record):
             return None
         if end - body > LARGEST:
@@ -364,19 +370,22 @@ class RecordFinder:
         self._check_place(record)
         return parse(opcode, self._source[body:end])
 
-    def _message(self, record: Record) -> tuple[int, int]:
+    def _message(self, offset: int, body: int, end: int) -> tuple[int, int]:
         """Read the channel and the log time of a message outside chunks."""
-        if not MESSAGE_HEAD.size <= record.end - record.body <= LARGEST:
+        if not MESSAGE_HEAD.size <= end - body <= LARGEST:
             raise BadRecord("a message of a length that cannot be")
-        if self._known:
-            chunk = self._borders[bisect_right(self._borders, record.offset) - 1]
-            if record.offset < self._summary.index_ends.get(chunk, 0):
-                raise BadRecord("a message where a message index should be")
-        head = self._source[record.body : record.body + MESSAGE_HEAD.size]
+        if self._known and self._is_index_here(offset):
+            raise BadRecord("a message where a message index should be")
+        head = self._source[body : body + MESSAGE_HEAD.size]
         channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
         if not self._first_ns <= log_time <= self._last_ns:
             raise BadRecord("a message of a time outside the log's")
         return channel_id, log_time
+
+    def _is_index_here(self, offset: int) -> bool:
+        """Whether a message index lies here, by the summary."""
+        chunk = self._borders[bisect_right(self._borders, offset) - 1]
+        return offset < self._summary.index_ends.get(chunk, 0)
 
     def _is_likely_message(self, record: Record) -> bool:
         """Whether this is a message of a known channel, logged within a day of a recent one."""
@@ -400,8 +409,8 @@ class RecordFinder:
         if any(record.opcode == opcode and is_so for opcode, is_so in misplaced.items()):
             raise BadRecord("a record that should not be here")
 
-    def _attachment_end(self, record: Record, *, chained: bool) -> int:
-        """Where an attachment ends, by its own length, that of its data, or the summary."""
+    def _attachment(self, record: Record, *, chained: bool) -> Record:
+        """Find where an attachment ends: by its own length, that of its data, or the summary."""
         at, own = record.body + 16, inf
         with suppress(struct.error):
             for _ in range(2):
@@ -409,20 +418,18 @@ class RecordFinder:
             own = at + 8 + struct.unpack("<Q", self._source[at : at + 8])[0] + 4
         border = min(self._border(record.offset), self._size)
         if own <= record.end <= border:
-            return record.end
+            return record
         known = self._summary.attachments.get(record.offset, 0)
         for end in (int(each) for each in (known, own, record.end) if chained and each <= border):
             with suppress(BadRecord):
                 if end > record.body and self.record(end, chained=False):
-                    return end
+                    return record._replace(end=end)
         raise BadRecord("an attachment whose lengths contradict each other")
 
     def _chunk(self, record: Record, *, chained: bool) -> Record:
         """Read a chunk's head, which gives its length twice, and the summary a third time."""
         size, heads = self._size, self._heads(record)
         own = heads[0] if heads else None
-        if heads and self._known and not self._listings & {head.listing for head in heads}:
-            raise BadRecord("a chunk that the summary does not list")
         if own is not None and not own.repaired:
             if record.end > size:
                 return self._cut(own)
@@ -467,8 +474,7 @@ class RecordFinder:
                 anything = Record(CHUNK, offset, offset, self._size)
                 for end in (chunk.data_end, self.next(chunk.data_offset, anything).offset):
                     found = chunk._replace(data_size=end - chunk.data_offset, repaired=True)
-                    ours = not self._known or found.listing in self._listings
-                    if ours and found.data_size > 0 and self._reader.is_sound(found):
+                    if found.data_size > 0 and self._reader.is_sound(found):
                         return record_of(found)
         return None
 
@@ -522,7 +528,7 @@ class RecordFinder:
         if in_chunk and opcode not in _NOT_IN_CHUNKS:
             return False
         if opcode == MESSAGE_INDEX and content[1].nbytes + 6 == record.end - record.body:
-            return True
+            return not self._known or self._is_index_here(record.offset)
         return (opcode != MESSAGE or self._is_likely_message(record)) and self._is_followed(record)
 
     def _is_followed(self, record: Record) -> bool:
