@@ -187,7 +187,7 @@ def run_sums(planes: Planes, runs: Runs, count: int) -> Sums:
     numpy.ndarray
         ``(count, 7)`` int64: pixels, sums of R, G, B, and sums of their squares.
     """
-    y, x, label = run_pixels(runs)
+    y, x, label = _run_pixels(runs)
     return _sums(label, np.dstack(planes)[y, x], count)
 
 
@@ -240,7 +240,7 @@ def transfer(image: Image, runs: Runs, source: Matrix, target: Matrix, gain: Mat
     float64, by label and channel. Returns ``(H, W, 3)`` uint8, elsewhere as it was.
     """
     result = image.copy()
-    y, x, k = run_pixels(runs)
+    y, x, k = _run_pixels(runs)
     value = target[k] + (image[y, x] - source[k]) * gain[k]
     result[y, x] = np.clip(np.rint(value), 0, 255).astype(np.uint8)
     return result
@@ -417,7 +417,7 @@ def components(bits: Bits, width: int, connectivity: int) -> tuple[Runs, int]:
 def paint(runs: Runs, height: int, width: int) -> Labels:
     """Return the ``(height, width)`` int32 image of `components`' labels, 0 outside."""
     labels = np.zeros((height, width), np.int32)
-    y, x, label = run_pixels(runs)
+    y, x, label = _run_pixels(runs)
     labels[y, x] = label
     return labels
 
@@ -433,7 +433,7 @@ def label_runs(labels: Labels) -> Runs:
     return found
 
 
-def run_pixels(runs: Runs) -> tuple[npt.NDArray[np.int64], ...]:
+def _run_pixels(runs: Runs) -> tuple[npt.NDArray[np.int64], ...]:
     """Row, column and label of every pixel of some runs, ``(n,)`` each."""
     y, start, end, label = runs.T.astype(np.int64)
     length = end - start

@@ -10,9 +10,9 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from roadeval.jobs.summary import PACKAGES
+from roadeval.jobs.summary import versions
 
-_NAMES: Final = "|".join(("roadeval", "python", *PACKAGES))
+_NAMES: Final = "|".join(versions())
 
 RULES: Final[Mapping[str, tuple[str, str | Callable[[re.Match[str]], str]]]] = {
     # The log's own checksum: its writer's version stands in the file.

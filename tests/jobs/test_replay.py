@@ -242,7 +242,7 @@ def test_a_log_without_truth_trains_a_model_for_others(drive, tmp_path):
 
 def test_the_memory_of_training_is_bounded_over_all_drives(drive, tmp_path, monkeypatch):
     other = write_log(tmp_path / "other.mcap")
-    monkeypatch.setattr("roadeval.training.held.GREATEST_MEMORY", 15 * 10_000)
+    monkeypatch.setattr("roadeval.training.learning.GREATEST_MEMORY", 15 * 10_000)
     with pytest.raises(RoadevalError, match=r"more than 1\d of them would take"):
         roadeval.train([drive, other], tmp_path / "m.model")
 

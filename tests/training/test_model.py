@@ -3,7 +3,6 @@
 import dataclasses
 import json
 import tracemalloc
-from contextlib import nullcontext
 from pathlib import Path
 from unittest.mock import Mock
 from zipfile import ZIP_DEFLATED, ZipFile
@@ -13,7 +12,6 @@ import pytest
 
 from roadeval.config import configure
 from roadeval.errors import RoadevalError
-from roadeval.pipeline.beyond.trees import TreesSettings
 from roadeval.training import Model, TrainingSettings, fit, load_model, save_model
 from roadeval.training.model import GREATEST_SIZE
 from tests.training.making import frame, pipelines
@@ -92,20 +90,6 @@ def test_settings_that_decide_and_teach_nothing_may_differ(tmp_path, name, stage
     }
     other = dataclasses.replace(pipeline, settings=settings)
     load_model(tmp_path / "x.model").require("x", other, tmp_path / "x.model")
-
-
-@pytest.mark.parametrize(("wanted", "fits"), [(150, True), (20, False)])
-def test_a_setting_that_an_older_model_does_not_know_was_at_its_default(tmp_path, wanted, fits):
-    pipeline = configure({"preset": "robust", **FEW}).pipeline
-    model = fit([frame(0)], {"x": pipeline}, TrainingSettings())
-    older = json.loads(json.dumps(model.settings["x"]))
-    del older["trees"]["trees"], older["trees"]["patch"]
-    model = dataclasses.replace(model, settings={"x": older})
-    settings = {**pipeline.settings, "trees": TreesSettings(trees=wanted, features=("place",))}
-    other = dataclasses.replace(pipeline, settings=settings)
-    told = nullcontext() if fits else pytest.raises(RoadevalError, match="trees 150 there")
-    with told:
-        model.require("x", other, tmp_path / "x.model")
 
 
 def test_a_variant_it_was_not_trained_for_is_refused(path):
