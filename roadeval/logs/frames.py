@@ -1,7 +1,4 @@
-"""The frames of a log: read one after the other, decoded in any thread.
-
-They are read in memory that does not grow with the log's length.
-"""
+"""The frames of a log: read one after the other in bounded memory, decoded in any thread."""
 
 from __future__ import annotations
 
@@ -10,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Final, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -22,8 +19,8 @@ from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import CompressedPicture, Picture
 from roadeval.logs.messages.pixels import to_rgb
 from roadeval.logs.messages.video import PictureSequence, Video
-from roadeval.logs.selection import Selection, scaled_size
-from roadeval.logs.topics.description import repeats, tell_repeats, tell_sizes
+from roadeval.logs.selection import SHADOW, TRUTH, Selection, scaled_size
+from roadeval.logs.topics.description import oddities
 from roadeval.logs.topics.reader import UNREADABLE
 from roadeval.logs.truth.meaning import Labels
 from roadeval.logs.truth.pairing import Clock, Partners
@@ -31,10 +28,6 @@ from roadeval.logs.truth.source import Label, LabelSource, read_or_error
 
 T = TypeVar("T")
 Pixels = TypeVar("Pixels", npt.NDArray[np.uint8], npt.NDArray[np.uint16])
-
-TRUTH: Final = "/truth"
-SHADOW: Final = "/shadow"
-"""Keys among a frame's labels; no mask's name begins with a slash."""
 
 
 @dataclass(slots=True)
@@ -63,9 +56,6 @@ class Accounting:
     fringes: dict[tuple[int, str], tuple[int, int]] = field(default_factory=dict)
     """By frame number and label source: pixels ignored because their value is too far from every
     known one, and pixels in all. Only of images that have any."""
-    truth_unused: int = 0
-    """Truth messages between the first and last paired one that belong to no image (counted only
-    if every frame is read)."""
 
     @property
     def losses(self) -> tuple[str, ...]:
@@ -73,30 +63,15 @@ class Accounting:
         frames = sorted((self.undecodable | self.damaged).items())
         return tuple(f"frame {number}: {reason}" for number, reason in frames)
 
-    def tell_fringes(self) -> Iterator[str]:
-        """Say which share of a source's labels is ignored, for each that has any."""
-        sums: dict[str, tuple[int, int, int]] = {}
-        for (_, source), (pixels, size) in sorted(self.fringes.items()):
-            images, ignored, all_pixels = sums.get(source, (0, 0, 0))
-            sums[source] = images + 1, ignored + pixels, all_pixels + size
-        for source, (images, ignored, size) in sums.items():
+    def ignored(self) -> Iterator[str]:
+        """Yield a sentence for each label source of which some pixels are ignored: how many."""
+        for source in dict.fromkeys(source for _, source in sorted(self.fringes)):
+            found = [counts for (_, own), counts in self.fringes.items() if own == source]
+            pixels, size = map(sum, zip(*found, strict=True))
             yield (
-                f"{source}: {100 * ignored / size:.2g} % of the pixels of {images} label images "
+                f"{source}: {100 * pixels / size:.2g} % of the pixels of {len(found)} label images "
                 "are ignored, being farther than `labels.tolerance` from every known value"
             )
-
-
-@dataclass(frozen=True, slots=True)
-class _Rules:
-    """How the frames of a stream are decoded."""
-
-    limits: Limits
-    """On their images: how large, and whether damaged."""
-    size: tuple[int, int] | None
-    """Width and height of the topic's images, if known."""
-    resize_labels: bool
-    scale: float
-    """Scale of image and labels together."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,10 +86,11 @@ class LoggedFrame:
     picture: Picture | FrameError
     """The image, or why it cannot be read."""
     labels: Mapping[str, Label]
-    """The labels that belong to it: `TRUTH`, `SHADOW`, and masks by their name."""
-    rules: _Rules
+    """The labels that belong to it, by their names in `Selection.labels`."""
+    selection: Selection
+    """How it is decoded."""
     accounting: Accounting
-    """Where it says what it found."""
+    """Where decoding counts what it finds."""
 
     @property
     def labelled(self) -> bool:
@@ -130,7 +106,7 @@ class LoggedFrame:
             If the image or a label of it cannot be decoded.
         """
         try:
-            return at_scale(self._decode(), self.rules.scale)
+            return at_scale(self._decode(), self.selection.scale)
         except (BadMessage, FrameError) as error:
             reason = f"frame {self.number}: {error}"
             self.accounting.undecodable[self.number] = str(error)
@@ -142,7 +118,7 @@ class LoggedFrame:
             raise picture
         image, is_whole = self._pixels(lambda limits: to_rgb(picture, limits))
         size = image.shape[1], image.shape[0]
-        if self.rules.size is not None and size != self.rules.size:
+        if size != (self.selection.image.size or size):
             self.accounting.sizes[self.number] = size
         labels = {name: self._label(label, image) for name, label in self.labels.items()}
         truth, shadow = (labels.pop(name, None) for name in (TRUTH, SHADOW))
@@ -164,13 +140,14 @@ class LoggedFrame:
         )
 
     def _pixels(self, decode: Callable[[Limits], T], place: str = "") -> tuple[T, bool]:
-        """Decode, damaged or not as the limits say; return also whether it was undamaged."""
+        """Decode, if the limits allow that even what is damaged; return whether it was whole."""
+        limits = self.selection.camera.images.limits
         try:
-            return decode(replace(self.rules.limits, keep_damaged=False)), True
+            return decode(replace(limits, keep_damaged=False)), True
         except DamagedMessage as error:
-            if not self.rules.limits.keep_damaged:
+            if not limits.keep_damaged:
                 raise
-            found = decode(self.rules.limits)
+            found = decode(limits)
             where = f"{place}: " if place else ""
             self.accounting.damaged[self.number] = f"{where}{error.damage}, used all the same"
             return found, False
@@ -182,12 +159,13 @@ class LoggedFrame:
         except BadMessage as error:
             raise FrameError(f"{label.place}: {error}") from error
         if found.fringe:
-            self.accounting.fringes[self.number, label.source] = found.fringe, found.truth.size
+            where = self.number, label.source.pictures.name
+            self.accounting.fringes[where] = found.fringe, found.truth.size
         height, width = image.shape[:2]
         high, wide = found.truth.shape
         if (high, wide) == (height, width):
             return found
-        if not self.rules.resize_labels:
+        if not self.selection.camera.resize_labels:
             raise FrameError(
                 f"{label.place} is {wide}x{high}, its image {width}x{height}: "
                 "scale the labels with `topics.resize_truth`"
@@ -211,24 +189,17 @@ class FrameStream:
 
     def __init__(self, selection: Selection, in_range: int, numbers: range) -> None:
         """Begin a stream of the frames of these numbers, from a range of so many."""
-        camera = selection.camera
-        self._images = camera.images
-        self._pictures: PictureSequence = camera.images
-        if camera.topic.kind is TopicKind.VIDEO:
-            self._pictures = Video(camera.images, camera.images.limits)
+        images = selection.camera.images
+        self._pictures: PictureSequence = images
+        if selection.image.kind is TopicKind.VIDEO:
+            self._pictures = Video(images, images.limits)
         self._selection = selection
         self._numbers = numbers
-        chosen = {TRUTH: selection.truth, SHADOW: selection.shadow, **selection.masks}
-        begin = int(camera.images.log_times[numbers[0]])
+        begin = int(images.log_times[numbers[0]])
         self._labels: dict[str, tuple[LabelSource, Partners]] = {
-            name: (source, source.begin(begin))
-            for name, source in chosen.items()
-            if source is not None
+            name: (source, source.partners(begin)) for name, source in selection.labels.items()
         }
-        self.accounting = Accounting(in_log=len(camera.images), in_range=in_range)
-        self._rules = _Rules(
-            camera.images.limits, camera.topic.size, camera.resize_labels, selection.scale
-        )
+        self.accounting = Accounting(in_log=len(images), in_range=in_range)
         self._stamps = array("q")
         self._iterator = map(self._frame, numbers)
 
@@ -243,17 +214,12 @@ class FrameStream:
 
     @cached_property
     def oddities(self) -> tuple[str, ...]:
-        """What a user should know of the frames that were read, a sentence each.
-
-        Ask for it after the last frame was decoded.
-        """
-        read, size = len(self._stamps), self._selection.image.size
-        stamps = np.array(self._stamps, np.int64)
-        return (
-            *tell_sizes(self.accounting.sizes, read, size),
-            *tell_repeats(repeats(self._images, self._numbers[:read], stamps), read),
-            *self.accounting.tell_fringes(),
-        )
+        """What a user should know of the frames that were read; complete after the last decode."""
+        numbers = self._numbers[: len(self._stamps)]
+        stamps, sizes = np.array(self._stamps, np.int64), self.accounting.sizes
+        camera = self._selection.camera
+        found = oddities(camera.images, camera.topic.size, numbers, stamps, sizes)
+        return (*found, *self.accounting.ignored())
 
     def _frame(self, number: int) -> LoggedFrame:
         labels = {
@@ -264,16 +230,14 @@ class FrameStream:
         self.accounting.read += 1
         self.accounting.labelled += TRUTH in labels
         self.accounting.masks.update(labels.keys() - {TRUTH, SHADOW})
-        if TRUTH in self._labels and self._numbers.step == 1:
-            self.accounting.truth_unused = self._labels[TRUTH][1].unused
         # Reading a message corrects its log time where the file's index is wrong.
         picture = read_or_error(self._pictures, number)
-        log_time = int(self._images.log_times[number])
-        stamped = self._selection.camera.clock is Clock.STAMP
-        stamp = self._images.stamp(number) if stamped else UNREADABLE
+        camera = self._selection.camera
+        log_time = int(camera.images.log_times[number])
+        stamp = camera.images.stamp(number) if camera.clock is Clock.STAMP else UNREADABLE
         self._stamps.append(log_time if stamp == UNREADABLE else stamp)
         return LoggedFrame(
-            number, self._stamps[-1], log_time, picture, labels, self._rules, self.accounting
+            number, self._stamps[-1], log_time, picture, labels, self._selection, self.accounting
         )
 
 

@@ -26,9 +26,9 @@ from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
 from roadeval.logs.topics.choose import named
 from roadeval.logs.topics.description import TopicInfo, describe_topic, survey
 from roadeval.logs.topics.reader import topic_readers
-from roadeval.logs.truth.folder import open_folder
-from roadeval.logs.truth.pairing import Camera
-from roadeval.logs.truth.source import LabelSource, in_folder, in_other_log, log_and_topic
+from roadeval.logs.truth.folder import labels_in
+from roadeval.logs.truth.named import with_keys
+from roadeval.logs.truth.source import LabelSource, beside_log, log_and_topic
 from roadeval.runtime.text import visible
 
 
@@ -163,37 +163,32 @@ class Log:
         """
         try:
             found = settle(self.topics, self._readers, self.config, several=several)
-            truth = "" if found.truth is None else found.truth.where
             beside = {
-                name: self._masks(name, own, found.camera, truth)
-                for name, own in self.config.masks.items()
+                name: self._masks(name, own, found) for name, own in self.config.masks.items()
             }
         except LogError as error:
             raise LogError(f"{self.path.name}: {error}") from error
-        return replace(found, masks={**found.masks, **beside})
+        return replace(found, labels={**found.labels, **beside})
 
-    def _masks(self, name: str, settings: MaskSettings, camera: Camera, truth: str) -> LabelSource:
+    def _masks(self, name: str, settings: MaskSettings, found: Selection) -> LabelSource:
         """Settle masks that lie beside the log; errors begin with their variant's name."""
         place = log_and_topic(settings.path)
         try:
             if place is None:
-                folder = open_folder(Path(settings.path), settings, self._limits)
-                return in_folder(folder, settings, camera)
+                files = labels_in(Path(settings.path))
+                labels = with_keys(files, settings.path, settings, self._limits)
+                return beside_log(labels, settings, found.camera, lambda: labels.digest)
             other = open_log(place[0], LogConfig(frames=self.config.frames))
             self._beside.append(other)
             topic = named(other.topics, place[1], "topic").name
-            if topic == truth and other.path.resolve() == self.path.resolve():
-                raise LogError(f"{topic} is the truth that it is held against")
-            return in_other_log(
-                other._readers[topic],
-                settings,
-                camera,
-                log=other.name,
-                digest=lambda: other.sha256,
-            )
+            same_log = other.path.resolve() == self.path.resolve()
+            if same_log and found.truth is not None and topic == found.truth.where:
+                raise LogError(f"{topic} is the truth that it is scored against")
+            reader = other._readers[topic]
+            return beside_log(reader, settings, found.camera, lambda: other.sha256, other.name)
         except LogError as error:
-            told = str(error).replace("`labels.", f"`masks.{name}.labels.")
-            raise LogError(f"`masks` {name}: {told}") from error
+            reason = str(error).replace("`labels.", f"`masks.{name}.labels.")
+            raise LogError(f"`masks` {name}: {reason}") from error
 
     def frames(self, selection: Selection) -> FrameStream:
         """Read the frames of a selection that are asked for, by log time; each call begins anew.

@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Final
 
 from roadeval.logs.errors import BadMessage, LogError
 from roadeval.logs.messages.pixels import to_rgb
-from roadeval.logs.settings import LabelSettings, LogConfig
+from roadeval.logs.settings import LabelSettings, LogConfig, MaskSettings
 from roadeval.logs.topics.choose import Choice, choose_image, choose_shadow, choose_truth, named
 from roadeval.logs.topics.description import TopicInfo
 from roadeval.logs.topics.reader import TopicReader
 from roadeval.logs.truth.pairing import Camera, Clock
 from roadeval.logs.truth.source import LabelSource, check_size, in_log, nothing_of, samples
+
+TRUTH: Final = "/truth"
+SHADOW: Final = "/shadow"
+"""Names of road truth and true shadow among labels; no mask's name begins with a slash."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,12 +29,8 @@ class Selection:
     """The camera's images, and how labels are paired with them."""
     image_why: str
     """Why that camera."""
-    truth: LabelSource | None
-    """Road truth."""
-    shadow: LabelSource | None
-    """Truth of shadow."""
-    masks: Mapping[str, LabelSource]
-    """Other systems' road masks by name: those in the log, then those beside it."""
+    labels: Mapping[str, LabelSource]
+    """`TRUTH`, `SHADOW`, and other systems' road masks by name, those in the log first."""
     scale: float = 1.0
     """Scale of the frames that are read, relative to the camera's; at most 1."""
     no_truth: str = ""
@@ -40,9 +41,24 @@ class Selection:
         """The camera's topic."""
         return self.camera.topic
 
+    @property
+    def truth(self) -> LabelSource | None:
+        """Road truth."""
+        return self.labels.get(TRUTH)
+
+    @property
+    def shadow(self) -> LabelSource | None:
+        """Truth of shadow."""
+        return self.labels.get(SHADOW)
+
+    @property
+    def masks(self) -> dict[str, LabelSource]:
+        """Other systems' road masks by name."""
+        return {name: each for name, each in self.labels.items() if name not in (TRUTH, SHADOW)}
+
     def digests(self) -> dict[str, str]:
-        """Return the SHA-256 of the masks that do not lie in the log, by name."""
-        return {name: each.digest() for name, each in self.masks.items() if each.digest}
+        """Return the SHA-256 of the labels that do not lie in the log, by name."""
+        return {name: each.digest() for name, each in self.labels.items() if each.digest}
 
     @property
     def size(self) -> tuple[int, int] | None:
@@ -53,14 +69,12 @@ class Selection:
     def reasons(self) -> tuple[str, ...]:
         """Which topics were chosen and why, a sentence each."""
         lines = [f"image: {self.image.name} ({self.image_why})"]
-        sources = {"truth": self.truth, "shadow truth": self.shadow}
-        sources |= {f"mask {name}": source for name, source in self.masks.items()}
-        for name, source in sources.items():
-            if source is not None:
-                words = source.meaning.words
-                if source is self.shadow:
-                    words = words.replace("road is", "shadow is")
-                lines.append(f"{name}: {source.where} ({source.why}; {words})")
+        for name, source in self.labels.items():
+            what = {TRUTH: "truth", SHADOW: "shadow truth"}.get(name, f"mask {name}")
+            words = source.meaning.words
+            if name == SHADOW:
+                words = words.replace("road is", "shadow is")
+            lines.append(f"{what}: {source.where} ({source.why}; {words})")
         if self.no_truth:
             lines.append(f"no truth: {self.no_truth}")
         if (clock := self.camera.clock) is not Clock.STAMP:
@@ -81,58 +95,41 @@ def settle(
     *,
     several: bool = False,
 ) -> Selection:
-    """Settle what to replay of these topics, but for what lies beside the log.
+    """Settle what to replay of a log's own topics.
 
     Raises
     ------
     LogError
         As `roadeval.logs.Log.select` says.
     """
-    asked, labels = config.topics, config.labels
+    asked = config.topics
     image, why = choose_image(topics, asked.image)
     _check_readable(readers[image.name], image)
-    truth = choose_truth(topics, image, asked.truth, labels)
-    shadow = choose_shadow(topics, image, asked.shadow, labels)
-    masks = {
-        name: Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")
-        for name, topic in asked.masks.items()
-    }
+    truth = choose_truth(topics, image, asked.truth, config.labels)
+    choices = {TRUTH: truth, SHADOW: choose_shadow(topics, image, asked.shadow, config.labels)}
+    for name, topic in asked.masks.items():
+        choices[name] = Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")
     # What would be scored against itself is refused.
     if truth.topic == image:
         raise LogError(f"`topics.truth` {image.name}: it is the image's own topic")
-    for name, mask in masks.items():
-        if mask.topic == truth.topic:
-            raise LogError(
-                f"`topics.masks` {name}: {asked.masks[name]} is the truth that it is held against"
-            )
-    camera = Camera.of(
-        readers[image.name], image, asked.sync_tolerance_ms, resize_labels=asked.resize_truth
-    )
-
-    def source(choice: Choice, labels: LabelSettings) -> LabelSource | None:
-        if choice.topic is None:
-            return None
-        check_size(choice.topic.name, choice.topic.size, camera)
-        return in_log(readers[choice.topic.name], choice.why, labels, camera, several=several)
-
-    masks_only = LabelSettings(tolerance=labels.tolerance)
-    found = {name: source(mask, masks_only) for name, mask in masks.items()}
-    return Selection(
-        camera,
-        why,
-        truth=source(truth, labels),
-        shadow=source(shadow, masks_only),
-        masks={name: each for name, each in found.items() if each is not None},
-        scale=config.frames.scale,
-        no_truth="" if truth.topic else truth.why,
-    )
+    for name, topic in asked.masks.items():
+        if choices[name].topic == truth.topic:
+            raise LogError(f"`topics.masks` {name}: {topic} is the truth that it is scored against")
+    camera = Camera.of(readers[image.name], image, asked)
+    masks_only = LabelSettings(tolerance=config.labels.tolerance)
+    labels = {}
+    for name, (chosen, reason) in choices.items():
+        if chosen is not None:
+            check_size(chosen.name, chosen.size, camera)
+            own = MaskSettings(labels=config.labels if name == TRUTH else masks_only)
+            reader = readers[chosen.name]
+            labels[name] = in_log(reader, own, camera, reason, several=several)
+    no_truth = "" if truth.topic else truth.why
+    return Selection(camera, why, labels, config.frames.scale, no_truth)
 
 
 def _check_readable(reader: TopicReader, topic: TopicInfo) -> None:
-    """Refuse, as a `LogError`, a topic of which nothing can be decoded.
-
-    Neither its first messages nor some spread over the log.
-    """
+    """Refuse, as a `LogError`, a topic of whose sampled messages none can be decoded."""
     if not topic.problem:
         return
     for picture in samples(reader):

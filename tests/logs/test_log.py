@@ -235,15 +235,6 @@ def test_truth_of_another_size_is_refused_and_the_remedy_named(tmp_path: Path) -
     assert frame.truth.shape == (6, 8)
 
 
-def test_truth_that_no_image_claimed_is_counted(tmp_path: Path) -> None:
-    labels = sorted([*STAMPS, STAMPS[4] + 10_000_000])
-    path = drive(tmp_path / "drive.mcap", STAMPS, labels)
-    with open_log(path) as log:
-        stream = log.frames(log.select())
-        assert all(frame.labelled for frame in stream)
-    assert stream.accounting.truth_unused == 1
-
-
 def test_another_systems_masks_and_true_shadow_come_along(tmp_path: Path) -> None:
     mask = grey(0)
     mask[:, 4:] = 255

@@ -63,7 +63,8 @@ class DecodedPicture:
 
 BUFFERS: Final = (bytes, bytearray, memoryview)
 
-Picture = RawPicture | CompressedPicture | DecodedPicture
+LoggedPicture = RawPicture | CompressedPicture
+Picture = LoggedPicture | DecodedPicture
 
 _SECONDS: Final = ("sec", "secs", "seconds")
 _NANOSECONDS: Final = ("nanosec", "nsec", "nsecs", "nanos", "nanoseconds")
@@ -91,7 +92,7 @@ def codec_of(picture: Picture) -> str | None:
     return "h264" if bytes(picture.data[:4]).startswith(_START_CODES) else None
 
 
-def picture_in(message: Any) -> Picture:
+def picture_in(message: Any) -> LoggedPicture:
     """Return the picture of a decoded message, by the names of its fields.
 
     Raises
@@ -158,7 +159,7 @@ class Decoder(NamedTuple):
     Both raise `BadMessage` for a message that cannot be decoded.
     """
 
-    picture: Callable[[Buffer], Picture]
+    picture: Callable[[Buffer], LoggedPicture]
     stamp: Callable[[Buffer], int]
 
 
@@ -192,7 +193,7 @@ def decoder_for(channel: Channel, schema: Schema | None) -> Decoder:
             f"{channel.message_encoding!r} messages with {name!r} schema are not readable"
         )
 
-    def picture(data: Buffer) -> Picture:
+    def picture(data: Buffer) -> LoggedPicture:
         with _one_error():
             return picture_in(reader.decode(data))
 

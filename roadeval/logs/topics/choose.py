@@ -1,4 +1,4 @@
-"""The choice of topics to replay: those the user named, else those whose role is plain."""
+"""The choice of topics to replay: those the user named, else those whose role is clear."""
 
 from __future__ import annotations
 
@@ -22,19 +22,16 @@ LABEL_WORDS: Final = _set(
 MASK_WORDS: Final = _set("mask masks")
 ROAD_WORDS: Final = _set("road roads drivable driveable freespace lane lanes")
 SHADOW_WORDS: Final = _set("shadow shadows")
-OUTPUT_WORDS: Final = _set(
+NO_TRUTH_WORDS: Final = _set(
     "pred preds prediction predictions predicted net network nn cnn dnn model inference "
-    "detection detections detected output result results estimate estimated"
+    "detection detections detected output result results estimate estimated overlay overlays "
+    "blend blended vis viz visual visualization visualisation debug colored"
 )
-PICTURE_WORDS: Final = _set(
-    "overlay overlays blend blended vis viz visual visualization visualisation debug colored"
-)
-PLAIN_WORDS: Final = _set(
-    "camera cam image images img raw compressed front left right rear png mono rect color"
-)
-DEPTH_FORMATS: Final = _set("16uc1 32fc1")
+"""Words for a network's output, and for pictures of labels."""
 TRANSPORT_WORDS: Final = _set("image img images raw compressed png mono rect color")
 SIDES: Final = _set("front rear left right side top bottom center")
+PLAIN_WORDS: Final = TRANSPORT_WORDS | _set("camera cam front left right rear")
+DEPTH_FORMATS: Final = ("16uc1", "32fc1")
 SAME_WORDS: Final = {
     "cam": "camera",
     "back": "rear",
@@ -43,9 +40,7 @@ SAME_WORDS: Final = {
     "centre": "center",
     "middle": "center",
 }
-"""Words of cameras' names, by other words for the same."""
-NO_TOPIC: Final = ""
-"""The name that means none, even if the log has one whose role is plain."""
+"""Words of cameras' names, by their synonyms."""
 
 
 class Choice(NamedTuple):
@@ -96,8 +91,8 @@ def choose_truth(
     Raises
     ------
     LogError
-        If the one asked for is not there or no image, or if several are candidates; or if what
-        values mean is said, and the only label images are compressed with loss.
+        If the one asked for is not there or no image, or if several are candidates; or if the
+        meaning of values is given, and the only label images are compressed with loss.
     """
     if asked is not None:
         return _asked_for(topics, asked, "`topics.truth`")
@@ -106,36 +101,36 @@ def choose_truth(
     elsewhere = {t.name: why for t in roads if (why := other_camera(t, image, topics))}
     own = [topic for topic in roads if topic.name not in elsewhere]
     colors = bool(labels.road_colors)
-    plain = _only(_plain_truths(own, image, colors=colors), image, "label", "`topics.truth`")
-    if plain is None and (others := _plain_truths(roads, image, colors=colors)):
+    truth = _only(_clear_truths(own, image, colors=colors), image, "label", "`topics.truth`")
+    if truth is not None:
+        by = "colours" if truth.channels == 3 else "single channel"
+        is_rig = bool(_other_cameras(topics, image))
+        no_others = ", and no other camera's by path and frame_id" if is_rig else ""
+        return Choice(truth, f"the label image, by its name and its {by}{no_others}")
+    if others := _clear_truths(roads, image, colors=colors):
         raise LogError(
             f"{others[0].name} belongs to another camera than {image.name}, by "
-            f"{elsewhere[others[0].name]}: name it with `topics.truth` to use it all the same, or "
-            "give an empty name there to go on without truth"
+            f"{elsewhere[others[0].name]}: name it with `topics.truth` to use it nevertheless, or "
+            "give an empty name there to continue without truth"
         )
-    if plain is not None:
-        by = "colours" if plain.channels == 3 else "single channel"
-        rig = len(_other_cameras(topics, image)) > 0
-        no_others = ", and no other camera's by path and frame_id" if rig else ""
-        return Choice(plain, f"the label image, by its name and its {by}{no_others}")
     if roads:
-        why = f"no topic is plainly road truth; `topics.truth` takes one of: {_names(roads)}"
-        return Choice(None, why)
-    if found:
-        why = f"{found[0].name} {lossy_labels(found[0].lossy)}"
-        if labels != LabelSettings():
-            raise LogError(why)
-        return Choice(None, why)
-    return Choice(None, "no label topic")
+        return Choice(None, f"no topic is clearly road truth; `topics.truth`: {_names(roads)}")
+    if not found:
+        return Choice(None, "no label topic")
+    why = f"{found[0].name} {lossy_labels(found[0].lossy)}"
+    if labels != LabelSettings():
+        raise LogError(why)
+    return Choice(None, why)
 
 
-def _plain_truths(roads: Sequence[TopicInfo], image: TopicInfo, *, colors: bool) -> list[TopicInfo]:
-    """Return the topics of the first kind that there is, in the order in which kinds count."""
-    single = [topic for topic in roads if topic.channels == 1]
-    by_name = [topic for topic in single if _is_plainly_truth(topic)]
-    masks = [topic for topic in single if _is_plain_mask(topic, image)]
-    coloured = [topic for topic in roads if topic.channels == 3 and _is_plainly_truth(topic)]
-    return (coloured if colors else []) or by_name or masks or coloured
+def _clear_truths(roads: Sequence[TopicInfo], image: TopicInfo, *, colors: bool) -> list[TopicInfo]:
+    """Return the topics of the first kind that there is, in the order of preference."""
+    by_name = [t for t in roads if _is_truth(words(t.name))]
+    coloured, single = ([t for t in by_name if t.channels == n] for n in (3, 1))
+    # A mask whose name does not say that it masks something other than the road.
+    no_others = MASK_WORDS | PLAIN_WORDS | words(image.name)
+    masks = [t for t in roads if t.channels == 1 and words(t.name) <= no_others]
+    return (coloured if colors else []) or single or masks or coloured
 
 
 def choose_shadow(
@@ -150,25 +145,26 @@ def choose_shadow(
     """
     if asked is not None:
         return _asked_for(topics, asked, "`topics.shadow`")
-    masks = [topic for topic in _label_topics(topics, image) if topic.channels == 1]
     shadows = [
         topic
-        for topic in masks
-        if words(topic.name) & SHADOW_WORDS and not other_camera(topic, image, topics)
+        for topic in _label_topics(topics, image)
+        if topic.channels == 1
+        and words(topic.name) & SHADOW_WORDS
+        and (labels.tolerance or not topic.lossy)
+        and not other_camera(topic, image, topics)
     ]
-    exact = [topic for topic in shadows if labels.tolerance or not topic.lossy]
-    shadow = _only(exact, image, "shadow", "`topics.shadow`")
+    shadow = _only(shadows, image, "shadow", "`topics.shadow`")
     if shadow is None:
         return Choice(None, "no shadow topic")
     return Choice(shadow, "the shadow mask, by its name and its single channel")
 
 
 def other_camera(label: TopicInfo, image: TopicInfo, topics: Sequence[TopicInfo]) -> str:
-    """Return by what a label topic belongs to another camera than an image topic; else empty.
+    """Return what shows that a label topic belongs to another camera than the image's; else empty.
 
     A topic's path and its header's ``frame_id`` name a camera by a side (front, rear, left ...), by
-    a number (``cam1``), or by any word that the cameras of the log are called by. Neither may name
-    another camera than the image's; that of a label may say less (``/front/labels`` of
+    a number (``cam1``), or by any word in the names of the log's cameras. Neither may name another
+    camera than the image's; a label's may name less of it (``/front/labels`` of
     ``/front/left/image``), unless another camera of the log fits better.
     """
     cameras = _other_cameras(topics, image)
@@ -178,7 +174,7 @@ def other_camera(label: TopicInfo, image: TopicInfo, topics: Sequence[TopicInfo]
     ):
         known = frozenset[str]().union(*map(_camera_words, (ours, *others)))
         of_label, of_image, *of_others = (
-            {word for word in _camera_words(text) if word in known or _is_a_camera(word)}
+            {w for w in _camera_words(text) if w in known | SIDES or re.fullmatch(r"camera\d+", w)}
             for text in (theirs, ours, *others)
         )
         is_another = bool(of_image - {"camera"}) and not of_label <= of_image
@@ -194,21 +190,17 @@ def _other_cameras(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicI
 
 
 def _camera_words(name: str) -> frozenset[str]:
-    """Split a path or a ``frame_id`` into words and numbers that may tell cameras apart."""
+    """Split a path or a ``frame_id`` into words and numbers that may distinguish cameras."""
     spaced = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", name).lower()
     numbered = re.sub(r"(?<![a-z])cam(?:era)?[ _]?(\d+)", r"camera\1", spaced)
     found = re.findall(r"camera\d+|[a-z]+|\d+", numbered)
-    said = frozenset(SAME_WORDS.get(word, word) for word in found)
-    return said - TRANSPORT_WORDS - LABEL_WORDS - MASK_WORDS - ROAD_WORDS
-
-
-def _is_a_camera(word: str) -> bool:
-    """Whether a word names a camera in whatever log."""
-    return word in SIDES or bool(re.fullmatch(r"camera\d+", word))
+    common = frozenset(SAME_WORDS.get(word, word) for word in found)
+    return common - TRANSPORT_WORDS - LABEL_WORDS - MASK_WORDS - ROAD_WORDS
 
 
 def _asked_for(topics: Sequence[TopicInfo], name: str, setting: str) -> Choice:
-    if name == NO_TOPIC:
+    """Return the topic of a name; an empty one takes none."""
+    if not name:
         return Choice(None, "asked to use none")
     return Choice(named(topics, name, setting), "asked for")
 
@@ -240,7 +232,7 @@ def _label_topics(topics: Sequence[TopicInfo], image: TopicInfo) -> list[TopicIn
         if topic.name != image.name
         and topic.count
         and _looks_like_label(topic)
-        and not words(topic.name) & (OUTPUT_WORDS | PICTURE_WORDS)
+        and not words(topic.name) & NO_TRUTH_WORDS
     ]
 
 
@@ -253,23 +245,16 @@ def _looks_like_depth(topic: TopicInfo) -> bool:
     return named_depth or topic.format.lower() in DEPTH_FORMATS or "depth" in topic.format.lower()
 
 
-def _is_plainly_truth(topic: TopicInfo) -> bool:
-    name = words(topic.name)
-    return bool(name & LABEL_WORDS) or bool(name & MASK_WORDS and name & ROAD_WORDS)
-
-
-def _is_plain_mask(topic: TopicInfo, image: TopicInfo) -> bool:
-    """Whether nothing in its name says that it masks something other than the road."""
-    return not words(topic.name) - MASK_WORDS - PLAIN_WORDS - words(image.name)
+def _is_truth(name: frozenset[str]) -> bool:
+    return bool(name & LABEL_WORDS or (name & MASK_WORDS and name & ROAD_WORDS))
 
 
 def _only(
     topics: Sequence[TopicInfo], image: TopicInfo, what: str, setting: str
 ) -> TopicInfo | None:
-    """Return the topic that shares the most words with the image's name: its own camera's.
+    """Return the topic that shares most words with the image's name, then its ``frame_id``.
 
-    Of several that share as many, the one of the same ``frame_id``. None if there is none, a
-    `LogError` if several are left.
+    None if there is no topic, a `LogError` if several are left.
     """
     shared = [
         (len(words(topic.name) & words(image.name)), topic.frame_id == image.frame_id)

@@ -16,7 +16,7 @@ from roadeval.logs.container.damage import sure_until
 from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError
-from roadeval.logs.messages.pictures import Decoder, Picture, decoder_for
+from roadeval.logs.messages.pictures import Decoder, LoggedPicture, decoder_for
 
 UNREADABLE: Final = -(2**63) + 1
 """A stamp that cannot be read."""
@@ -77,7 +77,6 @@ class TopicReader:
         # A file that is damaged may have lost the topic itself.
         self._files = files
         self._lacks_files = lacks_files
-        self._decoders: dict[int, Decoder | BadMessage] = {}
         rows = [np.empty((0, 4), np.int64)]
         for number, source in enumerate(channels):
             for chunk, entries in source.log.blocks:
@@ -137,7 +136,7 @@ class TopicReader:
             self.log_times[promised[promise]] = log_time
             self._offsets[promised[promise]] = offset
 
-    def picture(self, position: int) -> Picture:
+    def picture(self, position: int) -> LoggedPicture:
         """Read the picture of a message.
 
         Raises
@@ -203,17 +202,8 @@ class TopicReader:
         return len(self) - lost
 
     def _decoder(self, position: int) -> Decoder:
-        number = int(self._numbers[position])
-        if number not in self._decoders:
-            source = self.channels[number]
-            try:
-                self._decoders[number] = decoder_for(source.channel, source.schema)
-            except BadMessage as error:
-                self._decoders[number] = error
-        decoder = self._decoders[number]
-        if isinstance(decoder, BadMessage):
-            raise decoder
-        return decoder
+        source = self.channels[self._numbers[position]]
+        return decoder_for(source.channel, source.schema)
 
     def _error(self, position: int, reason: str) -> FrameError:
         return FrameError(f"{self.name} message {position}: {reason}")

@@ -225,18 +225,16 @@ def understand(
     given = {*labels.road, *labels.ignore}
     if several and {255} <= {*values} <= _MASKS[0].keys() - given:
         labels = LabelSettings()
-    if labels.road_colors:
-        road, ignore = map(_packed, labels.road_colors), map(_packed, labels.ignore_colors)
-        wanted = {"`labels.road_colors`": tuple(road), "`labels.ignore_colors`": tuple(ignore)}
-        return _as_given(wanted, values, name, by_color=True, several=several)
-    if labels.road:
-        wanted = {"`labels.road`": labels.road, "`labels.ignore`": labels.ignore}
-        return _as_given(wanted, values, name, by_color=False, several=several)
+    if labels.road or labels.road_colors:
+        return _as_given(labels, values, name, several=several)
     for meaning in _MASKS:
-        if {*values} <= meaning.keys() and _is_plain(meaning, pictures):
-            of_road = [str(value) for value, truth in meaning.items() if truth == ROAD]
+        # A 1 in few pictures of a mask of 0 and 255 may be damage: were it road, all the road would
+        # be ignored.
+        road = next(value for value, truth in meaning.items() if truth == ROAD)
+        is_plain = road > 1 or 2 * pictures[road] >= pictures[255]
+        if {*values} <= meaning.keys() and is_plain:
             ignored = [str(value) for value in values if meaning[value] == IGNORE]
-            words = f"a mask of {_listed(map(str, values))}: {_words(of_road, ignored)}"
+            words = f"a mask of {_listed(map(str, values))}: {_words([str(road)], ignored)}"
             return ClassMap(meaning, UNKNOWN, False, words)
     raise LogError(
         f"{name} holds the values {_listed(map(str, values))}: name those that mean road with "
@@ -244,37 +242,24 @@ def understand(
     )
 
 
-def _is_plain(meaning: Mapping[int, int], pictures: Mapping[int, int]) -> bool:
-    """Whether values leave no doubt about their meaning, by the number of pictures with each.
-
-    A 1 in few pictures of a mask of 0 and 255 may be damage: were it road, all the road would be
-    ignored.
-    """
-    road = next(value for value, truth in meaning.items() if truth == ROAD)
-    return road > 1 or 2 * pictures.get(road, 0) >= pictures.get(255, 0)
-
-
-def _as_given(
-    wanted: Mapping[str, tuple[int, ...]],
-    seen: list[int],
-    name: str,
-    *,
-    by_color: bool,
-    several: bool,
-) -> ClassMap:
-    """Return the meaning that the settings give to road and to ignore, in this order."""
-    text = _color_name if by_color else str
+def _as_given(labels: LabelSettings, seen: list[int], name: str, *, several: bool) -> ClassMap:
+    """Return the meaning of the values, or of the colours, that the settings name."""
+    by_color = bool(labels.road_colors)
+    ending, text = ("_colors", _color_name) if by_color else ("", str)
+    wanted = {
+        "road": [*labels.road, *map(_packed, labels.road_colors)],
+        "ignore": [*labels.ignore, *map(_packed, labels.ignore_colors)],
+    }
     help_ = "; say with `drives` what holds for this drive alone" if several else ""
     for setting, values in wanted.items():
         for value in values:
             if value not in seen:
                 raise LogError(
-                    f"{setting} {text(value)} does not occur in {name}, whose frames hold "
-                    f"{_listed(map(text, seen))}{help_}"
+                    f"`labels.{setting}{ending}` {text(value)} does not occur in {name}, whose "
+                    f"frames hold {_listed(map(text, seen))}{help_}"
                 )
-    road, ignore = wanted.values()
-    meaning = dict.fromkeys(road, ROAD) | dict.fromkeys(ignore, IGNORE)
-    return ClassMap(meaning, NON_ROAD, by_color, _words(map(text, road), map(text, ignore)))
+    meaning = dict.fromkeys(wanted["road"], ROAD) | dict.fromkeys(wanted["ignore"], IGNORE)
+    return ClassMap(meaning, NON_ROAD, by_color, _words(*(map(text, v) for v in wanted.values())))
 
 
 def _within(labels: LabelSettings, tolerance: int, seen: list[int], name: str) -> ClassMap:

@@ -1,4 +1,4 @@
-"""Pairs of images and labels by header stamp, in whole nanoseconds, or by what takes its place.
+"""Which label belongs to which image: by header stamp, frame number, or what takes their place.
 
 Labels may be logged long after their images, so log times do not pair them. Stamps are read only
 where they are needed: around the stamp that is looked for.
@@ -15,37 +15,35 @@ from typing import Final, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from roadeval.logs.errors import LogError
+from roadeval.logs.settings import MaskSettings, TopicSettings
 from roadeval.logs.topics.description import TopicInfo, median_period
 from roadeval.logs.topics.reader import UNREADABLE, TopicReader
+from roadeval.logs.truth.named import NamedLabels
 
 REACH: Final = 4
 """Messages to look at on either side: topics are logged nearly, not always, in stamp order."""
 ALONE_NS: Final = 50_000_000
 """Half the period of a camera of 10 Hz."""
 LOOKED_AT: Final = 10
-"""Images at the log's start that settle by what they are paired."""
+"""First images of a log that decide by what labels are paired."""
+
+LabelPictures = TopicReader | NamedLabels
+"""Label pictures in the order of their times or numbers."""
 
 
 class Stamps(Protocol):
-    """The stamps of pictures, nearly rising."""
+    """The stamps of pictures, or numbers in place of stamps; nearly rising."""
 
     def __len__(self) -> int: ...
 
     def stamp(self, position: int) -> int:
-        """Nanoseconds, or `UNREADABLE`."""
+        """Return nanoseconds, or `UNREADABLE`."""
         ...
 
 
 class Times:
-    """Other numbers in place of stamps, for logs whose stamps are all zero or equal.
-
-    Parameters
-    ----------
-    times
-        By position, rising.
-    sure
-        How many of them are known; the others count as unreadable. By default all are.
-    """
+    """Rising numbers in place of stamps; only the first ``sure`` of them, by default all, count."""
 
     def __init__(
         self, times: Sequence[int] | npt.NDArray[np.int64], sure: int | None = None
@@ -62,7 +60,7 @@ class Times:
 
 
 class Clock(StrEnum):
-    """By what images and labels are paired."""
+    """What the images of a log can be paired by."""
 
     STAMP = "header stamps"
     LOG_TIME = "log times"
@@ -71,23 +69,22 @@ class Clock(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
-    """The images of a log that labels are paired with, and by which rules."""
+    """The images that labels are paired with, and the rules for it."""
 
     images: TopicReader
     topic: TopicInfo
     clock: Clock
     """Header stamps if they differ, else log times, else their order."""
     tolerance_ns: int
-    """How far an image and its label may be apart."""
+    """Largest time between an image and its label."""
     resize_labels: bool
     """Whether labels of another size are scaled to the image's (nearest pixel)."""
 
     @classmethod
-    def of(
-        cls, images: TopicReader, topic: TopicInfo, asked_ms: float | None, *, resize_labels: bool
-    ) -> Camera:
-        """Find the rules for a topic: a tolerance of half the frame period unless one is given."""
-        return cls(images, topic, clock_of(images), tolerance(images, asked_ms), resize_labels)
+    def of(cls, images: TopicReader, topic: TopicInfo, asked: TopicSettings) -> Camera:
+        """Find the rules for a camera; the tolerance defaults to half the frame period."""
+        tolerance_ns = tolerance(images, asked.sync_tolerance_ms)
+        return cls(images, topic, clock_of(images), tolerance_ns, asked.resize_truth)
 
 
 def clock_of(reader: TopicReader) -> Clock:
@@ -101,9 +98,9 @@ def clock_of(reader: TopicReader) -> Clock:
 
 
 def tolerance(reader: TopicReader, asked_ms: float | None) -> int:
-    """Return the tolerance asked for, or else half the frame period, in nanoseconds.
+    """Return the tolerance asked for, else half the frame period, in nanoseconds.
 
-    An image alone has no period; what is within `ALONE_NS` of it belongs to it.
+    A single image has no period: its tolerance is `ALONE_NS`.
     """
     if asked_ms is not None:
         return round(asked_ms * 1e6)
@@ -119,15 +116,14 @@ def tolerance(reader: TopicReader, asked_ms: float | None) -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pairing:
-    """By what images and labels are paired.
+    """How the images and labels of one source are paired.
 
-    Equal stamps are a pair (the k-th image with a stamp and the k-th label with it); else the
+    Equal stamps are a pair (the k-th image and the k-th label of the same stamp); otherwise the
     nearest within the tolerance, if each is the other's nearest.
     """
 
     images: Stamps
     labels: Stamps
-    """Both nearly in the order of their stamps, or of the numbers that take their place."""
     tolerance: int
     """Largest difference of the stamps of a pair."""
     unused: int = 0
@@ -136,57 +132,35 @@ class Pairing:
     """Frames without a label because their number is not certain: an unknown number of images, or
     of the other log's labels, is lost before them."""
 
-    def begin(self, near: int = 0) -> Partners:
-        """Begin to pair image after image, the first one with a label near a position."""
-        return Partners(self, near)
-
 
 class Partners:
-    """Finds each image's label, and each label's image: at most one.
+    """Finds each image's label, at most one; quickest for one image after the other.
 
-    Attributes
-    ----------
-    unused
-        Labels between the ones found that belong to no image; means something only if every
-        image is asked for.
+    The search for the first one begins at the label position ``near``.
     """
 
-    def __init__(self, pairing: Pairing, near: int) -> None:
-        self.unused = 0
-        self._images = pairing.images
-        self._labels = pairing.labels
-        self._tolerance = pairing.tolerance
-        self._near_label = min(near, max(len(pairing.labels) - 1, 0))
-        self._last: int | None = None
+    def __init__(self, pairing: Pairing, near: int = 0) -> None:
+        self._pairing = pairing
+        self._near = min(near, max(len(pairing.labels) - 1, 0))
 
     def of(self, image: int) -> int | None:
-        """Position of the label that belongs to the image at a position, if there is one."""
-        stamp = self._images.stamp(image)
-        if stamp == UNREADABLE or not len(self._labels):
+        """Return the position of the label of an image; None if it has none."""
+        images, labels = self._pairing.images, self._pairing.labels
+        stamp = images.stamp(image)
+        if stamp == UNREADABLE or not len(labels):
             return None
-        self._near_label = _closest(self._labels, stamp, self._near_label)
-        exact = _equal(self._labels, stamp, self._near_label)
-        if exact:
-            rank = _equal(self._images, stamp, image).index(image)
-            found = exact[rank] if rank < len(exact) else None
-        else:
-            found = self._nearest(image, stamp)
-        if found is not None:
-            if self._last is not None:
-                self.unused += max(found - self._last - 1, 0)
-            self._last = found
-        return found
-
-    def _nearest(self, image: int, stamp: int) -> int | None:
-        label = self._near_label
-        theirs = self._labels.stamp(label)
-        if theirs == UNREADABLE or abs(theirs - stamp) > self._tolerance:
+        label = self._near = _closest(labels, stamp, self._near)
+        if exact := _equal(labels, stamp, label):
+            rank = _equal(images, stamp, image).index(image)
+            return exact[rank] if rank < len(exact) else None
+        theirs = labels.stamp(label)
+        if theirs == UNREADABLE or abs(theirs - stamp) > self._pairing.tolerance:
             return None
-        return label if _closest(self._images, theirs, image) == image else None
+        return label if _closest(images, theirs, image) == image else None
 
 
 def _closest(stamps: Stamps, stamp: int, hint: int) -> int:
-    """Position whose stamp is nearest to ``stamp`` (the first of equals), sought from a hint."""
+    """Return the position of the nearest stamp (the first of equals); search from a hint."""
 
     def distance(position: int) -> int:
         theirs = stamps.stamp(position)
@@ -205,10 +179,12 @@ def _around(stamps: Stamps, middle: int) -> range:
 
 
 def _seek(stamps: Stamps, stamp: int, hint: int) -> int:
-    """First position at or after ``stamp``, by ever longer steps from the hint, then halving."""
+    """Return the first position at or after a stamp: ever longer steps from the hint, then halving.
+
+    A stamp that cannot be read counts as the next one that can.
+    """
 
     def at(position: int) -> int:
-        """Stamp at a position, or of the next one that can be read."""
         for candidate in range(position, min(position + REACH, len(stamps))):
             if (found := stamps.stamp(candidate)) != UNREADABLE:
                 return found
@@ -227,3 +203,79 @@ def _seek(stamps: Stamps, stamp: int, hint: int) -> int:
         else:
             high = middle
     return min(low, len(stamps) - 1)
+
+
+# --- How one source is paired ---------------------------------------------------------------------
+
+
+def by_time(labels: LabelPictures, camera: Camera) -> Pairing:
+    """Pair by stamps, by log times, or by order where the log has no times at all.
+
+    Order means something only if there is a label for each image.
+    """
+    images, clock = camera.images, camera.clock
+    if clock is Clock.STAMP:
+        return Pairing(images, labels, camera.tolerance_ns)
+    if clock is Clock.LOG_TIME:
+        return Pairing(Times(images.log_times), Times(labels.log_times), camera.tolerance_ns)
+    count = min(labels.sure, len(labels) if len(images) == len(labels) else 0)
+    unsure = len(images) - min(images.sure, labels.sure)
+    frames = Times(range(len(images)), images.sure)
+    return Pairing(frames, Times(range(count)), camera.tolerance_ns, unsure=unsure)
+
+
+def check_times(pairing: Pairing, name: str, clock: Clock) -> None:
+    """Refuse, as a `LogError`, labels beside the log whose times are all outside of the frames'."""
+    if not len(pairing.labels):
+        raise LogError(f"{name}: the log has no times to pair masks by; pair by number")
+    (first, last), (theirs, their_last) = (
+        (each.stamp(0), each.stamp(len(each) - 1)) for each in (pairing.images, pairing.labels)
+    )
+    apart = max(first - their_last, theirs - last)
+    if UNREADABLE not in (first, last, theirs, their_last) and apart > pairing.tolerance:
+        raise LogError(
+            f"{name}: no mask belongs to a frame: theirs are from {theirs} to {their_last} ns, the "
+            f"frames from {first} to {last} ns, by {clock}"
+        )
+
+
+def by_number(labels: LabelPictures, settings: MaskSettings, images: TopicReader) -> Pairing:
+    """Pair by frame numbers.
+
+    Frames after the loss of an unknown number of images, or of another log's labels, have no
+    certain number, and no label.
+
+    Raises
+    ------
+    LogError
+        If no number is a frame's, or the numbers look shifted by one.
+    """
+    first, frames = settings.first, len(images)
+    if isinstance(labels, TopicReader):
+        known = labels.sure - first if labels.sure < len(labels) else frames
+        unsure = frames - max(0, min(images.sure, known))
+        numbers = Times(range(-first, labels.sure - first))
+        return Pairing(Times(range(frames), images.sure), numbers, 0, unsure=unsure)
+    name, keys = labels.name, labels.log_times
+    named, cut = labels.images, images.expected() != frames
+    if named is not None and (named < frames or (named > frames and not cut)):
+        raise LogError(
+            f"{name}: {settings.images} holds {named} images and the log {frames}, so it was not "
+            "made of all of them: leave `images` out, and pair masks by number or stamp"
+        )
+    inside = int(np.count_nonzero((keys >= 0) & (keys < frames)))
+    if not inside:
+        theirs = f"{keys[0] + first} to {keys[-1] + first}" if len(keys) else "none"
+        what = "no image has the name of one" if named is not None else f"theirs are {theirs}"
+        raise LogError(
+            f"{name}: no mask belongs to a frame by {labels.by}: {what}, and the frames' numbers "
+            f"are {first} to {first + frames - 1}"
+        )
+    if named is None and (keys[0], keys[-1], len(keys)) == (1, frames, frames):
+        raise LogError(
+            f"{name}: its numbers are {first + 1} to {first + frames}, and the frames' {first} to "
+            f"{first + frames - 1}: if its masks begin at the first frame, set first = {first + 1} "
+            "in [masks]"
+        )
+    unused = len(labels) - inside + labels.nameless if images.sure == frames else 0
+    return Pairing(Times(range(frames), images.sure), labels, 0, unused, frames - images.sure)

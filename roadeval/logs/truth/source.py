@@ -7,28 +7,27 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from roadeval.images import Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages.pictures import Picture, RawPicture
 from roadeval.logs.messages.pixels import format_of, size_of
 from roadeval.logs.messages.video import PictureSequence
-from roadeval.logs.settings import LabelSettings, MaskSettings
-from roadeval.logs.topics.reader import UNREADABLE, TopicReader
-from roadeval.logs.truth.folder import LabelFolder
+from roadeval.logs.settings import MaskSettings
+from roadeval.logs.topics.reader import TopicReader
 from roadeval.logs.truth.meaning import TOP, Confidence, Labels, Meaning, seen_in, understand
 from roadeval.logs.truth.pairing import (
     LOOKED_AT,
     Camera,
-    Clock,
+    LabelPictures,
     Pairing,
     Partners,
-    Stamps,
-    Times,
+    by_number,
+    by_time,
+    check_times,
 )
 
 _TOPIC_OF_A_LOG: Final = re.compile(r"(.+\.mcap|.{2,}(?=:/)):(.+)")
@@ -41,43 +40,17 @@ _ONES: Final = (1, 257)
 """Greatest codes of a confidence map whose greatest value is 1, of 16 and of 8 bits."""
 
 
-class Pictures(PictureSequence, Stamps, Protocol):
-    """Label pictures in the order of their times: a topic's, or a folder's."""
-
-    @property
-    def name(self) -> str:
-        """The topic, or the folder."""
-
-    @property
-    def limits(self) -> Limits:
-        """On the pictures."""
-
-    @property
-    def log_times(self) -> npt.NDArray[np.int64]:
-        """``(n,)`` int64, rising."""
-
-    @property
-    def sure(self) -> int:
-        """How many of them, from the first one on, are certain to have their original positions."""
-
-    def __len__(self) -> int: ...
-
-    def place(self, position: int) -> str:
-        """Return where a picture lies, for messages to people."""
-        ...
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class LabelSource:
     """Labels of one source: truth, true shadow, or another method's masks."""
 
     where: str
     """The topic, the folder, or the topic and its log, for a person."""
-    pictures: Pictures
+    pictures: LabelPictures
     meaning: Meaning
     """How they are read."""
     pairing: Pairing
-    """By what they are paired with images."""
+    """How they are paired with images."""
     why: str
     """Why they were chosen, or how they are paired, in words."""
     digest: Callable[[], str] | None = None
@@ -88,109 +61,93 @@ class LabelSource:
         """Whether they are thresholds on how probable road is."""
         return isinstance(self.meaning, Confidence)
 
-    def begin(self, logged_ns: int) -> Partners:
-        """Begin to pair images with labels at an image of that log time."""
-        return self.pairing.begin(int(np.searchsorted(self.pictures.log_times, logged_ns)))
+    def partners(self, logged_ns: int) -> Partners:
+        """Pair images with labels, beginning at an image of that log time."""
+        return Partners(self.pairing, int(np.searchsorted(self.pictures.log_times, logged_ns)))
 
     def label(self, position: int) -> Label:
-        """Read the label at a position, not decoded yet."""
+        """Read the label at a position; it is not decoded yet."""
         picture = read_or_error(self.pictures, position)
-        return Label(picture, self.meaning, self.pictures.name, self.pictures.place(position))
+        return Label(self, picture, self.pictures.place(position))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Label:
     """A label of a frame as logged, which any thread can decode."""
 
+    source: LabelSource
     picture: Picture | FrameError
     """The picture, or why it cannot be read."""
-    meaning: Meaning
-    """How it is read."""
-    source: str
-    """The topic or folder that it comes from."""
     place: str
-    """That, or its own file."""
+    """Where it lies: its topic, or its own file."""
 
     def read(self, limits: Limits) -> Labels:
         """Decode the label; a `BadMessage` or `FrameError` if that is impossible."""
         if isinstance(self.picture, FrameError):
             raise self.picture
-        return self.meaning.read(self.picture, limits)
+        return self.source.meaning.read(self.picture, limits)
 
 
 def read_or_error(pictures: PictureSequence, position: int) -> Picture | FrameError:
-    """Return a picture, or the error that it cannot be read."""
+    """Return a picture, or the error if it cannot be read."""
     try:
         return pictures.picture(position)
     except FrameError as error:
         return error
 
 
-def samples(reader: PictureSequence) -> Iterator[Picture]:
-    """Read the first pictures of a topic, or of a folder, and some spread over the rest."""
-    if not len(reader):
-        return
-    spread = np.linspace(0, max(len(reader) - 1, 0), LOOKED_AT, dtype=int).tolist()
-    for position in sorted({*range(min(LOOKED_AT, len(reader))), *spread}):
+def samples(pictures: PictureSequence) -> Iterator[Picture]:
+    """Read the first pictures, and some spread over the rest, as far as they can be read."""
+    count = len(pictures)
+    spread = np.linspace(0, count - 1, LOOKED_AT, dtype=int).tolist() if count else []
+    for position in sorted({*range(min(LOOKED_AT, count)), *spread}):
         with suppress(FrameError):
-            yield reader.picture(position)
+            yield pictures.picture(position)
 
 
 def in_log(
-    labels: TopicReader, why: str, settings: LabelSettings, camera: Camera, *, several: bool
+    labels: TopicReader, settings: MaskSettings, camera: Camera, why: str, *, several: bool
 ) -> LabelSource:
-    """Settle a label topic of the log itself, whose size is known to fit.
+    """Settle a label topic of the log itself, whose size was checked.
 
     Raises
     ------
     LogError
         If its values cannot be understood.
     """
-    meaning = _meaning(labels, MaskSettings(labels=settings), several=several)
-    pairing = Pairing(*_stamps(labels, camera), camera.tolerance_ns)
-    return LabelSource(labels.name, labels, meaning, pairing, why)
+    meaning = _meaning(labels, settings, several=several)
+    return LabelSource(labels.name, labels, meaning, by_time(labels, camera), why)
 
 
-def in_folder(folder: LabelFolder, settings: MaskSettings, camera: Camera) -> LabelSource:
-    """Settle the labels of a folder.
+def beside_log(
+    labels: LabelPictures,
+    settings: MaskSettings,
+    camera: Camera,
+    digest: Callable[[], str],
+    log: str = "",
+) -> LabelSource:
+    """Settle the labels of a folder, or of a topic of another ``log``.
 
     Raises
     ------
     LogError
         If none belongs to a frame, they cannot be understood, or are of another size.
     """
-    if folder.by == "stamp":
-        pairing = _by_time(folder, camera)
+    if not isinstance(labels, TopicReader):
+        by, count, where = labels.by, f"{len(labels)} files", labels.name
+    elif settings.images is None:
+        by, where = settings.pair or "stamp", f"{labels.name} of {log}"
+        count = f"{len(labels)} messages"
     else:
-        pairing = _by_number(folder, settings, camera.images)
-    why = f"{len(folder)} files, paired by {folder.by}"
-    meaning = _meaning(folder, settings, camera)
-    return LabelSource(folder.name, folder, meaning, pairing, why, lambda: folder.digest)
-
-
-def in_other_log(
-    labels: TopicReader,
-    settings: MaskSettings,
-    camera: Camera,
-    *,
-    log: str,
-    digest: Callable[[], str],
-) -> LabelSource:
-    """Settle the labels of a topic of another log; errors as of `in_folder`."""
-    if settings.images is not None:
         raise LogError("images are for a folder of masks: those of a log have no names")
-    if settings.pair == "number":
-        images, sure = camera.images, labels.sure
-        frames = Times(range(len(images)), images.sure)
-        numbers = Times(range(-settings.first, sure - settings.first))
-        lost = sure - settings.first if sure < len(labels) else len(images)
-        unsure = len(images) - max(0, min(images.sure, lost))
-        pairing = Pairing(frames, numbers, 0, unsure=unsure)
+    if by == "stamp":
+        pairing = by_time(labels, camera)
+        check_times(pairing, labels.name, camera.clock)
     else:
-        pairing = _by_time(labels, camera)
-    why = f"{len(labels)} messages, paired by {settings.pair or camera.clock}"
+        pairing = by_number(labels, settings, camera.images)
+    words = camera.clock if log and settings.pair is None else by
     meaning = _meaning(labels, settings, camera)
-    return LabelSource(f"{labels.name} of {log}", labels, meaning, pairing, why, digest)
+    return LabelSource(where, labels, meaning, pairing, f"{count}, paired by {words}", digest)
 
 
 def log_and_topic(path: str) -> tuple[str, str] | None:
@@ -204,7 +161,7 @@ def log_and_topic(path: str) -> tuple[str, str] | None:
 
 
 def mask_files(settings: MaskSettings) -> list[Path]:
-    """Return the files that hold masks, or give them their frames, whether they are there or not.
+    """Return the files that hold masks, or give them their frames, even if they do not exist.
 
     An OSError if a folder cannot be listed.
     """
@@ -214,88 +171,37 @@ def mask_files(settings: MaskSettings) -> list[Path]:
     return [f for each in folders for f in (sorted(each.iterdir()) if each.is_dir() else [each])]
 
 
-def _stamps(labels: Pictures, camera: Camera) -> tuple[Stamps, Stamps]:
-    """Return the times by which images and labels are paired."""
-    images = camera.images
-    if camera.clock is Clock.STAMP:
-        return images, labels
-    if camera.clock is Clock.LOG_TIME:
-        return Times(images.log_times), Times(labels.log_times)
-    # Without any time, order means something only if there is a label for each image.
-    count = len(labels) if len(images) == len(labels) else 0
-    return Times(range(len(images)), images.sure), Times(range(min(count, labels.sure)))
-
-
-def _by_time(labels: Pictures, camera: Camera) -> Pairing:
-    """Pair by stamps, or what takes their place; a `LogError` if labels lie at other times."""
-    stamps = _stamps(labels, camera)
-    frames, theirs = (
-        [each.stamp(place) for place in (0, len(each) - 1)] if len(each) else [] for each in stamps
+def check_size(labels: str, size: tuple[int, int] | None, camera: Camera) -> None:
+    """Refuse labels of another size than the images', unless they are resized; a `LogError`."""
+    wanted = camera.topic.size
+    if camera.resize_labels or size is None or wanted is None or size == wanted:
+        return
+    theirs, ours = ("x".join(map(str, each)) for each in (size, wanted))
+    raise LogError(
+        f"{labels} is {theirs}, but {camera.topic.name} is {ours}: scale the labels with "
+        "`topics.resize_truth`"
     )
-    if not theirs:
-        raise LogError(f"{labels.name}: the log has no times to pair masks by; pair by number")
-    apart = max(frames[0] - theirs[1], theirs[0] - frames[1])
-    if UNREADABLE not in (*frames, *theirs) and apart > camera.tolerance_ns:
-        raise LogError(
-            f"{labels.name}: no mask belongs to a frame: theirs are from {theirs[0]} to "
-            f"{theirs[1]} ns, the frames from {frames[0]} to {frames[1]} ns, by {camera.clock}"
-        )
-    count = len(camera.images)
-    sure = min(camera.images.sure, labels.sure) if camera.clock is Clock.ORDER else count
-    return Pairing(*stamps, camera.tolerance_ns, unsure=count - sure)
 
 
-def _by_number(folder: LabelFolder, settings: MaskSettings, images: TopicReader) -> Pairing:
-    """Pair by frame numbers; a `LogError` if none is a frame's, or they look shifted by one.
-
-    Frames after the loss of an unknown number of images have no certain number, and no label.
-    """
-    keys, first = folder.log_times, settings.first
-    frames, sure = len(images), images.sure
-    named, cut = folder.images, images.expected() != frames
-    if named is not None and (named < frames or (named > frames and not cut)):
-        raise LogError(
-            f"{folder.name}: {settings.images} holds {named} images and the log {frames}, so it "
-            "was not made of all of them: leave `images` out, and pair masks by number or stamp"
-        )
-    inside = int(np.count_nonzero((keys >= 0) & (keys < frames)))
-    if not inside:
-        theirs = f"{keys[0] + first} to {keys[-1] + first}" if len(keys) else "none"
-        what = "no image has the name of one" if folder.by == "name" else f"theirs are {theirs}"
-        raise LogError(
-            f"{folder.name}: no mask belongs to a frame by {folder.by}: {what}, and the frames' "
-            f"numbers are {first} to {first + frames - 1}"
-        )
-    if folder.by == "number" and (keys[0], keys[-1]) == (1, frames) and len(keys) == frames:
-        raise LogError(
-            f"{folder.name}: its numbers are {first + 1} to {first + frames}, and the frames' "
-            f"{first} to {first + frames - 1}: if its masks begin at the first frame, set first = "
-            f"{first + 1} in [masks]"
-        )
-    unused = len(folder) - inside + folder.nameless if sure == frames else 0
-    return Pairing(Times(range(frames), sure), folder, 0, unused, frames - sure)
-
-
-def check_same_size(
-    labels: str, size: tuple[int, int] | None, image: str, wanted: tuple[int, int] | None
-) -> None:
-    """Refuse labels of another size than the images'; a `LogError`."""
-    if size != wanted:
-        ours, theirs = ("x".join(map(str, each or ())) for each in (wanted, size))
-        raise LogError(
-            f"{labels} is {theirs}, but {image} is {ours}: scale the labels with "
-            "`topics.resize_truth`"
-        )
+def nothing_of(pictures: LabelPictures, problem: str) -> LogError:
+    """Return the error that no picture can be decoded, with the reason of the first one."""
+    if not problem:
+        first = read_or_error(pictures, 0) if len(pictures) else "it holds no picture"
+        problem = str(first)
+    return LogError(f"nothing of {pictures.name} can be decoded: {problem}")
 
 
 def _meaning(
-    labels: Pictures,
+    labels: LabelPictures,
     settings: MaskSettings,
     camera: Camera | None = None,
     *,
     several: bool = False,
 ) -> Meaning:
-    """Look at some labels: their values must be known, and the size of those beside the log fit."""
+    """Find the meaning of labels by looking at some; of those beside the log check the size, too.
+
+    A `LogError` if their values cannot be understood.
+    """
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     seen: list[int] = []
     problem, fractions = "", False
@@ -321,26 +227,6 @@ def _meaning(
         if camera is None or len(set(seen)) <= _CLASSES:
             raise
         raise LogError(f"{error}; or, for confidences, their threshold") from error
-
-
-def check_size(labels: str, size: tuple[int, int] | None, camera: Camera) -> None:
-    """Refuse labels of another size than the images', unless they are resized; a `LogError`."""
-    wanted = camera.topic.size
-    if camera.resize_labels or size is None or wanted is None or size == wanted:
-        return
-    theirs, ours = ("x".join(map(str, each)) for each in (size, wanted))
-    raise LogError(
-        f"{labels} is {theirs}, but {camera.topic.name} is {ours}: scale the labels with "
-        "`topics.resize_truth`"
-    )
-
-
-def nothing_of(pictures: Pictures, problem: str) -> LogError:
-    """Return the error that none of some pictures can be decoded: as the first one shows."""
-    if not problem:
-        first = read_or_error(pictures, 0) if len(pictures) else "it holds no picture"
-        problem = str(first)
-    return LogError(f"nothing of {pictures.name} can be decoded: {problem}")
 
 
 def _check_confidence(greatest: int, name: str, *, fractions: bool) -> None:

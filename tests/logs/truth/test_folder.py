@@ -1,13 +1,16 @@
 """Which mask of a folder belongs to which frame, by its name."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from roadeval.images import Limits
 from roadeval.logs import LogError, MaskSettings
 from roadeval.logs.messages.pictures import CompressedPicture
-from roadeval.logs.truth.folder import npy_picture, open_folder
+from roadeval.logs.truth.folder import labels_in, npy_picture
 from roadeval.logs.truth.meaning import Confidence
+from roadeval.logs.truth.named import NamedLabels, with_keys
 from roadeval.logs.truth.source import log_and_topic
 from tests.logs.making import png
 from tests.logs.truth.test_npy import file_of
@@ -21,10 +24,14 @@ def folder(tmp_path, *names):
     return made
 
 
+def opened(path: Path, **settings) -> NamedLabels:
+    return with_keys(labels_in(path), str(path), MaskSettings(str(path), **settings), Limits())
+
+
 def keys(path, **settings):
-    opened = open_folder(path, MaskSettings(str(path), **settings), Limits())
-    names = [file.name for file in opened.files]
-    return opened.by, dict(zip(names, opened.log_times.tolist(), strict=True))
+    found = opened(path, **settings)
+    names = [label.path.name for label in found.labels]
+    return found.by, dict(zip(names, found.log_times.tolist(), strict=True))
 
 
 def test_the_last_number_of_a_name_is_its_frame(tmp_path):
@@ -63,7 +70,7 @@ def test_a_mask_belongs_to_the_image_of_its_name_at_its_place(tmp_path):
     for name in ("a.jpg", "b.jpg", "c.jpg"):
         (images / name).touch()
     assert keys(path, images=str(images)) == ("name", {"a.png": 0, "c_mask.png": 2})
-    assert open_folder(path, MaskSettings(str(path), images=str(images)), Limits()).nameless == 1
+    assert opened(path, images=str(images)).nameless == 1
 
 
 @pytest.mark.parametrize(
@@ -72,7 +79,7 @@ def test_a_mask_belongs_to_the_image_of_its_name_at_its_place(tmp_path):
         ((), {}, "no image in it"),
         (("road.png",), {}, "road.png: its name has no number"),
         (("1.png", "a1.npy"), {}, "a1.npy and 1.png belong to the same frame, by number"),
-        (("1.png",), {"pair": "stamp"}, "1.png: its name is no time"),
+        (("1.png",), {"pair": "stamp"}, "1.png: its name is not a time"),
     ],
 )
 def test_names_that_tell_no_frame_are_refused(tmp_path, names, settings, message):
@@ -84,7 +91,7 @@ def test_the_digest_tells_content_and_frame_not_the_place(tmp_path):
     def digest(name, file, content):
         (tmp_path / name).mkdir()
         (tmp_path / name / file).write_bytes(content)
-        return open_folder(tmp_path / name, MaskSettings(), Limits()).digest
+        return opened(tmp_path / name).digest
 
     one = digest("a", "1.png", b"x")
     assert digest("b", "frame_01.png", b"x") == one

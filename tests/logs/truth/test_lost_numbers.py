@@ -224,7 +224,7 @@ def test_the_truth_is_not_held_against_itself_by_the_log_s_own_path(tmp_path):
     itself = LogConfig(masks={"net": MaskSettings(path=f"{path}:{broken.MASK}")})
     with (
         open_log(path, itself) as log,
-        pytest.raises(LogError, match="is the truth that it is held"),
+        pytest.raises(LogError, match="is the truth that it is scored"),
     ):
         log.select()
 

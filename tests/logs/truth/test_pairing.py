@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from roadeval.logs.topics.reader import UNREADABLE
-from roadeval.logs.truth.pairing import Pairing
+from roadeval.logs.truth.pairing import Pairing, Partners
 
 
 class Stamps:
@@ -20,7 +20,7 @@ class Stamps:
 
 
 def pairs(images: Sequence[int], labels: Sequence[int], tolerance: int = 0) -> list[int | None]:
-    partners = Pairing(Stamps(images), Stamps(labels), tolerance).begin()
+    partners = Partners(Pairing(Stamps(images), Stamps(labels), tolerance))
     return [partners.of(image) for image in range(len(images))]
 
 
@@ -76,5 +76,5 @@ def test_no_labels_no_partner() -> None:
 
 def test_only_stamps_near_the_one_looked_for_are_read() -> None:
     images, labels = Stamps(range(0, 100_000, 10)), Stamps(range(0, 100_000, 10))
-    assert Pairing(images, labels, 5).begin().of(7_000) == 7_000
+    assert Partners(Pairing(images, labels, 5)).of(7_000) == 7_000
     assert len(images.read) + len(labels.read) < 60
