@@ -44,9 +44,8 @@ from roadeval.results.rows import Key, cells, drive_row
 from roadeval.results.schema import ALL, TABLES
 from roadeval.results.summary import json_text
 from roadeval.runtime import memory
-from roadeval.runtime.claims import alone
 from roadeval.runtime.documents import read_bounded, read_json
-from roadeval.runtime.files import own_names, put
+from roadeval.runtime.files import alone, own_names, put
 from roadeval.training import TrainingError, learning, save_model
 from roadeval.training.learning import HeldFrames
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,9 +14,7 @@ from roadeval.recording import RecordRule
 from roadeval.results.fleet.kind import FILES, is_fleet
 from roadeval.results.folder import CONTENT, belonging
 from roadeval.results.summary import SUMMARY
-from roadeval.runtime.claims import claimed
-from roadeval.runtime.files import check_file, check_folder, made, own_names, target_of
-from roadeval.runtime.folders import home_of, recover
+from roadeval.runtime.files import claimed_file, claimed_folder, own_names, remove, target_of
 from roadeval.runtime.paths import AnyPath
 
 if TYPE_CHECKING:
@@ -47,28 +44,30 @@ class Outputs:
 
     @contextmanager
     def holding(self, inputs: Iterable[AnyPath | None]) -> Iterator[Path | None]:
-        """Hold them all; yield the newest partial recording that an earlier run has left.
+        """Hold them all, as `holding` does; yield the newest partial recording of an earlier run.
 
-        Whatever else earlier runs have left of these outputs is removed.
-
-        Raises
-        ------
-        RoadevalError
-            If one is an input or another output, cannot be written, or is being written by
-            another run.
+        The older ones are removed.
         """
-        _keep_apart(inputs, (self.recording, self.mcap))
-        _keep_apart((), (self.recording, self.mcap, self.reports))
-        with ExitStack() as claims:
-            _claim_file(claims, self.mcap)
-            left = _claim_recording(claims, self.recording)
-            _claim_folder(claims, self.reports)
-            yield left
+        with holding(self.recording, self.mcap, folder=self.reports, inputs=inputs) as certain:
+            yield self._partial() if certain else None
+
+    def _partial(self) -> Path | None:
+        there = own_names(target_of(self.recording), hidden=False) if self.recording else []
+        newest = [each for each in there if each.is_file() and each.stat().st_size][-1:]
+        for each in there:
+            if each not in newest:
+                remove(each)
+        return newest[0] if newest else None
 
 
 @contextmanager
-def holding(*files: AnyPath, inputs: Iterable[AnyPath | None] = ()) -> Iterator[None]:
-    """Hold the files that a command writes; what earlier runs have left of them is removed.
+def holding(
+    *files: AnyPath | None, folder: Path | None = None, inputs: Iterable[AnyPath | None] = ()
+) -> Iterator[bool]:
+    """Hold the files that a command writes, and its results folder, if it writes one.
+
+    What earlier runs have left of them is removed. Yields whether it is certain that no other run
+    writes them.
 
     Raises
     ------
@@ -76,83 +75,34 @@ def holding(*files: AnyPath, inputs: Iterable[AnyPath | None] = ()) -> Iterator[
         If one is an input or another output, cannot be written, or is being written by another
         run.
     """
-    _keep_apart(inputs, files)
-    with ExitStack() as claims:
-        for file in files:
-            _claim_file(claims, Path(file))
-        yield
-
-
-def _keep_apart(inputs: Iterable[AnyPath | None], outputs: Iterable[AnyPath | None]) -> None:
-    """Refuse an output that would replace an input or another output."""
+    paths = [Path(file) for file in files if file is not None]
+    outputs = [*paths, *([folder] if folder else [])]
     # Of a loop of links pathlib makes an error of its own.
-    taken = {Path(os.path.realpath(path)) for path in inputs if path is not None}
-    taken |= {path / name for path in taken for name in _content(path)}
-    for path in outputs:
-        if path is None:
-            continue
-        place = Path(os.path.realpath(path))
-        if place in taken:
+    places = [os.path.realpath(path) for path in outputs]
+    taken = {os.path.realpath(place) for path in inputs if path for place in _places(Path(path))}
+    for number, path in enumerate(outputs):
+        earlier = places[:number] if path is folder else {*places[:number], *taken}
+        if places[number] in earlier:
             raise RoadevalError(f"{path}: is an input or another output; name a file of its own")
-        taken.add(place)
+    with ExitStack() as claims:
+        certain = [_claim(claims, path, claimed_file(path)) for path in paths]
+        if folder:
+            certain.append(_claim(claims, folder, claimed_folder(folder, CONTENT)))
+        yield all(certain)
 
 
-def _content(folder: Path) -> Iterable[str]:
-    """Return the names of the files by which a folder is a result or a fleet."""
-    if is_fleet(folder):
-        return FILES
-    return belonging(folder) if (folder / SUMMARY).is_file() else ()
+def _places(path: Path) -> Iterator[Path]:
+    """Yield the path of an input and of the files by which a folder is a result or a fleet."""
+    yield path
+    if is_fleet(path):
+        yield from (path / name for name in FILES)
+    elif (path / SUMMARY).is_file():
+        yield from (path / name for name in belonging(path / SUMMARY))
 
 
-def _claim_file(claims: ExitStack, path: Path | None) -> bool:
-    """Claim a file; return whether it is certain that no other run writes it."""
-    if path is None:
-        return False
-    with _explained(path):
-        check_file(path)
-        target = target_of(path)
-        claims.enter_context(made(target.parent))
-        certain = claims.enter_context(claimed(target, target.parent))
-        if certain:
-            _remove(own_names(target))
-    return certain
-
-
-def _claim_recording(claims: ExitStack, path: Path | None) -> Path | None:
-    """Claim a recording; return the newest partial one, which may be all that a run has left."""
-    if path is None or not _claim_file(claims, path):
-        return None
-    with _explained(path):
-        left = own_names(target_of(path), hidden=False)
-        newest = [each for each in left if each.is_file() and each.stat().st_size][-1:]
-    _remove(each for each in left if each not in newest)
-    return next(iter(newest), None)
-
-
-def _claim_folder(claims: ExitStack, path: Path) -> None:
-    with _explained(path):
-        check_folder(path)
-        target = Path(os.path.realpath(path))
-        home = home_of(target)
-        claims.enter_context(made(home))
-        if claims.enter_context(claimed(target, home)):
-            recover(target, CONTENT)
-
-
-def _remove(paths: Iterable[Path]) -> None:
-    """Remove files and folders; what cannot be removed is only clutter."""
-    for path in paths:
-        if path.is_dir():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            with suppress(OSError):
-                path.unlink()
-
-
-@contextmanager
-def _explained(path: Path) -> Iterator[None]:
+def _claim(claims: ExitStack, path: Path, claim: AbstractContextManager[bool]) -> bool:
     try:
-        yield
+        return claims.enter_context(claim)
     except BlockingIOError as error:
         raise RoadevalError(
             f"{path}: {error.strerror}; wait until it has ended, or write elsewhere"

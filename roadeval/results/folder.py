@@ -1,6 +1,6 @@
 """The results folder: tables and summary as plain files.
 
-It is built beside the one of its name, and replaces it as one: see `roadeval.runtime.folders`.
+It is built beside the one of its name, and replaces it as one: see `roadeval.runtime.files`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from roadeval.results.schema import OF_A_DRIVE, TABLES, TableSchema
 from roadeval.results.summary import SUMMARY, read_summary, summary_text
 from roadeval.results.tables import ResultsError, read_rows, read_table
 from roadeval.runtime.documents import read_bounded, read_json
-from roadeval.runtime.folders import Content, NewFolder
+from roadeval.runtime.files import Content, NewFolder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,14 +29,11 @@ NAME_BYTES: Final = 255
 """Of a file's name, at most, on the file systems that there are."""
 
 
-def belonging(folder: Path) -> frozenset[str]:
-    """Return the names of the files in a folder that are results, there or not.
-
-    A summary lists them in all formats.
-    """
+def belonging(summary: Path) -> frozenset[str]:
+    """Return the names of the files that are results, by a summary, which may be missing."""
     listed = None
     with suppress(OSError, ValueError, AttributeError):
-        listed = read_json(read_bounded(folder / SUMMARY)).get("files")
+        listed = read_json(read_bounded(summary)).get("files")
     names = [str(name) for name in listed] if isinstance(listed, list) else []
     plain = {name for name in names if _is_name(name)}
     return frozenset(plain) | {SUMMARY, RUN, *(f"{table}.csv" for table in OF_A_DRIVE)}

@@ -1,132 +1,92 @@
-"""Files that appear under their name only when they are complete."""
+"""Files and folders that are replaced as one, by one run at a time.
+
+Each is written under a name of its own and takes its place when it is complete, so whatever has an
+output's name is whole. A run claims its outputs before it computes; what killed runs have left of
+an output is removed then.
+"""
 
 from __future__ import annotations
 
+import ctypes
 import errno
+import hashlib
 import os
+import platform
 import re
 import secrets
+import shutil
 import stat
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Final
 
-_TOKEN: Final = 4
-"""Random bytes in the name of a run's own."""
+_MOVING: Final = "-moving"
+"""Ends the name of a complete folder while its files are moved into the one that it replaces."""
+_REPLACED: Final = ".replaced"
+"""The name of the old folder's seal in such a folder."""
+_PATIENCE_S: Final = 0.2
+"""Time between two attempts to claim an output."""
+
 _KINDS: Final = {
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
+    stat.S_IFDIR: "a folder",
+    stat.S_IFREG: "a file",
     stat.S_IFIFO: "a pipe",
     stat.S_IFSOCK: "a socket",
 }
 
-
-def check_file(path: Path) -> None:
-    """Raise an OSError if no file can take this name, for what bears it is none.
-
-    Nothing may bear it yet. A link counts as what it leads to.
-    """
-    mode = _mode(path)
-    with suppress(FileNotFoundError):
-        own_name(path).lstat()  # longer than its own name: too long, perhaps
-    if mode is not None and stat.S_ISDIR(mode):
-        raise IsADirectoryError(errno.EISDIR, "is a folder; name a file in it", str(path))
-    if mode is not None and not stat.S_ISREG(mode):
-        kind = _KINDS.get(stat.S_IFMT(mode), "something else")
-        raise OSError(errno.ENOTSUP, f"is {kind}, not a file; name another", str(path))
+# --- Names and kinds ------------------------------------------------------------------------------
 
 
 def check_input(path: str | Path) -> None:
-    """Raise an OSError if a path leads to no file that can be read from its begin to its end.
+    """Raise an OSError if a path does not lead to a file that can be read from begin to end.
 
-    A pipe may never give anything, and a device never end, so what is read as a whole is asked
-    this before it is opened.
+    A pipe may never give anything, and a device may never end.
     """
-    mode = Path(path).stat().st_mode
-    if stat.S_ISDIR(mode):
-        raise IsADirectoryError(errno.EISDIR, "is a folder, not a file", str(path))
-    if not stat.S_ISREG(mode):
-        kind = _KINDS.get(stat.S_IFMT(mode), "something else")
-        problem = f"is {kind}, not a file; write what it gives to a file first"
-        raise OSError(errno.ENOTSUP, problem, str(path))
+    _check_kind(Path(path), "a file", "")
 
 
-def check_folder(path: Path) -> None:
-    """Raise an OSError if no folder can take this name, for what bears it is none."""
-    mode = _mode(path)
-    if mode is not None and not stat.S_ISDIR(mode):
-        kind = _KINDS.get(stat.S_IFMT(mode), "a file")
-        raise NotADirectoryError(errno.ENOTDIR, f"is {kind}, not a folder; name another", str(path))
+def check_output(path: Path, *, folder: bool = False) -> None:
+    """Raise an OSError if no file, or folder, can be written under a name."""
+    if "\0" in str(path):
+        raise OSError(errno.EINVAL, "its name has a null character", str(path))
+    with suppress(FileNotFoundError):
+        own_name(path).lstat()  # it is longer, and may be too long
+    with suppress(FileNotFoundError):
+        _check_kind(path, "a folder" if folder else "a file", "; name another")
 
 
-def _mode(path: Path) -> int | None:
-    try:
-        return path.stat().st_mode
-    except FileNotFoundError:
-        return None
-    except ValueError as error:  # a name with a null character
-        raise OSError(errno.EINVAL, str(error), str(path)) from error
+def _check_kind(path: Path, wanted: str, advice: str) -> None:
+    mode = stat.S_IFMT(path.stat().st_mode)
+    kind = _KINDS.get(mode, "a device")
+    if kind != wanted:
+        number = errno.EISDIR if mode == stat.S_IFDIR else errno.ENOTSUP
+        raise OSError(number, f"is {kind}, not {wanted}{advice}", str(path))
 
 
 def own_name(path: Path, *, hidden: bool = True) -> Path:
-    """Return a name beside an output's that no other run has, for what is not complete yet.
+    """Return a unique name beside an output's, for what is not complete yet.
 
     ``out.rrd`` may become ``.out.5d1c02fe.partial.rrd``.
     """
     dot = "." if hidden else ""
-    return path.parent / f"{dot}{path.stem}.{secrets.token_hex(_TOKEN)}.partial{path.suffix}"
+    return path.parent / f"{dot}{path.stem}.{secrets.token_hex(4)}.partial{path.suffix}"
 
 
 def own_names(path: Path, *, hidden: bool = True) -> list[Path]:
-    """List what lies there under an `own_name` of an output, the newest last.
+    """List the files and folders with an `own_name` of an output, the newest last.
 
-    Names that go on with a hyphen are among them, for what a run keeps beside such a file.
+    A name may go on with a hyphen and a word.
     """
-    stem, suffix = re.escape(path.stem), re.escape(path.suffix)
-    dot, token = r"\." if hidden else "", rf"\.[0-9a-f]{{{2 * _TOKEN}}}"
-    pattern = re.compile(rf"{dot}{stem}{token}\.partial{suffix}(-\w+)?")
-    found = [each for each in path.parent.iterdir() if pattern.fullmatch(each.name)]
+    dot, stem, suffix = r"\." if hidden else "", re.escape(path.stem), re.escape(path.suffix)
+    pattern = re.compile(rf"{dot}{stem}\.[0-9a-f]{{8}}\.partial{suffix}(-\w+)?")
+    there = path.parent.iterdir() if path.parent.is_dir() else ()
+    found = [each for each in there if pattern.fullmatch(each.name)]
     return sorted(found, key=lambda each: each.lstat().st_mtime_ns)
-
-
-class NewFile:
-    """A file that is written under a name of its own, and takes its place when it is complete.
-
-    Where ``path`` is a link, what it leads to is replaced.
-
-    Parameters
-    ----------
-    path
-        The name that it will have.
-    hidden
-        Whether its name begins with a dot meanwhile.
-    """
-
-    def __init__(self, path: Path, *, hidden: bool = True) -> None:
-        self.path: Final = path
-        self._target: Final = target_of(path)
-        self.partial: Final = own_name(self._target, hidden=hidden)
-
-    def begin(self) -> None:
-        """Make its folder.
-
-        Raises
-        ------
-        OSError
-            If that cannot be made, or the file cannot have its name (see `check_file`).
-        """
-        check_file(self.path)
-        self._target.parent.mkdir(parents=True, exist_ok=True)
-
-    def publish(self) -> None:
-        """Give the file its name; what bore it is replaced."""
-        self.partial.replace(self._target)
-
-    def discard(self) -> None:
-        """Remove what was begun; nothing, if the file has its name already."""
-        with suppress(OSError):
-            self.partial.unlink(missing_ok=True)
 
 
 def leads_outside(path: Path, folder: Path) -> bool:
@@ -139,15 +99,325 @@ def target_of(path: Path) -> Path:
     return Path(os.path.realpath(path)) if os.path.islink(path) else path  # noqa: PTH114
 
 
-@contextmanager
-def made(folder: Path) -> Iterator[None]:
-    """Make a folder and its parents; those that are empty when the block ends are removed again.
+def remove(path: Path) -> None:
+    """Remove a file or folder, if that is possible; what is left is only clutter."""
+    with suppress(OSError):
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
 
-    Raises
-    ------
-    OSError
-        If it cannot be made.
+
+# --- Files ----------------------------------------------------------------------------------------
+
+
+class NewFile:
+    """A file that is written as ``partial`` and takes its place when it is complete.
+
+    Where ``path`` is a link, its target is replaced.
     """
+
+    def __init__(self, path: Path, *, hidden: bool = True) -> None:
+        self._target: Final = target_of(path)
+        self.partial: Final = own_name(self._target, hidden=hidden)
+
+    def begin(self) -> None:
+        """Make its folder; an OSError if that fails, or no file can have its name."""
+        check_output(self._target)
+        self._target.parent.mkdir(parents=True, exist_ok=True)
+
+    def publish(self) -> None:
+        """Give the complete file its name."""
+        self.partial.replace(self._target)
+
+    def discard(self) -> None:
+        """Remove the partial file, if there is one."""
+        remove(self.partial)
+
+
+def put(path: Path, content: bytes) -> None:
+    """Write a file atomically, and make its folder; an OSError leaves nothing behind."""
+    file = NewFile(path)
+    file.begin()
+    try:
+        file.partial.write_bytes(content)
+        file.publish()
+    finally:
+        file.discard()
+
+
+def companion_name(path: Path, files: Mapping[str, bytes]) -> str:
+    """Return the name of the folder beside a file, from its content: ``page.files-0a1b2c3d``."""
+    digest = hashlib.blake2b(digest_size=4)
+    for name, content in sorted(files.items()):
+        digest.update(f"{name}\0{len(content)}\0".encode() + content)
+    return f"{path.stem}.files-{digest.hexdigest()}"
+
+
+def put_with(path: Path, content: bytes, files: Mapping[str, bytes]) -> None:
+    """Write a file and the folder of files beside it, whose name is `companion_name`.
+
+    The folder is complete before the file, and the folder of the earlier file is removed after it:
+    the file always finds its folder. An OSError leaves the earlier ones.
+    """
+    target = target_of(path)
+    folder = target.with_name(companion_name(target, files))
+    is_new = not folder.exists()
+    try:
+        for name, each in files.items():
+            put(folder / name, each)
+        put(path, content)
+    except OSError:
+        if is_new:
+            remove(folder)
+        raise
+    pattern = re.compile(rf"{re.escape(target.stem)}\.files-[0-9a-f]{{8}}")
+    for other in target.parent.iterdir():
+        if pattern.fullmatch(other.name) and other != folder:
+            remove(other)
+
+
+# --- Folders --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """The files of a folder that are replaced; all others stay."""
+
+    seal: str
+    """The file without which nobody takes the folder for whole."""
+    names: Callable[[Path], frozenset[str]]
+    """Reads the names of the files from a seal, which may be missing."""
+
+
+class NewFolder:
+    """A folder that is written as ``partial`` and takes its place when it is complete.
+
+    On Linux it changes places with an old folder that holds nothing else, in one step. Otherwise
+    its files are moved into the old folder: the seal is removed first and moved last, and
+    `claimed_folder` completes what a killed run had begun.
+
+    Parameters
+    ----------
+    path
+        Its name. Where it is a link, the target is replaced.
+    content
+        What is replaced in an old folder.
+    """
+
+    def __init__(self, path: Path, content: Content) -> None:
+        self.path: Final = path
+        self._content: Final = content
+        self._target: Final = Path(os.path.realpath(path))
+        self.partial: Final = own_name(_home_of(self._target) / self._target.name)
+
+    def begin(self) -> None:
+        """Make it, empty; an OSError if that fails, or no folder can have its name."""
+        check_output(self.path, folder=True)
+        self.partial.mkdir(parents=True)
+
+    def publish(self) -> None:
+        """Let it take its place.
+
+        After an OSError the old content is there, or the next `claimed_folder` completes the new.
+        """
+        if not self._target.exists():
+            self.partial.rename(self._target)
+        elif self._exchanged():
+            remove(self.partial)  # it has the old content now
+        else:
+            self._move_in()
+
+    def discard(self) -> None:
+        """Remove the partial folder, if there is one."""
+        remove(self.partial)
+
+    def _exchanged(self) -> bool:
+        """Exchange it with the old folder and return True, if that is possible."""
+        target = self._target
+        own = self._content.names(target / self._content.seal)
+        try:
+            if (
+                _home_of(target) == target
+                or target.samefile(os.curdir)
+                or any(each.name not in own or each.is_dir() for each in target.iterdir())
+            ):
+                return False
+            old = target.stat()
+            with suppress(OSError, AttributeError):  # Windows has no such function
+                os.chown(self.partial, old.st_uid, old.st_gid)
+            self.partial.chmod(stat.S_IMODE(old.st_mode))
+            _exchange(self.partial, target)
+        except OSError:
+            return False
+        return True
+
+    def _move_in(self) -> None:
+        """Move its files into the old folder."""
+        for each in self.partial.iterdir():
+            if (self._target / each.name).is_dir():
+                raise IsADirectoryError(errno.EISDIR, "is a folder", str(self._target / each.name))
+        inside = own_name(self._target / self._target.name)
+        try:
+            shutil.move(self.partial, inside)  # perhaps from another disk
+        except OSError:
+            remove(inside)
+            raise
+        _settle(inside.rename(f"{inside}{_MOVING}"), self._content)
+
+
+def _settle(moving: Path, content: Content) -> None:
+    """Move the files of a complete folder into its parent; after a kill, the remaining ones."""
+    target, seal, replaced = moving.parent, moving / content.seal, moving / _REPLACED
+    if seal.exists():
+        with suppress(FileNotFoundError):  # without an old seal all files there are of others
+            (target / content.seal).replace(replaced)
+        if replaced.exists():
+            for name in content.names(replaced):
+                if not (target / name).is_dir():
+                    (target / name).unlink(missing_ok=True)
+            replaced.unlink()
+        for each in moving.iterdir():
+            if each != seal:
+                each.replace(target / each.name)
+        seal.replace(target / content.seal)
+    remove(moving)
+
+
+def _exchange(one: Path, other: Path) -> None:
+    """Exchange the names of two folders in one step; an OSError where that is impossible."""
+    if sys.platform == "linux":
+        here, exchange = -100, 2  # AT_FDCWD and RENAME_EXCHANGE in the kernel's headers
+        renameat2 = getattr(ctypes.CDLL(None), "renameat2", None)
+        names = here, os.fsencode(one), here, os.fsencode(other)
+        if renameat2 is not None and not renameat2(*names, exchange):
+            return
+    raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+
+
+def _home_of(target: Path) -> Path:
+    """Return the folder for partial files and locks: an output's parent, or the output itself.
+
+    The parent of a mount point is on another disk, and perhaps not seen by everybody.
+    """
+    if not os.path.isdir(target):  # noqa: PTH112 - for a name that is too long it is False
+        return target.parent
+    apart = os.path.ismount(target) or not os.access(target.parent, os.W_OK | os.X_OK)
+    return target if apart else target.parent
+
+
+# --- Claims ---------------------------------------------------------------------------------------
+
+
+@contextmanager
+def claimed_file(path: Path, *, wait: bool = False) -> Iterator[bool]:
+    """Hold the claim on a file to be written, see `claimed`; earlier partial files are removed.
+
+    An OSError if the file cannot be written.
+    """
+    check_output(path)
+    target = target_of(path)
+    with _made(target.parent), claimed(target, target.parent, wait=wait) as certain:
+        for left in own_names(target) if certain else ():
+            remove(left)
+        yield certain
+
+
+@contextmanager
+def alone(*paths: Path) -> Iterator[None]:
+    """Hold the claims on files; wait while other runs have them."""
+    with ExitStack() as claims:
+        for path in paths:
+            claims.enter_context(claimed_file(path, wait=True))
+        yield
+
+
+@contextmanager
+def claimed_folder(path: Path, content: Content) -> Iterator[bool]:
+    """Hold the claim on a folder to be replaced, as `claimed_file` does on a file.
+
+    Files that a killed run had begun to move are moved.
+    """
+    check_output(path, folder=True)
+    target = Path(os.path.realpath(path))
+    home = _home_of(target)
+    with _made(home), claimed(target, home) as certain:
+        if certain:
+            for left in own_names(target / target.name):
+                _settle(left, content) if left.name.endswith(_MOVING) else remove(left)
+            for left in own_names(target):
+                remove(left)
+        yield certain
+
+
+@contextmanager
+def claimed(path: Path, home: Path, *, wait: bool = False) -> Iterator[bool]:
+    """Hold the claim on an output: a lock of the system on a file in a folder.
+
+    The lock ends with the process. All runs that write the output name the same folder. While
+    another run has the claim, wait, or raise a BlockingIOError that names the run.
+
+    Yields whether it is certain that no other run has it: False where the system or the disk has no
+    locks. The library ``filelock`` names no owner of a lock, and leaves its files behind.
+    """
+    name = home / f".{path.name}.lock"
+    file, certain = _locked(name, wait=wait)
+    try:
+        yield certain
+    finally:
+        # Before the lock ends: after that the file may be another run's.
+        with suppress(OSError):
+            name.unlink(missing_ok=True)
+        os.close(file)
+
+
+def _locked(name: Path, *, wait: bool) -> tuple[int, bool]:
+    """Open and lock a file; return also whether there are locks."""
+    # A link in a folder from elsewhere is not followed: its target would be overwritten.
+    here = getattr(os, "O_NOFOLLOW", 0)
+    while True:
+        try:
+            file = os.open(name, os.O_RDWR | os.O_CREAT | here, 0o666)
+        except PermissionError:
+            if not name.exists():
+                raise
+            file = os.open(name, os.O_RDONLY | here)  # another user's, left by a killed run
+        try:
+            certain = _lock(file)
+            # The last owner may have removed the file meanwhile: then it protects nothing.
+            if not certain or os.path.samestat(os.fstat(file), name.stat()):
+                return file, certain
+        except FileNotFoundError:
+            pass
+        except BlockingIOError:
+            if not wait:
+                os.close(file)
+                raise
+            time.sleep(_PATIENCE_S)
+        os.close(file)
+
+
+def _lock(file: int) -> bool:
+    """Lock a file, write into it who did, and return True; False where there are no locks."""
+    try:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError) as error:
+        who = os.pread(file, 200, 0).decode(errors="replace") or "it has just begun"
+        raise BlockingIOError(errno.EAGAIN, f"another run is writing it ({who})") from error
+    except (ImportError, OSError):  # the system has none, or the disk
+        return False
+    now = datetime.now().astimezone().isoformat(" ", "seconds")
+    with suppress(OSError):
+        os.ftruncate(file, 0)
+        os.pwrite(file, f"process {os.getpid()} on {platform.node()}, since {now}".encode(), 0)
+    return True
+
+
+@contextmanager
+def _made(folder: Path) -> Iterator[None]:
+    """Make a folder and its parents; the new ones that stay empty are removed at the end."""
     missing = [each for each in (folder, *folder.parents) if not each.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -156,37 +426,3 @@ def made(folder: Path) -> Iterator[None]:
         for each in missing:
             with suppress(OSError):
                 each.rmdir()
-
-
-@contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """Write a file atomically: under a name of its own, and then under its path.
-
-    Yields the temporary path, in the folder of ``path``, which is made if it does not exist. When
-    the block ends the file takes its name and replaces what bore it; if the block fails it is
-    removed, and what bore the name stays.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be made or the file cannot take its name.
-    """
-    file = NewFile(path)
-    file.begin()
-    try:
-        yield file.partial
-        file.publish()
-    finally:
-        file.discard()
-
-
-def put(path: Path, content: bytes) -> None:
-    """Write a file atomically, and make its folder.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written; then nothing is left behind.
-    """
-    with replacing(path) as temporary:
-        temporary.write_bytes(content)

@@ -18,7 +18,7 @@ import roadeval
 from roadeval.jobs.serve import serving
 from roadeval.recording.screen import viewer
 from roadeval.results.summary import digest_of
-from roadeval.runtime.claims import claimed
+from roadeval.runtime.files import claimed
 from tests.e2e.commands import here
 from tests.e2e.serving import status
 from tests.e2e.test_fleet import Here, write

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.runtime import folders
+from roadeval.runtime.files import claimed_folder
 from tests.faults import making, steps
 from tests.faults.forking import Forks
 
@@ -17,19 +17,10 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def others_file(place):
-    (place / "reports" / "notes.txt").write_text("mine")
-
-
-def others_folder(place):
-    (place / "reports" / "sub").mkdir()
-    (place / "reports" / "sub" / "notes.txt").write_text("mine")
-
-
 IN_PLACE = "in place"
-SITUATIONS = {"exchange": others_file, IN_PLACE: others_folder, "first": None}
+SITUATIONS = ["exchange", IN_PLACE, "first"]
 if sys.platform != "linux":
-    del SITUATIONS["exchange"]
+    SITUATIONS.remove("exchange")
 
 
 @pytest.fixture(scope="module")
@@ -60,9 +51,12 @@ def again(tmp_path, situation):
     """Returns a place with earlier outputs, each time as new."""
     model = tmp_path / "model"
     model.mkdir()
-    if SITUATIONS[situation]:
+    if situation != "first":
         making.run(model, "old")
-        SITUATIONS[situation](model)
+    if situation == IN_PLACE:
+        (model / "reports" / "sub").mkdir()
+        for name in ("notes.txt", "sub/notes.txt"):
+            (model / "reports" / name).write_text("mine")
 
     def again() -> Path:
         shutil.rmtree(tmp_path / "place", ignore_errors=True)
@@ -75,6 +69,11 @@ def notes(place):
     """Others' files under their names."""
     paths = [path.relative_to(place) for path in place.rglob("notes.txt")]
     return {path: (place / path).read_text() for path in paths if path.parts[0][0] != "."}
+
+
+def recover(place):
+    with claimed_folder(place / "reports", making.CONTENT) as certain:
+        assert certain
 
 
 def check_next_run(place, before, whole):
@@ -103,7 +102,7 @@ def test_a_run_that_is_killed_at_any_step_leaves_old_or_new_and_nothing_else(
             assert situation == IN_PLACE
             assert "summary.json" not in found["reports"]
             moving += 1
-            folders.recover(place / "reports", making.CONTENT)
+            recover(place)
             assert making.outputs(place)["reports"] == new["reports"]
         assert notes(place) == notes(tmp_path / "model")
         check_next_run(place, tmp_path / "model", after)
@@ -124,7 +123,7 @@ def test_a_disk_that_is_full_from_any_step_on_costs_no_earlier_result(
         found = making.outputs(place)
         if found["reports"] not in (old["reports"], new["reports"]):
             assert "summary.json" not in found["reports"]
-            folders.recover(place / "reports", making.CONTENT)
+            recover(place)
             assert making.outputs(place)["reports"] == new["reports"]
         elif code == steps.FAILED and found["reports"] == old["reports"]:
             # They take their names together, the folder first.

@@ -238,9 +238,9 @@ def test_the_next_run_s_files_are_all_that_is_left_of_results_and_others_stay(
 )
 def test_a_summary_names_no_file_elsewhere_as_a_result(tmp_path: Path, listed: Any) -> None:
     write(tmp_path / "results")
-    summary = json.loads((tmp_path / "results" / "summary.json").read_text())
-    (tmp_path / "results" / "summary.json").write_text(json.dumps(summary | {"files": listed}))
-    assert not belonging(tmp_path / "results") & {"notes.txt", "..", ".", "n", "a", "/etc"}
+    path = tmp_path / "results" / "summary.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"files": listed}))
+    assert not belonging(path) & {"notes.txt", "..", ".", "n", "a", "/etc"}
     (tmp_path / "results" / "folder").mkdir()
     for name in ("notes.txt", "results/n", "results/a"):
         (tmp_path / name).write_text("mine")

@@ -1,6 +1,5 @@
 """Claims: of the runs that would write one output, one at a time may."""
 
-import builtins
 import errno
 import fcntl
 import os
@@ -11,11 +10,11 @@ import sys
 
 import pytest
 
-from roadeval.runtime.claims import claimed
+from roadeval.runtime.files import claimed
 
 HELD = """
 import pathlib, sys
-from roadeval.runtime.claims import claimed
+from roadeval.runtime.files import claimed
 with claimed(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[1]).parent):
     print("held", flush=True)
     sys.stdin.read()
@@ -102,29 +101,29 @@ def test_a_dead_run_s_lock_that_is_another_user_s_is_taken_over(tmp_path, monkey
         claim(tmp_path)
 
 
-def test_without_the_system_s_locks_nothing_is_certain(tmp_path, monkeypatch):
-    usual = builtins.__import__
-
-    def without(name, *rest):
-        if name == "fcntl":
-            raise ModuleNotFoundError(name)
-        return usual(name, *rest)
-
-    monkeypatch.setattr(builtins, "__import__", without)
-    with claimed(tmp_path / "out", tmp_path) as one, claimed(tmp_path / "out", tmp_path) as other:
-        assert not one
-        assert not other
-        assert names(tmp_path) == []
+def no_locks_of_the_system(monkeypatch):
+    monkeypatch.setitem(sys.modules, "fcntl", None)
 
 
-@pytest.mark.parametrize("number", [errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS])
-def test_on_a_disk_without_locks_nothing_is_certain(number, tmp_path, monkeypatch):
+def no_locks_of_the_disk(monkeypatch):
     def fails(_file, _how):
-        raise OSError(number, os.strerror(number))
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
     monkeypatch.setattr(fcntl, "flock", fails)
-    assert not claim(tmp_path)
+
+
+@pytest.mark.parametrize("without", [no_locks_of_the_system, no_locks_of_the_disk])
+def test_without_locks_nothing_is_certain(without, tmp_path, monkeypatch):
+    without(monkeypatch)
+    with claimed(tmp_path / "out", tmp_path) as one, claimed(tmp_path / "out", tmp_path) as other:
+        assert (one, other) == (False, False)
     assert names(tmp_path) == []
+
+
+def test_who_may_wait_has_the_claim_when_the_other_run_ends(other, tmp_path, monkeypatch):
+    monkeypatch.setattr("time.sleep", lambda _seconds: (other.kill(), other.wait()))
+    with claimed(tmp_path / "out", tmp_path, wait=True) as certain:
+        assert certain
 
 
 def test_a_folder_that_cannot_be_written_to_is_an_os_error(tmp_path):

@@ -33,40 +33,6 @@ def test_a_file_is_put_whole_or_not_at_all(tmp_path, monkeypatch):
     assert path.read_bytes() == b"second"
 
 
-def test_a_file_has_its_name_when_its_block_has_ended(tmp_path):
-    path = tmp_path / "a" / "b" / "file"
-    with files.replacing(path) as temporary:
-        temporary.write_text("all of it")
-        assert temporary.parent == path.parent
-        assert not path.exists()
-    assert names(path.parent) == ["file"]
-
-
-@pytest.mark.parametrize("stop", [ValueError, KeyboardInterrupt])
-def test_what_bore_the_name_stays_if_the_block_fails(stop, tmp_path):
-    path = tmp_path / "file"
-    path.write_text("before")
-
-    def fail():
-        with files.replacing(path) as temporary:
-            temporary.write_text("half of")
-            raise stop
-
-    with pytest.raises(stop):
-        fail()
-    assert names(tmp_path) == ["file"]
-    assert path.read_text() == "before"
-
-
-def test_two_that_write_one_file_do_not_mix_and_the_last_one_stays(tmp_path):
-    path = tmp_path / "file"
-    with files.replacing(path) as one, files.replacing(path) as other:
-        one.write_text("one")
-        other.write_text("other")
-    assert path.read_text() == "one"
-    assert names(tmp_path) == ["file"]
-
-
 def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path):
     (tmp_path / "far").mkdir()
     (tmp_path / "near").symlink_to(tmp_path / "far" / "file")
@@ -98,7 +64,7 @@ def _socket(path):
 
 @pytest.mark.parametrize(
     ("make", "kind"),
-    [(_pipe, "a pipe"), (_socket, "a socket"), (Path.mkdir, "a folder; name a file in it")],
+    [(_pipe, "a pipe"), (_socket, "a socket"), (Path.mkdir, "a folder, not a file; name another")],
 )
 @pytest.mark.parametrize("link", [False, True])
 def test_what_is_no_file_is_not_replaced(make, kind, link, tmp_path, monkeypatch):
@@ -117,24 +83,23 @@ def test_what_is_no_file_is_not_replaced(make, kind, link, tmp_path, monkeypatch
 @pytest.mark.parametrize("path", ["/dev/null", "/dev/full", "/", ".", ".."])
 def test_devices_and_folders_are_known(path):
     with pytest.raises(OSError, match=r"is a (device|folder)"):
-        files.check_file(Path(path))
+        files.check_output(Path(path))
 
 
 @pytest.mark.parametrize(("name", "error"), [("a\0b", "null"), (245 * "a", "too long")])
 def test_a_name_that_no_file_can_have_or_none_of_a_run_s_own_is_an_os_error(name, error, tmp_path):
     with pytest.raises(OSError, match=error):
-        files.check_file(tmp_path / name)
-    files.check_file(tmp_path / (230 * "a"))
+        files.check_output(tmp_path / name)
+    files.check_output(tmp_path / (230 * "a"))
 
 
 def test_a_folder_is_none_where_a_file_or_a_device_bears_the_name(tmp_path):
     (tmp_path / "file").touch()
-    with pytest.raises(OSError, match="is a file, not a folder"):
-        files.check_folder(tmp_path / "file")
-    with pytest.raises(OSError, match="is a device, not a folder"):
-        files.check_folder(Path("/dev/null"))
-    files.check_folder(tmp_path)
-    files.check_folder(tmp_path / "new")
+    for path, kind in ((tmp_path / "file", "a file"), (Path("/dev/null"), "a device")):
+        with pytest.raises(OSError, match=f"is {kind}, not a folder"):
+            files.check_output(path, folder=True)
+    files.check_output(tmp_path, folder=True)
+    files.check_output(tmp_path / "new", folder=True)
 
 
 @pytest.mark.parametrize(
@@ -183,11 +148,56 @@ def test_an_own_name_is_found_again_and_no_two_are_the_same(tmp_path):
             assert len(given) == 4
 
 
-def test_folders_made_for_nothing_go_and_others_stay(tmp_path):
-    (tmp_path / "old").mkdir()
-    with files.made(tmp_path / "old"), files.made(tmp_path / "new" / "deep"):
+def test_two_that_write_one_file_do_not_mix_and_the_last_one_stays(tmp_path):
+    one, other = (files.NewFile(tmp_path / "file") for _ in range(2))
+    for file, text in ((one, "one"), (other, "other")):
+        file.begin()
+        file.partial.write_text(text)
+    for file in (other, one):
+        file.publish()
+        file.discard()
+    assert (tmp_path / "file").read_text() == "one"
+    assert names(tmp_path) == ["file"]
+
+
+def test_folders_made_for_a_claim_go_where_nothing_was_written(tmp_path):
+    with files.claimed_file(tmp_path / "new" / "deep" / "file"):
         assert (tmp_path / "new" / "deep").is_dir()
-    assert names(tmp_path) == ["old"]
-    with files.made(tmp_path / "new" / "deep"):
-        (tmp_path / "new" / "file").touch()
-    assert names(tmp_path / "new") == ["file"]
+    assert names(tmp_path) == []
+    with files.claimed_file(tmp_path / "new" / "deep" / "file"):
+        (tmp_path / "new" / "other").touch()
+    assert names(tmp_path / "new") == ["other"]
+
+
+def page(path, text):
+    beside = {"a.jpg": text.encode()}
+    files.put_with(path, files.companion_name(path, beside).encode(), beside)
+
+
+def test_a_page_finds_its_folder_and_the_earlier_one_is_removed(tmp_path):
+    path = tmp_path / "page.html"
+    others = [tmp_path / "page.files-mine", tmp_path / "other.files-00000000"]
+    for each in others:
+        each.mkdir()
+    for text in ("one", "two", "two"):
+        page(path, text)
+        companion = tmp_path / path.read_text()
+        assert set(tmp_path.iterdir()) == {path, companion, *others}
+        assert (companion / "a.jpg").read_text() == text
+
+
+def test_where_a_page_cannot_be_written_the_earlier_one_and_its_folder_stay(tmp_path, monkeypatch):
+    path = tmp_path / "page.html"
+    page(path, "one")
+    before = names(tmp_path)
+    usual = files.put
+
+    def full(to, content):
+        if to == path:
+            raise OSError("full")
+        usual(to, content)
+
+    monkeypatch.setattr(files, "put", full)
+    with pytest.raises(OSError, match="full"):
+        page(path, "two")
+    assert names(tmp_path) == before

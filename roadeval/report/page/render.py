@@ -33,7 +33,7 @@ from roadeval.report.blocks import (
 from roadeval.report.chart import Chart, legend
 from roadeval.report.drawing import drawn, span_of_frames
 from roadeval.report.pdf.typeset import ReportError
-from roadeval.runtime.companions import folder_name, put_with
+from roadeval.runtime.files import companion_name, put_with
 from roadeval.runtime.text import visible
 
 STYLE: Final = "page.css"
@@ -301,7 +301,7 @@ def write_page(path: Path, document: Document, beside: Beside = Beside.NOTHING) 
     """
     files = dict(document.files() if beside is not Beside.NOTHING else {})
     files |= code() if beside is Beside.ALL else {}
-    at = f"{folder_name(path, files)}/" if files else None
+    at = f"{companion_name(path, files)}/" if files else None
     place = Place(
         pictures=None if beside is Beside.NOTHING else at,
         code=at if beside is Beside.ALL else None,

@@ -22,9 +22,8 @@ from roadeval.results.fleet.summary import summarise
 from roadeval.results.fleet.tables import Member, write_tables
 from roadeval.results.summary import digest_of, json_text, plain
 from roadeval.results.tables import FLEET_FORMAT, ResultsError, read_parquet
-from roadeval.runtime.claims import alone
 from roadeval.runtime.documents import read_bounded, read_json
-from roadeval.runtime.files import check_folder, leads_outside, put
+from roadeval.runtime.files import alone, check_output, leads_outside, put
 from roadeval.runtime.text import is_utf8
 
 RESULTS: Final = (
@@ -59,7 +58,7 @@ class FleetWriter:
                 "there: choose another name"
             )
         with self._explained():
-            check_folder(self.folder)
+            check_output(self.folder, folder=True)
             if is_fleet(self.folder):
                 with suppress(ValueError):  # damage: it is written anew
                     check_format(path := self.folder / FLEET, read_json(read_bounded(path)))
