@@ -16,8 +16,7 @@ import numpy.typing as npt
 from scipy import signal, special, stats
 
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats import holm, within_drive
-from roadeval.evaluation.stats.autocorrelation import mean_distribution
+from roadeval.evaluation.stats import holm, mean_distribution, within_drive
 
 Drives = npt.NDArray[np.float64]
 """``(drives, frames)`` differences of mean 0 and variance 1."""

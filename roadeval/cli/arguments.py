@@ -69,7 +69,7 @@ def usage() -> Iterator[None]:
 
 
 def _condition(texts: list[str] | None) -> list[str] | None:
-    from roadeval.evaluation.conditions import Condition
+    from roadeval.evaluation.comparison import Condition
 
     with usage():
         for text in texts or ():

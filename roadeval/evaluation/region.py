@@ -1,21 +1,18 @@
-"""Regions: sets of pixels counted separately, found in every labelled frame."""
+"""Regions: sets of pixels that are counted apart, found in every labelled frame."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from math import isqrt
+
+import numpy as np
 
 from roadeval.data import Frame, TruthBits, VariantResult
-from roadeval.data.arrays import Bits
+from roadeval.data.arrays import Bits, Reach
 from roadeval.evaluation.settings import EvaluationSettings
-
-Titles = Callable[[Collection[str], int], Mapping[str, str]]
-"""Returns the titles of those of some names that it knows, in order; see `RegionFamily`."""
-
-
-def fixed(titles: Mapping[str, str]) -> Titles:
-    """Return what picks from titles that are always the same."""
-    return lambda names, _height: {name: titles[name] for name in titles if name in names}
+from roadeval.kernels import KERNELS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,41 +27,41 @@ class LabelledFrame:
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A region."""
+    """A region, or several that are found together."""
 
-    name: str
-    """As ``true_shadow``, in the column ``region`` of ``regions.csv``."""
-    title: str
-    """A few words for a person, as ``inside true shadow``."""
+    titles: Mapping[str, str] | Callable[[Collection[str], int], Mapping[str, str]]
+    """A few words for a person by name, as ``true_shadow`` in the column ``region``, in order.
+
+    Where titles depend on the drive: a function that returns those of some names, given the
+    images' height in pixels, 0 if it is not known.
+    """
     order: int
     """Its place among the regions."""
-    find: Callable[[LabelledFrame], Bits | None]
-    """Computes the region, ``(H, words)``; None where the frame has none."""
-
-    def found(self, labelled: LabelledFrame) -> Mapping[str, Bits]:
-        """Return the region by its name, or nothing."""
-        bits = self.find(labelled)
-        return {} if bits is None else {self.name: bits}
-
-    @property
-    def titles(self) -> Titles:
-        """See `RegionFamily`."""
-        return fixed({self.name: self.title})
-
-
-@dataclass(frozen=True, slots=True)
-class RegionFamily:
-    """Regions that are found together."""
-
-    order: int
-    """Their place among the regions."""
-    found: Callable[[LabelledFrame], Mapping[str, Bits]]
-    """Computes the regions, ``(H, words)`` each, by name."""
-    titles: Titles
-    """Returns the titles of those of some names that belong to the family, in order. The second
-    argument is the images' height in pixels, 0 if it is not known.
-    """
+    find: Callable[[LabelledFrame], Mapping[str, Bits]]
+    """Computes the regions, ``(H, words)`` each, by name; without those that the frame lacks."""
     whole: bool = False
-    """Whether the regions, none of which overlap, together are the whole frame: the counts are
-    checked against that.
-    """
+    """Whether the regions do not overlap and together are the whole frame, which is checked."""
+
+    def titled(self, names: Collection[str], height: int = 0) -> Mapping[str, str]:
+        """Return the titles of those of some names that are its own, in order."""
+        if callable(self.titles):
+            return self.titles(names, height)
+        return {name: title for name, title in self.titles.items() if name in names}
+
+
+def grow(bits: Bits, reach: Reach, truth: TruthBits) -> Bits:
+    """Dilate a mask of the truth's shape by an element."""
+    grown: Bits = KERNELS.dilate(bits, reach, truth.shape[1])
+    return grown
+
+
+@lru_cache(maxsize=8)
+def square(radius: int) -> Reach:
+    """Return the element of ``radius`` pixels in chessboard distance, ``(radius + 1,)`` int64."""
+    return np.full(radius + 1, radius)
+
+
+@lru_cache(maxsize=8)
+def disk(radius: int) -> Reach:
+    """Return the element of ``radius`` pixels in Euclidean distance, ``(radius + 1,)`` int64."""
+    return np.array([isqrt(radius**2 - row**2) for row in range(radius + 1)])

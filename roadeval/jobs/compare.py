@@ -13,11 +13,18 @@ import numpy as np
 from roadeval.data import BASELINE
 from roadeval.data.rows import joined
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import comparison, scored
-from roadeval.evaluation.comparison import Comparison
-from roadeval.evaluation.conditions import Condition, Judgement, judge
-from roadeval.evaluation.effects import TESTED
-from roadeval.evaluation.pairing import Kind, Note, Side, one_drive
+from roadeval.evaluation import comparison, score
+from roadeval.evaluation.comparison import (
+    Comparison,
+    Condition,
+    Judgement,
+    Kind,
+    Note,
+    Side,
+    judge,
+    one_drive,
+)
+from roadeval.evaluation.score import TESTED
 from roadeval.evaluation.settings import settings_of
 from roadeval.jobs.result import Result
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
@@ -61,12 +68,12 @@ class Compared:
         masks = masks_of(self.sides, frames)
         if not masks:
             return []
-        blind = scored.finals(frames[self.sides[0].label].of_variant(BASELINE))
+        blind = score.finals(frames[self.sides[0].label].of_variant(BASELINE))
         rows = table_of(masks, frames)
         rows = joined([rows, blind.take(np.isin(blind["frame"], rows["frame"]))])
         size = self.comparison.settings.window
         size *= max(-(-len(rows.distinct("frame")) // (size * ROWS)), 1)
-        windows = as_arrays("windows", window_rows(scored.windows(rows, size)))
+        windows = as_arrays("windows", window_rows(score.windows(rows, size)))
         return over_windows(windows, [TESTED], looks_of(masks) | looks([BASELINE]))
 
     @property
@@ -102,7 +109,7 @@ def compare(
         ``b``. Of a single one: these, the first being the base; by default all, ``unfiltered``
         first.
     fail_if
-        Conditions, see `roadeval.evaluation.conditions`.
+        Conditions, see `roadeval.evaluation.comparison.conditions`.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from typing import Any
 
 from roadeval.config import RunConfig, run_toml
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.conditions import Condition
+from roadeval.evaluation.comparison import Condition
 from roadeval.fleet.engine import ATTEMPTS, died, started
 from roadeval.fleet.entry import DriveEntry
 from roadeval.fleet.errors import FleetError
@@ -137,7 +137,7 @@ def replay_fleet(
         Who replays the drives; by default Dask's workers, as `RunConfig.fleet` says.
     fail_if
         Conditions on a rate of each drive, as ``post.filtered.ERR > 20%``; see
-        `roadeval.evaluation.conditions`.
+        `roadeval.evaluation.comparison.conditions`.
     retry_failed
         Whether drives that failed before are tried again.
     on_progress

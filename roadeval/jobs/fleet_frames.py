@@ -11,8 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from roadeval.data import BASELINE, ERRORS, FrameResult, Role, Tally
-from roadeval.evaluation.effects import final_stages
-from roadeval.evaluation.light import Light, light_of
+from roadeval.evaluation.score import Light, final_stages, light_of
 from roadeval.report.images import LayerImage, jpeg, shrink
 from roadeval.results.fleet.record import PICTURES, frames_path
 from roadeval.results.rows import frame_rows

@@ -11,7 +11,7 @@ import numpy as np
 
 from roadeval.data import BASELINE
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import scored
+from roadeval.evaluation import score
 from roadeval.evaluation.metrics import SHORT
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.result import DriveResult
@@ -35,7 +35,7 @@ class WorstFrame:
     rates: dict[str, float]
     """Of the final mask, as short tables show them."""
     parts: dict[str, float]
-    """How ERR came about, see `roadeval.evaluation.scored.causes`."""
+    """How ERR came about, see `roadeval.evaluation.score.causes`."""
     notes: tuple[str, ...]
     """What the recording says about it."""
 
@@ -64,7 +64,7 @@ def worst_frames(
     if chosen not in names:
         raise RoadevalError(f"{result.path}: no variant {chosen}; there are {', '.join(names)}")
     looked_at = rows if among is None else rows.take(np.isin(rows["frame"], [*among]))
-    ranked = scored.worst(looked_at, chosen, count)
+    ranked = score.worst(looked_at, chosen, count)
     if not len(ranked):
         if among is None:
             raise RoadevalError(
@@ -72,7 +72,7 @@ def worst_frames(
                 "so no frame is the worst"
             )
         return []
-    causes = scored.causes(rows, chosen)
+    causes = score.causes(rows, chosen)
     frames, stamps = ranked["frame"].tolist(), ranked["stamp_ns"].tolist()
     return [
         WorstFrame(

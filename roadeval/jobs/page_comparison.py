@@ -11,10 +11,9 @@ import numpy as np
 
 from roadeval.data import BASELINE, ERRORS, TRUTH, Rows
 from roadeval.data.rows import joined
-from roadeval.evaluation import scored
-from roadeval.evaluation.comparison import Comparison
+from roadeval.evaluation import score
+from roadeval.evaluation.comparison import Comparison, Side
 from roadeval.evaluation.metrics import SHORT
-from roadeval.evaluation.pairing import Side
 from roadeval.evaluation.settings import NOTEWORTHY
 from roadeval.jobs.page_frames import BYTES, PICTURED, fitting
 from roadeval.jobs.report_frames import rates_by_frame
@@ -127,7 +126,7 @@ def table_of(masks: Sequence[ComparedMask], frames: Mapping[str, Rows]) -> Rows:
     parts = []
     for variant in dict.fromkeys(mask.variant for mask in masks):
         own = [mask for mask in masks if mask.variant == variant]
-        found = [scored.finals(frames[mask.result].of_variant(variant)) for mask in own]
+        found = [score.finals(frames[mask.result].of_variant(variant)) for mask in own]
         common = [*set.intersection(*(set(rows["frame"].tolist()) for rows in found))]
         for mask, rows in zip(own, found, strict=True):
             there = rows.take(np.isin(rows["frame"], common))

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Health
-from roadeval.evaluation import analysis, scored
+from roadeval.evaluation import score
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.score import judge
 from roadeval.evaluation.settings import NOTEWORTHY
@@ -60,7 +60,7 @@ def facts_of(result: DriveResult) -> Iterator[FrameFacts]:
         yield from (FrameFacts(number, stamps[number], {}) for number in result.pictured)
         return
     dark = _much_shadow(result)
-    for frame, stamp, rates in rates_by_frame(scored.finals(frames), [*SHORT]):
+    for frame, stamp, rates in rates_by_frame(score.finals(frames), [*SHORT]):
         blind = rates.get(BASELINE)
         others = {name: each for name, each in rates.items() if name != BASELINE}
         yield FrameFacts(
@@ -100,7 +100,7 @@ def _much_shadow(result: DriveResult) -> set[int]:
     regions = result.regions
     if not len(regions) or "shadow" not in set(regions["region"]):
         return set()
-    last = analysis.finals(regions)
+    last = score.final_frames(regions)
     first = last[last["variant"] == last["variant"].iloc[0]]
     shadow = first[first["region"] == "shadow"].set_index("frame")["N"]
     if not len(shadow) or shadow.max() == shadow.min():
@@ -208,8 +208,8 @@ def _chosen(result: DriveResult, count: int) -> list[int]:
     if not variants:
         return spread
     own = rows.take(np.isin(rows["frame"], pictured))
-    worst = scored.worst(own, variants[0], count)["frame"].tolist()
-    ranked = scored.worst(own, variants[0], len(pictured), 0)["frame"].tolist()
+    worst = score.worst(own, variants[0], count)["frame"].tolist()
+    ranked = score.worst(own, variants[0], len(pictured), 0)["frame"].tolist()
     best = ranked[::-1]
     turns: list[int] = []
     for place in range(count):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Packed, Rows, TruthBits
-from roadeval.evaluation import analysis, counts, maps, scored
+from roadeval.evaluation import score
 from roadeval.evaluation.settings import settings_of
 from roadeval.jobs.report_frames import FramePicker, evenly, variants_but_baseline
 from roadeval.jobs.result import DriveResult
@@ -43,23 +43,23 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
         pictured=len(pictured),
         summary=summary,
         properties=result.properties,
-        finals=scored.final_stages(result.rows),
+        finals=score.stages_of(result.rows),
         windows=windows,
         window_size=window_size,
         paired=paired,
-        regions=analysis.by_region(result.regions) if len(frames) else result.regions,
+        regions=score.by_region(result.regions) if len(frames) else result.regions,
         overlap={
-            variant: {stage: scored.overlap(total) for stage, total in stages.items()}
+            variant: {stage: score.overlap(total) for stage, total in stages.items()}
             for variant, stages in summary["totals"].items()
         },
         changes=_stage_changes(changes),
         error_parts={
-            name: scored.causes(result.rows, name).means() for name in variants_but_baseline(frames)
+            name: score.causes(result.rows, name).means() for name in variants_but_baseline(frames)
         },
         heatmaps=[
             _heatmap(str(name), cells) for name, cells in heat.groupby("variant", sort=False)
         ],
-        oracles=analysis.oracles(result.extra("oracles"), frames),
+        oracles=score.perfect_stages(result.extra("oracles"), frames),
         beyond=summary.get("beyond", {}),
         levels=result.levels,
         sampled=sampled,
@@ -96,13 +96,13 @@ def _windows(result: DriveResult) -> tuple[Rows, int]:
     if not count or (count <= WINDOWS and len(result.windows)):
         return result.windows, size
     size *= -(-count // WINDOWS)
-    return as_arrays("windows", window_rows(scored.windows(result.rows, size))), size
+    return as_arrays("windows", window_rows(score.windows(result.rows, size))), size
 
 
 def _paired(result: DriveResult, changes: pd.DataFrame) -> Iterator[PairedComparison]:
     """Compare filtered against unfiltered, then every variant with the baseline."""
     frames, summary = result.frames, result.summary
-    finals = scored.final_stages(result.rows)
+    finals = score.stages_of(result.rows)
     if change := summary["difference"].get(finals.get(FILTERED)):
         yield _pair(frames, FILTERED, UNFILTERED, change, changes)
     for variant, change in summary["against_blind"].items():
@@ -116,7 +116,7 @@ def _pair(
     differences: Mapping[str, Mapping[str, Any]],
     changes: pd.DataFrame,
 ) -> PairedComparison:
-    paired = analysis.pairs(frames, treated, control)
+    paired = score.pairs(frames, treated, control)
     pixels = _changed_pixels(changes, treated, control)
     return PairedComparison(treated, control, differences, paired, pixels)
 
@@ -169,9 +169,9 @@ def _mask_sums(
     return changes, heat, sample.frames
 
 
-def _sample(result: DriveResult, numbers: Sequence[int]) -> maps.Maps:
+def _sample(result: DriveResult, numbers: Sequence[int]) -> score.Maps:
     """Sum up the masks of evenly spread frames."""
-    sums, recording = maps.Maps(), result.recording
+    sums, recording = score.Maps(), result.recording
     if recording is None or not len(result.frames):
         return sums
     for number in evenly(numbers, SAMPLED):
@@ -183,10 +183,10 @@ def _sample(result: DriveResult, numbers: Sequence[int]) -> maps.Maps:
             if (mask := result.layer(variant.name, stage, number)) is not None
         }
         finals = {variant: mask for (variant, _), mask in masks.items()}
-        errors = {name: counts.error_map(mask, truth) for name, mask in finals.items()}
+        errors = {name: score.error_map(mask, truth) for name, mask in finals.items()}
         packed = TruthBits.of(truth)
         stacked = packed.bits_of(map(Packed.of, masks.values()))
-        sums.add(errors, maps.changes(list(masks), stacked, packed))
+        sums.add(errors, score.changes(list(masks), stacked, packed))
     return sums
 
 

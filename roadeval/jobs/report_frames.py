@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.data import BASELINE, ERRORS, FILTERED, TRUTH, UNFILTERED, LayerKind, Rows
-from roadeval.evaluation import analysis, scored
+from roadeval.evaluation import score
 from roadeval.evaluation.metrics import SHORT
 from roadeval.jobs.result import DriveResult
 from roadeval.recording import Recording
@@ -81,10 +81,10 @@ class FramePicker:
         self._outcomes, self._layered = slice(outcomes), slice(layered)
         self._recording = result.recording
         self._frames = result.frames
-        self._finals = analysis.finals(result.frames)
+        self._finals = score.final_frames(result.frames)
         self._variants = variants_but_baseline(result.frames)
         self._scored = frozenset(result.rows["frame"].tolist())
-        self._causes = {name: scored.causes(result.rows, name) for name in self._variants}
+        self._causes = {name: score.causes(result.rows, name) for name in self._variants}
 
     def examples(self, numbers: Sequence[int]) -> list[ExampleFrame]:
         """Return frames for figure 2."""
@@ -98,7 +98,7 @@ class FramePicker:
         """Return the worst frames of the first variant."""
         if not self._variants:
             return []
-        rows = scored.worst(self._result.rows, self._variants[0], WORST)
+        rows = score.worst(self._result.rows, self._variants[0], WORST)
         return [
             self._notable(*row)
             for row in zip(rows["frame"].tolist(), rows["stamp_ns"].tolist(), strict=True)
@@ -110,7 +110,7 @@ class FramePicker:
             if (pair.treated, pair.control) == (FILTERED, UNFILTERED):
                 frames = pair.frames
                 stamps, changes = frames["stamp_ns"].to_numpy(), frames["ERR"].to_numpy()
-                places = scored.most_changed(stamps, changes, MOVED, harmed=harmed)
+                places = score.most_changed(stamps, changes, MOVED, harmed=harmed)
                 rows = frames.iloc[places].reset_index().to_dict("records")
                 return [self._notable(row["frame"], row["stamp_ns"], row["ERR"]) for row in rows]
         return []

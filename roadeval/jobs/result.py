@@ -14,8 +14,8 @@ import numpy as np
 
 from roadeval.data import Rows
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import scored
-from roadeval.evaluation.effects import as_parts, drive_effects
+from roadeval.evaluation import score
+from roadeval.evaluation.score import as_parts, drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.recording.layout import DamagedError, RecordingError
 from roadeval.results.fleet.folder import Fleet
@@ -198,7 +198,7 @@ class DriveResult:
         """Make the summary that a killed run did not get to write, of what it had scored."""
         assert self.recording is not None
         layout, settings = self.recording.layout, EvaluationSettings()
-        effects = drive_effects(list(scored.mask_counts(self.rows)), settings)
+        effects = drive_effects(list(score.mask_counts(self.rows)), settings)
         return {
             "drive": {"name": layout.drive, "width": layout.width, "height": layout.height},
             "frames": {
@@ -213,7 +213,7 @@ class DriveResult:
             "versions": {},
             "seconds": {},
             "training": {"source": layout.properties.get("trained_on")},
-            "totals": (totals := scored.totals(self.rows)),
+            "totals": (totals := score.totals(self.rows)),
             "verdict": verdict(totals, effects, settings),
             **as_parts(effects),
         }
@@ -360,7 +360,7 @@ def _own(result: DriveResult, name: str) -> pd.DataFrame:
     if name == "drives":
         rows = [drive_row(facts, result.name, str(result.path))]
     elif name == "scores":
-        rows = [*score_rows(facts, scored.region_totals(result.table("regions")))]
+        rows = [*score_rows(facts, score.region_totals(result.table("regions")))]
     else:
         rows = [*effect_rows(facts)]
     return pd.DataFrame(cells(name, key, rows), columns=TABLES[name].names)

@@ -12,8 +12,7 @@ from roadeval import logs
 from roadeval.config import RunConfig, Variant
 from roadeval.data import VariantLayout
 from roadeval.evaluation.metrics import METRICS
-from roadeval.evaluation.score import BlindPrior
-from roadeval.evaluation.scoreboard import Scoreboard
+from roadeval.evaluation.score import BlindPrior, Scoreboard
 from roadeval.jobs import frame
 from roadeval.jobs.failures import Failures
 from roadeval.jobs.identity import identity

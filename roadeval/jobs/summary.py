@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from roadeval.config import RunConfig
 from roadeval.data import BASELINE, Role
-from roadeval.evaluation.effects import as_parts
+from roadeval.evaluation.score import as_parts
 from roadeval.jobs.identity import computing
 from roadeval.jobs.run import Run
 from roadeval.results.sentences import verdict

@@ -13,14 +13,15 @@ from roadeval.evaluation.comparison import (
     Change,
     ComparedResult,
     Comparison,
+    Disagreement,
     DriveChange,
+    Judgement,
+    MovedFrame,
     RegionChange,
 )
-from roadeval.evaluation.conditions import Judgement
-from roadeval.evaluation.effects import TESTED
 from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
+from roadeval.evaluation.score import TESTED
 from roadeval.evaluation.stats import Difference
-from roadeval.evaluation.where import Disagreement, MovedFrame
 from roadeval.report.blocks import (
     Block,
     BulletList,

@@ -38,7 +38,7 @@ from roadeval.data import (
     Truth,
     colours,
 )
-from roadeval.evaluation import scored
+from roadeval.evaluation import score
 from roadeval.report.chart import FAINT, thinned
 from roadeval.report.charts.rates import over_windows
 from roadeval.report.images import (
@@ -267,8 +267,8 @@ def _over_drive(title: str, windows: Rows, rates: Mapping[str, str]) -> Figure:
 
 
 def _subtitle(windows: Rows) -> str:
-    stages = ", ".join(scored.finals(windows).distinct("stage"))
-    sizes = scored.each_window(windows)["frames"]
+    stages = ", ".join(score.finals(windows).distinct("stage"))
+    sizes = score.each_window(windows)["frames"]
     size, rest = sizes.max(), sizes[-1]
     each = f"each point is the mean of {size} frames" if size > 1 else "each point is one frame"
     if len(sizes) > CROWDED:

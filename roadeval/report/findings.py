@@ -105,7 +105,7 @@ class Findings:
     paired: Sequence[PairedComparison]
     """Filtered against unfiltered first, if both were run; then against the baseline."""
     regions: pd.DataFrame
-    """See `roadeval.evaluation.analysis.by_region`."""
+    """See `roadeval.evaluation.score.by_region`."""
     overlap: Mapping[str, Mapping[str, Mapping[str, float]]]
     """IoU, F1 and precision by variant and stage, pooled."""
     changes: pd.DataFrame
@@ -113,11 +113,11 @@ class Findings:
     pixels.
     """
     error_parts: Mapping[str, Mapping[str, float]]
-    """The parts of each variant's mean ERR by stage, see `roadeval.evaluation.scored.causes`."""
+    """The parts of each variant's mean ERR by stage, see `roadeval.evaluation.score.causes`."""
     heatmaps: Sequence[ErrorHeatmap]
     """One a variant."""
     oracles: pd.DataFrame
-    """See `roadeval.evaluation.analysis.oracles`; empty if the run counted none."""
+    """See `roadeval.evaluation.score.perfect_stages`; empty if the run counted none."""
     beyond: Mapping[str, Mapping[str, Any]]
     """Boundary F and flicker of each final mask, as in ``summary.json``."""
     levels: Rows

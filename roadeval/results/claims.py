@@ -12,7 +12,7 @@ WORDS: Final[Mapping[str, str]] = {
     "svm_ERR": "ERR of the SVM is lower than that of the colour distance (section 4.3)",
     "post_ERR": "ERR after post-processing is lower than after the SVM (section 4.4)",
 }
-"""By the names of `roadeval.evaluation.claims.CLAIMS`; the last two are of the filtered variant."""
+"""By the names of `roadeval.evaluation.score.CLAIMS`; the last two are of the filtered variant."""
 NO_NUMBERS: Final = (
     "The paper's text gives no number for its figures 3a and 3b, and their curves are lost, so "
     "nothing can be held against it number by number. Its claims can be checked."

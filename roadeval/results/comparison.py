@@ -7,10 +7,8 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from roadeval.data.words import percent, plain_points
-from roadeval.evaluation.comparison import FALSE, Change, Comparison
-from roadeval.evaluation.conditions import Judgement
-from roadeval.evaluation.effects import TESTED
-from roadeval.evaluation.pairing import Kind, Note
+from roadeval.evaluation.comparison import FALSE, Change, Comparison, Judgement, Kind, Note
+from roadeval.evaluation.score import TESTED
 from roadeval.results.sentences import sentence, stands
 
 FORMAT: Final = {"name": "roadeval-comparison", "version": 2}

@@ -21,17 +21,14 @@ from roadeval.data import (
     Rows,
     Transition,
 )
-from roadeval.evaluation.effects import final_stages
-from roadeval.evaluation.thresholds import at_levels
+from roadeval.evaluation.score import at_levels, final_stages
 from roadeval.results.fleet.record import DAMAGED, SCORED, UNSCORED
 from roadeval.results.schema import ALL, KEY, TABLES, Kind
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
-    from roadeval.evaluation.frame_counts import Window
-    from roadeval.evaluation.maps import HeatMap, Name
-    from roadeval.evaluation.scoreboard import DriveSums
-    from roadeval.evaluation.thresholds import Sums
+    from roadeval.data.arrays import Sums
+    from roadeval.evaluation.score import DriveSums, HeatMap, Name, Window
 
 Row = tuple[str | int | float, ...]
 """A row's cells in the order of its table's columns, without the key."""

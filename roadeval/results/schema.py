@@ -125,7 +125,7 @@ LIGHT: Final = (
     Column("shadow", Kind.RATE, "share of the image's lower half that is dark beside its lit part"),
     Column("sun", Kind.NUMBER, "how much bluer grey things are there: above 0 in the sun"),
 )
-"""The light, measured from the images: see `roadeval.evaluation.light`."""
+"""The light, measured from the images: see `roadeval.evaluation.score.light_of`."""
 
 _OF_FRAMES: Final = (
     TableSchema(

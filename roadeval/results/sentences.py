@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import in_percent, plain_points
-from roadeval.evaluation.effects import TESTED, Effect, final_stages
+from roadeval.evaluation.score import TESTED, Effect, final_stages
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference
 

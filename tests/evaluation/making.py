@@ -25,8 +25,7 @@ from roadeval.data import (
 )
 from roadeval.data.arrays import Bits
 from roadeval.evaluation import metrics
-from roadeval.evaluation.comparison import Change, ComparedResult, Comparison
-from roadeval.evaluation.pairing import Side
+from roadeval.evaluation.comparison import Change, ComparedResult, Comparison, Side
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference
 
@@ -134,7 +133,12 @@ class APart:
 _NOTHING = {
     "regions": rows_of(pd.DataFrame({"variant": [], "stage": [], "region": [], "frame": []})),
     "disagreements": rows_of(
-        pd.DataFrame({"from_variant": [], "to_variant": [], "frame": [], "N": []})
+        pd.DataFrame(
+            {
+                name: []
+                for name in ("from_variant", "to_variant", "frame", "repaired", "spoiled", "N")
+            }
+        )
     ),
 }
 

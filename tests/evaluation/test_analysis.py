@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from roadeval.evaluation import analysis
+from roadeval.evaluation import score
 from roadeval.results.schema import TABLES
 from tests.evaluation.making import a_table
 
@@ -12,7 +12,7 @@ POST, CONTROL_POST = ("filtered", "post"), ("unfiltered", "post")
 
 def test_pairs_subtract_the_same_frames_only():
     frames = a_table({POST: [10, 20, 30], CONTROL_POST: [10, 25]})
-    paired = analysis.pairs(frames, "filtered", "unfiltered")
+    paired = score.pairs(frames, "filtered", "unfiltered")
     assert paired.index.tolist() == [0, 1]
     assert paired["ERR"].tolist() == pytest.approx([0, -0.05])
     assert paired["wrong"].tolist() == [0, -5]
@@ -27,7 +27,7 @@ def test_a_region_tells_its_share_of_the_pixels_and_of_the_errors():
         ],
         columns=list(TABLES["regions"].names[2:]),
     )
-    found = analysis.by_region(regions).set_index("region")
+    found = score.by_region(regions).set_index("region")
     assert found.loc["boundary", "ERR"] == 0.5
     assert found["pixels"].tolist() == pytest.approx([0.1, 0.9, 0.0])
     assert found["errors"].tolist() == pytest.approx([0.5, 0.5, 0.0])
@@ -45,4 +45,4 @@ def test_a_region_tells_its_share_of_the_pixels_and_of_the_errors():
     ],
 )
 def test_stages_of_several_chains_stand_in_the_order_of_each(chains, order):
-    assert analysis.merged(chains) == order
+    assert score.merged(chains) == order

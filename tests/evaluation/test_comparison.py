@@ -6,9 +6,17 @@ from dataclasses import astuple, replace
 import numpy as np
 import pytest
 
-from roadeval.evaluation.comparison import ComparisonError, compare, variants_as_sides
-from roadeval.evaluation.conditions import Condition, ConditionError, judge
-from roadeval.evaluation.pairing import Kind, Note, Side
+from roadeval.evaluation.comparison import (
+    ComparisonError,
+    Condition,
+    ConditionError,
+    Kind,
+    Note,
+    Side,
+    compare,
+    judge,
+    variants_as_sides,
+)
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import within_drive
 from tests.evaluation.making import APart, a_part, a_side, a_table, rows_of

@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.evaluation.comparison import Change
-from roadeval.evaluation.conditions import Condition, ConditionError
+from roadeval.evaluation.comparison import Change, Condition, ConditionError
 from roadeval.evaluation.stats import Difference
 
 MASK = Change(

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from roadeval.evaluation.effects import as_parts, drive_effects, final_stages
-from roadeval.evaluation.frame_counts import FrameCounts
+from roadeval.evaluation.score import FrameCounts, as_parts, drive_effects, final_stages
 from roadeval.evaluation.settings import EvaluationSettings
 
 SETTINGS = EvaluationSettings()

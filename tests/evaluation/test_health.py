@@ -4,10 +4,10 @@ import pytest
 
 from roadeval.data import Counts, Health
 from roadeval.evaluation import metrics
-from roadeval.evaluation.score import Rates, judge
+from roadeval.evaluation.score import judge
 
 
-def with_error(percent: int, road: int = 50) -> Rates:
+def with_error(percent: int, road: int = 50) -> dict[str, float]:
     """Rates of a frame of 100 pixels, of which ``percent`` are called road wrongly."""
     return metrics.of(Counts(tp=road, tn=100 - road - percent, fp=percent, fn=0))
 

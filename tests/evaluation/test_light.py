@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from roadeval.evaluation.light import light_of
+from roadeval.evaluation.score import light_of
 
 GREY = 160
 

@@ -5,8 +5,7 @@ from dataclasses import replace
 import pytest
 
 from roadeval.data import Packed, Role
-from roadeval.evaluation.score import BlindPrior
-from roadeval.evaluation.scoreboard import Scoreboard
+from roadeval.evaluation.score import BlindPrior, Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from tests.evaluation.making import a_frame, a_variant, pixels
 

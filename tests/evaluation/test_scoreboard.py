@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 
 from roadeval.data import Change, Counts, Health, Packed, Role
-from roadeval.evaluation.score import BlindPrior, CountsNotConservedError, check_conserved
-from roadeval.evaluation.scoreboard import Scoreboard
+from roadeval.evaluation.score import (
+    BlindPrior,
+    CountsNotConservedError,
+    Scoreboard,
+    check_conserved,
+)
 from roadeval.evaluation.settings import EvaluationSettings
 from tests.evaluation.making import a_frame, a_variant, pixels
 

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from roadeval.data import Role, Rows
-from roadeval.evaluation import scored
-from roadeval.evaluation.score import BlindPrior
-from roadeval.evaluation.scoreboard import Scoreboard
+from roadeval.evaluation import score
+from roadeval.evaluation.score import BlindPrior, Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.schema import TABLES
 from roadeval.results.tables import read_rows
@@ -39,61 +38,61 @@ def scored_drive() -> tuple[Scoreboard, Rows]:
 
 def test_totals_of_the_table_are_those_of_the_run():
     board, frames = scored_drive()
-    assert scored.totals(frames) == board.totals()
+    assert score.totals(frames) == board.totals()
 
 
 def test_totals_keep_the_table_s_order():
     table = rows_of(a_table({("wide", "svm"): [1], ("wide", "post"): [1], ("blind", "post"): [1]}))
-    totals = scored.totals(table)
+    totals = score.totals(table)
     assert [*totals] == ["wide", "blind"]
     assert [*totals["wide"]] == ["svm", "post"]
 
 
 def test_the_final_stage_is_post_or_else_the_last():
     rows = rows_of(a_table({SVM: [1], POST: [1], ("mine", "net"): [1], ("mine", "crf"): [1]}))
-    assert scored.final_stages(rows) == {"filtered": "post", "mine": "crf"}
+    assert score.stages_of(rows) == {"filtered": "post", "mine": "crf"}
 
 
 def test_the_rows_of_final_masks_keep_their_order_in_the_table():
     rows = rows_of(a_table({SVM: [1, 2], POST: [3, 4], ("mine", "net"): [5, 6]}))
     mixed = rows.take(np.array([4, 2, 0, 3, 1, 5]))
-    found = scored.finals(mixed)
+    found = score.finals(mixed)
     assert found["FP"].tolist() == [4, 5, 3, 6]
     assert found["variant"].tolist() == ["filtered", "mine", "filtered", "mine"]
-    assert len(scored.finals(rows.take(slice(0)))) == 0
+    assert len(score.finals(rows.take(slice(0)))) == 0
 
 
 def test_a_window_holds_the_frames_of_the_mask_that_has_most():
     cells = {"window": [1, 0, 1, 0], "frames": [7, 10, 9, 8], "variant": ["a", "a", "b", "b"]}
-    each = scored.each_window(Rows({name: np.array(values) for name, values in cells.items()}))
+    each = score.each_window(Rows({name: np.array(values) for name, values in cells.items()}))
     assert each["window"].tolist() == [0, 1]
     assert each["frames"].tolist() == [10, 9]
 
 
 def test_windows_of_the_table_are_those_of_the_run():
     board, frames = scored_drive()
-    found = [asdict(window) for window in scored.windows(frames, 5)]
+    found = [asdict(window) for window in score.windows(frames, 5)]
     told = [asdict(window) for window in board.windows()]
     assert sorted(map(str, found)) == sorted(map(str, told))
 
 
 def test_the_causes_of_an_error_add_up_to_it():
     frames = rows_of(a_table({SVM: [30], POST: [12], CONTROL_SVM: [20], CONTROL_POST: [15]}))
-    filtered = scored.causes(frames, "filtered").of(0)
+    filtered = score.causes(frames, "filtered").of(0)
     assert filtered == pytest.approx({"svm": 0.20, "filter": 0.10, "post": -0.18})
     assert sum(filtered.values()) == pytest.approx(0.12)
-    unfiltered = scored.causes(frames, "unfiltered").of(0)
+    unfiltered = score.causes(frames, "unfiltered").of(0)
     assert unfiltered == pytest.approx({"svm": 0.20, "post": -0.05})
 
 
 def test_a_variant_of_one_stage_has_one_cause():
     frames = rows_of(a_table({("mine", "post"): [7], POST: [1]}))
-    assert scored.causes(frames, "mine").of(0) == pytest.approx({"post": 0.07})
+    assert score.causes(frames, "mine").of(0) == pytest.approx({"post": 0.07})
 
 
 def test_where_err_is_undefined_on_every_frame_its_causes_are_undefined_too():
     table = rows_of(a_table({key: [0, 0] for key in (SVM, POST, CONTROL_SVM, CONTROL_POST)}))
-    found = scored.causes(table.replace(ERR=np.full(len(table), math.nan)), "filtered")
+    found = score.causes(table.replace(ERR=np.full(len(table), math.nan)), "filtered")
     assert [*found.parts] == ["svm", "filter", "post"]
     assert found.frames.tolist() == [0, 1]
     assert np.isnan([*found.parts.values()]).all()
@@ -102,21 +101,21 @@ def test_where_err_is_undefined_on_every_frame_its_causes_are_undefined_too():
 
 def test_the_mean_of_a_cause_is_that_of_the_frames_on_which_it_is_known():
     frames = rows_of(a_table({("mine", "net"): [10, 20, 30], ("mine", "post"): [10, 10]}))
-    assert scored.causes(frames, "mine").means() == pytest.approx({"net": 0.2, "post": -0.05})
+    assert score.causes(frames, "mine").means() == pytest.approx({"net": 0.2, "post": -0.05})
 
 
 def test_of_neighbouring_bad_frames_only_the_worst_is_picked():
     frames = rows_of(a_table({POST: [*[0] * 10, 40, 50, 45, *[0] * 10, 30]}, hertz=10))
     second = 1_000_000_000
-    assert scored.worst(frames, "filtered", 2, apart_ns=second)["frame"].tolist() == [11, 23]
-    assert scored.worst(frames, "filtered", 2, apart_ns=0)["frame"].tolist() == [11, 12]
+    assert score.worst(frames, "filtered", 2, apart_ns=second)["frame"].tolist() == [11, 23]
+    assert score.worst(frames, "filtered", 2, apart_ns=0)["frame"].tolist() == [11, 12]
 
 
 def test_neighbours_are_a_thirtieth_of_the_drive_apart_and_at_most_a_second():
     errors = [40, 50, 45, *[0] * 57, 30]
     short, long = (rows_of(a_table({POST: errors}, hertz=hertz)) for hertz in (10, 0.1))
-    assert scored.worst(short, "filtered", 3)["frame"].tolist() == [1, 60, 3]
-    assert scored.worst(long, "filtered", 3)["frame"].tolist() == [1, 2, 0]
+    assert score.worst(short, "filtered", 3)["frame"].tolist() == [1, 60, 3]
+    assert score.worst(long, "filtered", 3)["frame"].tolist() == [1, 2, 0]
 
 
 SECONDS = np.arange(4) * 1_000_000_000
@@ -125,10 +124,10 @@ SECONDS = np.arange(4) * 1_000_000_000
 @pytest.mark.parametrize(("harmed", "places"), [(True, [2, 1]), (False, [3])])
 def test_frames_that_changed_most_are_those_that_changed_at_all(harmed, places):
     changes = np.array([0, 0.1, 0.2, -0.1])
-    assert scored.most_changed(SECONDS, changes, 5, harmed=harmed).tolist() == places
+    assert score.most_changed(SECONDS, changes, 5, harmed=harmed).tolist() == places
 
 
 @pytest.mark.parametrize("harmed", [True, False])
 def test_a_change_that_is_undefined_is_none(harmed):
     changes = np.array([math.nan] * 4)
-    assert not len(scored.most_changed(SECONDS, changes, 5, harmed=harmed))
+    assert not len(score.most_changed(SECONDS, changes, 5, harmed=harmed))

@@ -13,17 +13,14 @@ from sklearn.metrics import (
     roc_curve,
 )
 
-from roadeval.evaluation.thresholds import (
+from roadeval.evaluation.score import (
     CODES,
     Curves,
     Thresholds,
     at_levels,
-    average_precision,
     calibration,
-    expected_calibration_error,
+    calibration_error,
     histogram,
-    max_f,
-    roc_auc,
 )
 
 TOP = CODES - 1
@@ -51,11 +48,11 @@ CASES = [(0, CODES), (1, CODES), (2, 256), (3, 4), (4, 2)]
 def test_areas_and_f_are_scikit_learns(seed, levels):
     codes, truth = drawn(seed, levels)
     found, (y, p) = Thresholds.of(histogram(codes, truth)), flat(codes, truth)
-    assert average_precision(found) == pytest.approx(average_precision_score(y, p), abs=1e-12)
-    assert roc_auc(found) == pytest.approx(roc_auc_score(y, p), abs=1e-12)
-    best = max_f(found)
-    assert best.f == pytest.approx(f1_score(y, p >= best.threshold), abs=1e-12)
-    assert 2 / (1 / best.precision + 1 / best.recall) == pytest.approx(best.f)
+    assert found.average_precision == pytest.approx(average_precision_score(y, p), abs=1e-12)
+    assert found.auc == pytest.approx(roc_auc_score(y, p), abs=1e-12)
+    best = found.max_f()
+    assert best["MaxF"] == pytest.approx(f1_score(y, p >= best["threshold"]), abs=1e-12)
+    assert 2 / (1 / best["precision"] + 1 / best["recall"]) == pytest.approx(best["MaxF"])
 
 
 @pytest.mark.parametrize(("seed", "levels"), CASES)
@@ -74,8 +71,8 @@ def test_curves_are_scikit_learns(seed, levels):
 def test_maxf_is_the_greatest_of_all_thresholds():
     codes, truth = drawn(2, 256)
     y, p = flat(codes, truth)
-    best = max_f(Thresholds.of(histogram(codes, truth)))
-    assert best.f == pytest.approx(max(f1_score(y, p >= t) for t in np.unique(p)), abs=1e-12)
+    best = Thresholds.of(histogram(codes, truth)).max_f()
+    assert best["MaxF"] == pytest.approx(max(f1_score(y, p >= t) for t in np.unique(p)), abs=1e-12)
 
 
 @pytest.mark.parametrize("bins", [10, 15])
@@ -90,10 +87,10 @@ def test_the_calibration_error_is_that_of_a_plain_loop(seed, bins):
         if inside.any():
             expected += inside.sum() / len(p) * abs(y[inside].mean() - p[inside].mean())
     found = calibration(histogram(codes, truth), bins)
-    assert expected_calibration_error(found) == pytest.approx(expected, abs=1e-12)
+    assert calibration_error(found) == pytest.approx(expected, abs=1e-12)
     road, probability = calibration_curve(y, p, n_bins=bins)
-    np.testing.assert_allclose([each.road for each in found], road)
-    np.testing.assert_allclose([each.probability for each in found], probability)
+    np.testing.assert_allclose([each["road"] for each in found], road)
+    np.testing.assert_allclose([each["probability"] for each in found], probability)
 
 
 def test_the_edges_of_bins_belong_to_the_lower_one():
@@ -101,32 +98,32 @@ def test_the_edges_of_bins_belong_to_the_lower_one():
     counts = np.zeros((2, CODES), np.int64)
     for code, pixels in ((0, 1), (TOP // 15, 2), (TOP // 15 + 1, 4), (2 * TOP // 15, 8), (TOP, 16)):
         counts[0, code] = pixels
-    assert [each.pixels for each in calibration(counts)] == [3, 12, 16]
+    assert [each["pixels"] for each in calibration(counts)] == [3, 12, 16]
 
 
 def test_a_perfect_probability():
     truth = np.array([[0, 0, 1, 1, 255]], np.uint8)
     codes = np.array([[0, 0, TOP, TOP, TOP]], np.uint16)
     found = Thresholds.of(histogram(codes, truth))
-    assert (average_precision(found), roc_auc(found), max_f(found).f) == (1, 1, 1)
-    assert expected_calibration_error(calibration(histogram(codes, truth))) == 0
+    assert (found.average_precision, found.auc, found.max_f()["MaxF"]) == (1, 1, 1)
+    assert calibration_error(calibration(histogram(codes, truth))) == 0
 
 
 def test_one_probability_for_all_pixels_knows_nothing():
     truth = np.array([[0, 0, 0, 1]], np.uint8)
     counts = histogram(np.full((1, 4), 30_000, np.uint16), truth)
     found = Thresholds.of(counts)
-    assert (average_precision(found), roc_auc(found)) == (0.25, 0.5)
-    assert max_f(found).recall == 1
+    assert (found.average_precision, found.auc) == (0.25, 0.5)
+    assert found.max_f()["recall"] == 1
 
 
 @pytest.mark.parametrize("value", [0, 1, 255])
 def test_what_has_no_road_or_nothing_else_is_undefined(value):
     counts = histogram(np.full((2, 2), 30_000, np.uint16), np.full((2, 2), value, np.uint8))
     found = Thresholds.of(counts)
-    assert math.isnan(roc_auc(found))
-    assert (max_f(found) is None) == (value != 1)
-    assert math.isnan(average_precision(found)) == (value != 1)
+    assert math.isnan(found.auc)
+    assert (found.max_f()["MaxF"] is None) == (value != 1)
+    assert math.isnan(found.average_precision) == (value != 1)
 
 
 def test_levels_hold_256_codes_each():

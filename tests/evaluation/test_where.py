@@ -4,10 +4,14 @@ import numpy as np
 import pytest
 
 from roadeval.data import Rows
-from roadeval.evaluation.comparison import compare, variants_as_sides
-from roadeval.evaluation.pairing import Side
+from roadeval.evaluation.comparison import (
+    Side,
+    compare,
+    disagreements,
+    region_counts,
+    variants_as_sides,
+)
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.where import disagreements, region_counts
 from tests.evaluation.making import APart, a_table, rows_of
 
 SETTINGS = EvaluationSettings()

@@ -7,9 +7,8 @@ import pandas as pd
 import pytest
 
 from roadeval.data import Counts
-from roadeval.evaluation import frame_counts as windows
-from roadeval.evaluation import metrics
-from roadeval.evaluation.frame_counts import FrameCounts, GrowingCounts, sum_up
+from roadeval.evaluation import metrics, score
+from roadeval.evaluation.score import FrameCounts, GrowingCounts, sum_up
 
 
 def counts_of(*counts: tuple[int, int, int, int]) -> FrameCounts:
@@ -20,25 +19,25 @@ def counts_of(*counts: tuple[int, int, int, int]) -> FrameCounts:
 
 
 def test_a_window_averages_rates_and_pools_counts() -> None:
-    (row,) = windows.cut(counts_of((0, 1, 1, 0), (0, 6, 2, 0)), [7, 9], size=10)
+    (row,) = score.cut(counts_of((0, 1, 1, 0), (0, 6, 2, 0)), [7, 9], size=10)
     assert (row.number, row.first_frame, row.last_frame, row.frames) == (0, 7, 9, 2)
     assert row.rates["FPR"] == (1 / 2 + 2 / 8) / 2
     assert row.pooled["FPR"] == 3 / 10
 
 
 def test_an_undefined_rate_is_left_out_of_the_mean() -> None:
-    (row,) = windows.cut(counts_of((3, 1, 0, 1), (0, 4, 0, 0)), [0, 1], size=10)
+    (row,) = score.cut(counts_of((3, 1, 0, 1), (0, 4, 0, 0)), [0, 1], size=10)
     assert row.rates["TPR"] == row.pooled["TPR"] == 0.75
 
 
 def test_a_rate_undefined_in_the_whole_window_stays_undefined() -> None:
-    (row,) = windows.cut(counts_of((0, 1, 1, 0)), [0], size=10)
+    (row,) = score.cut(counts_of((0, 1, 1, 0)), [0], size=10)
     assert math.isnan(row.rates["TPR"])
     assert math.isnan(row.pooled["TPR"])
 
 
 def test_the_last_window_may_be_short() -> None:
-    rows = list(windows.cut(counts_of(*[(1, 1, 1, 1)] * 7), list(range(10, 17)), size=3))
+    rows = list(score.cut(counts_of(*[(1, 1, 1, 1)] * 7), list(range(10, 17)), size=3))
     spans = [(row.number, row.first_frame, row.last_frame, row.frames) for row in rows]
     assert spans == [(0, 10, 12, 3), (1, 13, 15, 3), (2, 16, 16, 1)]
 
@@ -47,7 +46,7 @@ def test_a_mask_that_is_missing_on_some_frames_says_how_many_it_has() -> None:
     growing = GrowingCounts()
     for position in (0, 4, 5):
         growing.append(position, Counts(1, 1, 1, 1))
-    rows = list(windows.cut(growing.so_far("net", "post"), [0, 1, 2, 3, 4, 5, 6], size=2))
+    rows = list(score.cut(growing.so_far("net", "post"), [0, 1, 2, 3, 4, 5, 6], size=2))
     assert [(row.number, row.frames) for row in rows] == [(0, 1), (2, 2)]
 
 
@@ -60,7 +59,7 @@ def test_windows_equal_a_groupby_of_pandas() -> None:
     groups = np.arange(37) // 10
     means = frames.groupby(groups).mean()
     sums = counts.groupby(groups).sum()
-    for row in windows.cut(mask, list(range(37)), size=10):
+    for row in score.cut(mask, list(range(37)), size=10):
         assert row.rates == pytest.approx(means.loc[row.number].to_dict(), nan_ok=True)
         assert row.pooled == pytest.approx(
             metrics.of(Counts(*sums.loc[row.number].tolist())), nan_ok=True

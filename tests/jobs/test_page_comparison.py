@@ -1,7 +1,6 @@
 """The frames of compared results on a page."""
 
-from roadeval.evaluation.comparison import compare
-from roadeval.evaluation.pairing import Side
+from roadeval.evaluation.comparison import Side, compare
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.jobs.page_comparison import browsed
 from tests.evaluation.making import a_part

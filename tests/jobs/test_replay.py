@@ -369,7 +369,7 @@ def test_another_rule_is_refused(drive, tmp_path, rule):
 def test_an_error_on_the_way_leaves_no_results_and_a_partial_recording(
     drive, tmp_path, monkeypatch
 ):
-    from roadeval.evaluation.scoreboard import Scoreboard
+    from roadeval.evaluation.score import Scoreboard
 
     add = Scoreboard.add
 

@@ -4,11 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from roadeval.evaluation.comparison import compare
-from roadeval.evaluation.conditions import Condition, judge
-from roadeval.evaluation.pairing import Kind, Note, Side
+from roadeval.evaluation.comparison import (
+    Condition,
+    Disagreement,
+    Kind,
+    MovedFrame,
+    Note,
+    Side,
+    compare,
+    judge,
+)
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.where import Disagreement, MovedFrame
 from roadeval.report.blocks import BulletList, Cell, Figure, Heading, Table, Text
 from roadeval.report.chart import Chart, ChartKind, Series, looks
 from roadeval.report.comparison import document, markdown

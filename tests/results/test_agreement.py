@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from roadeval.evaluation import scored
-from roadeval.evaluation.comparison import compare, variants_as_sides
-from roadeval.evaluation.effects import as_parts, drive_effects
-from roadeval.evaluation.pairing import Side
+from roadeval.evaluation import score
+from roadeval.evaluation.comparison import Side, compare, variants_as_sides
+from roadeval.evaluation.score import as_parts, drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.fleet.record import Record
 from roadeval.results.fleet.tables import Member
@@ -42,14 +41,14 @@ def a_drive(variants):
 
 
 def replayed(rows):
-    effects = drive_effects([*scored.mask_counts(rows)], SETTINGS)
-    return effects, verdict(scored.totals(rows), effects, SETTINGS)
+    effects = drive_effects([*score.mask_counts(rows)], SETTINGS)
+    return effects, verdict(score.totals(rows), effects, SETTINGS)
 
 
 def a_fleet_of(rows, folder):
     """The content of ``fleet.json`` of a fleet of this drive."""
     effects, _ = replayed(rows)
-    facts = {"totals": scored.totals(rows), "beyond": {}, **as_parts(effects)}
+    facts = {"totals": score.totals(rows), "beyond": {}, **as_parts(effects)}
     about = {"status": "scored", "evaluated": len(rows.distinct("frame")), "sha256": "d1"}
     tables = {
         "drives": [about],

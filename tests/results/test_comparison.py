@@ -4,9 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.evaluation.comparison import DriveChange
-from roadeval.evaluation.conditions import Condition
-from roadeval.evaluation.pairing import Kind, Note
+from roadeval.evaluation.comparison import Condition, DriveChange, Kind, Note
 from roadeval.results.comparison import as_dict, changed_settings, judged, verdict, warnings, where
 from roadeval.results.sentences import sentence
 from tests.evaluation.making import a_change, a_comparison, a_difference

@@ -31,10 +31,10 @@ from roadeval.evaluation.region import Region
 
 def left(labelled):
     height, width = labelled.truth.shape
-    return pack(np.arange(width)[None].repeat(height, 0) < 2)
+    return {"left": pack(np.arange(width)[None].repeat(height, 0) < 2)}
 
 
-REGIONS = (Region("left", "on the left", order=25, find=left),)
+REGIONS = (Region({"left": "on the left"}, order=25, find=left),)
 '''
 PROGRAM = """
 import importlib.util
@@ -55,8 +55,8 @@ for kind in ("metrics", "regions"):
     spec.loader.exec_module(module)
 
 from roadeval.data import Role
-from roadeval.evaluation import regions, scored
-from roadeval.evaluation.scoreboard import Scoreboard
+from roadeval.evaluation import regions, score
+from roadeval.evaluation.score import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.folder import ResultsFolder, ResultsWriter
 from roadeval.results.schema import TABLES, documentation
@@ -78,7 +78,7 @@ read = ResultsFolder(folder / "out")
 assert read.frames["FDR"].tolist() == [0.25]
 assert read.windows["FDR"].tolist() == read.windows["pooled_FDR"].tolist() == [0.25]
 assert read.summary["totals"]["net"]["post"]["pooled_FDR"] == 0.25
-assert scored.totals(read.rows("frames"))["net"]["post"]["FDR"] == 0.25
+assert score.totals(read.rows("frames"))["net"]["post"]["FDR"] == 0.25
 assert "FP / (TP + FP)" in documentation(TABLES, "csv")
 left = read.regions.set_index("region").loc["left"]
 assert left[["TP", "TN", "FP", "FN"]].tolist() == [3, 0, 0, 1]

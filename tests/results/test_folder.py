@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 from roadeval.data import FrameResult, Packed, Role
-from roadeval.evaluation.score import BlindPrior
-from roadeval.evaluation.scoreboard import Scoreboard
+from roadeval.evaluation.score import BlindPrior, Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.folder import ResultsFolder, ResultsWriter, belonging
 from roadeval.results.schema import OF_A_DRIVE

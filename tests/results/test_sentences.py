@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from roadeval.evaluation.effects import Effect
+from roadeval.evaluation.score import Effect
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference
 from roadeval.results.sentences import (

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 from roadeval.cli.screens import tables
 from roadeval.cli.screens.tables import Row, interval, marked, percent, points
-from roadeval.evaluation.comparison import Change, Comparison, DriveChange
-from roadeval.evaluation.conditions import Judgement
-from roadeval.evaluation.effects import TESTED
+from roadeval.evaluation.comparison import Change, Comparison, DriveChange, Judgement
 from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.score import TESTED
 from roadeval.results.comparison import NAMED, changed_settings, judged, verdict, where
 from roadeval.results.sentences import correction
 

@@ -12,8 +12,8 @@ from roadeval.cli.screens import seeds, tables, thresholds
 from roadeval.cli.screens.tables import Row, marked, percent, points
 from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.data.words import defined
-from roadeval.evaluation.effects import final_stages
 from roadeval.evaluation.metrics import FULL, SHORT
+from roadeval.evaluation.score import final_stages
 from roadeval.results.sentences import correction
 
 if TYPE_CHECKING:

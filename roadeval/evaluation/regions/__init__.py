@@ -11,43 +11,29 @@ from itertools import chain
 from typing import Final
 
 from roadeval.data.arrays import Bits
-from roadeval.evaluation.region import LabelledFrame, Region, RegionFamily
+from roadeval.evaluation.region import LabelledFrame, Region
 from roadeval.runtime.discovery import found_in
 
-REGIONS: Final[tuple[Region | RegionFamily, ...]] = tuple(
+REGIONS: Final[tuple[Region, ...]] = tuple(
     sorted(chain(*found_in(sys.modules[__name__], "REGIONS")), key=lambda region: region.order)
 )
 
 
 def of_frame(labelled: LabelledFrame) -> dict[str, Bits]:
     """Compute every region of a labelled frame, ``(H, words)`` each, by name."""
-    found: dict[str, Bits] = {}
-    for region in REGIONS:
-        found |= region.found(labelled)
-    return found
+    return {name: bits for region in REGIONS for name, bits in region.find(labelled).items()}
 
 
 def titles(names: Collection[str], height: int = 0) -> dict[str, str]:
     """Return the titles of some regions for people, in order.
 
-    Parameters
-    ----------
-    names
-        Of regions; one that no file defines, as of a stage from elsewhere, is its own title.
-    height
-        Of the images in pixels, 0 if it is not known.
+    A region that no file defines, as of a stage from elsewhere, is its own title. ``height`` is
+    that of the images in pixels, 0 if it is not known.
     """
-    known: dict[str, str] = {}
-    for region in REGIONS:
-        known |= region.titles(names, height)
+    known = {n: title for r in REGIONS for n, title in r.titled(names, height).items()}
     return known | {name: name.replace("_", " ") for name in names if name not in known}
 
 
 def partitions(names: Collection[str]) -> list[list[str]]:
     """Return those of some regions that together are the whole frame, family by family."""
-    families = [
-        [*region.titles(names, 0)]
-        for region in REGIONS
-        if isinstance(region, RegionFamily) and region.whole
-    ]
-    return [family for family in families if family]
+    return [own for region in REGIONS if region.whole and (own := [*region.titled(names)])]

@@ -10,8 +10,7 @@ import numpy as np
 
 from roadeval.data import Packed, TruthBits, everywhere
 from roadeval.data.arrays import Bits
-from roadeval.evaluation.counts import grow, square
-from roadeval.evaluation.region import LabelledFrame, Region, RegionFamily, fixed
+from roadeval.evaluation.region import LabelledFrame, Region, grow, square
 
 SHADOW_TITLES: Final = {
     "shadow": "inside detected shadow",
@@ -34,15 +33,12 @@ def detected(labelled: LabelledFrame) -> dict[str, Bits]:
     return dict(zip(masks, labelled.truth.bits_of(masks.values()), strict=True))
 
 
-def true_shadow(labelled: LabelledFrame) -> Bits | None:
-    """Return the truly shadowed pixels, ``(H, words)``; None without a truth of shadow."""
-    if labelled.frame.shadow_truth is None:
-        return None
-    bits: Bits = labelled.truth.bits_of([Packed.of(labelled.frame.shadow_truth == 1)])[0]
-    return bits
-
-
-EDGE_TITLES: Final = {"boundary": "near the road's edge", "interior": "away from the road's edge"}
+def true_shadow(labelled: LabelledFrame) -> dict[str, Bits]:
+    """Return the truly shadowed pixels, where there is a truth of shadow."""
+    shadow = labelled.frame.shadow_truth
+    if shadow is None:
+        return {}
+    return {"true_shadow": labelled.truth.bits_of([Packed.of(shadow == 1)])[0]}
 
 
 def boundary(truth: TruthBits, width: int) -> Bits:
@@ -50,7 +46,7 @@ def boundary(truth: TruthBits, width: int) -> Bits:
 
     A pixel belongs to it if the square of side ``2 * width + 1`` around it holds both road and
     non-road of the truth. An ignored pixel is neither, so where road meets ignored pixels there
-    is no edge. ``width`` is in pixels on either side, in chessboard distance.
+    is no edge.
     """
     element = square(width)
     return grow(truth.road, element, truth) & grow(truth.other, element, truth)
@@ -65,12 +61,7 @@ def _halves(labelled: LabelledFrame) -> dict[str, Bits]:
 def row_bands(shape: tuple[int, int], bands: int) -> Mapping[str, Bits]:
     """Cut an image's rows into stripes of equal height to within a row, ``(H, words)`` each.
 
-    Parameters
-    ----------
-    shape
-        Height and width in pixels.
-    bands
-        Number of stripes; ``band_0`` is the topmost.
+    ``shape`` is height and width in pixels; ``band_0`` is the topmost stripe.
     """
     stripe = np.arange(shape[0]) * bands // shape[0]
     whole = everywhere(shape)
@@ -80,11 +71,7 @@ def row_bands(shape: tuple[int, int], bands: int) -> Mapping[str, Bits]:
     }
 
 
-def _bands(labelled: LabelledFrame) -> Mapping[str, Bits]:
-    return row_bands(labelled.truth.shape, labelled.settings.bands)
-
-
-def _titles(names: Collection[str], height: int) -> dict[str, str]:
+def _titles_of_bands(names: Collection[str], height: int) -> dict[str, str]:
     bands = [name for name in names if name.startswith("band_")]
     titles = {}
     for place, name in enumerate(bands):
@@ -97,8 +84,18 @@ def _titles(names: Collection[str], height: int) -> dict[str, str]:
 
 
 REGIONS: Final = (
-    RegionFamily(order=10, found=detected, titles=fixed(SHADOW_TITLES)),
-    Region("true_shadow", "inside true shadow", order=20, find=true_shadow),
-    RegionFamily(order=30, found=_halves, titles=fixed(EDGE_TITLES), whole=True),
-    RegionFamily(order=40, found=_bands, titles=_titles, whole=True),
+    Region(SHADOW_TITLES, order=10, find=detected),
+    Region({"true_shadow": "inside true shadow"}, order=20, find=true_shadow),
+    Region(
+        {"boundary": "near the road's edge", "interior": "away from the road's edge"},
+        order=30,
+        find=_halves,
+        whole=True,
+    ),
+    Region(
+        _titles_of_bands,
+        order=40,
+        find=lambda frame: row_bands(frame.truth.shape, frame.settings.bands),
+        whole=True,
+    ),
 )

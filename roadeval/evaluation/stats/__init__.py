@@ -1,5 +1,6 @@
 """The statistics: differences with intervals, within a drive and over drives, and corrections."""
 
+from roadeval.evaluation.stats.autocorrelation import mean_distribution
 from roadeval.evaluation.stats.difference import (
     Difference,
     benjamini_hochberg,
@@ -12,6 +13,9 @@ from roadeval.evaluation.stats.drives import (
     Stratum,
     group_means,
     over_drives,
+    sign_flip_can_tell,
+    sign_flip_interval,
+    sign_flip_p,
     strata,
 )
 
@@ -23,7 +27,11 @@ __all__ = [
     "benjamini_hochberg",
     "group_means",
     "holm",
+    "mean_distribution",
     "over_drives",
+    "sign_flip_can_tell",
+    "sign_flip_interval",
+    "sign_flip_p",
     "strata",
     "within_drive",
 ]

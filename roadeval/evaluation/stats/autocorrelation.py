@@ -26,7 +26,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -49,19 +49,14 @@ _SKEWNESS_ERROR: Final = 6.0
 """Variance of the skewness of n independent normal values, times n."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Models:
-    """The grid of models for series of a length, and what each expects of them."""
+class _Models(NamedTuple):
+    """What each of the ``g`` models of the grid expects of a series of a given length."""
 
-    coefficients: Series
-    shares: Series
-    """``(g,)``: of the autoregression, and its share of the variance."""
     precisions: Series
     """``(g, m)``: one over the variances of the cosine coefficients, in the series' variance."""
     log_factor: Series
     """``(g,)``: the logarithm of the weight before any series is seen, times the factor of the
-    likelihood that depends on the model alone.
-    """
+    likelihood that depends on the model alone."""
     of_mean: Series
     """``(g,)``: variance of the mean, in the series' variance."""
 
@@ -156,8 +151,6 @@ def _models(n: int) -> _Models:
     variances = shares[:, None] * slow + (1 - shares[:, None])
     prior = np.outer(list(_SHARES.values()), distance).ravel()
     return _Models(
-        coefficients=coefficients,
-        shares=shares,
         precisions=1 / variances,
         log_factor=np.log(prior) - np.log(variances).sum(axis=1) / 2,
         of_mean=_variance_of_mean(coefficients, shares, n),

@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
 from typing import Literal
 
 import numpy as np
@@ -115,46 +114,31 @@ def within_drive(rates: Series, base: Series, settings: EvaluationSettings) -> D
     )
 
 
-def holm(family: Sequence[Difference]) -> list[Difference]:
-    """Return differences with their p-values corrected for how many they are.
-
-    One without a p-value is not counted, nor is one that is 0 on every unit: nothing can be found
-    there.
-    """
-    values = [None if each.is_zero else each.p for each in family]
-    comparisons = sum(p is not None for p in values)
-    return [
-        each if p is None else replace(each, p_holm=p, comparisons=comparisons)
-        for each, p in zip(family, holm_p_values(values), strict=True)
-    ]
-
-
 # --- Multiple-comparison corrections of p-values --------------------------------------------------
 
 
-def holm_p_values(values: Sequence[float | None]) -> list[float | None]:
-    """Correct p-values so that a false finding among them is rare.
+def holm(family: Sequence[Difference]) -> list[Difference]:
+    """Return differences with p-values corrected so that a false finding among them is rare.
 
-    If nothing is true in a family, the probability that any corrected value is below ``a`` is at
-    most ``a``, however the comparisons depend on each other [1]_.
-
-    Parameters
-    ----------
-    values
-        None for what was not tested, which is not counted and stays None.
+    If no difference of the family is real, the probability that any corrected p-value is below
+    ``a`` is at most ``a``, however the comparisons depend on each other [1]_. A difference without
+    a p-value is not counted, nor is one that is 0 on every unit: nothing can be found there.
 
     References
     ----------
     .. [1] S. Holm, A Simple Sequentially Rejective Multiple Test Procedure, Scandinavian Journal
        of Statistics 6, 1979, 65-70.
     """
-    tested = {place: p for place, p in enumerate(values) if p is not None}
-    corrected: list[float | None] = [None] * len(values)
-    least = 0.0
-    for rank, place in enumerate(sorted(tested, key=tested.__getitem__)):
-        least = max(least, min((len(tested) - rank) * tested[place], 1.0))
-        corrected[place] = least
-    return corrected
+    tested = sorted(
+        (each.p, place)
+        for place, each in enumerate(family)
+        if each.p is not None and not each.is_zero
+    )
+    found, least = list(family), 0.0
+    for rank, (p, place) in enumerate(tested):
+        least = max(least, min((len(tested) - rank) * p, 1.0))
+        found[place] = replace(family[place], p_holm=least, comparisons=len(tested))
+    return found
 
 
 def benjamini_hochberg(values: Sequence[float | None]) -> list[float | None]:
@@ -174,11 +158,10 @@ def benjamini_hochberg(values: Sequence[float | None]) -> list[float | None]:
     .. [1] Y. Benjamini, Y. Hochberg, Controlling the False Discovery Rate, Journal of the Royal
        Statistical Society B 57, 1995, 289-300.
     """
-    tested = {place: p for place, p in enumerate(values) if p is not None}
-    order = sorted(tested, key=tested.__getitem__)
-    scaled = [tested[place] * len(order) / rank for rank, place in enumerate(order, start=1)]
-    least = list(accumulate(reversed(scaled), min))[::-1]
+    tested = sorted((p, place) for place, p in enumerate(values) if p is not None)
     corrected: list[float | None] = [None] * len(values)
-    for place, p in zip(order, least, strict=True):
-        corrected[place] = min(p, 1.0)
+    least = 1.0
+    for rank, (p, place) in reversed([*enumerate(tested, start=1)]):
+        least = min(least, p * len(tested) / rank)
+        corrected[place] = least
     return corrected

@@ -34,7 +34,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Final
 
 import numpy as np
@@ -97,7 +96,9 @@ def over_drives(
     known = [each.mean for each in drives if not math.isnan(each.mean)]
     rises, falls = sum(mean > 0 for mean in known), sum(mean < 0 for mean in known)
     means = group_means(drives)
-    needed = _needed(confidence)
+    # Below that, no sign flip is rare enough.
+    enough = (n for n in range(LEAST_GROUPS, STUDENT_FROM) if sign_flip_can_tell(n, confidence))
+    needed = next(enough, STUDENT_FROM)
     low = high = p = None
     if len(means) >= STUDENT_FROM:
         low, high, p = _student(means, confidence)
@@ -117,14 +118,6 @@ def over_drives(
         equal=len(known) - rises - falls,
         needed=needed if low is None else None,
     )
-
-
-def _needed(confidence: float) -> int:
-    """Return how many groups an interval needs: below that, no sign flip is rare enough."""
-    needed = LEAST_GROUPS
-    while needed < STUDENT_FROM and not sign_flip_can_tell(needed, confidence):
-        needed += 1
-    return needed
 
 
 def _student(means: Values, confidence: float) -> tuple[float, float, float]:
@@ -165,16 +158,10 @@ def sign_flip_p(values: Values, mean: float = 0.0) -> float:
 def sign_flip_interval(values: Values, confidence: float) -> tuple[float, float]:
     """Compute the values of the mean whose p-value is at least ``1 - confidence``.
 
-    Returns
-    -------
-    tuple of float
-        Its ends; it holds 0 exactly where `sign_flip_p` of 0 is that high. Without end in both
-        directions where no pattern of signs is rare enough.
+    `sign_flip_can_tell` must hold. Returned are the interval's ends; it holds 0 exactly where
+    `sign_flip_p` of 0 is that high.
     """
-    if not sign_flip_can_tell(len(values), confidence):
-        return -np.inf, np.inf
-    low = _lower_end(values, confidence)
-    return low, -_lower_end(-values, confidence)
+    return _lower_end(values, confidence), -_lower_end(-values, confidence)
 
 
 def sign_flip_can_tell(count: int, confidence: float) -> bool:
@@ -218,13 +205,8 @@ def _sums(values: Values) -> Values:
 
 # --- Parts of a fleet -----------------------------------------------------------------------------
 
-
-class Third(StrEnum):
-    """A third of the fleet's drives by a measured condition."""
-
-    LOW = "low"
-    MIDDLE = "middle"
-    HIGH = "high"
+THIRDS: Final = ("low", "middle", "high")
+"""Of the fleet's drives, by a measured condition."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,11 +216,15 @@ class Stratum:
     by: str
     """The tag or the condition."""
     value: str
-    """The tag's, or the `Third`."""
+    """The tag's, or one of `THIRDS`."""
     least: float | None
     most: float | None
     """The condition's least and greatest value in it; None for a tag."""
     difference: Difference
+
+
+_Part = tuple[str, str, float | None, float | None, Sequence[int]]
+"""A stratum with the places of its drives in place of their difference."""
 
 
 def strata(
@@ -270,22 +256,11 @@ def strata(
     parts = [part for by, values in tags.items() for part in _by_value(by, values, known)]
     for by, measured in conditions.items():
         parts += _by_third(by, measured, known)
-    found = holm([over_drives([drives[p] for p in part.places], confidence) for part in parts])
+    found = holm([over_drives([drives[place] for place in part[4]], confidence) for part in parts])
     return [
-        Stratum(part.by, part.value, part.least, part.most, difference)
-        for part, difference in zip(parts, found, strict=True)
+        Stratum(by, value, least, most, each)
+        for (by, value, least, most, _), each in zip(parts, found, strict=True)
     ]
-
-
-@dataclass(frozen=True, slots=True)
-class _Part:
-    """Which drives a stratum has."""
-
-    by: str
-    value: str
-    least: float | None
-    most: float | None
-    places: Sequence[int]
 
 
 def _by_value(by: str, values: Sequence[str | None], known: Sequence[int]) -> list[_Part]:
@@ -295,24 +270,24 @@ def _by_value(by: str, values: Sequence[str | None], known: Sequence[int]) -> li
         value = values[place]
         if value is not None:
             by_value.setdefault(value, []).append(place)
-    if len(by_value) == 1 and len(*by_value.values()) == len(known):
+    if any(len(places) == len(known) for places in by_value.values()):
         return []
-    return [_Part(by, value, None, None, places) for value, places in sorted(by_value.items())]
+    return [(by, value, None, None, places) for value, places in sorted(by_value.items())]
 
 
 def _by_third(by: str, values: Sequence[float | None], known: Sequence[int]) -> list[_Part]:
     """Return the drives of each third of a condition."""
-    measured = np.array([np.nan if values[place] is None else values[place] for place in known])
-    measured = measured.astype(np.float64)
-    if not np.isfinite(measured).any():
+    measured = np.array([values[place] for place in known], np.float64)  # None becomes NaN
+    finite = np.isfinite(measured)
+    if not finite.any():
         return []
-    cuts = np.quantile(measured[np.isfinite(measured)], [1 / 3, 2 / 3])
     # A value on a cut is below it.
-    number = np.where(np.isfinite(measured), np.searchsorted(cuts, measured, side="left"), -1)
-    parts = []
-    for third, value in enumerate(Third):
+    cuts = np.quantile(measured[finite], [1 / 3, 2 / 3])
+    number = np.where(finite, np.searchsorted(cuts, measured, side="left"), -1)
+    parts: list[_Part] = []
+    for third, value in enumerate(THIRDS):
         own = np.flatnonzero(number == third)
         if len(own):
             ends = float(measured[own].min()), float(measured[own].max())
-            parts.append(_Part(by, value, *ends, [known[place] for place in own.tolist()]))
+            parts.append((by, value, *ends, [known[place] for place in own.tolist()]))
     return parts if len(parts) > 1 else []

@@ -11,9 +11,9 @@ import numpy as np
 from roadeval.data import BASELINE, Rows, colours
 from roadeval.data.rows import Cells
 from roadeval.data.words import in_percent
-from roadeval.evaluation import scored
-from roadeval.evaluation.analysis import merged
+from roadeval.evaluation import score
 from roadeval.evaluation.metrics import METRICS, SHORT
+from roadeval.evaluation.score import merged
 from roadeval.report.chart import Chart, ChartKind, HeatMap, Look, Series, looks, thinned
 from roadeval.runtime.discovery import found_in
 
@@ -65,7 +65,7 @@ def over_windows(
     """Return a chart a rate: each variant's final mask, window by window."""
     if not len(windows):
         return []
-    final = scored.finals(windows)
+    final = score.finals(windows)
     return _along(final, (final["first_frame"] + final["last_frame"]) / 2, rates, drawn)
 
 
@@ -73,7 +73,7 @@ def over_frames(
     frames: Rows, rates: Sequence[str], drawn: Mapping[str, Look] | None = None
 ) -> list[Chart]:
     """Return a chart a rate: each variant's final mask, frame by frame."""
-    final = scored.finals(frames)
+    final = score.finals(frames)
     return _along(final, final["frame"], rates, drawn)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from roadeval.data import BASELINE, Rows
 from roadeval.data.words import in_percent
-from roadeval.evaluation import scored
-from roadeval.evaluation.thresholds import LEVELS, Thresholds
+from roadeval.evaluation import score
+from roadeval.evaluation.score import LEVELS, Thresholds
 from roadeval.report.chart import FAINT, Chart, ChartKind, Look, Series, looks
 
 LEAST: Final = 50
@@ -92,7 +92,7 @@ def _thresholds(levels: Rows) -> dict[str, Thresholds]:
 
 def _mask(total: Mapping[str, Any]) -> tuple[float, float, float]:
     """Return FPR, TPR and precision of a mask, in percent."""
-    precision = scored.overlap(total)["precision"]
+    precision = score.overlap(total)["precision"]
     return in_percent(total["pooled_FPR"]), in_percent(total["pooled_TPR"]), in_percent(precision)
 
 

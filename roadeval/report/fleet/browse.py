@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from roadeval.data.words import DASH, number, percent, points
-from roadeval.evaluation.effects import BASES
+from roadeval.evaluation.score import BASES
 from roadeval.report.blocks import Block, Cell, Heading, LongTable, Table, Text
 from roadeval.report.fleet.drives import against, tags_in_words
 from roadeval.report.fleet.findings import FleetFindings, Row

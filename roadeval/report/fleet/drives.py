@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import number, percent, points
-from roadeval.evaluation.effects import BASES
+from roadeval.evaluation.score import BASES
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.charts.differences import MEAN, ForestRow, caption, forest
 from roadeval.report.fleet.findings import FleetFindings, Row

@@ -7,7 +7,7 @@ from typing import Final
 
 from roadeval.data.words import listing, percent, points, timestamp
 from roadeval.evaluation.metrics import SHORT
-from roadeval.evaluation.scored import FILTER
+from roadeval.evaluation.score import FILTER
 from roadeval.report.blocks import (
     Block,
     Command,

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from roadeval.data.words import DASH, percent
-from roadeval.evaluation import scored
+from roadeval.evaluation import score
 from roadeval.evaluation.metrics import FULL
 from roadeval.evaluation.settings import settings_of
 from roadeval.report.blocks import (
@@ -71,7 +71,7 @@ def _tables(findings: Findings) -> Iterator[Block]:
         yield _table(findings, names[place : place + together])
     size = findings.window_size
     long = "" if size == PAPER_WINDOW else f" The paper's rows are of {PAPER_WINDOW}."
-    rest = scored.each_window(findings.windows)["frames"][-1]
+    rest = score.each_window(findings.windows)["frames"][-1]
     short = f" The last row holds {rest}." if rest < size else ""
     yield Text(
         f"Rows of {size} evaluated frames: the mean of the frames' rates in percent.{long}{short} "
@@ -89,7 +89,7 @@ def _table(findings: Findings, rates: Sequence[str]) -> Table:
         place = places.get((name, findings.finals[name], window))
         return percent(None if place is None else float(windows[rate][place]))
 
-    each = scored.each_window(windows)
+    each = score.each_window(windows)
     spans = (each[name].tolist() for name in ("window", "first_frame", "last_frame"))
     rows: list[list[Cell | str]] = [
         [

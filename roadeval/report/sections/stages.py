@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
 from roadeval.data.words import DASH, number, percent, points
-from roadeval.evaluation.analysis import merged
 from roadeval.evaluation.metrics import SHORT, SHORT_OVERLAP
-from roadeval.evaluation.scored import FILTER
+from roadeval.evaluation.score import FILTER, merged
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.charts import rates
 from roadeval.report.findings import Findings

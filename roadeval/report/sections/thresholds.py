@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from roadeval.data.words import number, percent
-from roadeval.evaluation.thresholds import BINS
+from roadeval.evaluation.score import BINS
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.charts.thresholds import CAPTION, curves
 from roadeval.report.findings import Findings

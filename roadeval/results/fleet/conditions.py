@@ -10,8 +10,7 @@ from typing import Any
 
 from roadeval.data import OUTCOMES, Counts
 from roadeval.evaluation import metrics
-from roadeval.evaluation.comparison import Change
-from roadeval.evaluation.conditions import Condition, ConditionError
+from roadeval.evaluation.comparison import Change, Condition, ConditionError
 from roadeval.evaluation.metrics import METRICS
 from roadeval.results.comparison import judged
 from roadeval.results.schema import ALL

@@ -12,8 +12,8 @@ from typing import Any, Final
 
 from roadeval.data import OUTCOMES, Counts
 from roadeval.evaluation import metrics
-from roadeval.evaluation.effects import TESTED, Effect, corrected
 from roadeval.evaluation.metrics import METRICS
+from roadeval.evaluation.score import TESTED, Effect, corrected
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference, DriveMean, Stratum, over_drives, strata
 from roadeval.results.fleet.record import FAILED

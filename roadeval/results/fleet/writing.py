@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
-from roadeval.evaluation.conditions import Condition
+from roadeval.evaluation.comparison import Condition
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.fleet.conditions import DriveJudgement, judge_drives
 from roadeval.results.fleet.folder import check_format

@@ -5,9 +5,7 @@ import io
 from rich.console import Console
 
 from roadeval.cli.screens.compare import DRIVES, show
-from roadeval.evaluation.comparison import DriveChange
-from roadeval.evaluation.conditions import Condition
-from roadeval.evaluation.pairing import Kind, Note
+from roadeval.evaluation.comparison import Condition, DriveChange, Kind, Note
 from tests.evaluation.making import a_change, a_comparison, a_difference
 
 FEW = a_difference(1)

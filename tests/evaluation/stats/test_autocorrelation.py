@@ -6,8 +6,7 @@ from scipy import stats
 from scipy.fft import dct
 from scipy.linalg import toeplitz
 
-from roadeval.evaluation.stats import autocorrelation
-from roadeval.evaluation.stats.autocorrelation import mean_distribution
+from roadeval.evaluation.stats import autocorrelation, mean_distribution
 from tests.evaluation.making import autoregression
 
 INDEPENDENT = np.random.default_rng(1).standard_normal(400)

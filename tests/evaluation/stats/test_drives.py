@@ -9,11 +9,14 @@ import pytest
 from scipy import stats
 from statsmodels.stats.multitest import multipletests
 
-from roadeval.evaluation.stats import DriveMean, holm, over_drives, strata
-from roadeval.evaluation.stats.drives import (
+from roadeval.evaluation.stats import (
+    DriveMean,
+    holm,
+    over_drives,
     sign_flip_can_tell,
     sign_flip_interval,
     sign_flip_p,
+    strata,
 )
 
 
@@ -218,7 +221,6 @@ def test_eight_equal_values_have_an_interval_without_width(everywhere, p):
 def test_five_values_cannot_tell_at_95_percent():
     assert not sign_flip_can_tell(5, 0.95)
     assert sign_flip_can_tell(6, 0.95)
-    assert sign_flip_interval(values(5), 0.95) == (-np.inf, np.inf)
     assert not sign_flip_can_tell(7, 0.99)
     assert sign_flip_can_tell(8, 0.99)
 

@@ -4,7 +4,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from roadeval.evaluation.conditions import Condition, ConditionError
+from roadeval.evaluation.comparison import Condition, ConditionError
 from roadeval.results.fleet.conditions import check_conditions, judge_drives
 from roadeval.results.fleet.folder import Fleet
 from roadeval.results.fleet.metrics import junit_xml

@@ -9,12 +9,10 @@ from typing import Final
 import numpy as np
 
 from roadeval.data import Rows
-from roadeval.evaluation import scored
-from roadeval.evaluation.effects import TESTED
-from roadeval.evaluation.frame_counts import FourCounts
+from roadeval.evaluation.comparison.pairing import MaskPair
 from roadeval.evaluation.metrics import METRICS
-from roadeval.evaluation.pairing import MaskPair
 from roadeval.evaluation.regions import titles
+from roadeval.evaluation.score import TESTED, FourCounts, counts_of, most_changed
 
 NAMED: Final = 5
 """Frames that are named of those that changed most, in each direction, and of those on which masks
@@ -56,62 +54,33 @@ def moved_frames(result: str, mask: MaskPair) -> Iterator[MovedFrame]:
     before, after = (rates[:, place] for rates in mask.rates)
     stamps, changes = mask.after["stamp_ns"], after - before
     for harmed in (True, False):
-        for frame in scored.most_changed(stamps, changes, NAMED, harmed=harmed).tolist():
+        for frame in most_changed(stamps, changes, NAMED, harmed=harmed).tolist():
             was, change = float(before[frame]), float(changes[frame])
-            yield MovedFrame(
-                result=result,
-                variant=mask.variant,
-                frame=int(mask.after["frame"][frame]),
-                stamp_ns=int(stamps[frame]),
-                base=was,
-                new=was + change,
-                change=change,
-            )
+            number, stamp = int(mask.after["frame"][frame]), int(stamps[frame])
+            yield MovedFrame(result, mask.variant, number, stamp, was, was + change, change)
 
 
 def disagreements(table: Rows, frames: Rows, base: str, new: str) -> Iterator[Disagreement]:
     """Yield the frames on which two variants of a run disagree most; of neighbours only one.
 
-    Parameters
-    ----------
-    table
-        The rows of ``disagreements.csv``.
-    frames
-        Rows with the frames' stamps.
-    base, new
-        The variants.
+    ``table`` has the rows of ``disagreements``, ``frames`` rows with the frames' stamps.
     """
     pairs = ((base, new, "repaired", "spoiled"), (new, base, "spoiled", "repaired"))
     stamps = dict(zip(frames["frame"].tolist(), frames["stamp_ns"].tolist(), strict=True))
     for one, other, new_right, base_right in pairs:
         own = table.take((table["from_variant"] == one) & (table["to_variant"] == other))
         own = own.take(np.isin(own["frame"], [*stamps]) & (own["N"] > 0))
-        if not len(own):
-            continue
         mine, theirs = own[new_right] / own["N"], own[base_right] / own["N"]
         times = np.array([stamps[number] for number in own["frame"].tolist()], np.int64)
-        for place in scored.most_changed(times, mine + theirs, NAMED, harmed=True).tolist():
-            yield Disagreement(
-                result=new,
-                variant=new,
-                frame=int(own["frame"][place]),
-                stamp_ns=int(times[place]),
-                base_right=float(theirs[place]),
-                new_right=float(mine[place]),
-            )
+        for place in most_changed(times, mine + theirs, NAMED, harmed=True).tolist():
+            frame, right = int(own["frame"][place]), (float(theirs[place]), float(mine[place]))
+            yield Disagreement(new, new, frame, int(times[place]), *right)
 
 
 def region_counts(regions: Rows, variant: str, stage: str, frames: Rows) -> dict[str, FourCounts]:
     """Return a mask's counts by region, ``(n, 4)`` each; 0 on a frame that the table lacks.
 
-    Parameters
-    ----------
-    regions
-        The rows of ``regions.csv``.
-    variant, stage
-        Whose mask.
-    frames
-        The mask's rows of ``frames.csv``, in any order.
+    ``regions`` has the rows of ``regions``, ``frames`` the mask's rows of ``frames``, in any order.
     """
     numbers = frames["frame"]
     own = regions.take((regions["variant"] == variant) & (regions["stage"] == stage))
@@ -121,7 +90,7 @@ def region_counts(regions: Rows, variant: str, stage: str, frames: Rows) -> dict
     for name in own.distinct("region"):
         rows = own.take(own["region"] == name)
         found[name] = np.zeros((len(numbers), 4), np.int64)
-        found[name][order[np.searchsorted(numbers[order], rows["frame"])]] = scored.counts(rows)
+        found[name][order[np.searchsorted(numbers[order], rows["frame"])]] = counts_of(rows)
     return found
 
 
@@ -131,22 +100,18 @@ def parts_of(
     """Yield a mask's regions and shades: name, title, and the counts of both there.
 
     A region that is not the same pixels in both, as the shadow that another filter found, is left
-    out: its ERR would tell of other places. So is one without a labelled pixel.
+    out: its ERR would describe other places. So is one without a labelled pixel.
     """
+    alike = [name for name in base if name in new and _same_pixels(base[name], new[name])]
     for name, title in titles([*base]).items():
-        if name in new and _same_pixels(base[name], new[name]):
-            known = base[name].any(axis=1)
-            if known.any():
-                yield name, title, base[name][known], new[name][known]
+        known = base[name].any(axis=1)
+        if name in alike and known.any():
+            yield name, title, base[name][known], new[name][known]
     # True shadow counts where the log has it, else what both results detected alike.
-    alike = [
-        name
-        for name in SHADOWS
-        if name in base and name in new and _same_pixels(base[name], new[name])
-    ]
-    if not alike:
+    shadows = [name for name in SHADOWS if name in alike]
+    if not shadows:
         return
-    share = base[alike[0]].sum(axis=1) / np.maximum(mask.before["N"], 1)
+    share = base[shadows[0]].sum(axis=1) / np.maximum(mask.before["N"], 1)
     much = share >= max(np.sort(share)[-max(round(SHADED * len(share)), 1)], 1e-9)
     if much.any() and not much.all():
         before, after = mask.counts

@@ -41,7 +41,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from roadeval.errors import RoadevalError
-from roadeval.evaluation.comparison import Change, ComparedResult, Comparison
+from roadeval.evaluation.comparison.compare import Change, ComparedResult, Comparison
 from roadeval.evaluation.metrics import COMPARED, METRICS, OVERLAP
 from roadeval.evaluation.settings import EvaluationSettings
 
@@ -66,11 +66,7 @@ class ConditionError(RoadevalError):
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """A limit on a rate of a stage of a variant.
-
-    ``limit`` is in percentage points of change if ``is_change``, else in percent. If ``surely``,
-    the whole interval of the change must lie beyond it.
-    """
+    """A limit on a rate of a stage of a variant."""
 
     text: str
     stage: str
@@ -78,8 +74,10 @@ class Condition:
     rate: str
     operator: str
     limit: float
+    """In percentage points of change if ``is_change``, else in percent."""
     is_change: bool
     surely: bool = False
+    """Whether the whole interval of the change must lie beyond the limit."""
 
     @classmethod
     def parse(cls, text: str) -> Condition:
@@ -97,22 +95,22 @@ class Condition:
                 "number with pp (change) or % (level), as 'post.filtered.ERR > +0.5pp', and after "
                 "pp 'surely' where the whole interval must lie beyond it"
             )
-        if match["rate"] not in QUANTITIES:
+        stage, variant, rate, sign, number, unit, surely = match.groups()
+        if rate not in QUANTITIES:
             raise ConditionError(
-                f"{text!r}: there is no rate {match['rate']}; there are {', '.join(QUANTITIES)}"
+                f"{text!r}: there is no rate {rate}; there are {', '.join(QUANTITIES)}"
             )
-        if match["surely"]:
-            _check_certainty(text, match["rate"], match["unit"])
-        return cls(
-            " ".join(text.split()),
-            match["stage"],
-            match["variant"],
-            match["rate"],
-            match["operator"],
-            float(match["number"]),
-            match["unit"] == "pp",
-            match["surely"] is not None,
-        )
+        if surely and unit == "%":
+            raise ConditionError(
+                f"{text!r}: 'surely' asks for the interval of a change (pp); a level (%) is that "
+                "of the frames themselves and has none: leave out 'surely', or limit the change"
+            )
+        if surely and rate not in COMPARED:
+            raise ConditionError(
+                f"{text!r}: {rate} has no interval; 'surely' goes with {', '.join(COMPARED)}"
+            )
+        own, is_change = " ".join(text.split()), unit == "pp"
+        return cls(own, stage, variant, rate, sign, float(number), is_change, bool(surely))
 
     def judge(self, mask: Change) -> Judgement:
         """Judge the condition on what was found of the mask that it names.
@@ -124,23 +122,21 @@ class Condition:
         """
         before, after = mask.base.get(self.rate, math.nan), mask.new[self.rate]
         difference = mask.difference.get(self.rate) if self.is_change else None
-        value = after - before if self.is_change else after
-        low = high = None
+        value, low, high = after - before if self.is_change else after, None, None
         if difference is not None:
             value, low, high = difference.mean, difference.low, difference.high
         if math.isnan(value):
             raise ConditionError(f"{self.text}: undefined in {mask.result}, so not judged")
-        limited = value
+        limited: float | None = value
         if self.surely:
             # The end of the interval that is nearest to keeping the limit.
-            end = low if self.operator in (">", ">=") else high
-            if end is None:
-                assert difference is not None
-                raise ConditionError(
-                    f"{self.text}: not judged in {mask.result}, because "
-                    f"{difference.none_because}; replay more, or leave out 'surely'"
-                )
-            limited = end
+            limited = low if self.operator in (">", ">=") else high
+        if limited is None:
+            assert difference is not None
+            raise ConditionError(
+                f"{self.text}: not judged in {mask.result}, because "
+                f"{difference.none_because}; replay more, or leave out 'surely'"
+            )
         holds = OPERATORS[self.operator](100 * limited, self.limit)
         return Judgement(self, mask.result, mask.drives, before, after, value, low, high, holds)
 
@@ -153,7 +149,7 @@ class Judgement:
     result: str
     """Label of the new result."""
     drives: int
-    """How many tell."""
+    """How many it was judged on."""
     before: float
     after: float
     """The rate of the base, NaN for a level, and of the new result."""
@@ -168,41 +164,21 @@ class Judgement:
 def judge(
     comparison: Comparison, conditions: Sequence[Condition], settings: EvaluationSettings
 ) -> tuple[Judgement, ...]:
-    """Judge each condition on every result that it names a mask of.
-
-    Parameters
-    ----------
-    comparison
-        See `roadeval.evaluation.comparison.compare`.
-    conditions
-        In the order in which they are judged.
-    settings
-        How many frames it takes.
+    """Judge each condition, in order, on every result that it names a mask of.
 
     Raises
     ------
     ConditionError
         If a condition asks for what is not there, or for a change between different drives or
-        scales, or if too few frames tell.
+        scales, or if there are too few frames.
     """
     judgements = []
     for condition in conditions:
         for mask in _named(condition, comparison):
-            _check_frames(condition, mask, comparison.results, settings.least_frames)
+            if why := _unjudged(condition, mask, comparison.results, settings.least_frames):
+                raise ConditionError(f"{condition.text}: not judged, because {why}")
             judgements.append(condition.judge(mask))
     return tuple(judgements)
-
-
-def _check_certainty(text: str, rate: str, unit: str) -> None:
-    if unit == "%":
-        raise ConditionError(
-            f"{text!r}: 'surely' asks for the interval of a change (pp); a level (%) is that of "
-            "the frames themselves and has none: leave out 'surely', or limit the change"
-        )
-    if rate not in COMPARED:
-        raise ConditionError(
-            f"{text!r}: {rate} has no interval; 'surely' goes with {', '.join(COMPARED)}"
-        )
 
 
 def _named(condition: Condition, comparison: Comparison) -> list[Change]:
@@ -223,41 +199,30 @@ def _named(condition: Condition, comparison: Comparison) -> list[Change]:
     return named
 
 
-def _check_frames(
+def _unjudged(
     condition: Condition, mask: Change, results: Sequence[ComparedResult], least: int
-) -> None:
-    """Refuse a condition on a mask of which too few frames tell, or other frames than the base's.
-
-    Raises
-    ------
-    ConditionError
-        See `judge`.
-    """
-    not_judged = f"{condition.text}: not judged, because"
+) -> str:
+    """Return why a condition cannot be judged on a mask; empty where it can."""
     if not condition.is_change:
-        if mask.frames < least:
-            raise ConditionError(
-                f"{not_judged} {mask.result} has {mask.frames} evaluated frames, and {least} are "
-                "needed; replay more of it"
-            )
-        return
+        if mask.frames >= least:
+            return ""
+        few = f"{mask.result} has {mask.frames} evaluated frames, and {least} are needed"
+        return f"{few}; replay more of it"
     base, new = results[0], next(each for each in results if each.label == mask.result)
     names = f"{base.label} and {new.label}"
-    if base.scale is not None and new.scale is not None and base.scale != new.scale:
-        raise ConditionError(
-            f"{not_judged} {names} were replayed with `frames.scale` {base.scale:g} and "
-            f"{new.scale:g}; replay both at one scale, or limit in %"
+    if None not in (base.scale, new.scale) and base.scale != new.scale:
+        return (
+            f"{names} were replayed with `frames.scale` {base.scale:g} and {new.scale:g}; replay "
+            "both at one scale, or limit in %"
         )
     unit, common, smaller = "evaluated frames", mask.frames, min(base.frames, new.frames)
     if min(base.scored, new.scored) > 1:
         unit, common, smaller = "drives", mask.drives, min(base.scored, new.scored)
-    if mask.frames < least or 2 * common < smaller:
-        few = (
-            f"and {least} are needed"
-            if mask.frames < least
-            else f"fewer than half of the {smaller} of the smaller one"
-        )
-        raise ConditionError(
-            f"{not_judged} {names} have {common} {unit} in common, {few}; replay the same "
-            f"{'drives' if unit == 'drives' else 'range'} into both"
-        )
+    if mask.frames < least:
+        few = f"and {least} are needed"
+    elif 2 * common < smaller:
+        few = f"fewer than half of the {smaller} of the smaller one"
+    else:
+        return ""
+    same = "drives" if unit == "drives" else "range"
+    return f"{names} have {common} {unit} in common, {few}; replay the same {same} into both"

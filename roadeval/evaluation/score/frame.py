@@ -1,4 +1,4 @@
-"""One frame against its truth: counts, rates, error maps, health and notes."""
+"""One frame against its truth: counts, rates, error maps and health; and the baseline."""
 
 from __future__ import annotations
 
@@ -27,10 +27,12 @@ from roadeval.data import (
     ones,
 )
 from roadeval.data.arrays import Bits, Sums
-from roadeval.evaluation import counts, maps, metrics, regions
-from roadeval.evaluation.edges_and_flicker import boundary_f
-from roadeval.evaluation.maps import Name
+from roadeval.evaluation import metrics, regions
 from roadeval.evaluation.region import LabelledFrame
+from roadeval.evaluation.score.counts import Name, count, error_map
+from roadeval.evaluation.score.edges import boundary_f
+from roadeval.evaluation.score.maps import changes
+from roadeval.evaluation.score.thresholds import histogram
 from roadeval.evaluation.settings import (
     DEGRADED_ERR,
     DEGRADED_MARGIN,
@@ -38,10 +40,10 @@ from roadeval.evaluation.settings import (
     FAILED_FNR,
     EvaluationSettings,
 )
-from roadeval.evaluation.thresholds import histogram
 
 K = TypeVar("K", str, int)
 """What further masks are of: the stage that was replaced by the truth, or a training's seed."""
+Rates = Mapping[str, float]
 
 
 class CountsNotConservedError(RuntimeError):
@@ -75,22 +77,25 @@ def score_frame(
     if frame.truth is None:
         raise ValueError(f"frame {frame.number} is to be evaluated, but has no truth")
     truth = TruthBits.of(frame.truth)
-    masks = _masks(variants, prior, truth.shape)
-    bits = truth.bits_of(masks.values())
-    found = regions.of_frame(LabelledFrame(frame, truth, variants, settings))
-    tallies = tally(list(masks), bits, truth, found)
-    final_bits = {variant: mask for (variant, _), mask in zip(masks, bits, strict=True)}
+    masks = {(v.variant, stage): mask for v in variants for stage, mask in v.masks()}
+    if prior is not None:
+        masks[BASELINE, FINAL_STAGE] = prior.mask(truth.shape)
+    names, bits = list(masks), truth.bits_of(masks.values())
+    tallies = tally(
+        names, bits, truth, regions.of_frame(LabelledFrame(frame, truth, variants, settings))
+    )
     finals = {result.variant: result.rates for result in tallies}
     blind = finals.pop(BASELINE, None)
+    final_bits = {variant: mask for (variant, _), mask in zip(names, bits, strict=True)}
     return FrameResult(
         frame,
         role,
         variants,
-        errors={v.variant: counts.error_map(v.final(), frame.truth) for v in variants},
+        errors={v.variant: error_map(v.final(), frame.truth) for v in variants},
         tallies=tallies,
         health={name: judge(own, blind) for name, own in finals.items()},
         truth_bits=truth,
-        changes=maps.changes(list(masks), bits, truth),
+        changes=changes(names, bits, truth),
         contours=boundary_f(final_bits, truth, settings.boundary_width),
         histograms={
             (variant.variant, each.stage): histogram(each.output.probability, frame.truth)
@@ -114,7 +119,7 @@ def tally(
         If the counts of a mask do not add up to the labelled pixels, or its parts not to the
         whole.
     """
-    counted = counts.count(masks, truth, list(found.values()))
+    counted = count(masks, truth, list(found.values()))
     check_conserved(names, counted, list(found), ones(truth.labelled))
     tallies = []
     for (variant, stage), rows in zip(names, counted.tolist(), strict=True):
@@ -130,8 +135,7 @@ def check_conserved(
     """Check that ``TP + TN + FP + FN = N = pixels - ignored``, and that the regions add up.
 
     Where regions that together are the frame are among those ``found``, as the row bands are,
-    their counts must add up to the whole's. ``counted`` is as `roadeval.evaluation.counts.count`
-    returns it.
+    their counts must add up to the whole's. ``counted`` is what `count` returns.
     """
     whole = counted[:, 0]
     lost = (whole.sum(axis=1) != labelled) | (whole < 0).any(axis=1)
@@ -154,39 +158,27 @@ def _tallies(
     named: dict[K, dict[Name, Packed]] = {}
     for variant, further in variants.items():
         for key, masks in further.items():
-            own = {(variant, stage): mask for stage, mask in masks.items()}
-            named.setdefault(key, {}).update(own)
+            for stage, mask in masks.items():
+                named.setdefault(key, {})[variant, stage] = mask
     return {
         key: tally(list(masks), truth.bits_of(masks.values()), truth, {})
         for key, masks in named.items()
     }
 
 
-def _masks(
-    variants: Sequence[VariantResult], prior: BlindPrior | None, shape: tuple[int, int]
-) -> dict[Name, Packed]:
-    named = {(v.variant, stage): mask for v in variants for stage, mask in v.masks()}
-    if prior is not None:
-        named[BASELINE, FINAL_STAGE] = prior.mask(shape)
-    return named
-
-
-Rates = Mapping[str, float]
-
-
 def judge(rates: Rates, blind: Rates | None) -> Health:
     """Return a variant's health by its final mask's rates and the baseline's, if there is one.
 
-    An undefined rate counts neither for nor against it. The thresholds and their reasons stand in
-    `roadeval.evaluation.settings`.
+    An undefined rate counts neither for nor against it. `roadeval.evaluation.settings` gives the
+    thresholds and their reasons.
     """
     if rates["ERR"] >= FAILED_ERR or rates["FNR"] >= FAILED_FNR:
         return Health.FAILED
     worse = blind is not None and rates["ERR"] - blind["ERR"] > DEGRADED_MARGIN
-    if worse or rates["ERR"] >= DEGRADED_ERR:
-        return Health.DEGRADED
-    return Health.OK
+    return Health.DEGRADED if worse or rates["ERR"] >= DEGRADED_ERR else Health.OK
 
+
+# --- The baseline that does not look at the image -------------------------------------------------
 
 _NEAREST: Final = 0
 _LINEAR: Final = 1
@@ -199,20 +191,14 @@ class BlindPrior:
 
     road: npt.NDArray[np.float32]
     """``(H, W)`` float32: the share of the training frames in which a pixel was road, among those
-    that label it; 0 where none does.
-    """
+    that label it; 0 where none does."""
     _masks: dict[tuple[int, int], Packed] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of_truths(cls, truths: Sequence[Truth]) -> BlindPrior:
-        """Average the truths, each ``(H, W)`` uint8 with 255 for ignored.
+        """Average the truths, each ``(H, W)`` uint8 with 255 for ignored; a ValueError for none.
 
         Truths of another size than the first are brought to it, nearest pixel.
-
-        Raises
-        ------
-        ValueError
-            If there is none.
         """
         if not truths:
             raise ValueError("a prior needs at least one truth")

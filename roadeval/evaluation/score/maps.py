@@ -11,13 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Change, Layer, Transition, TruthBits, everywhere, ones
-from roadeval.data.arrays import Bits
-from roadeval.evaluation.counts import flat
+from roadeval.data.arrays import Bits, Sums
+from roadeval.evaluation.score.counts import Name, flat
 from roadeval.kernels import KERNELS
 
-Sums = npt.NDArray[np.int64]
-Name = tuple[str, str]
-"""A mask's variant and stage."""
 CELLS: Final = 160
 """Cells across the longer side of a heat map, at most."""
 PENDING: Final = 255
@@ -28,12 +25,11 @@ class HeatMap:
     """How often each pixel was labelled, and was a false positive or a false negative.
 
     Summed up in square cells, no more than `CELLS` across the longer side: a sum a pixel would be
-    a large part of a run's memory. Frames of another size than the first are left out, and counted.
+    a large part of a run's memory. Frames of another size than the first are left out.
     """
 
     def __init__(self) -> None:
         self.frames = 0
-        self.left_out = 0
         self._side = 1
         self._sums = np.zeros((3, 0, 0), np.int64)
         self._bytes = np.zeros((3, 0, 0), np.uint8)
@@ -45,7 +41,6 @@ class HeatMap:
             self._bytes = np.zeros((3, *errors.shape), np.uint8)
             self._sums = np.zeros((3, *(-(-n // self._side) for n in errors.shape)), np.int64)
         if errors.shape != self._bytes.shape[1:]:
-            self.left_out += 1
             return
         if self.frames and self.frames % PENDING == 0:
             self._carry()
@@ -53,13 +48,10 @@ class HeatMap:
         KERNELS.add_outcomes(errors, self._bytes)
 
     def cells(self) -> tuple[int, Sums]:
-        """Return the sums.
+        """Return the cells' side in pixels, and their sums.
 
-        Returns
-        -------
-        side, sums
-            The cells' side in pixels, and ``(3, rows, columns)`` int64: pixels that were labelled,
-            FP and FN, over all frames. The last row and column may be narrower.
+        These are ``(3, rows, columns)`` int64: pixels that were labelled, FP and FN, over all
+        frames. The last row and column may be narrower.
         """
         self._carry()
         return self._side, self._sums.copy()

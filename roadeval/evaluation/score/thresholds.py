@@ -2,7 +2,7 @@
 
 A stage that says how probable road is (`roadeval.data.Output.probability`) is one method for each
 threshold: road is what has at least that. All labelled pixels of a drive count alike, as in
-KITTI's road benchmark [1]_. Two integers a code are kept, so nothing here grows with the drive,
+KITTI's road benchmark [1]_. Two integers a code are kept, so memory does not grow with the drive,
 and the order of the frames makes no difference.
 
 References
@@ -15,15 +15,16 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import NON_ROAD, ROAD, Histogram, Probability, Truth
-from roadeval.evaluation.maps import Name
+from roadeval.data.arrays import Floats, Sums
+from roadeval.evaluation.score.counts import Name
 
 CODES: Final = 1 << 16
 """Codes of a probability: ``code / 65535`` is from 0 to 1."""
@@ -31,8 +32,6 @@ BINS: Final = 15
 """Bins of the calibration, equally wide, as many as in [1]_ of `calibration`."""
 LEVELS: Final = 256
 """Levels of the table: each holds as many codes as it."""
-
-Sums = npt.NDArray[np.int64]
 
 
 def histogram(probability: Probability, truth: Truth) -> Histogram:
@@ -77,80 +76,59 @@ class Thresholds:
         return cls(found, tp, fp, road, other)
 
     @property
-    def precision(self) -> npt.NDArray[np.float64]:
+    def precision(self) -> Floats:
         """``TP / (TP + FP)``."""
         return self.tp / (self.tp + self.fp)
 
     @property
-    def recall(self) -> npt.NDArray[np.float64]:
+    def recall(self) -> Floats:
         """``TP / (TP + FN)``, the TPR; NaN without road."""
         return self.tp / (self.road or math.nan)
 
     @property
-    def fpr(self) -> npt.NDArray[np.float64]:
+    def fpr(self) -> Floats:
         """``FP / (FP + TN)``; NaN without non-road."""
         return self.fp / (self.other or math.nan)
 
+    @property
+    def average_precision(self) -> float:
+        """AP, ``sum (R_k - R_(k-1)) P_k`` over falling thresholds; NaN without road.
 
-def average_precision(found: Thresholds) -> float:
-    """Compute AP: ``sum (R_k - R_(k-1)) P_k`` over falling thresholds; NaN without road.
+        Without interpolation, as scikit-learn's ``average_precision_score``; KITTI's and Pascal
+        VOC's interpolate precision and come out a little higher.
+        """
+        steps = np.diff(self.recall, prepend=0.0)
+        return float((steps * self.precision).sum()) if self.road else math.nan
 
-    Without interpolation, as scikit-learn's ``average_precision_score``; KITTI's and Pascal VOC's
-    interpolate precision and come out a little higher.
-    """
-    if not found.road:
-        return math.nan
-    steps = np.diff(found.recall, prepend=0.0)
-    return float((steps * found.precision).sum())
+    @property
+    def auc(self) -> float:
+        """The area under the ROC by the trapezoid rule; NaN without road or non-road.
 
+        It is the chance that of a road and a non-road pixel the road has the higher probability,
+        where equal ones count half.
+        """
+        x, y = (np.concatenate([[0.0], each]) for each in (self.fpr, self.recall))
+        return float(np.trapezoid(y, x)) if self.road and self.other else math.nan
 
-def roc_auc(found: Thresholds) -> float:
-    """Compute the area under the ROC by the trapezoid rule; NaN without road or non-road.
+    def max_f(self) -> dict[str, float | None]:
+        """Return MaxF, the greatest ``F = 2 TP / (2 TP + FP + FN)`` over thresholds, F1 in [1]_.
 
-    It is the chance that of a road and a non-road pixel the road has the higher probability, where
-    equal ones count half.
-    """
-    if not (found.road and found.other):
-        return math.nan
-    x, y = (np.concatenate([[0.0], each]) for each in (found.fpr, found.recall))
-    return float(np.trapezoid(y, x))
-
-
-@dataclass(frozen=True, slots=True)
-class BestF:
-    """The threshold of the greatest F, as a fraction; that F, its precision and its recall."""
-
-    f: float
-    threshold: float
-    precision: float
-    recall: float
-
-
-def max_f(found: Thresholds) -> BestF | None:
-    """Find MaxF: the greatest ``F = 2 TP / (2 TP + FP + FN)`` over thresholds, F1 in [1]_ above.
-
-    Of equal ones the highest threshold; None without road.
-    """
-    if not found.road:
-        return None
-    f = 2 * found.tp / (found.tp + found.fp + found.road)
-    best = int(f.argmax())
-    at = (f[best], found.codes[best] / (CODES - 1), found.precision[best], found.recall[best])
-    return BestF(*map(float, at))
+        With it the ``threshold`` as a fraction, of equal ones the highest, and the ``precision``
+        and ``recall`` there; all None without road.
+        """
+        names = "MaxF", "threshold", "precision", "recall"
+        if not self.road:
+            return dict.fromkeys(names)
+        f = 2 * self.tp / (self.tp + self.fp + self.road)
+        best = int(f.argmax())
+        at = f[best], self.codes[best] / (CODES - 1), self.precision[best], self.recall[best]
+        return dict(zip(names, map(float, at), strict=True))
 
 
-@dataclass(frozen=True, slots=True)
-class CalibrationBin:
-    """The pixels of a bin: how many, their mean probability, and which share of them is road."""
-
-    pixels: int
-    probability: float
-    road: float
-
-
-def calibration(counts: Sums, bins: int = BINS) -> tuple[CalibrationBin, ...]:
+def calibration(counts: Sums, bins: int = BINS) -> list[dict[str, float]]:
     """Return the bins of the reliability diagram that hold any pixel, from low to high.
 
+    Of each its ``pixels``, their mean ``probability``, and the share of them that is ``road``.
     Bin ``b`` of ``B`` holds probabilities in ``(b / B, (b + 1) / B]``, and the first one 0, too.
     In [1]_ bins are of the confidence in whichever class is called; here, with two classes, of the
     probability of road, as in scikit-learn's ``calibration_curve``.
@@ -171,31 +149,26 @@ def calibration(counts: Sums, bins: int = BINS) -> tuple[CalibrationBin, ...]:
     places = np.maximum(codes * bins - 1, 0) // (CODES - 1)
     pixels, road = (np.bincount(places, each, bins) for each in (counts.sum(axis=0), counts[1]))
     sums = np.bincount(places, counts.sum(axis=0) * codes, bins)
-    return tuple(
-        CalibrationBin(int(n), total / n / (CODES - 1), own / n)
+    return [
+        {"pixels": int(n), "probability": total / n / (CODES - 1), "road": own / n}
         for n, total, own in zip(pixels.tolist(), sums.tolist(), road.tolist(), strict=True)
         if n
-    )
+    ]
 
 
-def expected_calibration_error(bins: Sequence[CalibrationBin]) -> float:
+def calibration_error(bins: list[dict[str, float]]) -> float:
     """Compute ECE: ``sum n_b / N |road_b - probability_b|`` over bins; NaN without a pixel."""
-    total = sum(each.pixels for each in bins)
-    gaps = sum(each.pixels * abs(each.road - each.probability) for each in bins)
+    total = sum(each["pixels"] for each in bins)
+    gaps = sum(each["pixels"] * abs(each["road"] - each["probability"]) for each in bins)
     return gaps / total if total else math.nan
 
 
 class Curves:
-    """The labelled pixels of a drive by how probable road is, for each variant and stage.
-
-    Attributes
-    ----------
-    counts
-        ``(2, 65536)`` int64 by variant and stage: non-road and road.
-    """
+    """The labelled pixels of a drive by how probable road is, for each variant and stage."""
 
     def __init__(self) -> None:
         self.counts: Final[dict[Name, Sums]] = {}
+        """``(2, 65536)`` int64 each: non-road and road."""
         self._frames: Final[Counter[Name]] = Counter()
 
     def add(self, histograms: Mapping[Name, Histogram]) -> None:
@@ -209,26 +182,17 @@ class Curves:
     def totals(self) -> dict[str, dict[str, dict[str, Any]]]:
         """Return by variant and stage what is quoted of curves, fit for JSON.
 
-        ``AP``, ``AUC`` and ``ECE``; ``MaxF`` with the ``threshold`` where it is reached, and the
-        ``precision`` and ``recall`` there; the ``bins`` of the reliability diagram.
+        ``AP``, ``AUC`` and ``ECE``; what `Thresholds.max_f` finds; the ``bins`` of `calibration`.
         """
         found: dict[str, dict[str, dict[str, Any]]] = {}
         for (variant, stage), counts in self.counts.items():
-            own = {"frames": self._frames[variant, stage], **_quoted(counts)}
-            found.setdefault(variant, {})[stage] = own
+            thresholds, bins = Thresholds.of(counts), calibration(counts)
+            found.setdefault(variant, {})[stage] = {
+                "frames": self._frames[variant, stage],
+                "AP": thresholds.average_precision,
+                "AUC": thresholds.auc,
+                **thresholds.max_f(),
+                "ECE": calibration_error(bins),
+                "bins": bins,
+            }
         return found
-
-
-def _quoted(counts: Sums) -> dict[str, Any]:
-    thresholds, bins = Thresholds.of(counts), calibration(counts)
-    best = max_f(thresholds)
-    return {
-        "AP": average_precision(thresholds),
-        "AUC": roc_auc(thresholds),
-        "MaxF": None if best is None else best.f,
-        "threshold": None if best is None else best.threshold,
-        "precision": None if best is None else best.precision,
-        "recall": None if best is None else best.recall,
-        "ECE": expected_calibration_error(bins),
-        "bins": [asdict(each) for each in bins],
-    }

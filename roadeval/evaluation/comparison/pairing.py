@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.data import Rows
-from roadeval.evaluation import metrics, scored
-from roadeval.evaluation.frame_counts import FourCounts
+from roadeval.evaluation import metrics
+from roadeval.evaluation.score import FourCounts, counts_of, stages_of
 
 Places = npt.NDArray[np.intp]
 Rates = npt.NDArray[np.float64]
@@ -54,6 +54,10 @@ class Part(Protocol):
         """Return its rows of ``frames``, ``regions`` or ``disagreements``."""
 
 
+Pair = tuple[Part, Part]
+"""A drive in the base and in the new result."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Side:
     """One of the results that are compared."""
@@ -89,7 +93,7 @@ class Side:
 
 
 class Kind(StrEnum):
-    """What a note on a comparison tells."""
+    """The subject of a note on a comparison."""
 
     ABSENT = "absent"
     """Drives that the other result does not have."""
@@ -112,7 +116,7 @@ class Kind(StrEnum):
     SETTINGS = "settings"
     """Settings that both results do not share."""
     TRUTH = "truth"
-    """Frames whose truth is another; ``settings`` may explain that."""
+    """Frames whose truth differs; ``settings`` may explain that."""
     END_MISSING = "end_missing"
     """A result whose run was stopped: it holds a part of the drive."""
 
@@ -132,22 +136,16 @@ class Note:
     """Both values by the setting's name."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Match:
-    """The drives of two results."""
-
-    pairs: Sequence[tuple[Part, Part]]
-    """Those that both have scored, in the base's order."""
-    by_log: int
-    """How many of them have other names, and are the same by their log."""
-    left_out: Sequence[Note]
-    """All others, by the result that has them and by the reason."""
-
-
-def match_drives(base: Side, new: Side) -> Match:
+def match_drives(base: Side, new: Side) -> tuple[list[Pair], list[Note]]:
     """Match the drives of two results, each by its name, else by its log.
 
     One name with two different logs is no match: the difference would be the scene's.
+
+    Returns
+    -------
+    pairs, left_out
+        The drives that both have scored, in the base's order; and notes on all others, one for
+        each result and reason.
     """
     there = {part.drive: part for part in new.parts}
     names = {part.drive for part in base.parts}
@@ -171,14 +169,13 @@ def match_drives(base: Side, new: Side) -> Match:
     for part in new.parts:
         if part.drive not in taken:
             left[Kind.ABSENT, new.label, base.label].append(part.name)
-    notes = [Note(*key, len(names), tuple(names)) for key, names in left.items()]
-    return Match(pairs, sum(one.drive != other.drive for one, other in pairs), notes)
+    return pairs, [Note(*key, len(names), tuple(names)) for key, names in left.items()]
 
 
 def one_drive(sides: Sequence[Side]) -> list[Side] | None:
     """Return the results with the one drive that is compared; None where several are, or none."""
     base, *others = sides
-    pairs = [match_drives(base, new).pairs for new in others]
+    pairs = [match_drives(base, new)[0] for new in others]
     firsts = {id(own[0][0]) for own in pairs if own}
     if len(firsts) != 1 or any(len(own) != 1 for own in pairs):
         return None
@@ -212,13 +209,10 @@ class MaskPair:
     before: Rows
     after: Rows
 
-    def __len__(self) -> int:
-        return len(self.before)
-
     @property
     def counts(self) -> tuple[FourCounts, FourCounts]:
         """``(n, 4)`` each: TP, TN, FP, FN of the base and of the new result."""
-        return scored.counts(self.before), scored.counts(self.after)
+        return counts_of(self.before), counts_of(self.after)
 
     @property
     def rates(self) -> tuple[Rates, Rates]:
@@ -240,15 +234,15 @@ def common_masks(base: Rows, new: Rows, variant: str | None = None) -> list[Mask
     Final masks are matched with final masks, whatever their stage is called, others by their stage.
     With ``variant`` the base's masks are taken for this variant's.
     """
-    last, last_new = scored.final_stages(base), scored.final_stages(new)
+    last, last_new = stages_of(base), stages_of(new)
     others = {(name, stage): places for name, stage, places in new.masks()}
     found = []
     for name, stage, places in base.masks():
         called, final = variant or name, stage == last[name]
-        if called not in last_new:
+        theirs = last_new.get(called) if final else stage
+        if theirs is None or (called, theirs) not in others:
             continue
-        theirs = last_new[called] if final else stage
-        if (called, theirs) not in others or (theirs == last_new[called] and not final):
+        if not final and theirs == last_new[called]:
             continue
         own, new_own = base.take(places), new.take(others[called, theirs])
         mine, matching = matched(own["stamp_ns"], new_own["stamp_ns"])
@@ -261,28 +255,14 @@ def common_masks(base: Rows, new: Rows, variant: str | None = None) -> list[Mask
 def matched(base: npt.NDArray[np.int64], new: npt.NDArray[np.int64]) -> tuple[Places, Places]:
     """Return the places of the stamps that both have, in the base's order.
 
-    Equal stamps are told apart by their order.
+    Frames with equal stamps are matched in their order.
 
     >>> [places.tolist() for places in matched(np.array([5, 7, 7, 9]), np.array([7, 4, 7, 5]))]
     [[0, 1, 2], [3, 0, 2]]
     """
-    if np.array_equal(base, new):
-        every = np.arange(len(base))
-        return every, every
-    _, codes = np.unique(np.concatenate([base, new]), return_inverse=True)
-    before, after = (
-        codes[part] * (len(codes) + 1) + _occurrences(codes[part])
-        for part in (slice(len(base)), slice(len(base), None))
-    )
-    _, mine, theirs = np.intersect1d(before, after, return_indices=True)
-    order = np.argsort(mine)
-    return mine[order], theirs[order]
-
-
-def _occurrences(codes: Places) -> Places:
-    """Return how often each value has come before: 0 at its first place."""
-    order = np.argsort(codes, kind="stable")
-    ordered = codes[order]
-    before = np.empty(len(codes), np.intp)
-    before[order] = np.arange(len(codes)) - np.searchsorted(ordered, ordered)
-    return before
+    there: defaultdict[int, deque[int]] = defaultdict(deque)
+    for place, stamp in enumerate(new.tolist()):
+        there[stamp].append(place)
+    pairs = [(n, there[stamp].popleft()) for n, stamp in enumerate(base.tolist()) if there[stamp]]
+    mine, theirs = np.array(pairs, np.intp).reshape(-1, 2).T
+    return mine, theirs

@@ -10,28 +10,35 @@ Where one drive is compared, intervals are those of its frames; where several ar
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
 
 from roadeval.data import BASELINE, UNFILTERED, Counts, Rows
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import metrics, scored
-from roadeval.evaluation.effects import TESTED
-from roadeval.evaluation.frame_counts import FourCounts, means
-from roadeval.evaluation.metrics import COMPARED, METRICS
-from roadeval.evaluation.pairing import (
+from roadeval.evaluation import metrics
+from roadeval.evaluation.comparison.pairing import (
     Kind,
     MaskPair,
-    Match,
     Note,
+    Pair,
     Part,
     Side,
     common_masks,
     match_drives,
 )
+from roadeval.evaluation.comparison.where import (
+    Disagreement,
+    MovedFrame,
+    disagreements,
+    moved_frames,
+    parts_of,
+    region_counts,
+)
+from roadeval.evaluation.metrics import COMPARED, METRICS
+from roadeval.evaluation.score import TESTED, FourCounts, Name, counts_of, means, stages_of
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import (
     Difference,
@@ -44,17 +51,7 @@ from roadeval.evaluation.stats import (
     strata,
     within_drive,
 )
-from roadeval.evaluation.where import (
-    Disagreement,
-    MovedFrame,
-    disagreements,
-    moved_frames,
-    parts_of,
-    region_counts,
-)
 
-Mask = tuple[str, str]
-"""Variant and stage."""
 FALSE: Final = 0.05
 """The share of the drives called changed that may be false, on average."""
 _OF_THE_LOG: Final = ("topics.", "labels.", "frames.every", "frames.scale")
@@ -244,7 +241,7 @@ def compare(
     sides
         Two at least, the base first.
     settings
-        Confidence and the rest of the intervals' making.
+        Confidence and least number of frames of the intervals.
     across_variants
         Whether each side is one variant of the same result, to be matched with another one.
 
@@ -258,27 +255,31 @@ def compare(
             raise ComparisonError(f"{side.label}: nothing was scored, so nothing can be compared")
     base, *others = sides
     if across_variants:
-        same = Match([(part, part) for part in base.scored], 0, [])
-        matches = [same] * len(others)
+        matches: list[tuple[list[Pair], list[Note]]] = [
+            ([(part, part) for part in base.scored], []) for _ in others
+        ]
     else:
         matches = [match_drives(base, new) for new in others]
-    if not all(match.pairs for match in matches):
-        return _side_by_side(sides, matches, settings)
+    for new, (pairs, _) in zip(others, matches, strict=True):
+        if not pairs:
+            return _side_by_side(sides, new, settings)
     found = [
-        _Against(base, new, match, settings, across_variants=across_variants)
+        _Against(base, new, *match, settings, across=across_variants)
         for new, match in zip(others, matches, strict=True)
     ]
     frames = [found[0].base_frames, *(each.new_frames for each in found)]
     changes = [change for each in found for change in each.changes()]
+    regions = [row for each in found for row in each.regions()]
+    corrected = holm([row.difference for row in regions])
     return Comparison(
         paired=True,
         results=tuple(_result(*each) for each in zip(sides, frames, strict=True)),
-        changed_settings=tuple(note for each in found for note in each.changed_settings()),
+        changed_settings=tuple(each.changed for each in found if each.changed.settings),
         changes=tuple(_corrected(changes)),
-        levels=tuple(row for each in found for row in each.levels.rows()),
+        levels=tuple(row for each in found for row in _changes(each.label, each.levels)),
         drives=tuple(row for each in found for row in each.drives()),
         strata=tuple(row for each in found for row in each.strata()),
-        regions=_corrected_regions([row for each in found for row in each.regions()]),
+        regions=tuple(replace(r, difference=d) for r, d in zip(regions, corrected, strict=True)),
         moved=tuple(frame for each in found for frame in each.moved),
         disagreements=tuple(frame for each in found for frame in each.disagreements),
         notes=tuple(note for each in found for note in each.notes()),
@@ -286,23 +287,23 @@ def compare(
     )
 
 
-def _side_by_side(
-    sides: Sequence[Side], matches: Sequence[Match], settings: EvaluationSettings
-) -> Comparison:
-    levels = [_Levels(side.label) for side in sides]
-    for side, own in zip(sides, levels, strict=True):
+def _side_by_side(sides: Sequence[Side], other: Side, settings: EvaluationSettings) -> Comparison:
+    """Give each result's own rates where ``other`` has no drive in common with the base."""
+    rows: list[Change] = []
+    results = []
+    for side in sides:
+        masks, frames = _Masks(list), 0
         for part in side.scored:
-            own.add(part, part.group or part.drive, side.rows(part, "frames"))
-    rows = tuple(row for own in levels for row in own.rows())
-    counted = zip(sides, (own.frames for own in levels), strict=True)
-    other = next(new for new, match in zip(sides[1:], matches, strict=True) if not match.pairs)
-    apart = sides[0], other
-    unknown = [s.label for s in apart if any(part.digest is None for part in s.scored)]
+            table = side.rows(part, "frames")
+            frames += _add_levels(masks, part, part.group or part.drive, table)
+        rows += _changes(side.label, masks)
+        results.append(_result(side, frames))
     note = Note(Kind.OTHER_DRIVES, sides[0].label, other.label)
-    if unknown:
-        note = Note(Kind.LOG_UNKNOWN, unknown[0])
-    results = tuple(_result(*each) for each in counted)
-    return Comparison(False, results, (), rows, rows, (), (), (), (), (), (note,), settings)
+    for side in (other, sides[0]):
+        if any(part.digest is None for part in side.scored):
+            note = Note(Kind.LOG_UNKNOWN, side.label)
+    made, levels = tuple(results), tuple(rows)
+    return Comparison(False, made, (), levels, levels, (), (), (), (), (), (note,), settings)
 
 
 def _result(side: Side, frames: int) -> ComparedResult:
@@ -321,90 +322,103 @@ def _result(side: Side, frames: int) -> ComparedResult:
 
 def _corrected(changes: Sequence[Change]) -> Iterator[Change]:
     """Correct the changes of ERR of final masks, but for the baseline's, for how many they are."""
-    told = [each.final and each.variant != BASELINE for each in changes]
-    family = (each.difference[TESTED] for each, own in zip(changes, told, strict=True) if own)
-    found = iter(holm([*family]))
-    for each, own in zip(changes, told, strict=True):
+    family = [each.final and each.variant != BASELINE for each in changes]
+    tested = [each.difference[TESTED] for each, own in zip(changes, family, strict=True) if own]
+    found = iter(holm(tested))
+    for each, own in zip(changes, family, strict=True):
         difference = {TESTED: next(found)} if own else {}
         yield replace(each, difference={**each.difference, **difference})
 
 
-def _corrected_regions(rows: Sequence[RegionChange]) -> tuple[RegionChange, ...]:
-    found = holm([row.difference for row in rows])
-    return tuple(replace(row, difference=each) for row, each in zip(rows, found, strict=True))
-
-
-# --- One new result against the base --------------------------------------------------------------
+# --- Masks, drive by drive ------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sum:
     """A mask's frames on one drive, summed up."""
 
-    drive: str
-    group: str
-    frames: int
     means: Mapping[str, float]
     counts: FourCounts
     """``(4,)``."""
 
     @classmethod
-    def of(cls, drive: str, group: str, counts: FourCounts) -> _Sum:
-        return cls(drive, group, len(counts), means(metrics.table(counts)), counts.sum(axis=0))
-
-
-def _mean(sums: Sequence[_Sum], rate: str) -> float:
-    """Average drives as their differences are, so that these lie between two rates."""
-    own = group_means(DriveMean(each.drive, each.group, each.means[rate]) for each in sums)
-    return float(own.mean()) if len(own) else np.nan
-
-
-def _rates(sums: Sequence[_Sum]) -> dict[str, float]:
-    """Return the means over drives, and the rates of all their pixels together."""
-    total = Counts(*np.sum([each.counts for each in sums], axis=0).tolist())
-    pooled = {f"pooled_{name}": value for name, value in metrics.of(total).items()}
-    return {name: _mean(sums, name) for name in METRICS} | pooled | metrics.overlap(total)
-
-
-class _Levels:
-    """A result's own rates, whatever the base has."""
-
-    def __init__(self, label: str) -> None:
-        self.label: Final = label
-        self.frames = 0
-        self._sums: Final[defaultdict[Mask, list[_Sum]]] = defaultdict(list)
-        self._final: Final[dict[Mask, bool]] = {}
-
-    def add(self, part: Part, group: str, rows: Rows) -> None:
-        """Add a drive."""
-        self.frames += len(np.unique(rows["frame"]))
-        last = scored.final_stages(rows)
-        for variant, stage, places in rows.masks():
-            mask, counts = (variant, stage), scored.counts(rows.take(places))
-            self._sums[mask].append(_Sum.of(part.drive, group, counts))
-            self._final[mask] = self._final.get(mask, True) and stage == last[variant]
-
-    def rows(self) -> Iterator[Change]:
-        """Yield a row a mask."""
-        for mask, own in self._sums.items():
-            frames, rates = sum(each.frames for each in own), _rates(own)
-            final = self._final[mask]
-            yield Change(self.label, *mask, final, len(own), frames, {}, rates, {})
+    def of(cls, counts: FourCounts) -> _Sum:
+        return cls(means(metrics.table(counts)), counts.sum(axis=0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _OnDrive:
-    """What a mask, or a region of it, changed on one drive."""
+    """A mask, or a region of it, on one drive."""
 
-    name: str
-    base: _Sum
+    part: Part
+    group: str
+    frames: int
     new: _Sum
-    means: Mapping[str, float]
+    base: _Sum | None = None
+    """None where nothing is subtracted, and there are no differences."""
+    means: Mapping[str, float] = field(default_factory=dict)
     """Of the frames' differences, by rate."""
-    within: Mapping[str, Difference]
+    within: Mapping[str, Difference] = field(default_factory=dict)
     """Those of which an interval is asked for."""
     final: bool = True
     title: str = ""
+
+    def mean(self, means: Mapping[str, float], rate: str) -> DriveMean:
+        """Return one of its means as a drive of its group."""
+        return DriveMean(self.part.drive, self.group, means[rate])
+
+
+_Masks = defaultdict[Name, list[_OnDrive]]
+"""Drives by variant and stage, or region."""
+
+
+def _add_levels(masks: _Masks, part: Part, group: str, rows: Rows) -> int:
+    """Add a result's own rates on a drive, whatever the base has; return how many frames it has."""
+    last = stages_of(rows)
+    for variant, stage, places in rows.masks():
+        own, final = counts_of(rows.take(places)), stage == last[variant]
+        drive = _OnDrive(part, group, len(own), _Sum.of(own), final=final)
+        masks[variant, stage].append(drive)
+    return len(np.unique(rows["frame"]))
+
+
+def _mean(own: Sequence[_OnDrive], sums: Sequence[_Sum], rate: str) -> float:
+    """Average drives as their differences are, so that these lie between two rates."""
+    drives = [each.mean(known.means, rate) for each, known in zip(own, sums, strict=True)]
+    known = group_means(drives)
+    return float(known.mean()) if len(known) else np.nan
+
+
+def _rates(own: Sequence[_OnDrive], sums: Sequence[_Sum]) -> dict[str, float]:
+    """Return the means over drives, and the rates of all their pixels together."""
+    if not sums:
+        return {}
+    total = Counts(*np.sum([each.counts for each in sums], axis=0).tolist())
+    pooled = {f"pooled_{name}": value for name, value in metrics.of(total).items()}
+    return {name: _mean(own, sums, name) for name in METRICS} | pooled | metrics.overlap(total)
+
+
+def _changes(
+    label: str,
+    masks: _Masks,
+    differences: Callable[[list[_OnDrive]], Mapping[str, Difference]] = lambda _: {},
+) -> Iterator[Change]:
+    """Yield a row a mask."""
+    for mask, own in masks.items():
+        yield Change(
+            result=label,
+            variant=mask[0],
+            stage=mask[1],
+            final=all(each.final for each in own),
+            drives=len(own),
+            frames=sum(each.frames for each in own),
+            base=_rates(own, [each.base for each in own if each.base]),
+            new=_rates(own, [each.new for each in own]),
+            difference=differences(own),
+        )
+
+
+# --- One new result against the base --------------------------------------------------------------
 
 
 class _Against:
@@ -414,34 +428,41 @@ class _Against:
         self,
         base: Side,
         new: Side,
-        match: Match,
+        pairs: Sequence[Pair],
+        left_out: Sequence[Note],
         settings: EvaluationSettings,
         *,
-        across_variants: bool,
+        across: bool,
     ) -> None:
-        self._base, self._new, self._match, self._settings = base, new, match, settings
-        self._across: Final = across_variants
-        self._several: Final = len(match.pairs) > 1
-        self.base_frames = 0
-        self.levels: Final = _Levels(new.label)
-        self._left = [0, 0]
+        self.label: Final = new.label
+        self._base, self._new, self._settings, self._across = base, new, settings, across
+        self._several: Final = len(pairs) > 1
+        self._left_out: Final = left_out
+        self._same_logs: Final = sum(one.drive != other.drive for one, other in pairs)
+        self.changed: Final = Note(
+            Kind.SETTINGS, base.label, new.label, settings=_changed_settings(pairs)
+        )
+        """All settings that are others in the new result."""
+        self.base_frames = self.new_frames = 0
+        self._lost = [0, 0]
         self._relabelled = 0
         self._apart: Final[list[str]] = []
         self._uncommon: Final[dict[str, None]] = {}
-        self._masks: Final[defaultdict[Mask, list[_OnDrive]]] = defaultdict(list)
-        self._regions: Final[defaultdict[Mask, list[_OnDrive]]] = defaultdict(list)
-        self.moved: tuple[MovedFrame, ...] = ()
-        self.disagreements: tuple[Disagreement, ...] = ()
+        self.levels: Final = _Masks(list)
+        self._masks: Final = _Masks(list)
+        self._regions: Final = _Masks(list)
+        self.moved: list[MovedFrame] = []
+        self.disagreements: list[Disagreement] = []
         firsts: dict[str | None, str] = {}
         for part in new.scored:
             firsts.setdefault(part.digest, part.drive)
-        before = {id(own): other for other, own in match.pairs}
+        before = {id(own): other for other, own in pairs}
         for part in new.scored:
             rows = new.rows(part, "frames")
             other = before.get(id(part))
             # Copies of a log count as one drive.
             group = part.group or (other and other.group) or firsts[part.digest]
-            self.levels.add(part, group, rows)
+            self.new_frames += _add_levels(self.levels, part, group, rows)
             if other is not None:
                 self._add(other, part, group, base.rows(other, "frames"), rows)
         if not self._masks:
@@ -450,61 +471,51 @@ class _Against:
                 "nothing can be compared; replay the same range into both"
             )
 
-    @property
-    def new_frames(self) -> int:
-        """Frames of the new result."""
-        return self.levels.frames
-
     def _add(self, base: Part, new: Part, group: str, before: Rows, after: Rows) -> None:
         """Add a drive that both have."""
-        masks = common_masks(before, after, self._new.label if self._across else None)
+        masks = common_masks(before, after, self.label if self._across else None)
         self.base_frames += len(np.unique(before["frame"]))
         if not masks:
             self._apart.append(new.name)
             return
-        for place, rows in enumerate((before, after)):
-            common = [(mask.before, mask.after)[place]["frame"] for mask in masks]
-            own = len(np.unique(rows["frame"])) - len(np.unique(np.concatenate(common)))
-            self._left[place] += own
+        common = [mask.before["frame"] for mask in masks], [mask.after["frame"] for mask in masks]
+        for place, (rows, own) in enumerate(zip((before, after), common, strict=True)):
+            self._lost[place] += len(np.unique(rows["frame"])) - len(np.unique(np.concatenate(own)))
         differing = [mask.before["frame"][mask.truth_differs] for mask in masks]
         self._relabelled += len(np.unique(np.concatenate(differing)))
-        compared = {mask.variant for mask in masks}
         if not self._across:
-            theirs = set(after.distinct("variant")) - compared
+            theirs = set(after.distinct("variant")) - {mask.variant for mask in masks}
             self._uncommon.update(
                 dict.fromkeys(v for v in before.distinct("variant") if v in theirs)
             )
+        regions = self._base.rows(base, "regions"), self._new.rows(new, "regions")
         for mask in masks:
+            chosen = mask.final and mask.variant != BASELINE
             tested = COMPARED
             if self._several:
-                tested = (TESTED,) if mask.final and mask.variant != BASELINE else ()
+                tested = (TESTED,) if chosen else ()
             made = self._on_drive(new, group, mask.counts, tested)
             self._masks[mask.variant, mask.stage].append(replace(made, final=mask.final))
-        regions = self._base.rows(base, "regions"), self._new.rows(new, "regions")
-        for mask in (mask for mask in masks if mask.final and mask.variant != BASELINE):
-            self._add_regions(new, group, mask, *regions)
+            if chosen:
+                self._add_regions(new, group, mask, *regions)
         if not self._several:
             first = next((mask for mask in masks if mask.final), masks[-1])
-            self.moved = tuple(moved_frames(self._new.label, first))
+            self.moved = list(moved_frames(self.label, first))
             if self._across:
-                table, names = new.rows("disagreements"), (self._base.label, self._new.label)
-                self.disagreements = tuple(disagreements(table, masks[0].after, *names))
+                table, names = new.rows("disagreements"), (self._base.label, self.label)
+                self.disagreements = list(disagreements(table, masks[0].after, *names))
 
     def _on_drive(
-        self,
-        part: Part,
-        group: str,
-        counts: tuple[FourCounts, FourCounts],
-        tested: Collection[str],
+        self, part: Part, group: str, counts: tuple[FourCounts, ...], tested: Sequence[str]
     ) -> _OnDrive:
         before, after = (metrics.table(each) for each in counts)
-        columns = {name: place for place, name in enumerate(METRICS) if name in tested}
         within = {
             name: within_drive(after[:, place], before[:, place], self._settings)
-            for name, place in columns.items()
+            for place, name in enumerate(METRICS)
+            if name in tested
         }
-        base, new = (_Sum.of(part.drive, group, each) for each in counts)
-        return _OnDrive(part.name, base, new, means(after - before), within)
+        base, new = map(_Sum.of, counts)
+        return _OnDrive(part, group, len(before), new, base, means(after - before), within)
 
     def _add_regions(self, part: Part, group: str, mask: MaskPair, base: Rows, new: Rows) -> None:
         """Add what changed by region and shade in a final mask that looks at the image."""
@@ -516,32 +527,33 @@ class _Against:
             made = self._on_drive(part, group, (counts[0], counts[1]), tested)
             self._regions[mask.variant, region].append(replace(made, title=title))
 
+    def _difference(self, own: Sequence[_OnDrive], rate: str) -> Difference:
+        """Return the difference within the one drive, or over several."""
+        if not self._several:
+            return own[0].within[rate]
+        drives = [each.mean(each.means, rate) for each in own]
+        better = METRICS[rate].higher_is_better
+        return over_drives(drives, self._settings.confidence, higher_is_better=better)
+
     def changes(self) -> Iterator[Change]:
         """Yield a row for each mask that both have."""
-        for mask, own in self._masks.items():
-            yield Change(
-                result=self._new.label,
-                variant=mask[0],
-                stage=mask[1],
-                final=all(each.final for each in own),
-                drives=len(own),
-                frames=sum(each.base.frames for each in own),
-                base=_rates([each.base for each in own]),
-                new=_rates([each.new for each in own]),
-                difference={rate: self._difference(own, rate) for rate in COMPARED},
-            )
+        return _changes(
+            self.label,
+            self._masks,
+            lambda own: {rate: self._difference(own, rate) for rate in COMPARED},
+        )
 
     def regions(self) -> Iterator[RegionChange]:
         """Yield what changed by region and shade."""
         for (variant, region), own in self._regions.items():
             yield RegionChange(
-                result=self._new.label,
+                result=self.label,
                 variant=variant,
                 region=region,
                 title=own[0].title,
-                frames=sum(each.base.frames for each in own),
-                base=_mean([each.base for each in own], TESTED),
-                new=_mean([each.new for each in own], TESTED),
+                frames=sum(each.frames for each in own),
+                base=_mean(own, [each.base for each in own if each.base], TESTED),
+                new=_mean(own, [each.new for each in own], TESTED),
                 difference=self._difference(own, TESTED),
             )
 
@@ -551,75 +563,60 @@ class _Against:
             values = benjamini_hochberg([each.within[TESTED].p for each in own])
             rows = [
                 DriveChange(
-                    *(self._new.label, variant, stage, each.name, each.base.frames),
-                    *(each.base.means[TESTED], each.new.means[TESTED], each.within[TESTED], q),
+                    *(self.label, variant, stage, each.part.name, each.frames),
+                    *(base.means[TESTED], each.new.means[TESTED], each.within[TESTED], q),
                 )
                 for each, q in zip(own, values, strict=True)
+                if (base := each.base)
             ]
             yield from sorted(rows, key=_surest)
 
     def strata(self) -> Iterator[StratumChange]:
         """Yield the changes of final masks by the new result's tags."""
-        tags = {part.drive: part.tags for part in self._new.parts}
-        keys = sorted({key for own in tags.values() for key in own})
+        keys = sorted({key for part in self._new.parts for key in part.tags})
         for (variant, stage), own in self._tested():
-            values = {key: [tags[each.new.drive].get(key) for each in own] for key in keys}
-            drives = [_drive_mean(each, TESTED) for each in own]
+            values = {key: [each.part.tags.get(key) for each in own] for key in keys}
+            drives = [each.mean(each.means, TESTED) for each in own]
             for stratum in strata(drives, values, {}, self._settings.confidence):
-                yield StratumChange(self._new.label, variant, stage, stratum)
+                yield StratumChange(self.label, variant, stage, stratum)
 
-    def _tested(self) -> Iterator[tuple[Mask, list[_OnDrive]]]:
+    def _tested(self) -> Iterator[tuple[Name, list[_OnDrive]]]:
         """Yield the final masks of several drives."""
         for mask, own in self._masks.items() if self._several else ():
             if kept := [each for each in own if TESTED in each.within]:
                 yield mask, kept
 
-    def _difference(self, own: Sequence[_OnDrive], rate: str) -> Difference:
-        """Return the difference within the one drive, or over several."""
-        if not self._several:
-            return own[0].within[rate]
-        drives = [_drive_mean(each, rate) for each in own]
-        better = METRICS[rate].higher_is_better
-        return over_drives(drives, self._settings.confidence, higher_is_better=better)
-
-    def changed_settings(self) -> Iterator[Note]:
-        """Yield the settings that are others in the new result, if there are any."""
-        if differing := self._differing():
-            yield Note(Kind.SETTINGS, self._base.label, self._new.label, settings=differing)
-
-    def _differing(self) -> dict[str, tuple[Any, Any]]:
-        """Return both values of the settings that both know and do not share."""
-        found: dict[str, tuple[Any, Any]] = {}
-        for base, new in self._match.pairs:
-            own, other = base.asked, new.asked
-            for name in own:
-                if name in other and own[name] != other[name]:
-                    found.setdefault(name, (own[name], other[name]))
-        return found
-
     def notes(self) -> Iterator[Note]:
         """Yield what was left out, and what makes the two less comparable than they look."""
-        base, new = self._base.label, self._new.label
-        yield from self._match.left_out
+        base, new = self._base.label, self.label
+        yield from self._left_out
         if apart := self._apart:
             yield Note(Kind.NO_FRAME, new, base, len(apart), tuple(apart))
-        if self._several and self._match.by_log:
-            yield Note(Kind.SAME_LOGS, base, new, self._match.by_log)
-        for label, other, frames in zip((base, new), (new, base), self._left, strict=True):
+        if self._several and self._same_logs:
+            yield Note(Kind.SAME_LOGS, base, new, self._same_logs)
+        for label, other, frames in zip((base, new), (new, base), self._lost, strict=True):
             if frames:
                 yield Note(Kind.FRAMES, label, other, frames)
         for variant in self._uncommon:
             if all(variant != mask[0] for mask in self._masks):
                 yield Note(Kind.VARIANT, base, new, names=(variant,))
-        of_the_log = {k: v for k, v in self._differing().items() if k.startswith(_OF_THE_LOG)}
+        changed = self.changed.settings
+        of_the_log = {name: both for name, both in changed.items() if name.startswith(_OF_THE_LOG)}
         if of_the_log:
-            yield Note(Kind.SETTINGS, base, new, settings=of_the_log)
+            yield replace(self.changed, settings=of_the_log)
         if self._relabelled:
             yield Note(Kind.TRUTH, base, new, self._relabelled, settings=of_the_log)
 
 
-def _drive_mean(own: _OnDrive, rate: str) -> DriveMean:
-    return DriveMean(own.new.drive, own.new.group, own.means[rate])
+def _changed_settings(pairs: Sequence[Pair]) -> dict[str, tuple[Any, Any]]:
+    """Return both values of the settings that both know and do not share."""
+    found: dict[str, tuple[Any, Any]] = {}
+    for base, new in pairs:
+        own, other = base.asked, new.asked
+        for name in own:
+            if name in other and own[name] != other[name]:
+                found.setdefault(name, (own[name], other[name]))
+    return found
 
 
 def _surest(row: DriveChange) -> tuple[float, float, str]:

@@ -1,0 +1,62 @@
+"""The comparison of results: what changed on the same frames, and the limits that it must keep."""
+
+from roadeval.evaluation.comparison.compare import (
+    FALSE,
+    Change,
+    ComparedResult,
+    Comparison,
+    ComparisonError,
+    DriveChange,
+    RegionChange,
+    StratumChange,
+    compare,
+    variants_as_sides,
+)
+from roadeval.evaluation.comparison.conditions import Condition, ConditionError, Judgement, judge
+from roadeval.evaluation.comparison.pairing import (
+    Kind,
+    Note,
+    Part,
+    Side,
+    common_masks,
+    match_drives,
+    matched,
+    one_drive,
+)
+from roadeval.evaluation.comparison.where import (
+    Disagreement,
+    MovedFrame,
+    disagreements,
+    parts_of,
+    region_counts,
+)
+
+__all__ = [
+    "FALSE",
+    "Change",
+    "ComparedResult",
+    "Comparison",
+    "ComparisonError",
+    "Condition",
+    "ConditionError",
+    "Disagreement",
+    "DriveChange",
+    "Judgement",
+    "Kind",
+    "MovedFrame",
+    "Note",
+    "Part",
+    "RegionChange",
+    "Side",
+    "StratumChange",
+    "common_masks",
+    "compare",
+    "disagreements",
+    "judge",
+    "match_drives",
+    "matched",
+    "one_drive",
+    "parts_of",
+    "region_counts",
+    "variants_as_sides",
+]

@@ -1,0 +1,217 @@
+"""Pixels by outcome (section 5): counted in every mask of a frame, and summed up over frames."""
+
+from __future__ import annotations
+
+from array import array
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import ERRORS, OUTCOMES, Counts, Layer, Mask, Tally, Truth, TruthBits, everywhere
+from roadeval.data.arrays import Bits, Floats, Sums
+from roadeval.evaluation import metrics
+from roadeval.kernels import KERNELS
+
+Name = tuple[str, str]
+"""A mask's variant and stage."""
+FourCounts = npt.NDArray[np.int64]
+"""``(n, 4)``: TP, TN, FP, FN of each frame."""
+Total = dict[str, Any]
+"""See `sum_up`."""
+
+
+# --- One frame ------------------------------------------------------------------------------------
+
+
+def count(masks: Bits, truth: TruthBits, regions: Sequence[Bits]) -> Sums:
+    """Count TP, TN, FP and FN of each mask, in the whole frame and in each region.
+
+    Parameters
+    ----------
+    masks
+        ``(K, H, words)``: road.
+    truth
+        Ignored pixels are in no count.
+    regions
+        R of ``(H, words)``; they may overlap.
+
+    Returns
+    -------
+    numpy.ndarray
+        ``(K, 1 + R, 4)`` int64: of each mask the whole frame's four, then each region's.
+    """
+    inside = flat([everywhere(truth.shape), *regions])
+    classes = flat([truth.road, truth.other])
+    positives, negatives = KERNELS.count_bits(inside[:1], classes, inside)[0]
+    tp, fp = KERNELS.count_bits(flat(masks), classes, inside).transpose(1, 0, 2)
+    return np.stack([tp, negatives - fp, fp, positives - tp], axis=2)
+
+
+def error_map(mask: Mask, truth: Truth) -> Layer:
+    """Classify each pixel by its outcome, as in `roadeval.data.ERRORS`.
+
+    ``mask`` is ``(H, W)`` uint8, 0 or 1; ``truth`` too, and 255 where it is ignored.
+    """
+    return Layer(ERRORS, KERNELS.outcomes(mask, truth))
+
+
+def flat(masks: Bits | Sequence[Bits]) -> Bits:
+    """Lay each mask's rows one after the other: ``(K, H * words)``."""
+    stacked = np.asarray(masks, np.uint64)
+    return stacked.reshape(len(stacked), stacked.shape[1] * stacked.shape[2])
+
+
+# --- Many frames ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameCounts:
+    """The counts of one stage of one variant, frame by frame."""
+
+    variant: str
+    stage: str
+    positions: npt.NDArray[np.int64]
+    """``(n,)`` int64: places among the evaluated frames, rising. A mask that the log itself carries
+    may be missing on some."""
+    counts: FourCounts
+
+    @property
+    def rates(self) -> Floats:
+        """``(n, m)`` float64: the rates in the order of `roadeval.evaluation.metrics.METRICS`."""
+        return metrics.table(self.counts)
+
+    def paired(self, base: FrameCounts) -> tuple[Floats, Floats]:
+        """Return the rates of both masks on the frames that both have, ``(n, m)`` each."""
+        _, mine, theirs = np.intersect1d(self.positions, base.positions, return_indices=True)
+        return self.rates[mine], base.rates[theirs]
+
+
+class GrowingCounts:
+    """Counts of one mask, added frame by frame: 20 bytes each."""
+
+    def __init__(self) -> None:
+        self._positions = array("I")
+        self._counts = array("I")
+
+    def append(self, position: int, counts: Counts) -> None:
+        """Add the counts of the evaluated frame at ``position``, counted from 0."""
+        self._positions.append(position)
+        self._counts.extend((counts.tp, counts.tn, counts.fp, counts.fn))
+
+    def so_far(self, variant: str, stage: str) -> FrameCounts:
+        """Return what was added, as counts of this mask."""
+        counts = np.array(self._counts, np.int64).reshape(-1, 4)
+        return FrameCounts(variant, stage, np.array(self._positions, np.int64), counts)
+
+
+class RegionSums:
+    """Totals of each mask and region, without keeping the frames."""
+
+    def __init__(self) -> None:
+        size = 1 + len(OUTCOMES) + 2 * len(metrics.METRICS)
+        self._sums: Final[defaultdict[tuple[str, str, str], Floats]] = defaultdict(
+            lambda: np.zeros(size)
+        )
+        """Frames, counts, sums of rates, and on how many frames each rate is defined."""
+
+    def add(self, tallies: Sequence[Tally]) -> None:
+        """Add a frame; a region without a labelled pixel does not count."""
+        found = {
+            (t.variant, t.stage, name): own for t in tallies for name, own in t.regions.items()
+        }
+        counts = np.array([(c.tp, c.tn, c.fp, c.fn) for c in found.values()], np.int64)
+        counts = counts.reshape(-1, 4)
+        rates = metrics.table(counts)
+        known = ~np.isnan(rates)
+        columns = counts.any(axis=1), counts, np.where(known, rates, 0.0), known
+        for name, row in zip(found, np.column_stack(columns), strict=True):
+            self._sums[name] += row
+
+    def totals(self) -> dict[tuple[str, str, str], Total]:
+        """Sum up by variant, stage and region: see `sum_up`."""
+        first = 1 + len(OUTCOMES)
+        return {
+            name: _total(int(row[0]), row[1:first].astype(np.int64), *row[first:].reshape(2, -1))
+            for name, row in self._sums.items()
+        }
+
+
+def sum_up(counts: FourCounts) -> Total:
+    """Sum up a drive: frames, counts, mean rates (the paper's), pooled rates, undefined ones.
+
+    A rate that is undefined on a frame is left out of its mean, and counted in ``undefined``.
+    """
+    rates = metrics.table(counts)
+    known = ~np.isnan(rates)
+    sums = np.where(known, rates, 0.0).sum(axis=0)
+    return _total(len(counts), counts.sum(axis=0), sums, known.sum(axis=0))
+
+
+def means(rates: Floats) -> dict[str, float]:
+    """Average rates over frames, ``(n, m)``; NaN where a rate is defined on none."""
+    known = ~np.isnan(rates)
+    return _means(np.where(known, rates, 0.0).sum(axis=0), known.sum(axis=0))
+
+
+def _means(sums: Floats, defined: npt.NDArray[Any]) -> dict[str, float]:
+    average = np.divide(sums, defined, out=np.full(len(sums), np.nan), where=defined > 0)
+    return dict(zip(metrics.METRICS, average.tolist(), strict=True))
+
+
+def _total(frames: int, counts: FourCounts, sums: Floats, defined: npt.NDArray[Any]) -> Total:
+    pooled = Counts(*counts.tolist())
+    undefined = (frames - defined.astype(np.int64)).tolist()
+    return {
+        "frames": frames,
+        **dict(zip((*OUTCOMES, "N"), (*counts.tolist(), pooled.n), strict=True)),
+        **_means(sums, defined),
+        **{f"pooled_{name}": value for name, value in metrics.of(pooled).items()},
+        "undefined": dict(zip(metrics.METRICS, undefined, strict=True)),
+    }
+
+
+# --- Windows: the paper's rows of ten frames ------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """One stage of one variant over consecutive evaluated frames."""
+
+    number: int
+    """From 0."""
+    first_frame: int
+    last_frame: int
+    """Frame numbers of the window's ends, both inclusive."""
+    frames: int
+    """Evaluated frames that have this mask; the last window may hold fewer than the others."""
+    variant: str
+    stage: str
+    rates: dict[str, float]
+    """Mean of the frames' rates, an undefined one left out (the paper's average)."""
+    pooled: dict[str, float]
+    """The rates of the summed counts."""
+
+
+def cut(mask: FrameCounts, frame_numbers: Sequence[int], size: int) -> Iterator[Window]:
+    """Cut a drive into windows of ``size`` consecutive evaluated frames.
+
+    ``frame_numbers`` are those of all evaluated frames, in order.
+    """
+    window_of, rates = mask.positions // size, mask.rates
+    for number in np.unique(window_of).tolist():
+        here = slice(*np.searchsorted(window_of, [number, number + 1]))
+        last = min((number + 1) * size, len(frame_numbers)) - 1
+        yield Window(
+            number=number,
+            first_frame=frame_numbers[number * size],
+            last_frame=frame_numbers[last],
+            frames=here.stop - here.start,
+            variant=mask.variant,
+            stage=mask.stage,
+            rates=means(rates[here]),
+            pooled=metrics.of(Counts(*mask.counts[here].sum(axis=0).tolist())),
+        )

@@ -1,0 +1,279 @@
+"""What the rows of a result's tables say: totals, windows, causes, worst frames, regions.
+
+Everything is computed from the tables alone, so that a recording of a run that was killed is
+understood as well as a complete one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import FILTERED, OUTCOMES, UNFILTERED, Counts, Rows
+from roadeval.data.arrays import Floats
+from roadeval.evaluation import metrics
+from roadeval.evaluation.regions import partitions
+from roadeval.evaluation.score.counts import FourCounts, FrameCounts, Total, Window, cut, sum_up
+from roadeval.evaluation.score.effects import final_stages
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FILTER: Final = "filter"
+"""The part of an error rate that the filter caused, beside the stages'."""
+
+Ints = npt.NDArray[np.int64]
+
+
+def stages_of(rows: Rows) -> dict[str, str]:
+    """Return each variant's final stage: ``post``, or the last that it has."""
+    return final_stages((variant, stage) for variant, stage, _ in rows.masks())
+
+
+def each_window(windows: Rows) -> Rows:
+    """Return one row of each window, in order, with the most ``frames`` that a mask has there."""
+    numbers, first, place = np.unique(windows["window"], return_index=True, return_inverse=True)
+    most = np.zeros(len(numbers), np.int64)
+    np.maximum.at(most, place, windows["frames"])
+    return windows.take(first).replace(frames=most)
+
+
+def finals(rows: Rows) -> Rows:
+    """Return the rows of each variant's final mask."""
+    last = stages_of(rows)
+    own = [places for variant, stage, places in rows.masks() if stage == last[variant]]
+    return rows.take(np.sort(np.concatenate(own)) if own else slice(0))
+
+
+def counts_of(rows: Rows) -> FourCounts:
+    """Return the counts of rows, ``(n, 4)`` int64."""
+    return np.stack([rows[name] for name in OUTCOMES], axis=1)
+
+
+def totals(rows: Rows) -> dict[str, dict[str, Total]]:
+    """Sum up the rows of ``frames`` by variant and stage, as in ``summary.json``."""
+    sums: dict[str, dict[str, Total]] = {}
+    for variant, stage, places in rows.masks():
+        sums.setdefault(variant, {})[stage] = sum_up(counts_of(rows.take(places)))
+    return sums
+
+
+def region_totals(regions: Rows) -> dict[tuple[str, str, str], Total]:
+    """Sum up the rows of ``regions`` by variant, stage and region, frames that have it alone."""
+    table, found = counts_of(regions), {}
+    for variant, stage, places in regions.masks():
+        names = regions["region"][places]
+        for region in dict.fromkeys(names.tolist()):
+            known = table[places[names == region]]
+            found[variant, stage, region] = sum_up(known[known.any(axis=1)])
+    return found
+
+
+def overlap(total: Mapping[str, Any]) -> dict[str, float]:
+    """Compute IoU, F1 and precision of a total's pooled counts."""
+    return metrics.overlap(Counts(*(total[name] for name in OUTCOMES)))
+
+
+def mask_counts(rows: Rows) -> Iterator[FrameCounts]:
+    """Yield the counts of each variant's stages, in the table's order."""
+    places = {number: place for place, number in enumerate(rows.distinct("frame"))}
+    for variant, stage, chosen in rows.masks():
+        own = rows.take(chosen)
+        positions = np.array([places[number] for number in own["frame"].tolist()], np.int64)
+        yield FrameCounts(variant, stage, positions, counts_of(own))
+
+
+def windows(rows: Rows, size: int) -> Iterator[Window]:
+    """Cut the drive into windows of ``size`` evaluated frames, one mask after the other."""
+    numbers = rows.distinct("frame")
+    for mask in mask_counts(rows):
+        yield from cut(mask, numbers, size)
+
+
+def merged(chains: Iterable[Iterable[str]]) -> list[str]:
+    """Return the names of several chains in one order, which is that of each chain where it can be.
+
+    >>> merged([("similarity", "svm", "post"), ("trees", "post")])
+    ['similarity', 'svm', 'trees', 'post']
+    """
+    names: list[str] = []
+    for chain in chains:
+        place = len(names)
+        for name in reversed(list(chain)):
+            if name in names:
+                place = names.index(name)
+            else:
+                names.insert(place, name)
+    return names
+
+
+# --- Which stage broke it -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Causes:
+    """Each frame's error rate, taken apart."""
+
+    frames: Ints
+    """``(n,)`` int64, rising."""
+    parts: dict[str, Floats]
+    """``(n,)`` float64 each, by the stage or `FILTER` that caused it, in order."""
+
+    def of(self, frame: int) -> dict[str, float]:
+        """Return the parts of a frame's error rate."""
+        place = int(np.searchsorted(self.frames, frame))
+        return {name: float(part[place]) for name, part in self.parts.items()}
+
+    def means(self) -> dict[str, float]:
+        """Return the mean of each part; NaN where it is defined on no frame."""
+        known = {name: part[~np.isnan(part)] for name, part in self.parts.items()}
+        return {name: float(part.mean()) if len(part) else np.nan for name, part in known.items()}
+
+
+def causes(rows: Rows, variant: str) -> Causes:
+    """Take each frame's error rate apart, stage by stage.
+
+    The final mask's ERR is a sum: the ERR of the mask that the final stage was given, as it is
+    without the filter; what the filter changed in that mask (`FILTER`, where both default
+    variants ran); and what the final stage changed. The parts add up to ERR exactly. A variant of
+    one stage has one part.
+    """
+    own = rows.of_variant(variant)
+    frames = np.unique(own["frame"])
+    mine = _errors(own, frames)
+    if len(mine) == 1:
+        return Causes(frames, mine)
+    *_, before, last = mine
+    parts = {before: mine[before]}
+    if variant == FILTERED:
+        without = _errors(rows.of_variant(UNFILTERED), frames)
+        if before in without:
+            parts = {before: without[before], FILTER: mine[before] - without[before]}
+    return Causes(frames, {**parts, last: mine[last] - mine[before]})
+
+
+def _errors(own: Rows, frames: Ints) -> dict[str, Floats]:
+    """Return a variant's ERR on frames by its stages, in the order they ran; NaN where unknown."""
+    found = {}
+    for _, stage, places in own.masks():
+        found[stage] = np.full(len(frames), np.nan)
+        chosen = places[np.isin(own["frame"][places], frames)]
+        found[stage][np.searchsorted(frames, own["frame"][chosen])] = own["ERR"][chosen]
+    return found
+
+
+# --- Frames worth opening -------------------------------------------------------------------------
+
+
+def worst(rows: Rows, variant: str, count: int, apart_ns: int | None = None) -> Rows:
+    """Pick at most ``count`` frames with the highest final ERR of a variant, the worst first.
+
+    Neighbours fail alike, so of frames less than ``apart_ns`` apart only the worst is picked: by
+    default a thirtieth of the drive, and at most a second.
+    """
+    own = finals(rows.of_variant(variant))
+    own = own.take(~np.isnan(own["ERR"]))
+    ranked = np.argsort(-own["ERR"], kind="stable")
+    return own.take(_apart(own["stamp_ns"], ranked, count, apart_ns))
+
+
+def most_changed(stamps: Ints, changes: Floats, count: int, *, harmed: bool) -> Ints:
+    """Return the places of the frames whose ERR rose most (``harmed``) or fell most.
+
+    Only frames that did rise, or fall, and of neighbours only one, as in `worst`.
+    """
+    sign = 1 if harmed else -1
+    ranked = np.argsort(-sign * changes, kind="stable")
+    return _apart(stamps, ranked[sign * changes[ranked] > 0], count)
+
+
+def _apart(stamps: Ints, ranked: Ints, count: int, apart_ns: int | None = None) -> Ints:
+    """Return the first ``count`` places of a ranking that are no neighbours of one before."""
+    if apart_ns is None:
+        apart_ns = min(int(np.ptp(stamps)) // 30, 1_000_000_000) if len(stamps) else 0
+    places: list[int] = []
+    for place in ranked.tolist():
+        if len(places) == count:
+            break
+        if (np.abs(stamps[places] - stamps[place]) >= apart_ns).all():
+            places.append(place)
+    return np.array(places, np.int64)
+
+
+# --- Tables of a report ---------------------------------------------------------------------------
+
+
+def final_frames(frames: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of each variant's final mask, as `finals` does for rows of arrays."""
+    masks = frames[["variant", "stage"]].drop_duplicates()
+    last = final_stages(masks.itertuples(index=False))
+    return frames[frames["stage"] == frames["variant"].map(last)]
+
+
+def pairs(frames: pd.DataFrame, treated: str, control: str) -> pd.DataFrame:
+    """Subtract the final masks' rates frame by frame, ``treated`` minus ``control``.
+
+    Returns
+    -------
+    DataFrame
+        Indexed by ``frame``, in the drive's order; ``stamp_ns``, a column a rate, and the net
+        change of wrong pixels as ``wrong``.
+    """
+    last = final_frames(frames)
+    columns = ["stamp_ns", *OUTCOMES, *metrics.METRICS]
+    mine, theirs = (
+        last[last["variant"] == name].set_index("frame")[columns] for name in (treated, control)
+    )
+    mine, theirs = mine.align(theirs, join="inner", axis=0)
+    found = mine[[*metrics.METRICS]] - theirs[[*metrics.METRICS]]
+    found["wrong"] = mine[["FP", "FN"]].sum(axis=1) - theirs[["FP", "FN"]].sum(axis=1)
+    found.insert(0, "stamp_ns", mine["stamp_ns"])
+    return found
+
+
+def by_region(regions: pd.DataFrame) -> pd.DataFrame:
+    """Pool the final masks' counts by variant and region.
+
+    Returns
+    -------
+    DataFrame
+        ``variant``, ``region``, the counts, the rates of short tables, and ``pixels`` and
+        ``errors``: the region's share of all labelled pixels, and of all wrong ones.
+    """
+    sums = final_frames(regions).groupby(["variant", "region"], sort=False)[[*OUTCOMES]].sum()
+    counts = [Counts(*row) for row in sums.to_numpy().tolist()]
+    for name, metric in metrics.SHORT.items():
+        sums[name] = [metric.function(each) for each in counts]
+    table = sums.reset_index()
+    wrong, labelled = table["FP"] + table["FN"], table[[*OUTCOMES]].sum(axis=1)
+    halves = table["region"].isin(next(iter(partitions(table["region"].unique().tolist())), []))
+    for column, share in (("pixels", labelled), ("errors", wrong)):
+        whole = share[halves].groupby(table["variant"]).sum()
+        table[column] = share / table["variant"].map(whole)
+    return table
+
+
+def perfect_stages(oracles: pd.DataFrame, frames: pd.DataFrame) -> pd.DataFrame:
+    """Average the final masks' rates once a stage was replaced by the truth.
+
+    Returns
+    -------
+    DataFrame
+        ``variant``, ``oracle``, the rates of short tables, the ``frames`` they are known on, and
+        ``as_is``: the ERR on the same frames as it really is. Empty if nothing was counted.
+    """
+    import pandas as pd
+
+    if not len(oracles):
+        return pd.DataFrame()
+    last = oracles.groupby(["variant", "oracle"], sort=False)["stage"].transform("last")
+    own = final_frames(frames)[["frame", "variant", "ERR"]].rename(columns={"ERR": "as_is"})
+    both = oracles[oracles["stage"] == last].merge(own, on=["frame", "variant"])
+    grouped = both.groupby(["variant", "oracle"], sort=False)
+    sums = grouped[[*metrics.SHORT, "as_is"]].mean()
+    sums["frames"] = grouped.size()
+    return sums.reset_index()

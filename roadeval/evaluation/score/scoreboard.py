@@ -1,0 +1,241 @@
+"""The scoreboard of a drive: frames are scored one by one, added in order and summed up."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any, Final
+
+import numpy as np
+
+from roadeval.data import (
+    BASELINE,
+    FILTERED,
+    UNFILTERED,
+    Change,
+    Frame,
+    FrameResult,
+    Role,
+    Tally,
+    Transition,
+    VariantResult,
+)
+from roadeval.data.arrays import Sums
+from roadeval.evaluation.metrics import COMPARED, METRICS
+from roadeval.evaluation.score.counts import (
+    FrameCounts,
+    GrowingCounts,
+    Name,
+    RegionSums,
+    Total,
+    Window,
+    cut,
+    sum_up,
+)
+from roadeval.evaluation.score.edges import EdgesAndFlicker
+from roadeval.evaluation.score.effects import Effect, drive_effects, evidence
+from roadeval.evaluation.score.frame import BlindPrior, score_frame
+from roadeval.evaluation.score.maps import HeatMap, Maps
+from roadeval.evaluation.score.thresholds import Curves
+from roadeval.evaluation.settings import EvaluationSettings
+
+Totals = dict[str, dict[str, Total]]
+"""By variant and stage."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DriveSums:
+    """The content of the drive's tables of sums.
+
+    Windows, changes of masks, heat maps, and pixels by how probable road is.
+    """
+
+    windows: Sequence[Window]
+    changes: Mapping[Transition, Change]
+    heat: Mapping[str, HeatMap]
+    probabilities: Mapping[Name, Sums]
+
+
+class _Masks:
+    """The counts of masks, added frame by frame."""
+
+    def __init__(self) -> None:
+        self._counts: Final[defaultdict[Name, GrowingCounts]] = defaultdict(GrowingCounts)
+
+    def add(self, position: int, tallies: Sequence[Tally]) -> None:
+        """Add the evaluated frame at ``position``, counted from 0."""
+        for tally in tallies:
+            self._counts[tally.variant, tally.stage].append(position, tally.counts)
+
+    def so_far(self) -> dict[Name, FrameCounts]:
+        """Return what was added, mask by mask as they first came."""
+        return {name: counts.so_far(*name) for name, counts in self._counts.items()}
+
+
+class Scoreboard:
+    """Scores frames against their truth and sums up the drive.
+
+    Parameters
+    ----------
+    settings
+        What is counted, and how it is judged.
+    variants
+        The names of all variants, in the order of the tables.
+    prior
+        The ``blind`` baseline, or None where no frame with truth was trained on.
+    """
+
+    def __init__(
+        self, settings: EvaluationSettings, variants: Sequence[str], prior: BlindPrior | None
+    ) -> None:
+        if BASELINE in variants:
+            raise ValueError(f"no variant may be called {BASELINE!r}")
+        self._settings: Final = settings
+        self._order: Final = (*variants, BASELINE)
+        self._prior: Final = prior
+        self._frames: Final[list[int]] = []
+        self._roles: Final[Counter[str]] = Counter()
+        self._health: Final[defaultdict[str, Counter[str]]] = defaultdict(Counter)
+        self._counts: Final = _Masks()
+        self._oracles: Final[defaultdict[str, _Masks]] = defaultdict(_Masks)
+        self._repeats: Final[defaultdict[int, _Masks]] = defaultdict(_Masks)
+        self._regions: Final = RegionSums()
+        self._maps: Final = Maps()
+        self._curves: Final = Curves()
+        self._edges: Final = EdgesAndFlicker(settings.boundary_width)
+        self._seconds: Final[defaultdict[Name, list[float]]] = defaultdict(lambda: [0.0, 0])
+
+    def score(self, frame: Frame, role: Role, variants: tuple[VariantResult, ...]) -> FrameResult:
+        """Score one frame; changes nothing, so any thread may call it at any time."""
+        return score_frame(frame, role, variants, self._settings, self._prior)
+
+    def add(self, result: FrameResult) -> None:
+        """Add a scored frame: in the drive's order, from one thread."""
+        self._roles[result.role] += 1
+        self._edges.add(result)
+        for variant in result.variants:
+            for stage in variant.stages:
+                spent = self._seconds[variant.variant, stage.stage]
+                spent[0] += stage.seconds
+                spent[1] += 1
+        if not result.tallies:
+            return
+        for name, health in result.health.items():
+            self._health[name][health] += 1
+        position = len(self._frames)
+        self._counts.add(position, result.tallies)
+        for oracle, tallies in result.oracles.items():
+            self._oracles[oracle].add(position, tallies)
+        for seed, tallies in result.repeats.items():
+            self._repeats[seed].add(position, tallies)
+        self._regions.add(result.tallies)
+        self._maps.add(result.errors, result.changes)
+        self._curves.add(result.histograms)
+        self._frames.append(result.frame.number)
+
+    def lose(self) -> None:
+        """Note that a frame was read here and could not be decoded."""
+        self._edges.interrupt()
+
+    def sums(self) -> DriveSums:
+        """Sum up the drive for its tables; nothing without a score."""
+        maps, curves = self._maps, self._curves
+        return DriveSums(tuple(self.windows()), maps.changes, maps.heat, curves.counts)
+
+    def roles(self) -> dict[str, int]:
+        """Count the frames added so far by role."""
+        return {str(role): count for role, count in self._roles.items()}
+
+    def totals(self) -> Totals:
+        """Sum up by variant and stage: see `roadeval.evaluation.score.sum_up`."""
+        return _totals(self._masks())
+
+    def oracles(self) -> dict[str, dict[str, dict[str, Total]]]:
+        """Sum up by variant, stage replaced by the truth, and stage after it, as in `totals`."""
+        sums: dict[str, dict[str, dict[str, Total]]] = {}
+        for oracle, masks in self._oracles.items():
+            for variant, own in _totals([*masks.so_far().values()]).items():
+                sums.setdefault(variant, {})[oracle] = own
+        return sums
+
+    def regions(self) -> dict[tuple[str, str, str], Total]:
+        """Sum up by variant, stage and region, as in `totals`."""
+        return self._regions.totals()
+
+    def windows(self) -> Iterator[Window]:
+        """Cut the drive into windows: by window, then variant and stage."""
+        rows = (cut(mask, self._frames, self._settings.window) for mask in self._masks())
+        return heapq.merge(*rows, key=attrgetter("number"))
+
+    def effects(self) -> list[Effect]:
+        """Return the paired differences of the drive."""
+        return drive_effects(self._masks(), self._settings)
+
+    def repeats(self) -> dict[str, Any]:
+        """Return the rates with each seed, in their order: first those of the run's own.
+
+        Returns
+        -------
+        dict
+            ``totals``, by variant and stage the mean and the pooled rates; ``difference``, by stage
+            the mean paired differences, filtered minus unfiltered. Empty without a further seed.
+            A mask that no training has to do with is not in it.
+        """
+        further = [masks.so_far() for _, masks in sorted(self._repeats.items())]
+        if not further:
+            return {}
+        own = {(mask.variant, mask.stage): mask for mask in self._masks()}
+        trainings, names = [own, *further], [name for name in own if name in further[-1]]
+        totals: dict[str, dict[str, dict[str, list[float]]]] = {}
+        difference: dict[str, dict[str, list[float]]] = {}
+        for name in names:
+            sums = [sum_up(training[name].counts) for training in trainings]
+            totals.setdefault(name[0], {})[name[1]] = {
+                rate: [each[rate] for each in sums]
+                for rate in (*METRICS, *(f"pooled_{rate}" for rate in METRICS))
+            }
+        for variant, stage in names:
+            if variant == FILTERED and (UNFILTERED, stage) in names:
+                each = [_mean_difference(training, stage) for training in trainings]
+                difference[stage] = {rate: [one[rate] for one in each] for rate in COMPARED}
+        return {"totals": totals, "difference": difference}
+
+    def summary(self) -> dict[str, Any]:
+        """Return the parts of ``summary.json`` that the evaluation knows, fit for JSON."""
+        seconds: dict[str, dict[str, float]] = {}
+        for (variant, stage), (total, runs) in self._seconds.items():
+            seconds.setdefault(variant, {})[stage] = total / runs
+        curves = self._curves.totals()
+        return {
+            "totals": self.totals(),
+            "beyond": self._edges.totals(),
+            **({"curves": curves} if curves else {}),
+            "oracles": self.oracles(),
+            "windows": -(-len(self._frames) // self._settings.window),
+            "claims": evidence(self.windows(), self._settings.window),
+            "health": {name: dict(counted) for name, counted in self._health.items()},
+            "seconds": seconds,
+        }
+
+    def _masks(self) -> list[FrameCounts]:
+        """Return the counts by variant in the tables' order, then by stage as they ran."""
+        masks = self._counts.so_far().values()
+        return sorted(masks, key=lambda mask: self._order.index(mask.variant))
+
+
+def _totals(masks: Sequence[FrameCounts]) -> Totals:
+    sums: Totals = {}
+    for mask in masks:
+        sums.setdefault(mask.variant, {})[mask.stage] = sum_up(mask.counts)
+    return sums
+
+
+def _mean_difference(training: Mapping[Name, FrameCounts], stage: str) -> dict[str, float]:
+    """Return the mean difference of each rate, filtered minus unfiltered."""
+    new, base = training[FILTERED, stage].paired(training[UNFILTERED, stage])
+    known = {rate: own[~np.isnan(own)] for rate, own in zip(METRICS, (new - base).T, strict=True)}
+    return {rate: float(own.mean()) if len(own) else math.nan for rate, own in known.items()}
