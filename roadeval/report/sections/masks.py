@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from roadeval.report.blocks import Block, Figure, Heading, ImageGrid, Text
+from roadeval.report.blocks import Block, Figure, Heading, Text
 from roadeval.report.charts.rates import coverage
 from roadeval.report.findings import Findings
-from roadeval.report.images import variants_of
-from roadeval.report.sections.common import example_pictures
+from roadeval.report.images import example_grid
 
 
 def section(findings: Findings) -> Iterator[Block]:
@@ -19,8 +18,7 @@ def section(findings: Findings) -> Iterator[Block]:
         "whether the filter helps, not which stage is at fault. What follows is what was computed."
     )
     if findings.examples:
-        pictures = list(example_pictures(findings.examples))
-        yield ImageGrid(pictures, len(variants_of(findings.examples)) + 1)
+        yield example_grid(findings.examples)
     if len(findings.coverage):
         table = findings.coverage
         shares = {str(name): table[name].to_numpy() for name in table}
