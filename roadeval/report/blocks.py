@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Final
 
 from roadeval.report.chart import Chart, HeatMap, legend
-from roadeval.report.drawing import HeatDrawing, drawn, key_on_paper, span_of_frames
+from roadeval.report.drawing import drawn, span_of_frames
 from roadeval.runtime.text import as_markdown
 
 _SUFFIXES: Final = {b"\x89PNG": "png", b"\xff\xd8\xff": "jpg"}
@@ -42,8 +42,7 @@ class Block:
 
     def as_json(self) -> dict[str, Any]:
         """Return the block's kind and its fields as JSON has them; an image file by its name."""
-        own = {each.name: _as_json(getattr(self, each.name)) for each in fields(self)}
-        return {"kind": self.kind, **own}
+        return {"kind": self.kind, **_fields(self)}
 
     def parts(self) -> Iterator[Any]:
         """Yield the image files, the charts and the blocks inside, and what is inside of those."""
@@ -59,16 +58,22 @@ class Block:
                 yield ImageFile(part.picture())
 
 
+def _fields(value: Any) -> dict[str, Any]:
+    return {each.name: _as_json(getattr(value, each.name)) for each in fields(value)}
+
+
 def _as_json(value: Any) -> Any:
     match value:
         case ImageFile():
             return value.name
+        case bytes():
+            return ImageFile(value).name
         case Block():
             return value.as_json()
-        case list() | tuple() | range():
+        case list() | tuple():
             return [_as_json(item) for item in value]
         case _:
-            return value
+            return _fields(value) if is_dataclass(value) else value
 
 
 def _parts(value: Any) -> Iterator[Any]:
@@ -177,17 +182,12 @@ class Figure(Block):
         """Return what paper needs to draw it."""
         span, keys = span_of_frames(self.charts), legend(self.charts)
         titles = "; ".join(f"{chart.title}, {chart.unit}" for chart in self.charts)
-        charts = []
-        for drawing in (drawn(chart, span) for chart in self.charts):
-            charts.append(drawing.on_paper())
-            if isinstance(drawing, HeatDrawing):
-                charts[-1]["picture"] = ImageFile(drawing.chart.picture()).name
         return {
             "kind": self.kind,
             "caption": self.caption,
             "alt": f"{titles}: {', '.join(key.name for key in keys)}".rstrip(": "),
-            "legend": [key_on_paper(key) for key in keys],
-            "charts": charts,
+            "legend": _as_json(keys),
+            "charts": _as_json([drawn(chart, span) for chart in self.charts]),
         }
 
 

@@ -202,7 +202,11 @@ def test_a_part_of_the_drive_is_the_same_part_in_every_chart_and_in_the_table(dr
     )
     assert len(views) > 4
     assert len(set(views)) == 1
-    low, _, size, _ = map(float, views[0].split())
+    left, _, width, _ = map(float, views[0].split())
+    told = tab.locator(".browser .along").first.get_attribute("data-values")
+    first, last = json.loads(told)["x"]
+    low, size = (share * (last - first) / 100 for share in (left, width))
+    low += first
     numbers = [
         int(each.get_attribute("data-frame"))
         for each in tab.locator(".frames tbody tr:not([hidden])").all()

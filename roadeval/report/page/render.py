@@ -31,7 +31,7 @@ from roadeval.report.blocks import (
     TableOfContents,
 )
 from roadeval.report.chart import Chart, legend
-from roadeval.report.drawing import drawn, span_of_frames
+from roadeval.report.drawing import drawn, span_of_frames, values
 from roadeval.report.pdf.typeset import ReportError
 from roadeval.runtime.files import companion_name, put_with
 from roadeval.runtime.text import visible
@@ -133,7 +133,7 @@ def _hash(code: str) -> str:
     return f"'sha256-{digest}'"
 
 
-def _rendered(template: str, place: Place, document: Document | None, **values: Any) -> bytes:
+def _rendered(template: str, place: Place, document: Document | None, **given: Any) -> bytes:
     parts = document.parts() if document else ()
     span = span_of_frames(part for part in parts if isinstance(part, Chart))
     own_frame = "#frame-{}" if place.frames is None else place.frames
@@ -143,7 +143,7 @@ def _rendered(template: str, place: Place, document: Document | None, **values: 
         .render(
             drawn=lambda chart: drawn(chart, span),
             legend=legend,
-            picture=lambda chart: ImageFile(chart.picture()),
+            values=values,
             source=lambda image: _source(image, place),
             frame_link=own_frame.format,
             filled=_filled,
@@ -152,7 +152,7 @@ def _rendered(template: str, place: Place, document: Document | None, **values: 
             has_forms=place.forms,
             # A picture inside the page is there already, and paper shows it only if it is loaded.
             loading="eager" if place.pictures is None else "lazy",
-            **values,
+            **given,
         )
     )
     return str(made).encode("utf-8")
@@ -179,7 +179,8 @@ def _shown(value: Any) -> Any:
     return visible(value) if type(value) is str else value
 
 
-def _source(image: ImageFile, place: Place) -> str:
+def _source(image: ImageFile | bytes, place: Place) -> str:
+    image = ImageFile(image) if isinstance(image, bytes) else image
     if place.pictures is not None:
         return f"{place.pictures}{image.name}"
     media = _MEDIA[image.name.rpartition(".")[2]]

@@ -134,6 +134,12 @@ class ChartView {
     return this.known;
   }
 
+  /** Where a position lies, in percent of the whole chart. */
+  share(x) {
+    const [first, last] = this.values.x;
+    return (100 * (x - first)) / (last - first);
+  }
+
   at(event) {
     const box = this.area.getBoundingClientRect();
     return this.low + ((event.clientX - box.left) / box.width) * (this.high - this.low);
@@ -149,7 +155,7 @@ class ChartView {
     this.cursor.removeAttribute("d");
     if (x === null) return;
     this.pointed = this.snapped(x);
-    this.cursor.setAttribute("d", `M${this.pointed} 0V100`);
+    this.cursor.setAttribute("d", `M${this.share(this.pointed)} 0V100`);
   }
 
   /** What stands at the position that is pointed at. */
@@ -188,14 +194,15 @@ class ChartView {
   select(from, to) {
     this.chosen?.remove();
     if (from === null) return;
-    this.chosen = svg("rect", { class: "chosen", x: Math.min(from, to), y: 0, width: Math.abs(to - from), height: 100 });
+    const [left, right] = [from, to].map((x) => this.share(x)).sort((a, b) => a - b);
+    this.chosen = svg("rect", { class: "chosen", x: left, y: 0, width: right - left, height: 100 });
     this.area.append(this.chosen);
   }
 
   show(low, high) {
     [this.low, this.high] = [low, high];
     this.whole.hidden = low === range.whole[0] && high === range.whole[1];
-    this.area.setAttribute("viewBox", `${low} 0 ${high - low} 100`);
+    this.area.setAttribute("viewBox", `${this.share(low)} 0 ${this.share(high) - this.share(low)} 100`);
     const ticks = roundNumbers(low, high, Math.max(2, Math.min(8, this.area.clientWidth / 60)));
     this.element.querySelector(".xs").replaceChildren(
       ...ticks.map((each) => {
@@ -207,7 +214,7 @@ class ChartView {
   }
 
   mark(frame) {
-    this.here.setAttribute("d", `M${frame} 0V100`);
+    this.here.setAttribute("d", `M${this.share(frame)} 0V100`);
   }
 }
 
