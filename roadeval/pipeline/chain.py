@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import takewhile
 from typing import Any
 
@@ -29,15 +28,17 @@ class Pipeline:
         """Return a pipeline of these stages with their default settings."""
         return cls(tuple(chain), {stage.name: stage.settings() for stage in stages_of(chain)})
 
-    def stages(self) -> tuple[Stage[Any, Any], ...]:
+    def stages(self) -> tuple[Stage, ...]:
         """Return the stages, in order."""
         return stages_of(self.chain)
 
+    def _each(self) -> Iterator[tuple[Stage, Any]]:
+        """Yield the stages with their settings."""
+        return ((stage, self.settings[stage.name]) for stage in self.stages())
+
     def layers(self) -> tuple[LayerSpec, ...]:
         """Return the layers that the stages will hand out, in order."""
-        return tuple(
-            spec for stage in self.stages() for spec in stage.layers(self.settings[stage.name])
-        )
+        return tuple(spec for stage, own in self._each() for spec in stage.specs(own))
 
     def masks(self) -> tuple[str, ...]:
         """Return the road masks, in order, by the names that their stages are reported under."""
@@ -56,64 +57,54 @@ class Pipeline:
         """Return the pipeline of one of its stages."""
         return self._of(lambda stage: stage.name == name)
 
-    def _of(self, chosen: Callable[[Stage[Any, Any]], bool]) -> Pipeline:
-        pairs = zip(self.chain, self.stages(), strict=True)
-        kept = [(name, stage) for name, stage in pairs if chosen(stage)]
-        settings = {stage.name: self.settings[stage.name] for _, stage in kept}
-        return Pipeline(tuple(name for name, _ in kept), settings)
+    def _of(self, chosen: Callable[[Stage], bool]) -> Pipeline:
+        pairs = zip(self.chain, self._each(), strict=True)
+        kept = {name: (stage.name, own) for name, (stage, own) in pairs if chosen(stage)}
+        return Pipeline(tuple(kept), dict(kept.values()))
 
     def learning(self) -> tuple[str, ...]:
         """Return the names of the stages that learn."""
         return tuple(stage.name for stage in self.stages() if stage.fit is not None)
 
     def relevant(self) -> dict[str, dict[str, Any]]:
-        """Return the settings that what is learnt depends on, by stage.
+        """Return the settings that the learnt parameters depend on, by stage.
 
         Those of stages that learn or change the image, except where they are `inference_only`.
         """
-        found = {}
-        for stage in self.stages():
-            if stage.fit is not None or not stage.yields_mask:
-                settings = dataclasses.asdict(self.settings[stage.name])
-                found[stage.name] = {
-                    key: value for key, value in settings.items() if key not in stage.inference_only
-                }
-        return found
+        return {
+            stage.name: {
+                key: value for key, value in asdict(own).items() if key not in stage.inference_only
+            }
+            for stage, own in self._each()
+            if stage.fit is not None or not stage.yields_mask
+        }
 
     def resolved(self) -> Pipeline:
         """Return the pipeline with settings stated that its stages find in files.
 
         A `RoadevalError` if a file cannot be used.
         """
-        found = {
-            stage.name: stage.resolve(self.settings[stage.name])
-            for stage in self.stages()
-            if stage.resolve is not None
-        }
-        return dataclasses.replace(self, settings={**self.settings, **found})
+        found = {stage.name: stage.resolve(own) for stage, own in self._each() if stage.resolve}
+        return replace(self, settings={**self.settings, **found})
 
     def without_places(self) -> Pipeline:
         """Return the pipeline without the settings that say where files lie."""
         found = {
-            stage.name: dataclasses.replace(
-                self.settings[stage.name], **dict.fromkeys(stage.places, "")
-            )
-            for stage in self.stages()
+            stage.name: replace(own, **dict.fromkeys(stage.places, ""))
+            for stage, own in self._each()
             if stage.places
         }
-        return dataclasses.replace(self, settings={**self.settings, **found})
+        return replace(self, settings={**self.settings, **found})
 
     def about(self) -> dict[str, dict[str, Any]]:
-        """Return what results tell of stages beside their settings, by stage."""
+        """Return what results say of stages beside their settings, by stage."""
         return {
-            stage.reported: dict(stage.about(self.settings[stage.name]))
-            for stage in self.stages()
-            if stage.about is not None
+            stage.reported: dict(stage.about(own)) for stage, own in self._each() if stage.about
         }
 
     def as_dict(self) -> dict[str, Any]:
         """Return the chain and its settings as plain data, in the shape of a TOML file."""
-        settings = {name: dataclasses.asdict(own) for name, own in self.settings.items()}
+        settings = {name: asdict(own) for name, own in self.settings.items()}
         return {"chain": list(self.chain), **settings}
 
     def bind(self, parameters: Mapping[str, Any]) -> Chain:
@@ -121,27 +112,22 @@ class Pipeline:
 
         A `MisfitError` if that does not fit the settings.
         """
-        return Chain(
-            tuple(
-                _bound(stage, self.settings[stage.name], parameters.get(stage.name))
-                for stage in self.stages()
-            )
-        )
+        steps = []
+        for stage, own in self._each():
+            learnt = parameters.get(stage.name)
+            oracle = stage.oracle(own, learnt) if stage.oracle else None
+            steps.append(Step(stage, own, stage.bind(own, learnt), oracle))
+        return Chain(tuple(steps))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
     """A stage with its settings and learnt parameters, ready to run."""
 
-    stage: Stage[Any, Any]
+    stage: Stage
     settings: Any
     run: Callable[[View], Output]
     oracle: Callable[[View, Truth], Output] | None = None
-
-
-def _bound(stage: Stage[Any, Any], settings: Any, parameters: Any) -> Step:
-    oracle = None if stage.oracle is None else stage.oracle(settings, parameters)
-    return Step(stage, settings, stage.bind(settings, parameters), oracle)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,12 +1,12 @@
 """What a stage must provide.
 
 A stage is one file in `roadeval.pipeline.paper` or `roadeval.pipeline.beyond` that defines
-``STAGE``, a `Stage`. It is found there, and a configuration names it in its ``chain``. The least
-that there can be is a filter without settings to learn::
+``STAGE``, a `Stage`. It is found there, and a configuration names it in its ``chain``. A minimal
+one is a filter without parameters to learn::
 
     DARKER = LayerSpec("darker", LayerKind.RGB, "Half as bright")
 
-    @validated(frozen=True, config=ConfigDict(extra="forbid"))
+    @stage_settings
     class DarkerSettings:
         share: float = 0.5
 
@@ -16,8 +16,7 @@ that there can be is a filter without settings to learn::
             return Output((Layer(DARKER, image),), image=image)
         return run
 
-    STAGE = Stage("darker", "Half as bright", DarkerSettings, bind, lambda _: (DARKER,),
-                  is_filter=True)
+    STAGE = Stage("darker", "Half as bright", DarkerSettings, bind, (DARKER,), is_filter=True)
 
 Recording, tables and report iterate over stages and layers, and know none by name.
 """
@@ -26,23 +25,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar, cast, dataclass_transform
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+from pydantic import ConfigDict
+from pydantic.dataclasses import dataclass as validated
 
 from roadeval.data import ROAD, LayerSpec, Moment, Output, Packed, Rgb, Truth
 from roadeval.data.arrays import Planes
 from roadeval.errors import RoadevalError
 from roadeval.runtime.discovery import Code
 
-__all__ = ["MisfitError", "Output", "Stage", "StageError", "TrainingSet", "View", "perfect_mask"]
+__all__ = ["Output", "Stage", "TrainingSet", "View", "perfect_mask", "stage_settings"]
 
-S = TypeVar("S")
-"""Settings of a stage: a frozen, validated dataclass."""
-P = TypeVar("P")
-"""Parameters that a stage learns: a frozen dataclass of floats and arrays, or None."""
+T = TypeVar("T")
+
+
+@dataclass_transform(frozen_default=True)
+def stage_settings(cls: type[T]) -> type[T]:
+    """Make a class the settings of a stage: frozen, validated, every field with a default."""
+    return cast("type[T]", validated(cls, frozen=True, config=ConfigDict(extra="forbid")))
 
 
 class MisfitError(RoadevalError, ValueError):
@@ -50,7 +54,7 @@ class MisfitError(RoadevalError, ValueError):
 
 
 class StageError(RoadevalError):
-    """A stage that fails on a frame, which that frame is lost for: which stage, and why."""
+    """A stage that fails on a frame, which is then skipped: which stage, and why."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,56 +87,62 @@ class View:
 
 
 @dataclass(frozen=True, slots=True)
-class Stage(Generic[S, P]):
+class Stage:
     """One step of a pipeline."""
 
     name: str
     """In a chain and in a configuration."""
     title: str
     """A few words for a person, as ``Phase 1: colour similarity``."""
-    settings: type[S]
-    """The type of its settings; every field has a default."""
-    bind: Callable[[S, Any], Callable[[View], Output]]
+    settings: type[Any]
+    """The type of its settings, a frozen dataclass; every field has a default."""
+    bind: Callable[[Any, Any], Callable[[View], Output]]
     """``bind(settings, parameters)`` returns the pure function from `View` to `Output`. What
     depends on settings and parameters alone (tables, structuring elements) is computed here,
     once. A `MisfitError` if the parameters do not fit the settings."""
-    layers: Callable[[S], tuple[LayerSpec, ...]]
-    """``layers(settings)`` returns the layers that it will hand out, in order."""
-    fit: Callable[[TrainingSet, S], P] | None = None
+    layers: tuple[LayerSpec, ...] | Callable[[Any], tuple[LayerSpec, ...]]
+    """The layers that it will hand out, in order; or a function that returns them for its settings.
+    """
+    fit: Callable[[TrainingSet, Any], Any] | None = None
     """``fit(training_set, settings)`` learns the parameters; None if there is nothing to learn."""
-    adapt: Callable[[P, TrainingSet, S], P] | None = None
+    adapt: Callable[[Any, TrainingSet, Any], Any] | None = None
     """``adapt(parameters, training_set, settings)`` learns further from a drive's own frames, on
     top of what other drives have taught; None if that stays as it is."""
-    parameters: type[P] | None = None
-    """The type of the parameters, for reading model files; None if there are none."""
+    parameters: type[Any] | None = None
+    """The type of the parameters, for reading model files: a frozen dataclass of floats and arrays;
+    None if there are none."""
     is_filter: bool = False
     """Whether it only changes the image, and is left out of the ``unfiltered`` variant, which shows
     what it contributes."""
     preprocesses: bool = False
     """Whether it only changes the image, in every variant."""
-    oracle: Callable[[S, Any], Callable[[View, Truth], Output]] | None = None
+    oracle: Callable[[Any, Any], Callable[[View, Truth], Output]] | None = None
     """``oracle(settings, parameters)`` returns the stage as it would be if it were perfect: a pure
     function of `View` and the truth, of shadow for a filter, else of the road. None where a
     perfect one would be of no interest."""
     inference_only: tuple[str, ...] = ()
-    """Settings that what is learnt does not depend on: a model may be used with other values than
-    it was trained with."""
+    """Settings that the learnt parameters do not depend on: a model may be used with other values
+    than it was trained with."""
     mask: str = ""
     """The layer of its mask, and its name in tables and timing, where that is not ``name``: stages
     that do the same in different ways are tabled under one name."""
     sees_mask_alone: bool = False
-    """Whether it looks at nothing but the mask before it. After a perfect mask its result is then
-    the same in every variant that has its settings."""
-    resolve: Callable[[S], S] | None = None
+    """Whether its only input is the mask before it. After a perfect mask its result is then the
+    same in every variant that has its settings."""
+    resolve: Callable[[Any], Any] | None = None
     """``resolve(settings)`` returns the settings with all stated that they leave to a file, its
     digest included; a `RoadevalError` if the file cannot be used. None where they name none."""
     places: tuple[str, ...] = ()
     """Settings that say where a file lies, and decide nothing once its digest is stated."""
-    about: Callable[[S], Mapping[str, Any]] | None = None
-    """``about(settings)`` returns what results tell of the stage beside its settings, as plain data
+    about: Callable[[Any], Mapping[str, Any]] | None = None
+    """``about(settings)`` returns what results say of the stage beside its settings, as plain data
     by name."""
     code: Code | None = None
-    """Of a stage of somebody else's; None for roadeval's own, whose version tells."""
+    """Of a stage from outside the package; roadeval's own are known by its version."""
+
+    def specs(self, settings: Any) -> tuple[LayerSpec, ...]:
+        """Return the layers that it will hand out with these settings, in order."""
+        return self.layers(settings) if callable(self.layers) else self.layers
 
     @property
     def yields_mask(self) -> bool:

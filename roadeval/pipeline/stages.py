@@ -18,7 +18,7 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from roadeval.runtime.text import visible
 GROUP: Final = "roadeval.stages"
 """The group of entry points by which a package adds stages."""
 
-STAGES: Final[Mapping[str, Stage[Any, Any]]] = by_name(
+STAGES: Final[Mapping[str, Stage]] = by_name(
     (*found_in(beyond, "STAGE"), *found_in(paper, "STAGE"))
 )
 """The stages of this package, found by their folder."""
@@ -42,9 +42,6 @@ TAKEN: Final = ("image", "moment", "settings")
 """The names of the arguments that a function may have."""
 FULL: Final = 65535
 """The code of a probability of 1."""
-
-S = TypeVar("S")
-P = TypeVar("P")
 
 
 class UnknownStageError(RoadevalError, LookupError):
@@ -56,13 +53,13 @@ def names() -> list[str]:
     return [*STAGES, *sorted({each.name for each in entry_points(group=GROUP)} - STAGES.keys())]
 
 
-def stages_of(chain: Iterable[str]) -> tuple[Stage[Any, Any], ...]:
+def stages_of(chain: Iterable[str]) -> tuple[Stage, ...]:
     """Return the stages that a chain names, in order; an `UnknownStageError` if one is none."""
     return tuple(STAGES.get(name) or _somebodys(name) for name in chain)
 
 
 @cache
-def _somebodys(name: str) -> Stage[Any, Any]:
+def _somebodys(name: str) -> Stage:
     """Import a stage that is not this package's own."""
     try:
         found = _imported(name)
@@ -73,7 +70,7 @@ def _somebodys(name: str) -> Stage[Any, Any]:
         if not isinstance(found, Stage):
             raise TypeError(f"it is {type(found).__name__}, and neither a Stage nor a function")
         _check(found)
-        return _told(guarded(found), name, modules)
+        return _with_origin(guarded(found), name, modules)
     except UnknownStageError:
         raise
     except Exception as error:  # whatever somebody's module raises
@@ -88,13 +85,13 @@ def _modules(found: Any, name: str) -> list[ModuleType]:
     return [module for module in (defining, named) if module is not None]
 
 
-def _told(stage: Stage[Any, Any], name: str, modules: Sequence[ModuleType]) -> Stage[Any, Any]:
-    """Return a stage that tells results where its code comes from."""
+def _with_origin(stage: Stage, name: str, modules: Sequence[ModuleType]) -> Stage:
+    """Return a stage whose results say where its code comes from."""
     code = code_of(module.__name__ for module in modules)
     file = getattr(modules[0], "__file__", None) if modules else None
     if not code.digest or file is None:
         return stage
-    told = {
+    origin = {
         "stage": name,
         "file": Path(file).name,
         "sha256": hashlib.sha256(Path(file).read_bytes()).hexdigest(),
@@ -103,7 +100,7 @@ def _told(stage: Stage[Any, Any], name: str, modules: Sequence[ModuleType]) -> S
     own = stage.about
 
     def about(settings: Any) -> Mapping[str, Any]:
-        return told if own is None else {**told, **own(settings)}
+        return {**origin, **(own(settings) if own else {})}
 
     return replace(stage, about=about, code=code)
 
@@ -127,7 +124,7 @@ def _imported(name: str) -> Any:
     return found
 
 
-def _check(stage: Stage[Any, Any]) -> None:
+def _check(stage: Stage) -> None:
     """Raise a ValueError where a stage's names cannot stand in results."""
     if not is_plain(stage.name) or not is_plain(stage.reported):
         raise ValueError(f"its name {stage.name!r} must be of letters, digits, '-' and '_' alone")
@@ -135,7 +132,7 @@ def _check(stage: Stage[Any, Any]) -> None:
         raise ValueError(f"its name {stage.name!r} is that of a stage of roadeval")
     if stage.fit is not None and stage.parameters is None:
         raise ValueError("it learns, and does not name the type of its parameters")
-    for spec in stage.layers(stage.settings()):
+    for spec in stage.specs(stage.settings()):
         if not is_plain(spec.name):
             raise ValueError(f"the name of its layer {spec.name!r} must be of letters and digits")
 
@@ -148,7 +145,7 @@ class NoSettings:
     """Settings of a function that has none."""
 
 
-def stage_of_function(name: str, function: Callable[..., Any]) -> Stage[Any, None]:
+def stage_of_function(name: str, function: Callable[..., Any]) -> Stage:
     """Return the stage of a function from an image to a road mask.
 
     Parameters
@@ -190,7 +187,7 @@ def stage_of_function(name: str, function: Callable[..., Any]) -> Stage[Any, Non
 
         return run
 
-    return Stage(name, spec.title, settings, bind, lambda _settings: (spec,))
+    return Stage(name, spec.title, settings, bind, (spec,))
 
 
 def _title(name: str, function: Callable[..., Any]) -> str:
@@ -219,13 +216,13 @@ def _output(found: Any, spec: LayerSpec) -> Output:
 # --- Somebody else's stage: its errors are named, and what it hands out is checked ----------------
 
 
-def guarded(stage: Stage[S, P]) -> Stage[S, P]:
+def guarded(stage: Stage) -> Stage:
     """Return a stage whose every error is a `StageError`, and so is an output that cannot be."""
 
-    def bind(settings: S, parameters: Any) -> Callable[[View], Output]:
+    def bind(settings: Any, parameters: Any) -> Callable[[View], Output]:
         with _named(stage, "cannot be made ready"):
             run = stage.bind(settings, parameters)
-            specs = stage.layers(settings)
+            specs = stage.specs(settings)
 
         def checked(view: View) -> Output:
             with _named(stage, "failed"):
@@ -235,7 +232,7 @@ def guarded(stage: Stage[S, P]) -> Stage[S, P]:
 
         return checked
 
-    def fit(training_set: TrainingSet, settings: S) -> P:
+    def fit(training_set: TrainingSet, settings: Any) -> Any:
         assert stage.fit is not None
         with _named(stage, "cannot learn"):
             return stage.fit(training_set, settings)
@@ -244,7 +241,7 @@ def guarded(stage: Stage[S, P]) -> Stage[S, P]:
 
 
 @contextmanager
-def _named(stage: Stage[Any, Any], what: str) -> Iterator[None]:
+def _named(stage: Stage, what: str) -> Iterator[None]:
     try:
         yield
     except (RoadevalError, MemoryError):
@@ -254,9 +251,7 @@ def _named(stage: Stage[Any, Any], what: str) -> Iterator[None]:
         raise StageError(f"stage {stage.name} {what}: {said}") from error
 
 
-def _check_output(
-    output: Output, view: View, stage: Stage[Any, Any], specs: tuple[LayerSpec, ...]
-) -> None:
+def _check_output(output: Output, view: View, stage: Stage, specs: tuple[LayerSpec, ...]) -> None:
     """Raise an error where an output is none, or not of the image's size."""
     if not isinstance(output, Output):
         raise TypeError(f"it returned {type(output).__name__} and no Output")

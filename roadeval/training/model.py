@@ -148,7 +148,7 @@ def save_model(model: Model, path: Path) -> None:
         raise ModelError(f"{path}: cannot write the model: {error.strerror}") from error
 
 
-def load_model(path: Path, stages: Iterable[Stage[Any, Any]] = ()) -> Model:
+def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
     """Read a model file; it holds data alone, so a file from elsewhere runs no code.
 
     Parameters
@@ -190,7 +190,7 @@ def _another_format(header: Mapping[str, Any]) -> str:
     return f"{made}, whose format is read no more: train it again"
 
 
-def kept_model(path: Path, stages: tuple[Stage[Any, Any], ...] = ()) -> Model:
+def kept_model(path: Path, stages: tuple[Stage, ...] = ()) -> Model:
     """Read a model file as `load_model` does, or return the one read before: a fleet has one.
 
     What a stage computes from a model alone is kept with it, as the SVM's table of colours.
@@ -203,9 +203,7 @@ def kept_model(path: Path, stages: tuple[Stage[Any, Any], ...] = ()) -> Model:
 
 
 @lru_cache(maxsize=2)
-def _kept(
-    path: Path, stages: tuple[Stage[Any, Any], ...], _node: int, _size: int, _time: int
-) -> Model:
+def _kept(path: Path, stages: tuple[Stage, ...], _node: int, _size: int, _time: int) -> Model:
     return load_model(path, stages)
 
 
@@ -245,7 +243,7 @@ class _Header:
 def _model(
     content: Mapping[str, Any],
     arrays: Mapping[str, npt.NDArray[Any]],
-    known: Mapping[str, Stage[Any, Any]],
+    known: Mapping[str, Stage],
 ) -> Model:
     """Return the model of a file; a ValueError if a part is missing, or is not what it must be."""
     names = [entry.name for entry in dataclasses.fields(_Header)]
@@ -271,9 +269,7 @@ def _model(
     return Model(parameters, **vars(header), prior=prior, fingerprints=prints)
 
 
-def _parameters(
-    where: str, stage: Stage[Any, Any] | None, arrays: Mapping[str, npt.NDArray[Any]]
-) -> Any:
+def _parameters(where: str, stage: Stage | None, arrays: Mapping[str, npt.NDArray[Any]]) -> Any:
     kind = None if stage is None else stage.parameters
     if kind is None:
         raise ValueError(f"{where} is no stage that learns")

@@ -87,7 +87,7 @@ LEARNS = Stage(
     "Brightness",
     Share,
     bind,
-    lambda _settings: (LEVEL, BRIGHT),
+    (LEVEL, BRIGHT),
     fit=fit,
     parameters=Level,
 )
@@ -101,5 +101,5 @@ UNFIT = Stage("unfit", "Unfit", Share, bind, LEARNS.layers, fit=_unfit, paramete
 TAKEN = Stage("svm", "Not ours", Share, bind, LEARNS.layers)
 UNNAMEABLE = Stage("a b", "Unnameable", Share, bind, LEARNS.layers)
 LAYERS = Stage(
-    "unannounced", "Unannounced", Share, lambda s, _: bind(s, Level(0)), lambda _: (BRIGHT,)
+    "unannounced", "Unannounced", Share, lambda s, _: bind(s, Level(0)), (BRIGHT,)
 )

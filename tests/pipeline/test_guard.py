@@ -20,7 +20,7 @@ def run(spec, array):
         road = Packed.of(IMAGE[..., 0])
         return lambda view: Output((Layer(spec, array),), mask=road)
 
-    stage = Stage("own", "Own", int, bind, lambda _settings: (spec,))
+    stage = Stage("own", "Own", int, bind, (spec,))
     return guarded(stage).bind(0, None)(View.of(IMAGE))
 
 

@@ -16,19 +16,18 @@ from typing import Annotated, Final, Literal
 import cv2
 import numpy as np
 import numpy.typing as npt
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as validated
+from pydantic import Field
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Mask, Rgb
 from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
-from roadeval.pipeline.stage import Output, Stage, View
+from roadeval.pipeline.stage import Output, Stage, View, stage_settings
 
 EXPOSED: Final = LayerSpec("exposed", LayerKind.RGB, "Exposure by the reference patch", exact=False)
 GAINS: Final = (0.25, 6.0)
 """Lowest and highest gain: a white or a black patch says nothing about the light."""
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+@stage_settings
 class ExposureSettings:
     """Settings of the exposure."""
 
@@ -94,16 +93,11 @@ def bind(settings: ExposureSettings, _parameters: None) -> Callable[[View], Outp
     return run
 
 
-def layers(_settings: ExposureSettings) -> tuple[LayerSpec, ...]:
-    """Return the layer of the exposure."""
-    return (EXPOSED,)
-
-
-STAGE: Final[Stage[ExposureSettings, None]] = Stage(
+STAGE: Final = Stage(
     name="exposure",
     title="Exposure by the reference patch",
     settings=ExposureSettings,
     bind=bind,
-    layers=layers,
+    layers=(EXPOSED,),
     preprocesses=True,
 )

@@ -28,8 +28,7 @@ from typing import Annotated, Final
 import cv2
 import numpy as np
 import numpy.typing as npt
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as validated
+from pydantic import Field
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Packed, Rgb, Truth, colours
 from roadeval.data.arrays import Floats, Values
@@ -38,7 +37,7 @@ from roadeval.pipeline.beyond.scene import Scene, enlarged, mean, reduced, stret
 from roadeval.pipeline.paper.shadow import SHADOW_COLOUR
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.reference_patch import ReferencePatch, Share
-from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
+from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, stage_settings
 
 GRID: Final = (12, 16)
 """Rows and columns of the cells by which the place of road is learnt."""
@@ -89,7 +88,7 @@ SHADOW: Final = _mask("shadow", "More likely road in the shade than not", "shado
 COMPENSATED: Final = LayerSpec("compensated", LayerKind.RGB, "Compensated image", exact=False)
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+@stage_settings
 class GatedSettings:
     """Settings of the gated filter. Lengths are in pixels of the working image."""
 

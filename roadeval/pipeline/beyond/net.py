@@ -50,17 +50,12 @@ def about(settings: NetSettings) -> Mapping[str, Any]:
     return Network.of(settings).facts()
 
 
-def layers(_settings: NetSettings) -> tuple[LayerSpec, ...]:
-    """Return the layers of the network."""
-    return PROBABILITY, NET
-
-
-STAGE: Final[Stage[NetSettings, None]] = Stage(
+STAGE: Final = Stage(
     name="net",
     title="Network",
     settings=NetSettings,
     bind=bind,
-    layers=layers,
+    layers=(PROBABILITY, NET),
     resolve=resolve,
     places=("file",),
     about=about,

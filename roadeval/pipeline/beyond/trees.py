@@ -22,8 +22,7 @@ from functools import partial
 from typing import Annotated, Final
 
 import numpy as np
-from pydantic import ConfigDict, Field, field_validator
-from pydantic.dataclasses import dataclass as validated
+from pydantic import Field, field_validator
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Packed, Rgb, mask_spec
 from roadeval.data.arrays import Flags, Floats, Values
@@ -50,6 +49,7 @@ from roadeval.pipeline.stage import (
     TrainingSet,
     View,
     perfect_mask,
+    stage_settings,
 )
 
 FULL: Final = 65535
@@ -76,7 +76,7 @@ GEODESIC: Final = LayerSpec(
 )
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+@stage_settings
 class TreesSettings:
     """Settings of the boosted trees."""
 
@@ -290,17 +290,12 @@ def bind(settings: TreesSettings, learnt: Stack) -> Callable[[View], Output]:
     return run
 
 
-def layers(_settings: TreesSettings) -> tuple[LayerSpec, ...]:
-    """Return the layers of the trees."""
-    return GEODESIC, PROBABILITY, TREES
-
-
 STAGE: Final = Stage(
     name="trees",
     title="Boosted trees on colour, place, texture, surroundings and paths from the patch",
     settings=TreesSettings,
     bind=bind,
-    layers=layers,
+    layers=(GEODESIC, PROBABILITY, TREES),
     fit=fit,
     adapt=adapt,
     parameters=Stack,

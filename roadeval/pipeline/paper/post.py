@@ -11,14 +11,13 @@ from typing import Annotated, Final, Literal
 
 import cv2
 import numpy as np
-from pydantic import ConfigDict, Field, field_validator
-from pydantic.dataclasses import dataclass as validated
+from pydantic import Field, field_validator
 
 from roadeval.data import LabelClass, Layer, LayerKind, LayerSpec, Mask, Packed, colours, mask_spec
 from roadeval.data.arrays import Reach
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.reference_patch import ReferencePatch, patch_mask
-from roadeval.pipeline.stage import Output, Stage, View
+from roadeval.pipeline.stage import Output, Stage, View, stage_settings
 
 LINE: Final = 3
 """Side of the square that erodes the result for its boundary (Eq. 22), which gives a line one pixel
@@ -35,7 +34,7 @@ BOUNDARY: Final = LayerSpec(
 )
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+@stage_settings
 class PostSettings:
     """Settings of phase 4."""
 
@@ -164,16 +163,11 @@ def bind(settings: PostSettings, _parameters: None) -> Callable[[View], Output]:
     return run
 
 
-def layers(_settings: PostSettings) -> tuple[LayerSpec, ...]:
-    """Return the layers of phase 4."""
-    return POST, BOUNDARY
-
-
-STAGE: Final[Stage[PostSettings, None]] = Stage(
+STAGE: Final = Stage(
     name="post",
     title="Phase 4: morphology",
     settings=PostSettings,
     bind=bind,
-    layers=layers,
+    layers=(POST, BOUNDARY),
     sees_mask_alone=True,
 )

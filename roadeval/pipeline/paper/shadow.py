@@ -13,8 +13,7 @@ from typing import Annotated, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as validated
+from pydantic import Field
 
 from roadeval.data import (
     LabelClass,
@@ -30,7 +29,7 @@ from roadeval.data import (
 )
 from roadeval.data.arrays import Floats, Labels, Runs
 from roadeval.kernels import KERNELS
-from roadeval.pipeline.stage import Output, Stage, View
+from roadeval.pipeline.stage import Output, Stage, View, stage_settings
 
 Codes = npt.NDArray[np.uint8]
 
@@ -59,7 +58,7 @@ COMPENSATED: Final = LayerSpec(
 )
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+@stage_settings
 class ShadowSettings:
     """Settings of the shadow filter."""
 
@@ -465,17 +464,12 @@ def _facts(
     }
 
 
-def layers(_settings: ShadowSettings) -> tuple[LayerSpec, ...]:
-    """Return the layers of the filter, in the order of the equations."""
-    return NDI, SHADOW, RINGS, COMPENSATED
-
-
-STAGE: Final[Stage[ShadowSettings, None]] = Stage(
+STAGE: Final = Stage(
     name="shadow",
     title="Phase 2: shadow filter",
     settings=ShadowSettings,
     bind=bind,
-    layers=layers,
+    layers=(NDI, SHADOW, RINGS, COMPENSATED),
     is_filter=True,
     oracle=oracle,
 )

@@ -8,13 +8,12 @@ from typing import Annotated, Final
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as validated
+from pydantic import Field
 
 from roadeval.data import Layer, LayerKind, LayerSpec, Packed, mask_spec
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.parameters import check_arrays, check_covariance, check_range
-from roadeval.pipeline.stage import Output, Stage, TrainingSet, View
+from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, stage_settings
 from roadeval.runtime.extensions import special
 
 RIDGE: Final = 1.0
@@ -24,7 +23,7 @@ covariance's inverse is lost in rounding."""
 SIMILARITY: Final = mask_spec("similarity", "Similar to road (Eq. 2)")
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+@stage_settings
 class SimilaritySettings:
     """Settings of phase 1."""
 

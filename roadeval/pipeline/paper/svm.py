@@ -9,10 +9,9 @@ from typing import Annotated, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass as validated
+from pydantic import Field
 
-from roadeval.data import Layer, LayerSpec, Packed, mask_spec
+from roadeval.data import Layer, Packed, mask_spec
 from roadeval.data.arrays import Floats
 from roadeval.pipeline.colour_table import (
     EPS,
@@ -23,7 +22,7 @@ from roadeval.pipeline.colour_table import (
     sums_of_terms,
 )
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
-from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask
+from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask, stage_settings
 from roadeval.runtime.extensions import extension, whole
 
 SVM: Final = mask_spec("svm", "SVM: road (Eq. 16)")
@@ -35,7 +34,7 @@ _BLOCK: Final = 1 << 17
 """Kernel values computed at once: 1 MB of float64, of which a few stay in the cache."""
 
 
-@validated(frozen=True, config=ConfigDict(extra="forbid"))
+@stage_settings
 class SvmSettings:
     """Settings of phase 3."""
 
@@ -218,17 +217,12 @@ def bind(settings: SvmSettings, machine: SupportVectors) -> Callable[[View], Out
     return run
 
 
-def layers(_settings: SvmSettings) -> tuple[LayerSpec, ...]:
-    """Return the layer of phase 3."""
-    return (SVM,)
-
-
 STAGE: Final = Stage(
     name="svm",
     title="Phase 3: support vector machine",
     settings=SvmSettings,
     bind=bind,
-    layers=layers,
+    layers=(SVM,),
     fit=fit,
     parameters=SupportVectors,
     oracle=perfect_mask,

@@ -212,7 +212,7 @@ def test_groups_must_be_known_and_named_once(names):
 
 def test_the_layers_are_those_that_are_announced(learnt):
     found = trees.bind(SMALL, learnt)(VIEW).layers
-    assert tuple(layer.spec for layer in found) == trees.layers(SMALL)
+    assert tuple(layer.spec for layer in found) == trees.STAGE.layers
     far = reach(scene_of(VIEW.image, SMALL.width, SMALL.patch))
     np.testing.assert_allclose(found[0].array, stretched(far, VIEW.image.shape), rtol=1e-6)
 

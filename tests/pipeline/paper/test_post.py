@@ -288,7 +288,7 @@ def test_the_boundary_layer_is_of_the_result():
     layers = {layer.spec.name: layer.array for layer in output.layers}
     np.testing.assert_array_equal(layers["post"], output.mask.pixels())
     np.testing.assert_array_equal(layers["boundary"], reference.boundary(layers["post"] > 0))
-    assert tuple(layer.spec for layer in output.layers) == post.layers(PostSettings())
+    assert tuple(layer.spec for layer in output.layers) == post.STAGE.layers
 
 
 def test_post_processing_needs_a_mask_before_it():

@@ -439,7 +439,7 @@ def test_layers_are_the_ones_announced():
     image = picture("..#", "...")
     for chosen in (ShadowSettings(), PRINTED):
         specs = [layer.spec for layer in run(image, chosen)[0].layers]
-        assert tuple(specs) == shadow.layers(chosen)
+        assert tuple(specs) == shadow.STAGE.specs(chosen)
 
 
 def test_facts_state_threshold_components_and_gains():
