@@ -100,6 +100,4 @@ def _unfit(_sample, _settings):
 UNFIT = Stage("unfit", "Unfit", Share, bind, LEARNS.layers, fit=_unfit, parameters=Level)
 TAKEN = Stage("svm", "Not ours", Share, bind, LEARNS.layers)
 UNNAMEABLE = Stage("a b", "Unnameable", Share, bind, LEARNS.layers)
-LAYERS = Stage(
-    "unannounced", "Unannounced", Share, lambda s, _: bind(s, Level(0)), (BRIGHT,)
-)
+LAYERS = Stage("unannounced", "Unannounced", Share, lambda s, _: bind(s, Level(0)), (BRIGHT,))
