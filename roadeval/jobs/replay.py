@@ -18,7 +18,7 @@ from roadeval.jobs.outputs import Outputs
 from roadeval.jobs.processing import process
 from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import Run, prepare
-from roadeval.recording import NullRecorder, RecordRule, SelectiveRecorder, recorder_for
+from roadeval.recording import NullRecorder, Recorder, RecordRule, recorder_for
 from roadeval.report.images import ExampleFrame
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import as_arrays, csv_lines, effect_rows, score_rows, sum_rows
@@ -145,7 +145,7 @@ def _written(
 
 def _record(
     run: Run,
-    recorder: SelectiveRecorder | NullRecorder,
+    recorder: Recorder | NullRecorder,
     results: ResultsWriter,
     sidecar: logs.SidecarWriter | logs.NoSidecar,
     *,

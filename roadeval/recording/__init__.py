@@ -11,8 +11,7 @@ if TYPE_CHECKING:
     from roadeval.recording.layout import DamagedError, Layout, RecordingError, RecordRule
     from roadeval.recording.read.recording import Recording
     from roadeval.recording.write.encoding import EncodedFrame
-    from roadeval.recording.write.recorder import NullRecorder, Recorder
-    from roadeval.recording.write.selective import SelectiveRecorder, recorder_for
+    from roadeval.recording.write.recorder import NullRecorder, Recorder, recorder_for
 
 __all__ = [
     "DamagedError",
@@ -23,7 +22,6 @@ __all__ = [
     "Recorder",
     "Recording",
     "RecordingError",
-    "SelectiveRecorder",
     "recorder_for",
 ]
 
@@ -36,8 +34,7 @@ _MODULES: Final = {
     "Recorder": "write.recorder",
     "Recording": "read.recording",
     "RecordingError": "layout",
-    "SelectiveRecorder": "write.selective",
-    "recorder_for": "write.selective",
+    "recorder_for": "write.recorder",
 }
 
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final, Protocol
+from typing import Any, ClassVar, Final
 
 import cv2
 import numpy as np
@@ -41,53 +41,79 @@ _FIFTHS: Final = (np.rint(np.arange(256) / 5) * 5).astype(np.uint8)
 """Every level rounded to a multiple of five: fewer levels take fewer bytes."""
 
 
-class Codec(Protocol):
-    """Encodes and decodes one kind of layer, and tells the viewer how to show it."""
-
-    component: str
-    """Name of the component that holds the bytes."""
-
-    def style(self) -> Sequence[Any]:
-        """Return the archetypes that are logged once for the entity."""
-
-    def encode(self, array: Any) -> bytes:
-        """Return the bytes of a frame's array; a mask may be packed."""
-
-    def columns(self, payloads: list[bytes]) -> Any:
-        """Return the viewer's columns of the bytes of many frames."""
-
-    def decode(self, payload: bytes) -> Array:
-        """Return the array; a ValueError if the bytes are damaged or of another kind."""
-
-
 def codecs_of(layout: Layout) -> dict[str, Codec]:
     """Return the codec of every image, by its entity path."""
     width, height = layout.width, layout.height
-    codecs: dict[str, Codec] = {CAMERA: CameraCodec(width, height)}
+    codecs: dict[str, Codec] = {CAMERA: Codec(width, height)}
     return codecs | {path: codec(spec, width, height) for path, spec in layout.images()}
 
 
 def codec(spec: LayerSpec, width: int, height: int) -> Codec:
     """Return the codec of a layer of ``width`` x ``height`` pixels."""
-    match spec.kind:
-        case LayerKind.MASK:
-            return MaskCodec(spec, width, height)
-        case LayerKind.LABELS:
-            return LabelCodec(spec, width, height)
-        case LayerKind.SCALAR:
-            return ScalarCodec(spec, width, height)
-        case LayerKind.RGB:
-            return ImageCodec(width, height, exact=spec.exact)
+    kinds = {
+        LayerKind.MASK: MaskCodec,
+        LayerKind.LABELS: LabelCodec,
+        LayerKind.SCALAR: ScalarCodec,
+        LayerKind.RGB: ImageCodec,
+    }
+    return kinds[spec.kind](width, height, spec)
 
 
 @dataclass(frozen=True)
-class MaskCodec:
-    """A mask: a PNG of a few bits a pixel whose palette holds the classes' colours."""
+class Codec:
+    """Encodes and decodes images of one kind, and tells the viewer how to show them.
 
-    spec: LayerSpec
+    This one is for the camera's images, JPEG or PNG as the log has them.
+    """
+
     width: int
     height: int
-    component = "EncodedImage:blob"
+    component: ClassVar = "EncodedImage:blob"
+    """The archetype and its component that hold the bytes."""
+
+    def style(self) -> Sequence[Any]:
+        """Return the archetypes that are logged once for the entity: drawn below every mask."""
+        import rerun as rr
+
+        return [rr.EncodedImage.from_fields(draw_order=-10)]
+
+    def encode(self, array: Any) -> bytes:
+        """Return the bytes of a frame's array, here of ``(H, W, 3)`` uint8 RGB as a JPEG file."""
+        return _jpeg(array)
+
+    def columns(self, payloads: list[bytes]) -> Any:
+        """Return the viewer's columns of the bytes of many frames."""
+        import rerun as rr
+
+        archetype, _, component = self.component.partition(":")
+        return getattr(rr, archetype).columns(**{component: payloads})
+
+    def decode(self, payload: bytes) -> Array:
+        """Return the array, here ``(H, W, 3)`` uint8 RGB; a ValueError if the bytes are damaged."""
+        return images.to_rgb(payload, limits_for(self.width, self.height))
+
+
+@dataclass(frozen=True)
+class _LayerCodec(Codec):
+    """A codec of a layer that a stage made."""
+
+    spec: LayerSpec
+
+
+class ImageCodec(_LayerCodec):
+    """A colour image: a PNG, or a small JPEG."""
+
+    def encode(self, array: Array) -> bytes:
+        """Return ``(H, W, 3)`` uint8 RGB as a file."""
+        return png.encode_levels(array) if self.spec.exact else _jpeg(_halve(array))
+
+    def decode(self, payload: bytes) -> Array:
+        """Return ``(H, W, 3)`` uint8 RGB at full resolution."""
+        return _restore(super().decode(payload), self.width, self.height)
+
+
+class MaskCodec(_LayerCodec):
+    """A mask: a PNG of a few bits a pixel whose palette holds the classes' colours."""
 
     @cached_property
     def _values(self) -> Array:
@@ -97,10 +123,11 @@ class MaskCodec:
     @cached_property
     def _places(self) -> Array | None:
         """The classes' places in the palette by their values; None if they are the same."""
-        if (self._values == np.arange(len(self._values))).all():
+        in_order = np.arange(len(self._values))
+        if (self._values == in_order).all():
             return None
         places = np.zeros(256, np.uint8)
-        places[self._values] = np.arange(len(self._values))
+        places[self._values] = in_order
         return places
 
     def style(self) -> Sequence[Any]:
@@ -115,25 +142,15 @@ class MaskCodec:
             array = np.asarray(cv2.LUT(array, self._places), np.uint8)
         return png.encode_labels(array, [c.rgba for c in self.spec.classes])
 
-    def columns(self, payloads: list[bytes]) -> Any:
-        """Return columns of encoded images."""
-        import rerun as rr
-
-        return rr.EncodedImage.columns(blob=payloads)
-
     def decode(self, payload: bytes) -> Array:
         """Return the same array."""
         labels = images.palette_indices(payload, limits_for(self.width, self.height))
         return labels if self._places is None else np.asarray(self._values[labels])
 
 
-@dataclass(frozen=True)
-class LabelCodec:
+class LabelCodec(_LayerCodec):
     """A label image: raw bytes, so that the viewer can name the class under the mouse."""
 
-    spec: LayerSpec
-    width: int
-    height: int
     component = "SegmentationImage:buffer"
 
     def style(self) -> Sequence[Any]:
@@ -141,12 +158,8 @@ class LabelCodec:
         import rerun as rr
 
         classes = [rr.AnnotationInfo(c.value, c.name, c.rgba) for c in self.spec.classes]
-        form = rr.components.ImageFormat(
-            self.width,
-            self.height,
-            color_model=rr.ColorModel.L,
-            channel_datatype=rr.ChannelDatatype.U8,
-        )
+        size, kind = (self.width, self.height), rr.ChannelDatatype.U8
+        form = rr.components.ImageFormat(*size, color_model=rr.ColorModel.L, channel_datatype=kind)
         return [
             rr.AnnotationContext(classes),
             rr.SegmentationImage.from_fields(format=form, opacity=1.0, draw_order=10),
@@ -156,24 +169,14 @@ class LabelCodec:
         """Return the bytes of ``(H, W)`` uint8."""
         return array.tobytes()
 
-    def columns(self, payloads: list[bytes]) -> Any:
-        """Return columns of segmentation images."""
-        import rerun as rr
-
-        return rr.SegmentationImage.columns(buffer=payloads)
-
     def decode(self, payload: bytes) -> Array:
         """Return the same array."""
         return np.frombuffer(payload, np.uint8).reshape(self.height, self.width)
 
 
-@dataclass(frozen=True)
-class ScalarCodec:
+class ScalarCodec(_LayerCodec):
     """A map of numbers: a grey PNG whose levels span the range, coloured by the viewer."""
 
-    spec: LayerSpec
-    width: int
-    height: int
     component = "EncodedDepthImage:blob"
 
     def style(self) -> Sequence[Any]:
@@ -197,15 +200,9 @@ class ScalarCodec:
             low, high = self.spec.value_range
             scaled = (array - np.float32(low)) * np.float32(255 / (high - low))
             array = np.clip(np.rint(scaled), 0, 255).astype(np.uint8)
-        if self.spec.exact:
-            return png.encode_levels(array)
-        return png.encode_levels(np.asarray(cv2.LUT(array, _FIFTHS), np.uint8))
-
-    def columns(self, payloads: list[bytes]) -> Any:
-        """Return columns of encoded depth images."""
-        import rerun as rr
-
-        return rr.EncodedDepthImage.columns(blob=payloads)
+        if not self.spec.exact:
+            array = np.asarray(cv2.LUT(array, _FIFTHS), np.uint8)
+        return png.encode_levels(array)
 
     def decode(self, payload: bytes) -> Array:
         """Return ``(H, W)`` float32 in the layer's own unit, at full resolution."""
@@ -213,52 +210,6 @@ class ScalarCodec:
         low, high = self.spec.value_range
         values: Array = codes * np.float32((high - low) / 255) + np.float32(low)
         return _restore(values, self.width, self.height)
-
-
-@dataclass(frozen=True)
-class CameraCodec:
-    """The camera's image: JPEG or PNG, as the log has it."""
-
-    width: int
-    height: int
-    component = "EncodedImage:blob"
-
-    def style(self) -> Sequence[Any]:
-        """Draw it below every mask."""
-        import rerun as rr
-
-        return [rr.EncodedImage.from_fields(draw_order=-10)]
-
-    def encode(self, array: Array) -> bytes:
-        """Return ``(H, W, 3)`` uint8 RGB as a JPEG file."""
-        return _jpeg(array)
-
-    def columns(self, payloads: list[bytes]) -> Any:
-        """Return columns of encoded images; the viewer tells JPEG from PNG by itself."""
-        import rerun as rr
-
-        return rr.EncodedImage.columns(blob=payloads)
-
-    def decode(self, payload: bytes) -> Array:
-        """Return ``(H, W, 3)`` uint8 RGB."""
-        return images.to_rgb(payload, limits_for(self.width, self.height))
-
-
-@dataclass(frozen=True)
-class ImageCodec(CameraCodec):
-    """A colour image that a stage made."""
-
-    exact: bool
-
-    def encode(self, array: Array) -> bytes:
-        """Return ``(H, W, 3)`` uint8 RGB as a PNG file, or a small JPEG file."""
-        if self.exact:
-            return png.encode_levels(array)
-        return _jpeg(_halve(array))
-
-    def decode(self, payload: bytes) -> Array:
-        """Return ``(H, W, 3)`` uint8 RGB at full resolution."""
-        return _restore(super().decode(payload), self.width, self.height)
 
 
 def _halve(array: Array) -> Array:

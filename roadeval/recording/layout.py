@@ -133,11 +133,21 @@ class Layout:
     @classmethod
     def from_json(cls, text: str) -> Layout:
         """Return the layout that `to_json` wrote; unknown fields are ignored."""
-        known = {each.name for each in fields(cls)}
-        raw = {name: value for name, value in read_json(text).items() if name in known}
-        raw["variants"] = tuple(_variant(v) for v in raw["variants"])
+        found = read_json(text)
+        raw = {each.name: found[each.name] for each in fields(cls) if each.name in found}
         raw["rates"] = tuple(raw["rates"])
+        raw["variants"] = tuple(
+            VariantLayout(v["name"], v["title"], tuple(v["stages"]), tuple(map(_spec, v["layers"])))
+            for v in raw["variants"]
+        )
         return cls(**raw)
+
+
+def _spec(raw: dict[str, Any]) -> LayerSpec:
+    classes = tuple(LabelClass(c["value"], c["name"], tuple(c["rgba"])) for c in raw["classes"])
+    low, high = raw["value_range"]
+    kind = LayerKind(raw["kind"])
+    return LayerSpec(raw["name"], kind, raw["title"], classes, (low, high), raw["exact"])
 
 
 SHADOW_TRUTH: Final = LayerSpec(
@@ -178,18 +188,6 @@ def state_path(variant: str) -> str:
 def result_path(name: str) -> str:
     """Return the entity path of a table or a document."""
     return f"/results/{name}"
-
-
-def _variant(raw: dict[str, Any]) -> VariantLayout:
-    layers = tuple(_spec(layer) for layer in raw["layers"])
-    return VariantLayout(raw["name"], raw["title"], tuple(raw["stages"]), layers)
-
-
-def _spec(raw: dict[str, Any]) -> LayerSpec:
-    classes = tuple(LabelClass(c["value"], c["name"], tuple(c["rgba"])) for c in raw["classes"])
-    low, high = raw["value_range"]
-    kind = LayerKind(raw["kind"])
-    return LayerSpec(raw["name"], kind, raw["title"], classes, (low, high), raw["exact"])
 
 
 class RuleKind(StrEnum):

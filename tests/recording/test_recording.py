@@ -11,10 +11,9 @@ import pytest
 import rerun as rr
 
 from roadeval.data import Health, Role
-from roadeval.recording import Recorder, Recording, RecordingError
+from roadeval.recording import Recorder, Recording, RecordingError, RecordRule
 from roadeval.recording.read.recording import Page, around
 from roadeval.recording.read.rrd_file import RrdFile
-from roadeval.recording.write.encoding import Images
 from tests.recording.making import (
     HEIGHT,
     RESULTS,
@@ -75,10 +74,10 @@ def test_frames_without_pictures_end_what_is_shown_and_are_not_among_those_that_
     drive, tmp_path
 ):
     pictured = [4, 5, 11]
-    with Recorder(tmp_path / "out.rrd", layout()) as recorder:
+    with Recorder(tmp_path / "out.rrd", layout(), RecordRule.parse("every:2")) as recorder:
         for each in drive:
-            images = Images.ALL if each.frame.number in pictured else Images.NONE
-            recorder.write(recorder.encode(each, lines(each), images))
+            position = 0 if each.frame.number in pictured else 1
+            recorder.write(recorder.encode(each, position, lines(each)))
         recorder.finish(RESULTS)
     recording = Recording(recorder.path)
     assert recording.frame_numbers == tuple(pictured)

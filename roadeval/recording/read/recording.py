@@ -38,7 +38,7 @@ class Recording:
     Raises
     ------
     RecordingError
-        If it is none, or of another format.
+        If it is no recording by this program, or of another format.
 
     Examples
     --------
@@ -75,24 +75,19 @@ class Recording:
         """The variants with their stages and layers; the baseline is none of them."""
         return self.layout.variants
 
-    @cached_property
+    @property
     def frame_numbers(self) -> tuple[int, ...]:
-        """The frames whose images are there, in order."""
-        batches = self._file.batches(at.CAMERA, _CAMERA, static=False)
-        return tuple(frame for batch in batches for frame in batch.column(at.FRAME).to_pylist())
+        """The frames that have images, in order."""
+        return tuple(self.stamps)
 
     @cached_property
     def stamps(self) -> dict[int, int]:
-        """The header stamps of the frames whose images are there, in nanoseconds."""
-        batches = self._file.batches(at.CAMERA, _CAMERA, static=False)
-        return {
-            frame: stamp
-            for batch in batches
-            for frame, stamp in zip(
-                *(batch.column(name).cast("int64").to_pylist() for name in (at.FRAME, at.STAMP)),
-                strict=True,
-            )
-        }
+        """The header stamps of the frames that have images, in nanoseconds."""
+        stamps: dict[int, int] = {}
+        for batch in self._file.batches(at.CAMERA, _CAMERA, static=False):
+            frames, own = (batch.column(n).cast("int64").to_pylist() for n in (at.FRAME, at.STAMP))
+            stamps |= zip(frames, own, strict=True)
+        return stamps
 
     @property
     def unsure(self) -> tuple[int, ...]:
@@ -112,7 +107,7 @@ class Recording:
         return roles
 
     def result(self, name: str) -> str | None:
-        """Return the text of a result, as ``summary``; None if the run did not get there."""
+        """Return the text of a result, as ``summary``; None if the run ended before it."""
         return self._file.document(at.result_path(name))
 
     @cached_property
@@ -140,7 +135,7 @@ class Recording:
         return self.table("windows")
 
     def table(self, name: str) -> pd.DataFrame:
-        """Return the rows of a table by its name, as ``oracles``; none if the run counted none."""
+        """Return the rows of a table by its name, as ``oracles``; empty if the run has none."""
         return read_table(name, self._text(name), self.summary.get("tables"))
 
     def rows(self, name: str) -> Rows:
@@ -196,11 +191,11 @@ class Recording:
         return self._array(at.layer_path(variant, name), frame)
 
     def is_whole(self, frame: int, *, scored: bool) -> bool:
-        """Return whether all masks of a frame are there, and if it was scored truth and errors."""
-        layers = [(v.name, stage) for v in self.variants for stage in v.stages]
-        layers += [(v.name, ERRORS.name) for v in self.variants if scored]
-        paths = [at.CAMERA, *(at.layer_path(*layer) for layer in layers)]
-        paths += [at.TRUTH_PATH] * scored
+        """Return whether a frame has its image and masks, and if it was scored truth and errors."""
+        paths = [at.CAMERA, *[at.TRUTH_PATH] * scored]
+        for variant in self.variants:
+            names = (*variant.stages, *[ERRORS.name] * scored)
+            paths += (at.layer_path(variant.name, name) for name in names)
         return all(self._payloads.holds(p, self._codecs[p].component, frame) for p in paths)
 
     @cached_property

@@ -124,7 +124,7 @@ class RrdFile:
         return (text for _, text in self.rows(path, _TEXT))
 
     def document(self, path: str) -> str | None:
-        """Return the document that was logged once; None if the run did not get there."""
+        """Return the document that was logged once; None if the run ended before it."""
         value = self.static(path, _TEXT)
         return None if value is None else str(value)
 
@@ -149,13 +149,16 @@ class RrdFile:
             self._unchecked.clear()
             return {}
         with whole(self.path, SUMS):
-            return sums_of(self.document(SUMS) or "")
+            pairs = json.loads(self.document(SUMS) or "")
+            return {int(offset): int(total) for offset, total in pairs}
 
     def _check(self, path: str) -> None:
         """Verify the messages of an entity, once."""
-        for place in self._unchecked.get(path, ()):
-            if self._sums.get(place.offset) != sum_at(self.path, place):
-                raise DamagedError(self.path, path)
+        with self.path.open("rb") as file:
+            for place in self._unchecked.get(path, ()):
+                file.seek(place.offset)
+                if self._sums.get(place.offset) != crc32(file.read(place.size)):
+                    raise DamagedError(self.path, path)
         self._unchecked.pop(path, None)
 
     def _all(self, chunks: LazyChunkStreamInternal, path: str) -> Iterator[ChunkInternal]:
@@ -289,18 +292,13 @@ class MessageSums:
                 self._next += _HEADER.size + size
 
     def document(self) -> str:
-        """Return all checksums by the messages' offsets, from which `sums_of` reads them."""
+        """Return all checksums, each with the offset of its message, as JSON."""
         return json.dumps(self._sums)
 
     def mark(self) -> str:
         """Return the path of the entity that says where the last message lies, and its checksum."""
         offset, total = self._sums[-1]
         return f"{SUMS}/{offset}_{total:08x}"
-
-
-def sums_of(document: str) -> dict[int, int]:
-    """Return the checksums of a file's messages by their offsets; a ValueError if it has none."""
-    return {int(offset): int(total) for offset, total in json.loads(document)}
 
 
 def marked(places: Mapping[str, Sequence[Place]]) -> dict[int, int]:
@@ -312,13 +310,6 @@ def marked(places: Mapping[str, Sequence[Place]]) -> dict[int, int]:
     marks = [path.rpartition("/")[2] for path in places if path.startswith(f"{SUMS}/")]
     found = {int(place): int(total, 16) for place, _, total in (m.partition("_") for m in marks)}
     return found if own == [*found] else {}
-
-
-def sum_at(path: Path, place: Place) -> int:
-    """Return the checksum of a message."""
-    with path.open("rb") as file:
-        file.seek(place.offset)
-        return crc32(file.read(place.size))
 
 
 def can_be_read(path: Path) -> bool:

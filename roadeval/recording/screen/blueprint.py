@@ -42,44 +42,45 @@ def arrange(layout: Layout) -> rrb.Blueprint:
     tabs = [overview(layout), *(_every_layer(layout, v) for v in layout.variants)]
     if layout.has_truth:
         tabs += [_rates(layout), _counts(layout)]
-    tabs += [_timing(layout), _results()]
+    tabs.append(rrb.Vertical(*map(stage_times, layout.variants), name="Timing"))
+    results = (
+        (at.OVERVIEW, "Results"),
+        ("windows", "Windows (CSV)"),
+        (at.SUMMARY, "Summary (JSON)"),
+    )
+    texts = (document(at.result_path(name), title) for name, title in results)
+    tabs.append(rrb.Horizontal(*texts, name="Results"))
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=0),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        _time_panel(layout),
+        # Opens at the last frame: the first ones may be training frames, whose error maps are
+        # empty, and a blueprint cannot name a frame to open at.
+        rrb.TimePanel(
+            state="collapsed", timeline=at.FRAME, play_state="following", fps=layout.rate_hz
+        ),
         auto_views=False,
         auto_layout=False,
     )
 
 
 def _every_layer(layout: Layout, variant: VariantLayout) -> BlueprintPart:
-    pictures = [
-        camera(),
-        *(layers(spec.title, variant.name, (spec,)) for spec in variant.layers),
-    ]
+    views = [camera(), *(layers(spec.title, variant.name, (spec,)) for spec in variant.layers)]
     if layout.has_shadow_truth:
-        pictures.append(picture("Truth: shadow", [at.CAMERA, at.TRUE_SHADOW]))
+        views.append(picture("Truth: shadow", at.CAMERA, at.TRUE_SHADOW))
     if layout.has_truth:
-        pictures += [truth(), outcome(layout, variant)]
-    return rrb.Grid(*pictures, grid_columns=4, name=f"{variant.name}: every layer")
+        views += [truth(), outcome(layout, variant)]
+    return rrb.Grid(*views, grid_columns=4, name=f"{variant.name}: every layer")
 
 
 def _rates(layout: Layout) -> BlueprintPart:
     """Return graphs, a row a stage and a column a rate."""
-    plots = [
-        plot(
-            f"{rate} of {stage}",
-            [
-                at.scalar_path("metrics", variant, other, rate)
-                for variant, other in layout.scored()
-                if other == stage
-            ],
-        )
-        for stage in dict.fromkeys(stage for _, stage in layout.scored())
-        for rate in SHORT
-        if rate in layout.rates
-    ]
+    plots = []
+    for stage in dict.fromkeys(stage for _, stage in layout.scored()):
+        variants = [variant for variant, other in layout.scored() if other == stage]
+        for rate in filter(layout.rates.__contains__, SHORT):
+            paths = [at.scalar_path("metrics", variant, stage, rate) for variant in variants]
+            plots.append(plot(f"{rate} of {stage}", paths))
     return rrb.Grid(*plots, grid_columns=len(SHORT), name="Rates by stage")
 
 
@@ -93,69 +94,30 @@ def _counts(layout: Layout) -> BlueprintPart:
     return rrb.Grid(*plots, grid_columns=columns, name="Counts")
 
 
-def _timing(layout: Layout) -> BlueprintPart:
-    return rrb.Vertical(*map(stage_times, layout.variants), name="Timing")
-
-
-def _results() -> BlueprintPart:
-    return rrb.Horizontal(
-        document(at.result_path(at.OVERVIEW), "Results"),
-        document(at.result_path("windows"), "Windows (CSV)"),
-        document(at.result_path(at.SUMMARY), "Summary (JSON)"),
-        name="Results",
-    )
-
-
-def _time_panel(layout: Layout) -> rrb.TimePanel:
-    """Return a time panel that opens at the last frame and plays at the drive's own rate.
-
-    The first frames may be training frames, whose error maps are empty, and a blueprint cannot
-    name a frame to open at.
-    """
-    return rrb.TimePanel(
-        state="collapsed",
-        timeline=at.FRAME,
-        play_state="following",
-        fps=layout.rate_hz,
-    )
-
-
 def overview(layout: Layout) -> BlueprintPart:
     """Return the first tab."""
     rows = {variant.name: _cells(variant) for variant in layout.variants[:_ROWS]}
-    columns = max(len(cells) for cells in rows.values())
+    columns = max(map(len, rows.values()))
     shortest = min(rows, key=lambda name: len(rows[name]))
     free = columns - len(rows[shortest])
     aside = {shortest: events(wide=free > 2)} if free > 1 else {}
 
+    pictures = [camera(), *([truth()] if layout.has_truth else [])]
+    pictures += [outcome(layout, variant) for variant in layout.variants[:_OUTCOMES]]
     ratio = layout.height / layout.width
     row = min((_WIDTH - _HEADER) / columns * ratio, _HEIGHT / 3) + _TITLE
-    pictures = _pictures(layout)
     height = _HEIGHT - row * len(rows) - _LEAST_CURVES - _TITLE
     width = max(min(height / ratio, (_WIDTH - _LEAST_WORDS) / len(pictures)), _LEAST_PICTURE)
     top = width * ratio + _TITLE
+    guide = document(at.GUIDE, "What you see")
+    shares = [*[width] * len(pictures), _WIDTH - width * len(pictures)]
     return rrb.Vertical(
-        _top(pictures, width),
+        rrb.Horizontal(*pictures, guide, column_shares=shares),
         *(_row(name, cells, columns, aside.get(name)) for name, cells in rows.items()),
-        _bottom(layout, None if aside else events(wide=False)),
+        rrb.Horizontal(*_curves(layout), *([] if aside else [events(wide=False)])),
         row_shares=[top, *[row] * len(rows), max(_HEIGHT - top - row * len(rows), _LEAST_CURVES)],
         name="Overview",
     )
-
-
-def _pictures(layout: Layout) -> list[BlueprintPart]:
-    """Return views of the camera, the truth, and what each variant made of it."""
-    return [
-        camera(),
-        *([truth()] if layout.has_truth else []),
-        *(outcome(layout, variant) for variant in layout.variants[:_OUTCOMES]),
-    ]
-
-
-def _top(pictures: Sequence[BlueprintPart], width: float) -> BlueprintPart:
-    words = document(at.GUIDE, "What you see")
-    shares = [*[width] * len(pictures), _WIDTH - width * len(pictures)]
-    return rrb.Horizontal(*pictures, words, column_shares=shares)
 
 
 def _cells(variant: VariantLayout) -> list[Cell]:
@@ -177,57 +139,54 @@ def _cells(variant: VariantLayout) -> list[Cell]:
 def _row(
     variant: str, cells: Sequence[Cell], columns: int, aside: BlueprintPart | None
 ) -> BlueprintPart:
-    """Return a variant's row, filled from the right: equal phases stand below each other."""
+    """Return a variant's row, filled from the right, so that equal phases are aligned."""
     width = (_WIDTH - _HEADER) / columns
     space = (columns - len(cells)) * width
     # Titles must be short here: the layers' names.
-    titles = (" + ".join(spec.name for spec in cell) for cell in cells)
-    pictures = [layers(t, variant, c) for t, c in zip(titles, cells, strict=True)]
+    pictures = [layers(" + ".join(spec.name for spec in cell), variant, cell) for cell in cells]
     header = document(at.guide_path(variant))
     start, shares = ([header, aside], [_HEADER, space]) if aside else ([header], [_HEADER + space])
     return rrb.Horizontal(*start, *pictures, column_shares=[*shares, *[width] * len(cells)])
 
 
-def _bottom(layout: Layout, aside: BlueprintPart | None) -> BlueprintPart:
-    plots = (
-        [_rate(layout, rate) for rate in SHORT if rate in layout.rates]
-        if layout.has_truth
-        else [stage_times(variant) for variant in layout.variants[:_ROWS]]
-    )
-    return rrb.Horizontal(*plots, *([aside] if aside else []))
-
-
-def _rate(layout: Layout, rate: str) -> BlueprintPart:
-    """Return a graph that compares a rate of the final masks."""
+def _curves(layout: Layout) -> list[BlueprintPart]:
+    """Return graphs that compare the rates of the final masks, or without truth the times."""
+    if not layout.has_truth:
+        return [stage_times(variant) for variant in layout.variants[:_ROWS]]
     finals = [(variant.name, variant.stages[-1]) for variant in layout.variants]
     finals += [(BASELINE, FINAL_STAGE)] * layout.baseline
-    paths = [at.scalar_path("metrics", *final, rate) for final in finals]
-    return plot(f"{rate}: {SHORT[rate].in_words}", paths)
+    return [
+        plot(
+            f"{rate}: {SHORT[rate].in_words}",
+            [at.scalar_path("metrics", *final, rate) for final in finals],
+        )
+        for rate in SHORT
+        if rate in layout.rates
+    ]
 
 
 # --- Single views ---------------------------------------------------------------------------------
 
 
-def picture(title: str, paths: Sequence[str]) -> BlueprintPart:
+def picture(title: str, *paths: str) -> BlueprintPart:
     """Return a view of images drawn over each other."""
     return rrb.Spatial2DView(origin="/", contents=list(paths), name=title)
 
 
 def camera() -> BlueprintPart:
     """Return a view of the image as logged."""
-    return picture("Camera", [at.CAMERA])
+    return picture("Camera", at.CAMERA)
 
 
 def truth() -> BlueprintPart:
     """Return a view of the truth: which pixels are road."""
-    return picture("Truth: road", [at.CAMERA, at.TRUTH_PATH])
+    return picture("Truth: road", at.CAMERA, at.TRUTH_PATH)
 
 
 def outcome(layout: Layout, variant: VariantLayout) -> BlueprintPart:
     """Return a view of the variant's errors, or without truth of what it calls road."""
-    name = ERRORS.name if layout.has_truth else variant.stages[-1]
-    title = f"{variant.name}: {'errors' if layout.has_truth else 'road'}"
-    return picture(title, [at.CAMERA, at.layer_path(variant.name, name)])
+    what, name = ("errors", ERRORS.name) if layout.has_truth else ("road", variant.stages[-1])
+    return picture(f"{variant.name}: {what}", at.CAMERA, at.layer_path(variant.name, name))
 
 
 def is_overlay(spec: LayerSpec) -> bool:
@@ -238,7 +197,7 @@ def is_overlay(spec: LayerSpec) -> bool:
 def layers(title: str, variant: str, specs: Sequence[LayerSpec]) -> BlueprintPart:
     """Return one view of layers of a variant."""
     below = [at.CAMERA] if is_overlay(specs[0]) else []
-    return picture(title, [*below, *(at.layer_path(variant, spec.name) for spec in specs)])
+    return picture(title, *below, *(at.layer_path(variant, spec.name) for spec in specs))
 
 
 def plot(title: str, paths: Sequence[str]) -> BlueprintPart:
@@ -273,6 +232,6 @@ def events(*, wide: bool) -> BlueprintPart:
         columns=rrb.TextLogColumns(timeline_columns=[at.FRAME], text_log_columns=["body"]),
         format_options=rrb.TextLogFormat(monospace_body=False),
     )
-    if wide:
-        return rrb.Horizontal(state, notes, column_shares=[1, 2])
-    return rrb.Vertical(state, notes)
+    return (
+        rrb.Horizontal(state, notes, column_shares=[1, 2]) if wide else rrb.Vertical(state, notes)
+    )

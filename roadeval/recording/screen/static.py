@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import rerun as rr
 
-from roadeval.data import BASELINE, FILTERED, UNFILTERED, Health, Role, VariantLayout, colours
+from roadeval.data import BASELINE, FILTERED, UNFILTERED, Health, Role, colours
 from roadeval.data.colours import Colour
 from roadeval.data.words import percent
 from roadeval.evaluation.metrics import SHORT
@@ -67,13 +67,6 @@ _HANDLING: Final = """\
 """
 
 
-def _colours(layout: Layout) -> dict[str, Colour]:
-    """Return the colour of every variant, the baseline included."""
-    extra = cycle(colours.EXTRA)
-    names = [variant.name for variant in layout.variants]
-    return {name: _VARIANTS.get(name) or next(extra) for name in (*names, BASELINE)}
-
-
 def before_the_first_frame(layout: Layout, codecs: Mapping[str, Codec]) -> StaticData:
     """Yield what is known before the first frame."""
     for path, codec in codecs.items():
@@ -81,12 +74,31 @@ def before_the_first_frame(layout: Layout, codecs: Mapping[str, Codec]) -> Stati
     yield at.LAYOUT, [rr.TextDocument(layout.to_json())]
     yield at.GUIDE, [_markdown(guide(layout))]
     for variant in layout.variants:
-        yield at.guide_path(variant.name), [_markdown(introduction(variant))]
+        # A heading would break the name in a column as narrow as this one.
+        words = f"**{as_markdown(variant.name)}**\n\n{as_markdown(variant.title)}\n"
+        yield at.guide_path(variant.name), [_markdown(words)]
     yield at.PROPERTIES, [rr.AnyValues(format=at.FORMAT, **layout.properties)]
     for name, header in layout.tables.items():
         yield at.result_path(name), [rr.AnyValues(header=header.rstrip())]
-    yield from _lanes(layout)
+    lanes: dict[str, tuple[str, ...]] = {at.ROLE: tuple(Role)}
+    lanes |= {at.state_path(variant.name): tuple(Health) for variant in layout.variants}
+    for path, states in lanes.items():
+        colours = [_STATES[state] for state in states]
+        yield path, [rr.StateConfiguration(values=states, colors=colours)]
     yield from _lines(layout)
+
+
+def _lines(layout: Layout) -> StaticData:
+    """Yield names and colours of the graphs of rates and counts."""
+    extra = cycle(colours.EXTRA)
+    names = [*(variant.name for variant in layout.variants), BASELINE]
+    variants = {name: _VARIANTS.get(name) or next(extra) for name in names}
+    counts = rr.SeriesLines(names=list(_COUNTS), colors=list(_COUNTS.values()))
+    for variant, stage in layout.scored():
+        for rate in layout.rates:
+            line = _line(variant, variants[variant])
+            yield at.scalar_path("metrics", variant, stage, rate), [line]
+        yield at.scalar_path("counts", variant, stage), [counts]
 
 
 def timing_lines(paths: Iterable[str]) -> StaticData:
@@ -106,8 +118,7 @@ def after_the_last_frame(layout: Layout, texts: Mapping[str, str]) -> StaticData
     else is the same when the same log is replayed again.
     """
     summary = json.loads(texts.get(at.SUMMARY, "{}"))
-    verdict = str(summary.get("verdict", ""))
-    yield at.GUIDE, [_markdown(guide(layout, verdict))]
+    yield at.GUIDE, [_markdown(guide(layout, str(summary.get("verdict", ""))))]
     yield at.result_path(at.OVERVIEW), [_markdown(overview(layout, summary))]
     yield at.SECONDS, [rr.TextDocument(json.dumps(summary.pop("seconds", {})))]
     kept = {at.SUMMARY: json.dumps(summary, indent=2)} if summary else {}
@@ -117,24 +128,6 @@ def after_the_last_frame(layout: Layout, texts: Mapping[str, str]) -> StaticData
 
 def _markdown(text: str) -> rr.TextDocument:
     return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
-
-
-def _lanes(layout: Layout) -> StaticData:
-    lanes: dict[str, tuple[str, ...]] = {at.ROLE: tuple(Role)}
-    lanes |= {at.state_path(variant.name): tuple(Health) for variant in layout.variants}
-    for path, states in lanes.items():
-        colours = [_STATES[state] for state in states]
-        yield path, [rr.StateConfiguration(values=states, colors=colours)]
-
-
-def _lines(layout: Layout) -> StaticData:
-    variants = _colours(layout)
-    lines = rr.SeriesLines(names=list(_COUNTS), colors=list(_COUNTS.values()))
-    for variant, stage in layout.scored():
-        for rate in layout.rates:
-            line = _line(variant, variants[variant])
-            yield at.scalar_path("metrics", variant, stage, rate), [line]
-        yield at.scalar_path("counts", variant, stage), [lines]
 
 
 def _line(name: str, colour: Colour) -> rr.SeriesLines:
@@ -150,12 +143,6 @@ def guide(layout: Layout, verdict: str = "") -> str:
     return "\n".join(
         [f"### {as_markdown(layout.drive)}", "", as_markdown(verdict), "", *parts, _HANDLING]
     )
-
-
-def introduction(layout: VariantLayout) -> str:
-    """Return the introduction of a variant."""
-    # A heading would break the name in a column as narrow as this one.
-    return f"**{as_markdown(layout.name)}**\n\n{as_markdown(layout.title)}\n"
 
 
 def overview(layout: Layout, summary: Mapping[str, Any]) -> str:
@@ -179,14 +166,14 @@ def _table(
     title: str, note: str, columns: Mapping[str, str], found: Mapping[str, Any]
 ) -> Iterator[str]:
     """Yield a table in percent, a row a variant and stage; nothing where there is none."""
-    rows = [(variant, stage, own) for variant, by in found.items() for stage, own in by.items()]
-    if rows:
+    if found:
         yield from ("", f"## {title}", "", note, "")
-        yield f"| {' | '.join(['variant', 'stage', *columns.values()])} |"
+        yield f"| variant | stage | {' | '.join(columns.values())} |"
         yield f"|---|---|{'---|' * len(columns)}"
-    for variant, stage, own in rows:
-        cells = (percent(own.get(name)) for name in columns)
-        yield f"| {' | '.join([as_markdown(variant), stage, *cells])} |"
+    for variant, stages in found.items():
+        for stage, own in stages.items():
+            cells = " | ".join(percent(own.get(name)) for name in columns)
+            yield f"| {as_markdown(variant)} | {stage} | {cells} |"
 
 
 def _accounts(frames: Mapping[str, Any]) -> Iterator[str]:
@@ -197,6 +184,6 @@ def _accounts(frames: Mapping[str, Any]) -> Iterator[str]:
             yield f"{name}: {count}".replace("_", " ")
 
 
-def _list(title: str, items: Any) -> list[str]:
+def _list(title: str, items: Iterable[Any]) -> list[str]:
     lines = [f"- {as_markdown(item)}" for item in items]
     return ["", f"## {title}", "", *lines] if lines else []

@@ -25,14 +25,13 @@ from roadeval.recording.layout import RecordingError
 from roadeval.runtime import files
 
 SIZE: Final = (1920, 1080)
-"""Of a picture, in pixels; the recording's views are arranged for it."""
+"""Of a screenshot, in pixels; the recording's views are arranged for it."""
 PACKAGE: Final = "mesa-vulkan-drivers"
 """Debian's package with the driver that draws without a graphics card."""
 DRIVERS: Final = Path("/usr/share/vulkan/icd.d")
 _LOADING_S: Final = 120.0
 _SETTLING_S: Final = 2.0
-"""How long to wait for a recording, and for the drawing to settle: after a jump images are decoded
-first."""
+"""Seconds to wait for a recording, and for the drawing: after a jump images are decoded first."""
 _POLL_S: Final = 0.25
 
 Answer = TypeVar("Answer")
@@ -69,7 +68,7 @@ def has_screen() -> bool:
 
 
 class WindowViewer:
-    """The viewer's window, led from frame to frame; opened again where somebody has closed it."""
+    """The viewer's window, moved from frame to frame; opened again after it was closed."""
 
     def __init__(self) -> None:
         self._stack: Final = ExitStack()
@@ -89,19 +88,15 @@ class WindowViewer:
                 "No screen to open a window on: type the command on a machine that has one."
             )
         with self._lock:
-            go(self._client(recording), frame)
-
-    def _client(self, recording: Path) -> ViewerClient:
-        """Return what steers the window, on a recording; it is opened where it is not there."""
-        if self._shown is not None:
-            shown, process, client = self._shown
-            if shown == recording and process.poll() is None:
-                return client
-        self._shown = None
-        self._stack.close()
-        process, client = self._stack.enter_context(opened(recording))
-        self._shown = recording, process, client
-        return client
+            if self._shown is not None:
+                shown, process, client = self._shown
+                if shown == recording and process.poll() is None:
+                    go(client, frame)
+                    return
+            self._shown = None
+            self._stack.close()
+            self._shown = recording, *self._stack.enter_context(opened(recording))
+            go(self._shown[2], frame)
 
     def close(self) -> None:
         """End the viewer."""
@@ -178,14 +173,14 @@ def _connect(process: subprocess.Popen[bytes], port: int, log: int) -> ViewerCli
 
 
 def asked(ask: Callable[[], Answer]) -> Answer:
-    """Return what the viewer answers; where it is late, ask again.
+    """Return the viewer's answer to a request, which is repeated after a timeout.
 
-    It gives up after 15 seconds by itself, in which a busy machine may not have drawn once.
+    Rerun's own timeout is 15 seconds, in which a busy machine may not have drawn once.
 
     Raises
     ------
     RecordingError
-        If it does not answer for long, or has ended.
+        If it does not answer in time, or has ended.
     """
     deadline = time.monotonic() + _LOADING_S
     while True:
@@ -213,14 +208,14 @@ def go(client: ViewerClient, frame: int | None) -> int | None:
     deadline = time.monotonic() + _SETTLING_S
     while True:
         shown = asked(client.get_state).recordings[0]
-        stands = shown.current_time if shown.current_timeline == at.FRAME else None
-        if frame in (None, stands) or time.monotonic() > deadline:
-            return stands
+        reached = shown.current_time if shown.current_timeline == at.FRAME else None
+        if frame in (None, reached) or time.monotonic() > deadline:
+            return reached
         time.sleep(_POLL_S)
 
 
 def _driver() -> dict[str, str]:
-    """Return the variables that choose the software driver: pictures look the same everywhere."""
+    """Return the variables that choose the software driver, which draws the same everywhere."""
     if "VK_ICD_FILENAMES" in os.environ or os.name != "posix":
         return {}
     found = sorted(DRIVERS.glob("lvp_icd*.json"))
@@ -248,5 +243,5 @@ def _free_port() -> int:
 def _reason(log: int) -> str:
     """Return the last line that the viewer printed."""
     os.lseek(log, 0, os.SEEK_SET)
-    said = os.read(log, 1 << 20).decode(errors="replace").split("\n")
-    return next((line.strip() for line in reversed(said) if line.strip()), "it said nothing")
+    lines = os.read(log, 1 << 20).decode(errors="replace").split("\n")
+    return next((line.strip() for line in reversed(lines) if line.strip()), "it printed nothing")

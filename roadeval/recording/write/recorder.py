@@ -8,7 +8,7 @@ import errno
 import hashlib
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -16,16 +16,19 @@ from typing import Any, Final, Self
 
 import rerun as rr
 
-from roadeval.data import FrameResult
+from roadeval.data import FrameResult, LayerKind
 from roadeval.recording import layout as at
-from roadeval.recording.layout import Layout, RecordingError
+from roadeval.recording.codecs import codecs_of
+from roadeval.recording.layout import Layout, RecordingError, RecordRule, RuleKind
 from roadeval.recording.read.rrd_file import MessageSums, indexed_chunks
 from roadeval.recording.screen import blueprint, static
 from roadeval.recording.write import rows as columns
-from roadeval.recording.write.encoding import EncodedFrame, FrameEncoder, Images
+from roadeval.recording.write.encoding import EncodedFrame, encode_frame, worst_error
 from roadeval.recording.write.rows import IMAGES_AND_TEXT, NOTHING, NUMBERS, Batcher, Key
+from roadeval.recording.write.worst import WorstFrames
 from roadeval.runtime.files import NewFile
 
+ALL: Final = RecordRule()
 UNWRITTEN: Final = 4 << 20
 """Bytes that may wait for Rerun's own thread to write them, which has no limit itself."""
 
@@ -47,17 +50,20 @@ class Recorder:
     Parameters
     ----------
     path
-        Where the complete recording will stand. A file there is replaced at the end only.
+        The name of the complete recording. A file of that name is replaced at the end only.
     layout
         What will come.
+    rule
+        Which images are kept, any but ``none``. Those of ``worst:K`` wait on disk until the end.
     """
 
-    def __init__(self, path: Path, layout: Layout) -> None:
+    def __init__(self, path: Path, layout: Layout, rule: RecordRule = ALL) -> None:
         self.path = path
         self._file = NewFile(path, hidden=False)
         self.partial = self._file.partial
         self._layout = layout
-        self._encoder = FrameEncoder(layout)
+        self._rule = rule
+        self._codecs = codecs_of(layout)
         self._rows, self._numbers = Batcher(IMAGES_AND_TEXT), Batcher(NUMBERS)
         self._begun = self._finished = self._failed = False
         self._chunks = self._unwritten = 0
@@ -66,6 +72,8 @@ class Recorder:
         self._shown: set[str] = set()
         self._blank: EncodedFrame | None = None
         self._stream: rr.RecordingStream | None = None
+        images = self.partial.with_name(f"{self.partial.name}-images")
+        self._worst = WorstFrames(images, rule.number)
 
     def __enter__(self) -> Self:
         """Open the partial file.
@@ -76,7 +84,10 @@ class Recorder:
             If it cannot be written.
         """
         try:
-            self._make_file()
+            with self._explained():
+                self._file.begin()
+                self.check_disk_space()
+                self.partial.touch()
             self._open()
         except BaseException:  # an interrupt, too; it holds no frame
             self._file.discard()
@@ -91,28 +102,44 @@ class Recorder:
         stream.save(self.partial, default_blueprint=blueprint.arrange(self._layout))
         stream.send_recording_name(self._layout.drive)
         self._stream = stream
-        self._log_static(static.before_the_first_frame(self._layout, self._encoder.codecs))
+        self._log_static(static.before_the_first_frame(self._layout, self._codecs))
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
-        if error is not None:
-            self._tell(error)
-            with suppress(RecordingError):  # the first error is the one to report
-                self._close()
-            return
         try:
             self._close()
-            if self._finished:
+            if self._finished and error is None:
                 with self._explained():
                     self._file.publish()
         except RecordingError as failed:
-            self._tell(failed)
-            raise
+            if error is None:  # else the first error is the one to report
+                error = failed
+                raise
+        finally:
+            self._worst.clear()
+            if error is not None and self.partial.exists():
+                error.add_note(f"the partial recording is {self.partial}")
 
-    def encode(
-        self, result: FrameResult, lines: Mapping[str, str], images: Images = Images.ALL
-    ) -> EncodedFrame:
-        """Encode a frame, with its lines of the tables, in any thread."""
-        return self._encoder.encode(result, lines, images)
+    def encode(self, result: FrameResult, position: int, lines: Mapping[str, str]) -> EncodedFrame:
+        """Encode a frame; the heavy part of the work, in any thread.
+
+        Parameters
+        ----------
+        result
+            With its layers.
+        position
+            Among the frames read, from 0.
+        lines
+            The frame's lines of the tables in `Layout.tables`, by name.
+        """
+        kinds: Collection[LayerKind] = tuple(LayerKind)
+        match self._rule.kind:
+            case RuleKind.MASKS:
+                kinds = (LayerKind.MASK, LayerKind.LABELS)
+            case RuleKind.EVERY if position % self._rule.number:
+                kinds = ()
+            case RuleKind.WORST if worst_error(result) < self._worst.least:
+                kinds = ()
+        return encode_frame(result, lines, self._layout, self._codecs, kinds)
 
     def write(self, encoded: EncodedFrame) -> None:
         """Append a frame. Frames come in order, from one thread.
@@ -125,7 +152,8 @@ class Recorder:
         if not self._begun:
             self._begun = True
             self._log_static(static.timing_lines(encoded.scalars))
-        self._add_images(encoded)
+        put_aside = encoded.payloads and self._rule.kind is RuleKind.WORST
+        self._add_images(replace(encoded, payloads={}) if put_aside else encoded)
         self._add_texts(encoded)
         when = encoded.number, encoded.stamp_ns
         for path, number in encoded.scalars.items():
@@ -134,14 +162,17 @@ class Recorder:
             self._numbers.add(path, columns.counts, *when, numbers)
         self._end_frame(self._rows)
         self._end_frame(self._numbers)
+        if put_aside:
+            self.check_disk_space()
+            self._worst.offer(encoded)
 
-    def write_images(self, frames: Iterable[EncodedFrame]) -> None:
-        """Append the images of frames whose numbers are written already, in order.
+    def _write_worst(self) -> None:
+        """Append the images put aside, in order; their frames' numbers are written already.
 
         They are cleared right after their frame, so that no later frame shows them. After an
-        interrupt it may be called again with the remaining frames.
+        interrupt it may be called again.
         """
-        for encoded in frames:
+        for encoded in self._worst.take():
             if self._blank is not None and self._blank.number != encoded.number:
                 self._add_images(self._blank)
             self._add_images(encoded)
@@ -160,6 +191,10 @@ class Recorder:
         RecordingError
             If it cannot be written.
         """
+        self._write_worst()
+        self._send_all()
+
+    def _send_all(self) -> None:
         for batcher in (self._rows, self._numbers):
             for key in list(batcher):
                 self._send(batcher, key)
@@ -204,10 +239,10 @@ class Recorder:
     def _add_images(self, encoded: EncodedFrame) -> None:
         when = encoded.number, encoded.stamp_ns
         for path, payload in encoded.payloads.items():
-            self._rows.add(path, self._encoder.codecs[path].columns, *when, payload)
+            self._rows.add(path, self._codecs[path].columns, *when, payload)
         # The viewer goes on showing an image until another comes, so a missing one is cleared.
         for path in sorted(self._shown - encoded.payloads.keys()):
-            self._rows.add(path, self._encoder.codecs[path].columns, *when, NOTHING)
+            self._rows.add(path, self._codecs[path].columns, *when, NOTHING)
         self._shown = set(encoded.payloads)
 
     def _add_texts(self, encoded: EncodedFrame) -> None:
@@ -252,23 +287,12 @@ class Recorder:
             raise RuntimeError("a recorder is used inside its 'with' block")
         return self._stream
 
-    def _make_file(self) -> None:
-        with self._explained():
-            self._file.begin()
-            self.check_disk_space()
-            self.partial.touch()
-
     @contextmanager
     def _explained(self) -> Iterator[None]:
         try:
             yield
         except OSError as error:
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
-
-    def _tell(self, error: BaseException) -> None:
-        """Add to an error where the partial recording is."""
-        if self.partial.exists():
-            error.add_note(f"the partial recording is {self.partial}")
 
     def _flush_stream(self) -> None:
         self._unwritten = 0
@@ -293,7 +317,9 @@ class Recorder:
         if self._stream is None:
             return
         try:
-            self.flush()
+            with suppress(RecordingError):  # the disk may have no room for them
+                self._write_worst()
+            self._send_all()
         finally:
             if self._stream is not None:
                 self._stream.disconnect()
@@ -304,7 +330,7 @@ class Recorder:
 
 
 def _failure(number: int) -> OSError:
-    """Return the error that Rerun has met, or would meet, and does not tell."""
+    """Return the error that Rerun has met, or would meet, and does not report."""
     return OSError(number, os.strerror(number))
 
 
@@ -328,3 +354,8 @@ class NullRecorder:
 
     def finish(self, results: Mapping[str, str]) -> None:
         """Keep nothing."""
+
+
+def recorder_for(path: Path | None, layout: Layout, rule: RecordRule) -> Recorder | NullRecorder:
+    """Return a recorder that keeps images by a rule; without a path one that does nothing."""
+    return NullRecorder() if path is None else Recorder(path, layout, rule)

@@ -6,15 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from roadeval.recording import (
-    EncodedFrame,
-    Recorder,
-    Recording,
-    RecordingError,
-    RecordRule,
-    SelectiveRecorder,
-)
-from roadeval.recording.write.selective import PictureStore
+from roadeval.recording import EncodedFrame, Recorder, Recording, RecordingError, RecordRule
+from roadeval.recording.write.worst import WorstFrames
 from tests.recording.making import RESULTS, layout, result, rows_of
 from tests.results.making import lines
 
@@ -24,7 +17,7 @@ ERRORS = [0.1, 0.5, 0.3, 0.5, 0.2, 0.4, 0.0]
 
 
 def selective(path, rule):
-    return SelectiveRecorder(path, layout(), RecordRule.parse(rule))
+    return Recorder(path, layout(), RecordRule.parse(rule))
 
 
 def write(recorder):
@@ -94,7 +87,7 @@ def test_a_run_that_is_stopped_keeps_the_worst_so_far(stop, tmp_path):
 
 
 @pytest.mark.parametrize("at", [1, 2, 3])
-@pytest.mark.parametrize("owner", [(PictureStore, "get"), (Recorder, "_end_frame")])
+@pytest.mark.parametrize("owner", [(WorstFrames, "_read"), (Recorder, "_end_frame")])
 def test_who_stops_a_run_while_the_worst_are_written_keeps_the_rest_of_them(
     owner, at, tmp_path, monkeypatch
 ):
@@ -158,7 +151,7 @@ def test_a_disk_that_fills_up_ends_the_run_with_one_line_and_a_readable_part(tmp
     def fill(recorder):
         with recorder:
             recorder.write(recorder.encode(result(0), 0, {}))
-            monkeypatch.setattr(PictureStore, "put", fail)
+            monkeypatch.setattr(WorstFrames, "offer", fail)
             recorder.write(recorder.encode(result(1), 1, {}))
 
     recorder = selective(tmp_path / "out.rrd", "worst:3")
@@ -172,36 +165,34 @@ ONE_LINE = r"^.*/images: the images put aside cannot be written or read \(.*\); 
 
 
 @pytest.fixture
-def store(tmp_path):
-    return PictureStore(tmp_path / "images")
+def worst(tmp_path):
+    return WorstFrames(tmp_path / "images", 1)
 
 
-def test_a_frame_comes_back_with_its_images_alone(store):
-    store.put(EncodedFrame(7, 70, PAYLOADS, scalars={"/metrics": 0.5}))
-    back = store.get(7)
+def test_a_frame_comes_back_with_its_images_alone(worst):
+    worst.offer(EncodedFrame(7, 70, PAYLOADS, scalars={"/metrics": 0.5}))
+    (back,) = worst.take()
     assert (back.number, back.stamp_ns, back.payloads) == (7, 70, PAYLOADS)
     assert list(back.payloads) == list(PAYLOADS)
     assert not back.scalars
 
 
-def test_nothing_is_left_when_it_is_cleared(store, tmp_path):
-    store.clear()
+def test_nothing_is_left_when_it_is_cleared(worst, tmp_path):
+    worst.clear()
     for number in (1, 2):
-        store.put(EncodedFrame(number, number, PAYLOADS))
-    store.drop(1)
+        worst.offer(EncodedFrame(number, number, PAYLOADS, worst_error=number))
     assert [path.name for path in (tmp_path / "images").iterdir()] == ["2"]
-    store.clear()
+    worst.clear()
     assert not list(tmp_path.iterdir())
 
 
-def test_images_that_were_lost_are_one_line(store, tmp_path):
-    store.put(EncodedFrame(7, 70, PAYLOADS))
+def test_images_that_were_lost_are_one_line(worst, tmp_path):
+    worst.offer(EncodedFrame(7, 70, PAYLOADS))
     (tmp_path / "images" / "7").unlink()
     with pytest.raises(RecordingError, match=ONE_LINE):
-        store.get(7)
+        list(worst.take())
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
-    store = PictureStore(tmp_path / "missing" / "images")
     with pytest.raises(RecordingError, match=ONE_LINE):
-        store.put(EncodedFrame(7, 70, PAYLOADS))
+        WorstFrames(tmp_path / "missing" / "images", 1).offer(EncodedFrame(7, 70, PAYLOADS))
