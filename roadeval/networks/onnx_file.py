@@ -16,7 +16,6 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.networks.protobuf import maker, weight_files
 from roadeval.networks.settings import NetSettings, NetworkError
 from roadeval.runtime.files import check_input
 from roadeval.runtime.text import visible
@@ -51,11 +50,11 @@ class Tensor:
     """None where a length is left open."""
 
     @classmethod
-    def of(cls, told: Any) -> Tensor:
-        """Return what onnxruntime tells of it."""
-        kind = re.sub(r"^tensor\((.*)\)$", r"\1", told.type)
-        sizes = (each if isinstance(each, int) and each > 0 else None for each in told.shape)
-        return cls(told.name, {"float": "float32", "double": "float64"}.get(kind, kind), (*sizes,))
+    def of(cls, found: Any) -> Tensor:
+        """Convert onnxruntime's description."""
+        kind = re.sub(r"^tensor\((.*)\)$", r"\1", found.type)
+        sizes = (each if isinstance(each, int) and each > 0 else None for each in found.shape)
+        return cls(found.name, {"float": "float32", "double": "float64"}.get(kind, kind), (*sizes,))
 
     def __str__(self) -> str:
         sizes = ", ".join("?" if size is None else str(size) for size in self.shape)
@@ -76,20 +75,17 @@ class OnnxFile:
     outputs: tuple[Tensor, ...]
     metadata: Mapping[str, str]
     makers: Mapping[str, str]
-    """By output: the operator that makes its numbers, see `roadeval.networks.protobuf.maker`."""
+    """By output: the operator that makes its numbers, see `maker`."""
     _tried: dict[Any, list[Array]] = field(default_factory=dict)
 
     def run(self, values: Array, outputs: tuple[str, ...]) -> list[Array]:
-        """Return outputs by their names for the values of the one input.
-
-        A `NetworkError` if onnxruntime cannot compute them.
-        """
+        """Compute some outputs for the values of the one input; a `NetworkError` if that fails."""
         with _explained(self.path):
             found = self.session.run(outputs, {self.inputs[0].name: values})
         return [np.asarray(each) for each in found]
 
     def tried(self, shape: tuple[int, ...], outputs: tuple[str, ...]) -> list[Array]:
-        """Return some outputs for an input of zeros: any input's have their shapes and types."""
+        """Return some outputs for an input of zeros, which show every frame's shapes and types."""
         key = (shape, outputs)
         if key not in self._tried:
             self._tried[key] = self.run(np.zeros(shape, self.inputs[0].dtype), outputs)
@@ -101,20 +97,20 @@ class OnnxFile:
 
     def question(self, what: str) -> NetworkError:
         """Return an error that asks for what the file leaves open, and lists what it has."""
-        return self.error(f"{what} ({self.described()})")
-
-    def described(self) -> str:
-        """List inputs and outputs in one line."""
-        return f"inputs: {_listed(self.inputs)}; outputs: {_listed(self.outputs)}"
+        listed = []
+        for tensors in (self.inputs, self.outputs):
+            more = f", and {len(tensors) - _SHOWN} more" if len(tensors) > _SHOWN else ""
+            listed.append(", ".join(map(str, tensors[:_SHOWN])) + more)
+        return self.error(f"{what} (inputs: {listed[0]}; outputs: {listed[1]})")
 
 
 def load(settings: NetSettings) -> OnnxFile:
-    """Open the network of some settings, or return it as long as its file stays the same.
+    """Open the network of some settings; one whose file did not change stays open.
 
     Raises
     ------
     NetworkError
-        If the file cannot be used, or is another one than the settings state.
+        If the file cannot be used, or is not the one whose SHA-256 the settings state.
     """
     if not settings.file:
         raise NetworkError("`net.file` names no network: give the path of an ONNX file")
@@ -125,7 +121,7 @@ def load(settings: NetSettings) -> OnnxFile:
     except FileNotFoundError as error:
         raise NetworkError(f"{path}: there is no such network") from error
     except (OSError, ValueError) as error:
-        raise _unreadable(path, error) from error
+        raise _unreadable(path, "cannot read the network", error) from error
     if there.st_size > LARGEST:
         raise NetworkError(f"{path}: larger than 2 GiB, which no ONNX file is")
     file = _opened(path, (there.st_dev, there.st_ino, there.st_size, there.st_mtime_ns))
@@ -145,13 +141,18 @@ def _opened(path: Path, _state: tuple[int, ...]) -> OnnxFile:
         content = path.read_bytes()
         beside = sorted(set(weight_files(memoryview(content))))
     except OSError as error:
-        raise _unreadable(path, error) from error
+        raise _unreadable(path, "cannot read the network", error) from error
     except ValueError as error:
         raise NetworkError(f"{path}: {_DAMAGED}") from error
     digest = hashlib.sha256(content)
     for name in beside:
         _add(digest, path, name)
-    _survived(path)
+    # Some damaged files end the process that opens them, so another process opens them first.
+    # -P: an onnxruntime.py that lies beside the network must not be what is imported.
+    probe = [sys.executable, "-P", "-c", _PROBE, str(path)]
+    # 1 is an exception, which is raised again below.
+    if subprocess.run(probe, check=False, capture_output=True).returncode not in (0, 1):
+        raise NetworkError(f"{path}: damaged: onnxruntime ends its process as it opens it")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4  # it throws what it logs
@@ -160,7 +161,7 @@ def _opened(path: Path, _state: tuple[int, ...]) -> OnnxFile:
             str(path), options, providers=["CPUExecutionProvider"], enable_fallback=0
         )
         inputs, outputs = (
-            tuple(map(Tensor.of, told)) for told in (session.get_inputs(), session.get_outputs())
+            tuple(map(Tensor.of, each)) for each in (session.get_inputs(), session.get_outputs())
         )
         metadata = session.get_modelmeta().custom_metadata_map
         makers = {each.name: maker(memoryview(content), each.name) for each in outputs}
@@ -178,24 +179,12 @@ def _add(digest: Any, path: Path, name: str) -> None:
             while block := file.read(1 << 20):
                 digest.update(block)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise NetworkError(
-            f"{path}: its weights lie in {visible(name)} beside it, which cannot be read: {reason}"
-        ) from error
+        what = f"its weights lie in {visible(name)} beside it, which cannot be read"
+        raise _unreadable(path, what, error) from error
 
 
-def _survived(path: Path) -> None:
-    """Open a network in another process first: some damaged files end the one that opens them."""
-    # -P: an onnxruntime.py that lies beside the network must not be what is imported.
-    probe = [sys.executable, "-P", "-c", _PROBE, str(path)]
-    code = subprocess.run(probe, check=False, capture_output=True).returncode
-    if code not in (0, 1):  # 1: an exception, which is met again
-        raise NetworkError(f"{path}: damaged: onnxruntime ends its process as it opens it")
-
-
-def _unreadable(path: Path, error: OSError | ValueError) -> NetworkError:
-    reason = getattr(error, "strerror", None) or error
-    return NetworkError(f"{path}: cannot read the network: {reason}")
+def _unreadable(path: Path, what: str, error: OSError | ValueError) -> NetworkError:
+    return NetworkError(f"{path}: {what}: {getattr(error, 'strerror', None) or error}")
 
 
 @contextmanager
@@ -218,6 +207,76 @@ def _explained(path: Path) -> Iterator[None]:
         raise NetworkError(f"{path}: {library} cannot run the network: {quoted}") from error
 
 
-def _listed(tensors: tuple[Tensor, ...]) -> str:
-    more = f", and {len(tensors) - _SHOWN} more" if len(tensors) > _SHOWN else ""
-    return ", ".join(map(str, tensors[:_SHOWN])) + more
+# --- What onnxruntime does not tell: weight files, and what makes the outputs ---------------------
+
+# An ONNX file is a protobuf message; fields have the numbers of ``onnx.proto``. What is no such
+# message is a ValueError.
+
+PASSING: Final = frozenset(
+    {"Cast", "Identity", "Reshape", "Resize", "Slice", "Squeeze", "Transpose", "Unsqueeze"}
+)
+"""Operators whose output holds the numbers of their input."""
+_GRAPH, _NODE, _INITIALIZER, _EXTERNAL_DATA = 7, 1, 5, 13
+
+
+def weight_files(model: memoryview) -> Iterator[str]:
+    """Yield the names of the files beside it that hold a model's weights."""
+    for graph in _all(model, _GRAPH):
+        for tensor in _all(graph, _INITIALIZER):
+            for entry in _all(tensor, _EXTERNAL_DATA):
+                key, value = (b"".join(_all(entry, number)) for number in (1, 2))
+                if key == b"location":
+                    yield _text(value)
+
+
+def maker(model: memoryview, output: str) -> str:
+    """Return the operator that makes the numbers of an output; empty where no node makes it.
+
+    Operators that only move or convert numbers are passed over.
+    """
+    made_by: dict[str, tuple[str, list[str]]] = {}
+    for graph in _all(model, _GRAPH):
+        for node in _all(graph, _NODE):
+            inputs, outputs, names = (list(map(_text, _all(node, n))) for n in (1, 2, 4))
+            made_by |= dict.fromkeys(outputs, ("".join(names), inputs))
+    for _ in made_by:
+        operator, inputs = made_by.get(output, ("", []))
+        if operator not in PASSING or not inputs:
+            return operator
+        output = inputs[0]
+    return ""
+
+
+def _all(message: memoryview, number: int) -> Iterator[memoryview]:
+    """Yield the bytes of each field of a message that has this number."""
+    place = 0
+    while place < len(message):
+        key, begin = _integer(message, place)
+        wire = key & 7
+        if wire == 0:
+            _, place = _integer(message, begin)
+        elif wire == 2:
+            size, begin = _integer(message, begin)
+            place = begin + size
+        elif wire in (1, 5):
+            place = begin + (8 if wire == 1 else 4)
+        else:
+            raise ValueError("a kind of field that ONNX does not use")
+        if place > len(message):
+            raise ValueError("a field that is cut off")
+        if key >> 3 == number:
+            yield message[begin:place]
+
+
+def _integer(message: memoryview, place: int) -> tuple[int, int]:
+    """Return an integer of variable length and the place behind it."""
+    value = 0
+    for index, byte in enumerate(message[place : place + 10]):
+        value |= (byte & 0x7F) << (7 * index)
+        if byte < 0x80:
+            return value, place + index + 1
+    raise ValueError("an integer that is cut off")
+
+
+def _text(value: memoryview | bytes) -> str:
+    return bytes(value).decode(errors="replace")

@@ -16,12 +16,12 @@ Class = Annotated[int, Field(ge=0, le=65535)] | str
 
 
 class NetworkError(RoadevalError):
-    """A network that cannot be used: which file, why, and what to do."""
+    """A network that cannot be used."""
 
 
 @validated(frozen=True, config=ConfigDict(extra="forbid"))
 class NetSettings:
-    """Settings of a network. Missing values are read from the file, and stated in ``run.toml``."""
+    """Settings of a network. Missing values are read from the file, and listed in ``run.toml``."""
 
     file: str = ""
     """The network, an ONNX file."""
@@ -69,7 +69,7 @@ class NetSettings:
 
     @property
     def input_shape(self) -> tuple[int, int, int, int]:
-        """Shape of the input, of stated settings."""
+        """Shape of the input, of complete settings."""
         assert self.size is not None
         width, height = self.size
         if self.layout == "NCHW":
@@ -78,7 +78,7 @@ class NetSettings:
 
     @property
     def road_numbers(self) -> list[int]:
-        """The classes that are road, of stated settings: those are numbers."""
+        """The numbers of the classes that are road, of complete settings."""
         return [int(each) for each in self.road or ()]
 
     @field_validator("deviation")

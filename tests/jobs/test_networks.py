@@ -223,5 +223,5 @@ def test_a_frame_on_which_the_network_fails_is_lost_and_accounted_for(folder, tm
     path = red_network(tmp_path / "nan.onnx", bias=float("nan"))
     outcome = run(folder / "drive.mcap", tmp_path, with_network(path))
     assert outcome.summary["frames"]["skipped"]["failed in a stage"] == 26
-    assert outcome.losses[0] == f"frame 0: net: {path}: gives numbers that are none (NaN)"
+    assert outcome.losses[0] == f"frame 0: net: {path}: gives NaN"
     assert json.loads((tmp_path / "reports" / "summary.json").read_text())["losses"]

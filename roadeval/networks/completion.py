@@ -1,6 +1,6 @@
-"""Settings of a network with nothing left open: read from its file, or asked for in one line.
+"""Completion of a network's settings: what is missing is read from its file, or asked for.
 
-A file's metadata can tell of class names, the channels' order, their range, and a licence. The keys
+A file's metadata may hold class names, the channels' order, their range, and a licence. The keys
 are those that exporters write: ``names`` (a dictionary in Python's or JSON's form, or a list) and
 ONNX's own ``Image.BitmapPixelFormat`` and ``Image.NominalPixelRange``.
 """
@@ -15,14 +15,13 @@ from typing import Any, Final, Literal
 
 import numpy.typing as npt
 
-from roadeval.networks.onnx_file import OnnxFile, Tensor
+from roadeval.networks.onnx_file import OnnxFile
 from roadeval.networks.settings import NetSettings
 from roadeval.runtime.text import visible
 
 FED: Final = frozenset({"float32", "float16", "float64", "uint8"})
 """Types of an input that takes an image."""
 NAMES: Final = ("names", "class_names", "classes", "labels")
-LICENCES: Final = ("license", "licence")
 ROAD_NAMES: Final = frozenset({"road", "drivable", "drivable area", "driveable area", "roadway"})
 """Names of classes that are road."""
 LONGEST: Final = 100_000
@@ -42,20 +41,20 @@ _RANGES: Final[Mapping[str, tuple[float, float]]] = {
 """Scale and mean that bring 0..255 to the range."""
 
 
-def stated(settings: NetSettings, file: OnnxFile) -> NetSettings:
-    """Return settings in which every choice is stated.
+def completed(settings: NetSettings, file: OnnxFile) -> NetSettings:
+    """Return settings without any missing value.
 
     Raises
     ------
     NetworkError
-        If the network cannot be used, or a choice cannot be read from its file: one line that asks
+        If the network cannot be used, or a value cannot be read from its file: one line that asks
         for it and lists the network's inputs and outputs.
     """
     settings = replace(settings, sha256=file.sha256)
     settings = _numbers(_input(settings, file), file)
     known = tuple(output.name for output in file.outputs)
     if settings.outputs is None and len(known) > 1:
-        raise file.question("gives several outputs: say which tell of road by `net.outputs`")
+        raise file.question("gives several outputs: name those that show road by `net.outputs`")
     outputs = settings.outputs or known
     for name in outputs:
         if name not in known:
@@ -78,11 +77,9 @@ def class_names(metadata: Mapping[str, str]) -> dict[int, str]:
 
 
 def licence(metadata: Mapping[str, str]) -> str | None:
-    """Return what the file says of its licence, in one line; None where it says nothing."""
-    for key in LICENCES:
-        if text := " ".join(metadata.get(key, "").split()):
-            return visible(text if len(text) <= QUOTED else f"{text[:QUOTED]}...")
-    return None
+    """Return the file's licence in one line; None if it names none."""
+    text = " ".join((metadata.get("license") or metadata.get("licence") or "").split())
+    return visible(text if len(text) <= QUOTED else f"{text[:QUOTED]}...") if text else None
 
 
 def is_labels(output: npt.NDArray[Any]) -> bool:
@@ -108,45 +105,36 @@ def as_scores(output: npt.NDArray[Any], layout: str | None) -> npt.NDArray[Any] 
 
 
 def _input(settings: NetSettings, file: OnnxFile) -> NetSettings:
-    """State layout, channels and size."""
-    if len(file.inputs) != 1:
-        raise file.question("takes something else than one image, and nothing can be put there")
-    only = file.inputs[0]
-    if len(only.shape) != 4 or only.dtype not in FED:
-        raise file.question("takes no image: that is four lengths of numbers")
-    if only.shape[0] not in (None, 1):
-        raise file.question(f"takes {only.shape[0]} images at once; export it for one")
-    layout = settings.layout or _layout(only, file)
-    _, *sizes = only.shape
-    count, rows, columns = sizes if layout == "NCHW" else (sizes[2], sizes[0], sizes[1])
+    """Complete layout, channels and size."""
+    shape = file.inputs[0].shape if len(file.inputs) == 1 else ()
+    if len(shape) != 4 or shape[0] not in (None, 1) or file.inputs[0].dtype not in FED:
+        raise file.question("takes no image: that is one input of four lengths, the first one 1")
+    layout = settings.layout or ("NCHW" if shape[1] in (1, 3) else "NHWC")
+    _, count, rows, columns = shape if layout == "NCHW" else (1, shape[3], shape[1], shape[2])
+    if settings.layout is None and count not in (1, 3):
+        raise file.question("give the order of its input's lengths by `net.layout`")
     width, height = settings.size or (columns, rows)
     if width is None or height is None:
         raise file.question(
-            "takes images of any size: say which by `net.size`, width and height as [512, 256]"
+            "takes images of any size: give width and height by `net.size`, as [512, 256]"
         )
     if columns not in (None, width) or rows not in (None, height):
         raise file.question(f"takes no input of {width}x{height}: see `net.size`")
-    told = _ORDERS.get(file.metadata.get("Image.BitmapPixelFormat", "").lower())
-    channels = settings.channels or told or ("grey" if count == 1 else "rgb")
+    order = _ORDERS.get(file.metadata.get("Image.BitmapPixelFormat", "").lower())
+    channels = settings.channels or order or ("grey" if count == 1 else "rgb")
     settings = replace(settings, layout=layout, channels=channels, size=(width, height))
     if count not in (None, settings.channel_count):
-        raise file.question(f"its input has {count} channels, and {settings.channels} has others")
+        raise file.question(
+            f"its input has {count} channels, and {channels} has {settings.channel_count}"
+        )
     return settings
 
 
-def _layout(only: Tensor, file: OnnxFile) -> Literal["NCHW", "NHWC"]:
-    if only.shape[1] in (1, 3):
-        return "NCHW"
-    if only.shape[3] in (1, 3):
-        return "NHWC"
-    raise file.question("say which of its input's lengths is that of channels: `net.layout`")
-
-
 def _numbers(settings: NetSettings, file: OnnxFile) -> NetSettings:
-    """State scale, mean and deviation."""
-    whole = file.inputs[0].dtype == "uint8"
-    told = _RANGES.get(file.metadata.get("Image.NominalPixelRange", "").lower())
-    scale, mean = told or (1.0 if whole else 1 / 255, 0.0)
+    """Complete scale, mean and deviation."""
+    default = (1.0 if file.inputs[0].dtype == "uint8" else 1 / 255, 0.0)
+    named = file.metadata.get("Image.NominalPixelRange", "").lower()
+    scale, mean = _RANGES.get(named, default)
     settings = replace(
         settings,
         scale=settings.scale or scale,
@@ -168,15 +156,16 @@ def _numbers(settings: NetSettings, file: OnnxFile) -> NetSettings:
 def _meaning(
     settings: NetSettings, file: OnnxFile, name: str, output: npt.NDArray[Any]
 ) -> NetSettings:
-    """State what an output means."""
+    """Complete what an output means."""
     assert settings.size is not None
+    width, height = settings.size
     scores = as_scores(output, settings.layout)
-    if scores is None or not _like(scores, settings.size):
+    count, rows, columns = (0, 0, 0) if scores is None else scores.shape
+    # It has about the proportions of the input, and no more than one class of whole numbers.
+    is_map = rows and abs(rows - height * columns / width) <= max(2.0, 0.1 * rows)
+    if not is_map or (is_labels(output) and count != 1):
         raise file.question(f"its output {name!r} is no map of the image, but {output.shape}")
-    count = len(scores)
     if is_labels(output):
-        if count != 1:
-            raise file.question(f"its output {name!r} holds whole numbers of {count} classes")
         road = _road(settings, file, None)
         return replace(settings, road=road, activation="none", decide="argmax")
     decide = settings.decide or ("threshold" if count == 1 else "argmax")
@@ -184,19 +173,13 @@ def _meaning(
         raise file.question(
             f"its output {name!r} has one class, which beats no other: see `net.decide`"
         )
-    made = file.makers.get(name, "").lower()
+    is_probability = file.makers.get(name, "").lower() in ("softmax", "sigmoid")
     usual: Literal["softmax", "sigmoid"] = "sigmoid" if count == 1 else "softmax"
-    activation = settings.activation or ("none" if made in ("softmax", "sigmoid") else usual)
+    activation = settings.activation or ("none" if is_probability else usual)
     road = _road(settings, file, count)
     if decide == "argmax" and len(road) == count:
         raise file.question("all of its classes are road: see `net.road`")
     return replace(settings, road=road, activation=activation, decide=decide)
-
-
-def _like(scores: npt.NDArray[Any], size: tuple[int, int]) -> bool:
-    """Return whether a map has about the proportions of the input."""
-    rows, columns = scores.shape[1:]
-    return bool(abs(rows - size[1] * columns / size[0]) <= max(2.0, 0.1 * rows))
 
 
 def _road(settings: NetSettings, file: OnnxFile, count: int | None) -> tuple[int, ...]:
@@ -211,7 +194,7 @@ def _road(settings: NetSettings, file: OnnxFile, count: int | None) -> tuple[int
     if not road:
         of = "" if count is None else f" of its {count}"
         listed = f", which are {_listed(names)}" if names else ""
-        raise file.question(f"say which classes{of} are road by `net.road`, as [0]{listed}")
+        raise file.question(f"name the classes{of} that are road by `net.road`, as [0]{listed}")
     if count is not None and max(road) >= count:
         raise file.question(f"has no class {max(road)}, but {count} from 0: see `net.road`")
     return road
@@ -220,11 +203,11 @@ def _road(settings: NetSettings, file: OnnxFile, count: int | None) -> tuple[int
 def _number(named: int | str, names: dict[int, str], file: OnnxFile) -> int:
     if isinstance(named, int):
         return named
-    for number, name in names.items():
-        if name == named:
-            return number
-    known = f"it has {_listed(names)}" if names else "its file names none, so give numbers"
-    raise file.question(f"has no class {named!r}; {known}: see `net.road`")
+    found = next((number for number, name in names.items() if name == named), None)
+    if found is None:
+        known = f"it has {_listed(names)}" if names else "its file names none, so give numbers"
+        raise file.question(f"has no class {named!r}; {known}: see `net.road`")
+    return found
 
 
 def _listed(names: dict[int, str], most: int = 30) -> str:

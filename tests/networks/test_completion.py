@@ -5,7 +5,7 @@ import pytest
 from onnx import TensorProto
 
 from roadeval.networks import NetSettings, Network, NetworkError
-from tests.networks.making import network
+from tests.networks.making import SIZE, network
 from tests.networks.test_onnx_file import with_weights_beside
 
 IMAGE = np.zeros((24, 32, 3), np.uint8)
@@ -123,7 +123,8 @@ def test_an_output_that_is_not_there(tmp_path):
 
 
 def test_which_of_three_classes_are_road(tmp_path):
-    assert "which classes of its 3 are road" in asked(network(tmp_path / "n.onnx", classes=3))
+    path = network(tmp_path / "n.onnx", classes=3)
+    assert "name the classes of its 3 that are road" in asked(path)
 
 
 def test_which_labels_are_road(tmp_path):
@@ -151,6 +152,12 @@ def test_an_operator_that_is_not_known(tmp_path):
     said = asked(network(tmp_path / "n.onnx", operator="Unheard"))
     assert "cannot run the network" in said
     assert "Unheard" in said
+
+
+def test_an_order_of_lengths_that_is_left_open(tmp_path):
+    path = network(tmp_path / "n.onnx", input_shape=(1, "c", "h", "w"))
+    assert "`net.layout`" in asked(path)
+    assert read(path, layout="NCHW", size=SIZE).channels == "rgb"
 
 
 def test_an_output_that_is_no_map(tmp_path):
