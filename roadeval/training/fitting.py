@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
@@ -35,7 +34,7 @@ _AT_ONCE: Final = 2
 
 
 class TrainingError(RoadevalError):
-    """Frames that nothing can be learnt from, and why."""
+    """Frames from which nothing can be learnt."""
 
 
 def fit(
@@ -69,22 +68,24 @@ def fit(
     """
     learning = {name: pipeline for name, pipeline in pipelines.items() if pipeline.learning()}
     source, truths = _truths(frames, settings)
-    samples = _sampled(frames, truths, settings) if learning else None
-    if samples is not None and source == "truth":
-        samples = dataclasses.replace(samples, share=_share_of_road(truths))
     parameters: dict[str, dict[str, Any]] = {name: {} for name in pipelines}
     warnings: list[str] = []
-    if samples is not None:
-        each = partial(_fit_variant, samples, {} if base is None else base.parameters)
-        for name, learnt, told in ordered(each, learning.items(), _AT_ONCE):
+    pixels = 0
+    if learning:
+        sampled = _sampled(frames, truths, settings)
+        if source == "truth":
+            sampled = dataclasses.replace(sampled, share=_share_of_road(truths))
+        pixels = len(sampled.road)
+        each = partial(_fit_variant, sampled, {} if base is None else base.parameters)
+        for name, learnt, warned in ordered(each, learning.items(), _AT_ONCE):
             parameters[name] = learnt
-            warnings += told
+            warnings += warned
     return Model(
         parameters,
         {name: pipeline.relevant() for name, pipeline in pipelines.items()},
         source,
         frozenset(frame.digest() for frame in frames) | (base.digests if base else frozenset()),
-        0 if samples is None else len(samples.road),
+        pixels,
         prior,
         tuple(warnings),
         np.stack([fingerprint(frame.image) for frame in frames]),
@@ -109,16 +110,14 @@ def _sampled(
     frames: Sequence[Frame], truths: list[Truth], settings: TrainingSettings
 ) -> TrainingSet:
     """Draw the pixels that every variant learns from."""
-    pixels = sample(truths, settings)
-    if not len(pixels.road):
-        numbers = f"{frames[0].number} to {frames[-1].number}"
+    sampled = sample(truths, settings)
+    if not len(sampled.road):
         raise TrainingError(
-            f"frames {numbers} do not show both road and non-road, so nothing can be learnt from "
-            "them; choose other frames with `frames.start` or `training.frames`, or give "
-            "`training.model`"
+            f"frames {frames[0].number} to {frames[-1].number} do not show both road and non-road, "
+            "so nothing can be learnt from them; choose other frames with `frames.start` or "
+            "`training.frames`, or give `training.model`"
         )
-    images = tuple(frame.image for frame in frames)
-    return TrainingSet(images, pixels.frame, pixels.row, pixels.column, pixels.road, settings.seed)
+    return dataclasses.replace(sampled, images=tuple(frame.image for frame in frames))
 
 
 def _share_of_road(truths: Sequence[Truth]) -> float:
@@ -128,14 +127,14 @@ def _share_of_road(truths: Sequence[Truth]) -> float:
 
 
 def _fit_variant(
-    samples: TrainingSet,
+    sampled: TrainingSet,
     base: Mapping[str, Mapping[str, Any]],
     variant: tuple[str, Pipeline],
 ) -> tuple[str, dict[str, Any], list[str]]:
     """Return the variant's name, what its stages learn, and the warnings."""
     name, pipeline = variant
-    learnt = _fit_stages(samples, pipeline, base.get(name, {}))
-    return name, learnt, _collapsed(name, samples.images, pipeline, learnt)
+    learnt = _fit_stages(sampled, pipeline, base.get(name, {}))
+    return name, learnt, _collapsed(name, sampled.images, pipeline, learnt)
 
 
 def _fit_stages(
@@ -163,7 +162,7 @@ def _collapsed(
     chain = pipeline.bind(parameters)
     shares: dict[str, list[float]] = {}
     for image in images:
-        with suppress(StageError):  # it is told of where the frame is replayed
+        with suppress(StageError):  # it is reported when the frame is replayed
             for name, output in chain.run(View.of(image)):
                 if output.mask is not None:
                     shares.setdefault(name, []).append(output.mask.area() / image[..., 0].size)
@@ -174,24 +173,11 @@ def _collapsed(
     ]
 
 
-Indices = npt.NDArray[np.intp]
-
-
 # --- Which pixels train ---------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Pixels:
-    """Where the sampled pixels lie, ``(n,)`` each, and which are road, ``(n,)`` bool."""
-
-    frame: Indices
-    row: Indices
-    column: Indices
-    road: npt.NDArray[np.bool_]
-
-
-def sample(truths: Sequence[Truth], settings: TrainingSettings) -> Pixels:
-    """Draw pixels of both classes from the truths of the training frames.
+def sample(truths: Sequence[Truth], settings: TrainingSettings) -> TrainingSet:
+    """Draw pixels of both classes from the truths of the training frames, without the images.
 
     Each frame gives at most ``pixels_per_class`` of either class; then the class that has more
     is thinned to the size of the other, so that the sample is balanced however little road (or
@@ -202,14 +188,17 @@ def sample(truths: Sequence[Truth], settings: TrainingSettings) -> Pixels:
     share = max(1, min(settings.pixels_per_class, settings.max_pixels // (2 * len(truths))))
     classes = [_draw(truths, value, share, rng) for value in (ROAD, NON_ROAD)]
     size = min(*(len(drawn) for drawn in classes), settings.max_pixels // 2)
-    road, other = (drawn[np.sort(rng.permutation(len(drawn))[:size])] for drawn in classes)
-    places = np.concatenate([road, other])
-    return Pixels(places[:, 0], places[:, 1], places[:, 2], np.arange(len(places)) < len(road))
+    places = np.concatenate(
+        [drawn[np.sort(rng.permutation(len(drawn))[:size])] for drawn in classes]
+    )
+    frame, row, column = places.T
+    return TrainingSet((), frame, row, column, np.arange(2 * size) < size, settings.seed)
 
 
 def _draw(
     truths: Sequence[Truth], value: int, share: int, rng: np.random.Generator
 ) -> npt.NDArray[np.intp]:
+    """Return frame, row and column of some pixels of a value, at most ``share`` a frame."""
     drawn = []
     for index, truth in enumerate(truths):
         flat = np.flatnonzero(truth == value)
@@ -226,10 +215,10 @@ def patch_truth(image: Rgb, settings: TrainingSettings) -> Truth:
     """Guess the truth of an ``(H, W, 3)`` uint8 RGB image from its reference patch.
 
     The ground right in front of a vehicle is road, and so is what can be reached from there without
-    crossing much of an edge, as a kerb, a wall or another vehicle has.
-    Road (1) is the patch, and what lies below the horizon row and nearer to it than
-    ``settings.far``, see `reach`; all else is not (0). The patch sets the exposure, whatever the
-    pipeline sees. Returns ``(H, W)`` uint8.
+    crossing a strong edge, such as a kerb, a wall or another vehicle.
+    Road (1) is the patch, and what lies below the horizon row and nearer to the patch than
+    ``settings.far``, see `reach`; all else is not (0). The patch also sets the exposure. Returns
+    ``(H, W)`` uint8.
     """
     height, width = image.shape[:2]
     exposure = ExposureSettings(patch=settings.patch)

@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final
 
 from roadeval.data import Frame
 from roadeval.errors import RoadevalError
 from roadeval.evaluation.score import BlindPrior
+from roadeval.logs import LoggedFrame
 from roadeval.pipeline.chain import Pipeline
 from roadeval.training.fitting import TrainingError, fit
 from roadeval.training.model import Model, kept_model
@@ -38,7 +39,7 @@ def from_file(path: Path, pipelines: Mapping[str, Pipeline]) -> tuple[Model, Sch
 
 
 def from_log(
-    frames: Callable[[], Iterable[Readable]],
+    frames: Callable[[], Iterable[LoggedFrame]],
     pipelines: Mapping[str, Pipeline],
     settings: TrainingSettings,
     on_frame: Callable[[int], None],
@@ -77,7 +78,7 @@ def from_log(
     """
     if base is not None:
         _require_adaptable(pipelines)
-    candidates, by_truth = candidates_of(frames, labelled=labelled)
+    candidates, by_truth = _candidates(frames, labelled=labelled)
     if base is not None and not by_truth and settings.source != "patch":
         raise TrainingError(
             "no frame of the range has road truth to adapt the model to, and what the reference "
@@ -85,30 +86,37 @@ def from_log(
             'training.source = "patch"'
         )
     if not by_truth and not any(pipeline.learning() for pipeline in pipelines.values()):
-        return (untrained(pipelines),), Schedule(frozenset())
-    choose = spread_out if settings.placement == "spread" else from_the_first
+        made_for = {name: pipeline.relevant() for name, pipeline in pipelines.items()}
+        nothing = Model({name: {} for name in pipelines}, made_for, "none", frozenset(), 0)
+        return (nothing,), Schedule(frozenset())
+    choose = _spread_out if settings.placement == "spread" else _from_the_first
     chosen = choose(candidates, settings, on_frame, by_truth=by_truth)
-    held = chosen.held
+    held, count = chosen.held, len(chosen.held.frames)
     warnings = []
     if held.is_full:
-        warnings.append(f"trained on {len(held.frames)} of {settings.frames} frames: {held.full()}")
+        warnings.append(f"trained on {count} of {settings.frames} frames: {held.full()}")
     if chosen.undecodable:
         warnings.append(
-            f"trained on {len(held.frames)} frames: {chosen.undecodable} more of those at equal "
-            "distances cannot be decoded"
+            f"trained on {count} frames: {chosen.undecodable} more of those at equal distances "
+            "cannot be decoded"
         )
     warnings += _repeated(held.frames)
     if labelled and not by_truth:
         warnings.append(f"no frame of the range has road truth: {BY_PATCH}")
-    if base is not None:
-        warnings.append(adapted(settings, len(held.frames), by_truth=by_truth))
-    models = _with_each_seed(held.frames, pipelines, settings, warnings, base)
-    sizes = frozenset(len(frame.payload) for frame in held.frames)
-    schedule = Schedule(models[0].digests, gap=chosen.gap, first=chosen.first, sizes=sizes)
-    if base is not None:  # frames that it has learnt from may be of any size, and encoded anew
+    schedule = Schedule(frozenset(), gap=chosen.gap, first=chosen.first)
+    if base is None:
+        schedule = replace(schedule, sizes=frozenset(len(f.payload) for f in held.frames))
+    else:
+        how = "labelled frames" if by_truth else "frames, by the reference patch in them,"
+        warnings.append(
+            f"the model of other drives ({settings.model}) was adapted to this drive with {count} "
+            f"of its own {how}: the rates are not those on a drive that it has not seen"
+        )
+        # Frames that it has learnt from may be of any size, and re-encoded.
         known = None if base.fingerprints is None else Likeness(base.fingerprints)
-        schedule = replace(schedule, sizes=None, likeness=known)
-    return models, schedule
+        schedule = replace(schedule, likeness=known)
+    models = _with_each_seed(held.frames, pipelines, settings, warnings, base)
+    return models, replace(schedule, digests=models[0].digests)
 
 
 def _require_adaptable(pipelines: Mapping[str, Pipeline]) -> None:
@@ -123,21 +131,6 @@ def _require_adaptable(pipelines: Mapping[str, Pipeline]) -> None:
             )
 
 
-def adapted(settings: TrainingSettings, frames: int, *, by_truth: bool) -> str:
-    """Return the sentence that sets an adapted model apart from one of other drives alone."""
-    how = "labelled frames" if by_truth else "frames, by the reference patch in them,"
-    return (
-        f"the model of other drives ({settings.model}) was adapted to this drive with {frames} of "
-        f"its own {how}: the rates are not those on a drive that it has not seen"
-    )
-
-
-def untrained(pipelines: Mapping[str, Pipeline]) -> Model:
-    """Return the model of variants that learn nothing, without a truth for the baseline."""
-    settings = {name: pipeline.relevant() for name, pipeline in pipelines.items()}
-    return Model({name: {} for name in pipelines}, settings, "none", frozenset(), 0)
-
-
 def _with_each_seed(
     frames: Sequence[Frame],
     pipelines: Mapping[str, Pipeline],
@@ -145,14 +138,14 @@ def _with_each_seed(
     warnings: Sequence[str],
     base: Model | None,
 ) -> tuple[Model, ...]:
-    """Train once a seed; the first model tells what any of the trainings warns of."""
+    """Train once with each seed; the first model has the warnings of all."""
     first, *others = (train_on(frames, pipelines, each, base=base) for each in settings.by_seed())
-    told = [
+    more = [
         f"seed {seed}: {warning}"
         for seed, model in enumerate(others, settings.seed + 1)
         for warning in model.warnings
     ]
-    return replace(first, warnings=(*warnings, *first.warnings, *told)), *others
+    return replace(first, warnings=(*warnings, *first.warnings, *more)), *others
 
 
 def from_drives(
@@ -180,7 +173,7 @@ def from_drives(
         )
     guessed = bare and settings.source == "auto"
     guess = [f"no drive has road truth in the range: {BY_PATCH}"] if guessed else []
-    repeated = [told for path, own in frames.items() for told in _repeated(own, f"{path.name}: ")]
+    repeated = [each for path, own in frames.items() for each in _repeated(own, f"{path.name}: ")]
     every = [frame for own in frames.values() for frame in own]
     return train_on(every, pipelines, settings, [*warnings, *repeated, *guess])
 
@@ -203,7 +196,7 @@ def train_on(
 
 
 def _repeated(frames: Sequence[Frame], drive: str = "") -> list[str]:
-    """Tell that some training frames of a drive show the same image as others, if they do."""
+    """Return a warning if some training frames of a drive are the same image."""
     repeated = len(frames) - len({frame.digest() for frame in frames})
     if not repeated:
         return []
@@ -214,7 +207,7 @@ def _repeated(frames: Sequence[Frame], drive: str = "") -> list[str]:
 
 
 def spread(
-    frames: Callable[[], Iterable[Readable]], count: int, *, labelled: bool
+    frames: Callable[[], Iterable[LoggedFrame]], count: int, *, labelled: bool
 ) -> Iterator[Frame]:
     """Decode ``count`` frames, spread evenly over those that there are.
 
@@ -265,21 +258,6 @@ class HeldFrames:
         )
 
 
-class Readable(Protocol):
-    """A frame of a log that has not been decoded yet."""
-
-    @property
-    def number(self) -> int:
-        """Position in the image topic."""
-
-    @property
-    def labelled(self) -> bool:
-        """Whether it has a truth."""
-
-    def decode(self) -> Frame:
-        """Decode it; a `RoadevalError` if it cannot be."""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Chosen:
     """The frames that train, and what that means for the others."""
@@ -294,9 +272,9 @@ class Chosen:
     """How many of the frames chosen do not train, for they cannot be decoded."""
 
 
-def candidates_of(
-    frames: Callable[[], Iterable[Readable]], *, labelled: bool
-) -> tuple[Iterator[Readable], bool]:
+def _candidates(
+    frames: Callable[[], Iterable[LoggedFrame]], *, labelled: bool
+) -> tuple[Iterator[LoggedFrame], bool]:
     """Return the labelled frames and True; if there are none, all frames and False."""
     if labelled:
         with_truth = (frame for frame in frames() if frame.labelled)
@@ -305,8 +283,8 @@ def candidates_of(
     return iter(frames()), False
 
 
-def from_the_first(
-    candidates: Iterator[Readable],
+def _from_the_first(
+    candidates: Iterator[LoggedFrame],
     settings: TrainingSettings,
     on_frame: Callable[[int], None],
     *,
@@ -339,8 +317,8 @@ def from_the_first(
     return Chosen(held, frozenset(following[:gap]), first)
 
 
-def spread_out(
-    candidates: Iterator[Readable],
+def _spread_out(
+    candidates: Iterator[LoggedFrame],
     settings: TrainingSettings,
     on_frame: Callable[[int], None],
     *,
@@ -349,7 +327,7 @@ def spread_out(
     """Choose ``settings.frames`` frames at equal distances; a gap lies on both sides of each.
 
     Without ``settings.gap`` the gap is a quarter of that distance, and at least one frame. The
-    parameters and errors are those of `from_the_first`, but all candidates are taken.
+    parameters and errors are those of `_from_the_first`, but all candidates are taken.
     """
     every = list(candidates)
     asked = frozenset(evenly([each.number for each in every], settings.frames))
@@ -378,7 +356,7 @@ def evenly(numbers: Sequence[int], count: int) -> list[int]:
     return [numbers[i * len(numbers) // taken] for i in range(taken)]
 
 
-def decoded(frames: Iterable[Readable]) -> Iterator[tuple[Readable, Frame]]:
+def decoded(frames: Iterable[LoggedFrame]) -> Iterator[tuple[LoggedFrame, Frame]]:
     """Decode what can be decoded; a frame that cannot is reported when it is replayed."""
     for readable in frames:
         try:
@@ -389,8 +367,8 @@ def decoded(frames: Iterable[Readable]) -> Iterator[tuple[Readable, Frame]]:
 
 
 def _hold(
-    candidates: Iterator[Readable], count: int, on_frame: Callable[[int], None]
-) -> tuple[HeldFrames, Iterator[Readable]]:
+    candidates: Iterator[LoggedFrame], count: int, on_frame: Callable[[int], None]
+) -> tuple[HeldFrames, Iterator[LoggedFrame]]:
     """Decode the first ``count`` frames, or as many as can be held; return the others too."""
     held = HeldFrames()
     for readable, frame in decoded(candidates):

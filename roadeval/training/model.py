@@ -29,8 +29,7 @@ from roadeval.version import VERSION as ROADEVAL
 
 FORMAT: Final = "roadeval-model"
 VERSION: Final = 7
-"""Of the file, the only one that is read; raised when what a stage has learnt means something else,
-or something is added."""
+"""Version of the file, the only one that is read; raised when a stage's parameters change."""
 WROTE: Final = {1: "0.1.0", 2: "0.1.0", 3: "0.2.0"}
 """The version of roadeval by that of the file, where the file does not say it."""
 GREATEST_SIZE: Final = 1 << 29
@@ -40,7 +39,7 @@ OWN: Final = ("prior", "fingerprints")
 
 
 class ModelError(RoadevalError):
-    """A model file that cannot be used, and why."""
+    """A model file that cannot be used."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +68,7 @@ class Model:
     """``(n, SIDE * SIDE)`` float16: the pictures of the training frames, see
     `roadeval.training.schedule`; None where nothing was learnt at all."""
     losses: tuple[str, ...] = ()
-    """What of the drives was lost when it was trained; a file does not keep it."""
+    """What was lost of the drives when it was trained; not kept in a file."""
 
     def __post_init__(self) -> None:
         if self.fingerprints is not None:
@@ -156,8 +155,8 @@ def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
     path
         The file.
     stages
-        Those besides roadeval's own that it may hold parameters of, as
-        ``config.pipelines()["mine"].stages()``. A file loads none by itself.
+        Further stages whose parameters it may hold, as ``config.pipelines()["mine"].stages()``.
+        A file loads no stage by itself.
 
     Raises
     ------
@@ -178,20 +177,18 @@ def load_model(path: Path, stages: Iterable[Stage] = ()) -> Model:
 
 def _another_format(header: Mapping[str, Any]) -> str:
     """Return which version of roadeval wrote a file of another format, and what to do."""
-    version = header.get("version")
-    later = isinstance(version, int) and version > VERSION
-    writer = header.get("roadeval")
-    if not isinstance(writer, str):
-        writer = WROTE.get(version) if isinstance(version, int) else None
-    age = "a later" if later else "an earlier"
+    version, writer = header.get("version"), header.get("roadeval")
+    number = version if isinstance(version, int) else 0
+    writer = writer if isinstance(writer, str) else WROTE.get(number)
+    age = "a later" if number > VERSION else "an earlier"
     made = f"made by roadeval {visible(writer)}" if writer else f"made by {age} version of roadeval"
-    if later:
+    if number > VERSION:
         return f"{made}: update roadeval, or train it again"
     return f"{made}, whose format is read no more: train it again"
 
 
 def kept_model(path: Path, stages: tuple[Stage, ...] = ()) -> Model:
-    """Read a model file as `load_model` does, or return the one read before: a fleet has one.
+    """Read a model file as `load_model` does, or return the one read before.
 
     What a stage computes from a model alone is kept with it, as the SVM's table of colours.
     """

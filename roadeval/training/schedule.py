@@ -1,9 +1,9 @@
-"""The role of each frame of a run: training, copy of such, gap, evaluated, unlabelled.
+"""The role of each frame of a run: training, copy of a training frame, gap, evaluated, unlabelled.
 
-Training pictures come again, encoded anew, or beside others of the same journey.
-A frame's hash knows the file that was logged, and not the picture: encoded anew it is another one.
-A fingerprint is the picture's brightness on a coarse grid. Its correlation with another's is close
-to one where both show the same, whatever the encoding and the size.
+Training pictures occur again re-encoded, or as neighbours in the same journey. A frame's hash
+identifies the file that was logged, which re-encoding changes. A fingerprint is the picture's
+brightness on a coarse grid: its correlation with another one is close to 1 where both show the
+same, whatever the encoding and the size.
 
 How far apart two fingerprints are, as the root mean square of their difference, was measured on
 seven sets of real frames and three synthetic drives:
@@ -29,9 +29,8 @@ a street, 15 Hz                                    0.066
 =================================================  =====================
 
 On the coarse grid the nearest frame of the same journey at 1 Hz is 0.04 to 0.28 away (median 0.12),
-and none of another journey nearer than 0.33. A camera that stands still, with nothing that moves
-before it, gives pictures that differ by its noise alone, less than another encoding does: they
-count as the same one.
+and none of another journey nearer than 0.33. Pictures of a static camera and scene differ only by
+noise, less than by another encoding: they count as the same picture.
 """
 
 from __future__ import annotations
@@ -49,11 +48,11 @@ SIDE: Final = 32
 COARSE: Final = 8
 """Those of the coarse grid, made of the other."""
 SAME: Final = 0.02
-"""Fingerprints at most so far apart are of one picture."""
+"""Largest distance of fingerprints of one picture."""
 BESIDE: Final = 0.2
-"""Coarse fingerprints at most so far apart are of one place, seen from nearly the same point."""
+"""Largest distance of coarse fingerprints of one place, seen from nearly the same point."""
 FLAT: Final = 1e-3
-"""A grid of a smaller deviation shows nothing that could be compared."""
+"""A grid of a smaller deviation has too little contrast to be compared."""
 
 Fingerprint = npt.NDArray[np.float16]
 """``(SIDE * SIDE,)``, of mean 0 and deviation 1; all 0 where the picture has one brightness."""
@@ -76,7 +75,7 @@ class Alike:
     same: bool = False
     """Whether it shows the same picture as one of them."""
     beside: frozenset[int] = frozenset()
-    """Places of those that show the same place."""
+    """Indices of those that show the same place."""
 
 
 class Likeness:
@@ -146,14 +145,11 @@ class Schedule:
     first: int | None = None
     """Number of the first frame to evaluate, where it is known beforehand."""
     sizes: frozenset[int] | None = None
-    """Bytes that the training frames take as logged, where they are known: a frame of another size
-    is none of them, and need not be hashed.
-    """
+    """Sizes in bytes of the training frames as logged, if known: frames of other sizes are not
+    hashed."""
     likeness: Likeness | None = None
-    """The pictures of the training frames, where these come from a file: a frame that shows the
-    same is not evaluated. In the log that trains its own model a frame after the training frames is
-    another one, however alike.
-    """
+    """The pictures of the training frames of a model file: frames that show the same are not
+    evaluated. In a log that trains its own model later frames count as others, however similar."""
 
     def use(self, frame: Frame) -> Use:
         """Return what a decoded frame is used for."""
