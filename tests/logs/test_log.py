@@ -301,7 +301,7 @@ def test_a_pipe_is_no_log_and_never_waited_for(tmp_path: Path) -> None:
     pipe = tmp_path / "drive.mcap"
     os.mkfifo(pipe)
     for path in (pipe, tmp_path):
-        with pytest.raises(LogError, match=r"is a pipe, .*write what it gives to a file first"):
+        with pytest.raises(LogError, match=r"is a pipe, not a file"):
             open_log(path)
 
 

@@ -95,7 +95,7 @@ def test_its_folder_is_made(tmp_path: Path) -> None:
 
 
 def test_a_folder_in_its_place_is_told_at_once(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="is a folder; name a file in it"):
+    with pytest.raises(LogError, match="is a folder, not a file"):
         LogWriter(tmp_path)
     assert list(tmp_path.iterdir()) == []
 
