@@ -3,7 +3,6 @@
 #
 # Run this file from the checkout (`python examples/api.py`), or cell by cell in an editor that
 # knows `# %%`. It replays 20 frames of the demo drive; all that it writes lands in `reports/api/`.
-# The plots need Matplotlib, which roadeval itself does not: `pip install matplotlib`.
 
 # %%
 from pathlib import Path

@@ -46,7 +46,7 @@ def of(run: Run) -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """Return the versions of roadeval, Python, what computes, and what writes files."""
-    writing = {name: version(name) for name in ("rerun-sdk", "pandas", "typst")}
+    writing = {name: version(name) for name in ("rerun-sdk", "pandas", "matplotlib")}
     return {"roadeval": VERSION, "python": platform.python_version(), **computing(), **writing}
 
 

@@ -9,15 +9,16 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import IGNORE, ROAD, LayerKind, LayerSpec, Mask, Rgb, Truth, colours
-from roadeval.report.blocks import ImageFile, ImageGrid
+from roadeval.data import LayerKind, LayerSpec, Mask, Rgb, Truth
+from roadeval.report.blocks import ImageFile
 
 EXAMPLE_WIDTH: Final = 400
 """Pixels across an example's picture, at most."""
 WIDTH: Final = 420
 """Pixels across a picture, at most: about 200 an inch at a quarter of the page."""
 QUALITY: Final = 85
-"""Quality of a JPEG."""
+FINEST: Final = 95
+"""Quality of a JPEG, and of one of which a figure is made."""
 FADED: Final = 5
 """The part of the camera's contrast that is left where there is no mask, as one of so many."""
 DARKEN: Final = 0.75
@@ -67,52 +68,27 @@ def variants_of(examples: Sequence[ExampleFrame]) -> list[str]:
     return list(dict.fromkeys(name for example in examples for name in example.masks))
 
 
-def example_grid(examples: Sequence[ExampleFrame]) -> ImageGrid:
-    """Return a row an example: the image, each variant's mask over it, and the truth over it."""
-    names = variants_of(examples)
-    truth = any(example.truth is not None for example in examples)
-    pictures = []
-    for example in examples:
-        pictures.append((f"frame {example.frame}", _jpeg(example.image)))
-        for name in names:
-            mask = example.masks.get(name)
-            title = f"{name}: no mask" if mask is None else name
-            pictures.append((title, _jpeg(_tinted(example.image, mask))))
-        if truth:
-            pictures.append(("truth", _jpeg(_tinted(example.image, example.truth))))
-    return ImageGrid(pictures, 1 + len(names) + truth)
-
-
-def _tinted(image: Rgb, labels: Mask | Truth | None) -> Rgb:
-    """Return an image with road tinted inside a white edge, and ignored pixels grey.
-
-    The edge tells the road apart in a black and white print, too. Without labels it is faded.
-    """
-    if labels is None:
-        return faded(image)
-    import cv2
-
-    picture = image.astype(np.float32)
-    for value, colour, strength in ((ROAD, colours.ROAD, 0.45), (IGNORE, colours.IGNORE, 0.8)):
-        here = labels == value
-        picture[here] += strength * (np.array(colour, np.float32) - picture[here])
-    road = (labels == ROAD).view(np.uint8)
-    picture[cv2.erode(road, np.ones((3, 3), np.uint8)) != road] = 255
-    return np.rint(picture).astype(np.uint8)
-
-
 def jpeg(layer: LayerImage, width: int = WIDTH) -> ImageFile:
     """Return the layer as a JPEG file of at most ``width`` pixels across."""
-    return _jpeg(shrink(painted(layer), width))
-
-
-def _jpeg(image: Rgb) -> ImageFile:
     import cv2
 
-    bgr = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
-    done, content = cv2.imencode(".jpg", bgr, (cv2.IMWRITE_JPEG_QUALITY, QUALITY))
+    return ImageFile(_packed(shrink(painted(layer), width), cv2.IMWRITE_JPEG_QUALITY, QUALITY))
+
+
+def finest_jpeg(image: Rgb) -> bytes:
+    """Return an image as a JPEG file in which a line of one pixel keeps its colour."""
+    import cv2
+
+    colours = cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444
+    return _packed(image, cv2.IMWRITE_JPEG_QUALITY, FINEST, *colours)
+
+
+def _packed(image: Rgb, *options: int) -> bytes:
+    import cv2
+
+    done, content = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), options)
     assert done
-    return ImageFile(bytes(content))
+    return bytes(content)
 
 
 def painted(layer: LayerImage) -> Rgb:
@@ -143,14 +119,14 @@ def _overlaid(image: Rgb, spec: LayerSpec, labels: npt.NDArray[Any]) -> Rgb:
     """Draw the classes' colours over the darkened image."""
     import cv2
 
-    rgba = np.zeros((256, 4), np.float32)
+    colours = np.zeros((256, 4), np.float32)
     for known in spec.classes:
-        rgba[known.value] = known.rgba
+        colours[known.value] = known.rgba
     overlaid: Rgb = np.empty_like(image)
     # A pixel's colour follows from its label and its own: a table of 256 for each label.
     for label in np.flatnonzero(np.bincount(labels.ravel(), minlength=256)):
-        opacity = rgba[label, 3:] / 255
-        mixed = _LEVELS * DARKEN * (1 - opacity) + rgba[label, :3] * opacity
+        opacity = colours[label, 3:] / 255
+        mixed = _LEVELS * DARKEN * (1 - opacity) + colours[label, :3] * opacity
         tinted = cv2.LUT(image, np.rint(mixed).astype(np.uint8)[None])
         cv2.copyTo(tinted, (labels == label).view(np.uint8), overlaid)
     return overlaid

@@ -15,6 +15,7 @@ from typing import Any, Final
 from unittest import mock
 
 import pandas as pd
+from matplotlib.figure import Figure
 
 from roadeval.cli.app import main
 from roadeval.report import blocks
@@ -107,13 +108,20 @@ def run(name: str) -> dict[str, Any]:
 
 @contextmanager
 def _drawn() -> Iterator[list[str]]:
-    """Describe every chart that is set on paper meanwhile."""
+    """Describe every figure of the paper and every chart of a report that is drawn meanwhile."""
     figures: list[str] = []
-    as_json = blocks.Figure.as_json
+    save, set_ = Figure.savefig, blocks.Figure.as_json
+
+    def saved(figure: Figure, *given: Any, **options: Any) -> None:
+        save(figure, *given, **options)
+        figures.append(drawings.described(figure))
 
     def on_paper(figure: blocks.Figure) -> dict[str, Any]:
         figures.append(drawings.charted(figure))
-        return as_json(figure)
+        return set_(figure)
 
-    with mock.patch.object(blocks.Figure, "as_json", on_paper):
+    with (
+        mock.patch.object(Figure, "savefig", saved),
+        mock.patch.object(blocks.Figure, "as_json", on_paper),
+    ):
         yield figures

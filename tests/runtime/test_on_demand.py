@@ -28,7 +28,9 @@ def test_a_package_by_itself_imports_no_library(name):
     assert not done.stdout.strip()
 
 
-def test_results_are_compared_without_rerun():
-    code = "import sys, roadeval.jobs.compare; print({'rerun', 'typst'} & {*sys.modules} or '')"
+def test_results_are_compared_without_rerun_and_without_matplotlib():
+    code = (
+        "import sys, roadeval.jobs.compare; print({'rerun', 'matplotlib'} & {*sys.modules} or '')"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not done.stdout.strip()

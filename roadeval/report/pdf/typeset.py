@@ -10,10 +10,14 @@ become markup, and nothing is fetched from anywhere.
 from __future__ import annotations
 
 import json
+import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from enum import StrEnum
+from functools import cache
 from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -26,10 +30,12 @@ from roadeval.runtime.text import visible
 if TYPE_CHECKING:
     from roadeval.report.blocks import Document
 
-Kind = Literal["pdf", "png"]
 _TEMPLATE: Final = "document.typ"
-_FIGURE: Final = "figure"
-"""The template's name of a page as high as what is on it."""
+_FIGURE: Final = b"""
+#set document(author: "roadeval", date: none)
+#set page(width: auto, height: auto, margin: 0pt)
+#image("figure.svg")
+"""
 
 
 class Paper(StrEnum):
@@ -49,17 +55,18 @@ class ReportError(RoadevalError):
 def pdf(document: Document, paper: Paper = Paper.A4) -> bytes:
     """Return a document as PDF; equal documents give equal bytes.
 
-    Fonts are Typst's own, never the machine's, so that a document looks the same everywhere. A
-    letter that none of them has is an empty box.
+    Fonts are Typst's own and, for the figures, DejaVu Sans; never the machine's, so that a document
+    looks the same everywhere. A letter that none of them has is an empty box.
     """
-    (made,) = _compiled(document, _TYPST_NAMES[paper], ["pdf"])
-    return made
+    inks = {"accent": colours.hex_of(colours.BLUE), "alarm": colours.hex_of(colours.VERMILLION)}
+    data = _visible(document.as_json() | {"paper": _TYPST_NAMES[paper], "colours": inks})
+    template = files("roadeval.report.pdf").joinpath(_TEMPLATE).read_bytes()
+    return _compiled(template, {"document.json": json.dumps(data).encode(), **document.files()})
 
 
-def figure_files(document: Document, dots_per_inch: int) -> dict[Kind, bytes]:
-    """Return the blocks of a document on one page of their height, as ``png`` and as ``pdf``."""
-    kinds: list[Kind] = ["png", "pdf"]
-    return dict(zip(kinds, _compiled(document, _FIGURE, kinds, dots_per_inch), strict=True))
+def figure_as(kind: Literal["pdf", "png"], svg: bytes, dots_per_inch: int | None = None) -> bytes:
+    """Return a figure, given as SVG, as a PDF of one page of its size, or as a PNG."""
+    return _compiled(_FIGURE, {"figure.svg": svg}, kind, dots_per_inch)
 
 
 def write_file(path: Path, content: bytes) -> Path:
@@ -80,41 +87,66 @@ def write_file(path: Path, content: bytes) -> Path:
 
 
 def _compiled(
-    document: Document, paper: str, kinds: Sequence[Kind], dots_per_inch: int | None = None
-) -> list[bytes]:
-    """Return what Typst makes of a document, in each format.
+    template: bytes,
+    sources: Mapping[str, bytes],
+    kind: Literal["pdf", "png"] = "pdf",
+    dots_per_inch: int | None = None,
+) -> bytes:
+    """Return what Typst makes of a template and the files that it reads, as a PDF or PNG.
 
     Raises
     ------
     ReportError
-        If its files cannot be written into the system's folder for temporary ones.
+        If these files cannot be written into the system's folder for temporary ones.
     """
     import typst
 
-    inks = {"accent": colours.hex_of(colours.BLUE), "alarm": colours.hex_of(colours.VERMILLION)}
-    data = _visible(document.as_json() | {"paper": paper, "colours": inks})
-    template = files("roadeval.report.pdf").joinpath(_TEMPLATE).read_bytes()
+    with _explained(), TemporaryDirectory(prefix="roadeval-") as folder:
+        for name, content in {_TEMPLATE: template, **sources}.items():
+            Path(folder, name).write_bytes(content)
+        compiled: bytes = typst.compile(
+            Path(folder, _TEMPLATE),
+            root=Path(folder),
+            font_paths=_fonts()[0],
+            format=kind,
+            ppi=dots_per_inch,
+        )
+    return compiled
+
+
+@contextmanager
+def _explained() -> Iterator[None]:
     try:
-        with TemporaryDirectory(prefix="roadeval-") as folder:
-            for name, content in (
-                (_TEMPLATE, template),
-                ("document.json", json.dumps(data).encode()),
-                *document.files().items(),
-            ):
-                Path(folder, name).write_bytes(content)
-            source, fonts = Path(folder, _TEMPLATE), typst.Fonts(include_system_fonts=False)
-            return [
-                typst.compile(
-                    source, root=source.parent, font_paths=fonts, format=kind, ppi=dots_per_inch
-                )
-                for kind in kinds
-            ]
+        yield
     except OSError as error:
         raise ReportError(
             f"{tempfile.tempdir or 'no folder for temporary files'}: figures and reports are put "
             f"together there, and it cannot be written ({error.strerror}); make room, or name "
             "another folder with TMPDIR"
         ) from error
+
+
+@cache
+def _fonts() -> tuple[Any, TemporaryDirectory[str]]:
+    """Return Typst's own fonts and Matplotlib's DejaVu Sans, and a folder of that one alone.
+
+    Typst reads the folder as long as the process lives. Matplotlib's own folder also has a font
+    with a sign for every letter there is: a text of a figure is set in one font, and if it had but
+    one letter that DejaVu Sans lacks, as in a drive's name, all of it would be such signs.
+    """
+    import typst
+
+    # Found without the import, which takes longer than a whole report.
+    found = find_spec("matplotlib")
+    assert found is not None
+    assert found.origin is not None
+    folder = TemporaryDirectory(prefix="roadeval-")
+    for font in Path(found.origin).parent.glob("mpl-data/fonts/ttf/DejaVuSans*.ttf"):
+        try:
+            Path(folder.name, font.name).symlink_to(font)
+        except OSError:  # a system on which not everyone may link
+            shutil.copy(font, folder.name)
+    return typst.Fonts(include_system_fonts=False, font_paths=[folder.name]), folder
 
 
 def _visible(value: Any) -> Any:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
+from roadeval.data import TRUTH, mask_spec
 from roadeval.data.words import percent
 from roadeval.evaluation.metrics import SHORT
-from roadeval.report.blocks import Cell
+from roadeval.report.blocks import Cell, ImageFile
 from roadeval.report.chart import looks
 from roadeval.report.findings import Findings
+from roadeval.report.images import ExampleFrame, LayerImage, faded, jpeg, variants_of
 
 SIDE_BY_SIDE: Final = 3
 """More variants than this do not fit beside each other under several rates."""
+ROAD: Final = mask_spec("road", "road")
 
 
 def variant_cell(name: str, names: Sequence[str]) -> Cell:
@@ -36,3 +39,18 @@ def sampled_frames(findings: Findings) -> str:
         f"{findings.sampled} of the {findings.pictured} frames whose pictures were kept, out of "
         f"{evaluated} evaluated (which may not be a fair sample)"
     )
+
+
+def example_pictures(examples: Sequence[ExampleFrame]) -> Iterator[tuple[str, ImageFile]]:
+    """Yield for each example the image, each variant's mask over it, and the truth over it."""
+    names = variants_of(examples)
+    for example in examples:
+        yield f"frame {example.frame}", jpeg(LayerImage("", example.image))
+        for name in names:
+            mask = example.masks.get(name)
+            if mask is None:
+                yield f"{name}: no mask", jpeg(LayerImage("", faded(example.image)))
+            else:
+                yield name, jpeg(LayerImage("", example.image, ROAD, mask))
+        if example.truth is not None:
+            yield "truth", jpeg(LayerImage("", example.image, TRUTH, example.truth))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from roadeval.report.blocks import Block, Figure, Heading, Text
+from roadeval.report.blocks import Block, Figure, Heading, ImageGrid, Text
 from roadeval.report.charts.rates import coverage
 from roadeval.report.findings import Findings
-from roadeval.report.images import example_grid
+from roadeval.report.images import variants_of
+from roadeval.report.sections.common import example_pictures
 
 
 def section(findings: Findings) -> Iterator[Block]:
@@ -18,7 +19,8 @@ def section(findings: Findings) -> Iterator[Block]:
         "whether the filter helps, not which stage is at fault. What follows is what was computed."
     )
     if findings.examples:
-        yield example_grid(findings.examples)
+        pictures = list(example_pictures(findings.examples))
+        yield ImageGrid(pictures, len(variants_of(findings.examples)) + 1)
     if len(findings.coverage):
         table = findings.coverage
         shares = {str(name): table[name].to_numpy() for name in table}

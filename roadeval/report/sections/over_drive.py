@@ -14,14 +14,15 @@ from roadeval.report.blocks import (
     Cell,
     Figure,
     Heading,
+    ImageGrid,
     KeepTogether,
     Table,
     Text,
 )
 from roadeval.report.charts.rates import figures_over_drive
 from roadeval.report.findings import Findings
-from roadeval.report.images import example_grid
-from roadeval.report.sections.common import SIDE_BY_SIDE
+from roadeval.report.images import variants_of
+from roadeval.report.sections.common import SIDE_BY_SIDE, example_pictures
 from roadeval.results.claims import NO_NUMBERS, claim_rows
 
 PAPER_WINDOW: Final = 10
@@ -36,7 +37,8 @@ def section(findings: Findings) -> Iterator[Block]:
     if len(findings.windows):
         yield from _tables(findings)
     if findings.examples:
-        yield example_grid(findings.examples)
+        pictures = list(example_pictures(findings.examples))
+        yield ImageGrid(pictures, len(variants_of(findings.examples)) + 2)
         yield Text("The paper's figure 2: input and output images, and the truth.", "note")
     for figure in figures_over_drive():
         if charts := figure.charts(findings.windows):
