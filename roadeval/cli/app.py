@@ -107,6 +107,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is not None:
         return _run(arguments)
     streams.take_over(debug=messages.debug())
+    streams.leave_word(f"{messages.PROGRAM}: error: {with_flags(memory.LACKING)}")
     memory.collect_rarely()
     _without_blas_threads()
     code = _run(None)
