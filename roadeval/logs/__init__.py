@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 from roadeval.runtime.on_demand import on_demand
 
 if TYPE_CHECKING:
-    from roadeval.logs.container.damage import Damage
+    from roadeval.logs.container.file import Damage
     from roadeval.logs.errors import FrameError, LogError
     from roadeval.logs.files import METADATA, files_of, natural
     from roadeval.logs.frames import Accounting, FrameStream, LoggedFrame

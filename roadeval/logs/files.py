@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 from pathlib import Path
 from typing import Final
 
-from roadeval.logs.container.damage import Damage
+from roadeval.logs.container.file import Damage
 from roadeval.logs.container.records import MAGIC
 from roadeval.logs.errors import LogError
 from roadeval.logs.settings import NS

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from hashlib import blake2b
 from typing import BinaryIO, Final
-
-from mcap.opcode import Opcode
 
 from roadeval.logs.container.records import FileBytes, parse_chunk, record_at
 from roadeval.logs.container.summary import read_summary
@@ -32,26 +29,18 @@ def identity_of(file: BinaryIO) -> str | None:
     digest, place = blake2b(str(len(source)).encode(), digest_size=16), 0
     try:
         summary = read_summary(source)
-        if not summary.in_place or not summary.chunks:
+        if not summary.checked or not summary.chunks:
             return None
         for offset in sorted(summary.chunks):
-            record = record_at(source, offset)
-            chunk = parse_chunk(source, record)
-            is_listed = record.opcode == Opcode.CHUNK and record.end == chunk.data_end
-            is_listed &= chunk.listing == summary.chunks[offset].listing and offset >= place
+            chunk = parse_chunk(source, record_at(source, offset))
+            is_listed = chunk.listing == summary.chunks[offset].listing and offset >= place
             if not is_listed or (chunk.size and not chunk.crc):
                 return None
-            for block in _blocks(source, place, offset):
-                digest.update(block)
-            digest.update(repr(chunk).encode())
+            for at in range(place, chunk.data_offset, BLOCK):
+                digest.update(source[at : min(at + BLOCK, chunk.data_offset)])
             place = summary.index_ends[offset]
-        for block in _blocks(source, place, len(source)):
-            digest.update(block)
+        for at in range(place, len(source), BLOCK):
+            digest.update(source[at : at + BLOCK])
     except BadRecord:
         return None
     return digest.hexdigest()
-
-
-def _blocks(source: FileBytes, start: int, end: int) -> Iterator[bytes | memoryview]:
-    for at in range(start, end, BLOCK):
-        yield source[at : min(at + BLOCK, end)]

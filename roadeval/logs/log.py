@@ -14,8 +14,7 @@ import numpy.typing as npt
 from mcap.records import Channel, Schema
 
 from roadeval.images import Limits
-from roadeval.logs.container.damage import Damage, damage_of
-from roadeval.logs.container.file import containers_in
+from roadeval.logs.container.file import Damage, containers_in, damage_of
 from roadeval.logs.errors import BadRecord, LogError
 from roadeval.logs.files import files_of
 from roadeval.logs.frames import FrameStream

@@ -18,7 +18,7 @@ from roadeval.logs import (
     TopicSettings,
     open_log,
 )
-from roadeval.logs.container import chunks
+from roadeval.logs.container import records
 from roadeval.logs.container.records import Message
 from roadeval.logs.topics.reader import UNREADABLE
 from tests.fixtures.make import make
@@ -163,8 +163,8 @@ def test_chunks_too_big_for_memory_are_read_all_the_same(
     tmp_path: Path, kind: CompressionType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = drive(tmp_path / "drive.mcap", STAMPS, STAMPS, compression=kind)
-    monkeypatch.setattr(chunks, "IN_MEMORY", 1000)
-    monkeypatch.setattr(chunks, "BLOCK", 100)
+    monkeypatch.setattr(records, "IN_MEMORY", 1000)
+    monkeypatch.setattr(records, "BLOCK", 100)
     with open_log(path) as log:
         log.verify()
         frames = [frame.decode() for frame in log.frames(log.select())]

@@ -5,7 +5,6 @@ through a file is our own because no package salvages MCAP: the library stops at
 that makes no sense, and has nothing for a log whose recorder was killed, whose chunks are damaged
 or whose summary is missing or wrong.
 
-- ``records``: bytes by position, and a record from its bytes; ``chunks``: the records of a chunk
-- ``summary``: what the file's end says; ``scan``: what is really there, record by record
-- ``file``: a log's table of contents; ``damage``: what is wrong with it, in sentences
+- ``records``: bytes by position, records and chunks; ``summary``: what the file's end says
+- ``scan``: what is really there, record by record; ``file``: a log's contents, and its damage
 """

@@ -1,52 +1,49 @@
-"""The table of contents of one MCAP log: its channels, and where their messages lie."""
+"""One MCAP log: its channels, where their messages lie, and what is damaged."""
 
 from __future__ import annotations
 
 import zlib
 from array import array
+from bisect import bisect_left
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
-from itertools import islice
+from dataclasses import dataclass, field, replace
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from roadeval.logs.container.chunks import IN_MEMORY, ChunkReader
 from roadeval.logs.container.records import (
+    BUFFER,
+    DEFINITIONS,
     HEAD,
-    MESSAGE,
-    MESSAGE_HEAD,
+    IN_MEMORY,
     PRIVATE,
-    Buffer,
     Bytes,
-    Chunk,
+    ChunkReader,
     Entries,
     FileBytes,
     Message,
     message_at,
-    parse,
     walk,
 )
-from roadeval.logs.container.scan import Scan, StampOf
+from roadeval.logs.container.scan import Scan, StampOf, definitions, entries_of
 from roadeval.logs.errors import BadRecord
+from roadeval.logs.settings import NS
 
 BLOCK: Final = 1 << 20
 """Bytes to take at a time of a whole file."""
 OUTSIDE: Final = -1
 """The chunk number of a message that lies in no chunk."""
-RECORDS: Final = 1 << 18
-"""Records that chunks may hold beyond one for every few of their bytes: a bomb holds millions."""
-BYTES_PER_RECORD: Final = 4
-"""Bytes that a message takes at least, however well a chunk is compressed: its times differ."""
 CHANNELS: Final = 4096
 """Channels that are read of a log; a robot has hundreds."""
 TRIED: Final = 5
-"""Chunks with messages by which is told which of two descriptions is right."""
-_DEFINITIONS: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
+"""Chunks with messages by which the right one of two descriptions is found."""
+BEFORE_ALL: Final = int(np.iinfo(np.int64).min) + 1
+"""A log time before all others."""
 
 Wanted = Callable[[Channel, Schema | None], bool]
 """Whether the messages of a channel, with its schema, will be read."""
@@ -86,13 +83,13 @@ def containers_in(
     keep_corrupt
         Whether to read data whose checksum is wrong.
     """
-    rest = FileBytes(path.open("rb", buffering=0))
-    size = len(rest)
-    while len(rest) or not size:
+    rest = FileBytes(path.open("rb", buffering=BUFFER))
+    while True:
         container = Container(path, rest, wanted, stamp_of, keep_corrupt=keep_corrupt)
         yield container
         rest = rest.part(len(container.source), len(rest))
-        size = size or 1
+        if not len(rest):
+            return
 
 
 class Container:
@@ -115,25 +112,23 @@ class Container:
             self.source = source = source.part(0, self.scan.next_log)
             self.reader = ChunkReader(source, keep_corrupt=keep_corrupt)
             self.scan = Scan(source, self.reader, stamp_of)
-        if self.scan.is_shifted:
-            self.scan = Scan(source, self.reader, stamp_of, strict=True)
-        self.summary = self.scan.summary
+        self.chunks, self.summary = self.scan.chunks, self.scan.summary
         self.schemas, self.channels = self.scan.schemas, self.scan.channels
         self.data_is_right: bool | None = None
         """Whether the checksum of all data is, None before it was looked at."""
-        self.saved_ns: int | None = None
-        """Log time of the last message saved from a chunk that is cut off."""
         self.misled: set[int] = set()
         """Chunks whose message indexes were found to be wrong."""
         self.unlisted: dict[int, int] = {}
         """Records that the message indexes of a chunk leave out, by the chunk's number."""
         self.redefined: dict[int, str] = {}
         """Which of two descriptions of topics is believed, by the offset of the second."""
-        self._records_left = RECORDS
-        self._looked: set[int] = set()
-        self._confirmed: set[int] = set()
+        self._checked: set[int] = set()
         self.logs = self._collect()
         """Where messages lie, by the number of their channel."""
+        self.looked_into = frozenset(self.scan.seen)
+        """Chunks whose messages were not filed by their message indexes."""
+        self.scan.seen.clear()
+        self._checked |= self.looked_into
         read = {channel_id for channel_id, log in self.logs.items() if log.wanted}
         order = sorted(self.channels, key=lambda channel_id: (channel_id not in read, channel_id))
         self.channels_left_out = order[CHANNELS:]
@@ -141,11 +136,6 @@ class Container:
         for channel_id in self.channels_left_out:
             del self.channels[channel_id]
             self.logs.pop(channel_id, None)
-
-    @property
-    def chunks(self) -> list[Chunk]:
-        """The chunks, in the order of the file."""
-        return self.scan.chunks
 
     @property
     def expected(self) -> Mapping[int, int]:
@@ -170,7 +160,10 @@ class Container:
     def look(self, chunk: int, channel_id: int) -> Entries:
         """Find the messages of a channel by looking into a chunk, whatever its indexes say."""
         self.misled.add(chunk)
-        return self._look(chunk).get(channel_id, _entries(array("Q")))
+        found, index = self.scan.look(chunk), self.scan.indexes[chunk] or {}
+        if all(len(found[each]) <= len(index.get(each, ())) for each in found):
+            self.unlisted.pop(chunk, None)
+        return found.get(channel_id, entries_of(array("Q")))
 
     def is_bad(self, chunk: int) -> bool:
         """Whether a chunk was found to be unreadable."""
@@ -179,12 +172,12 @@ class Container:
     def verify(self) -> None:
         """Read everything once, so that all damage is known."""
         for number in range(len(self.chunks)):
-            if number not in self._confirmed:
+            if number not in self._checked:
                 with suppress(BadRecord):
                     self._records(number)
         self.verify_data()
 
-    def read_all(self, take: Callable[[Buffer], object]) -> None:
+    def read_all(self, take: Callable[[bytes], object]) -> None:
         """Pass the whole log to ``take`` in blocks, and check the checksum of all data."""
         crc, end = 0, self.scan.data_end or 0
         for offset in range(0, len(self.source), BLOCK):
@@ -207,124 +200,74 @@ class Container:
     def _records(self, number: int) -> Bytes:
         """Read a chunk; the first time see whether its message indexes list all that it holds."""
         records = self.reader.read(self.chunks[number])
-        if number not in self._confirmed:
-            self._confirmed.add(number)
-            index = self.scan.indexes[number]
-            missing = _unlisted(records, index) if index and number not in self._looked else 0
-            if missing:
+        index = self.scan.indexes[number]
+        if index and number not in self._checked and number not in self.scan.seen:
+            self._checked.add(number)
+            if missing := _unlisted(records, index):
                 self.unlisted[number] = missing
         return records
 
     def _collect(self) -> dict[int, ChannelLog]:
         """File all messages by channel; look into every chunk if the statistics differ."""
-        counted = self.summary.statistics is not None
-        found = [self._index(number, look=not counted) for number in range(len(self.chunks))]
-        logs = self._file(found)
-        if counted and not self._is_as_counted(logs):
-            for number in set(range(len(self.chunks))) - self._looked:
-                found[number] = self._index(number, look=True)
-            logs = self._file(found)
-        if logs.keys() - self.channels.keys():
-            self._define_by_remains()
-            logs = self._file(found)
-        return self._file(found) if self._redefine(logs) else logs
+        logs = self._file()
+        if self.summary.statistics is not None and not self._is_as_counted(logs):
+            logs = self._file(look=True)
+        if logs.keys() - self.channels.keys():  # perhaps they are described in damaged chunks alone
+            for chunk in self.chunks:
+                if chunk.offset in self.reader.bad:
+                    self.scan.define(*definitions(self.reader.remains(chunk)))
+            logs = self._file()
+        return self._file() if self._redefine(logs) else logs
 
     def _is_as_counted(self, logs: Mapping[int, ChannelLog]) -> bool:
         expected = {channel_id: count for channel_id, count in self.expected.items() if count}
         return expected == {channel_id: log.count for channel_id, log in logs.items()}
 
-    def _file(self, found: list[Mapping[int, Entries]]) -> dict[int, ChannelLog]:
+    def _file(self, *, look: bool = False) -> dict[int, ChannelLog]:
         logs: dict[int, ChannelLog] = {}
-        outside = {channel_id: _entries(values) for channel_id, values in self.scan.loose.items()}
-        for number, index in (*enumerate(found), (OUTSIDE, outside)):
+        found = [(number, self._index(number, look=look)) for number in range(len(self.chunks))]
+        outside = {channel_id: entries_of(values) for channel_id, values in self.scan.loose.items()}
+        for number, index in (*found, (OUTSIDE, outside)):
             for channel_id, entries in index.items():
                 if channel_id not in logs:
-                    channel = self.channels.get(channel_id)
-                    schema = self.schemas.get(channel.schema_id) if channel else None
+                    channel, schema = self._described(channel_id)
                     logs[channel_id] = ChannelLog(bool(channel and self._wanted(channel, schema)))
                 logs[channel_id].add(number, entries)
         return logs
 
     def _index(self, number: int, *, look: bool) -> Mapping[int, Entries]:
         """Messages of a chunk by channel, by its message indexes or by looking into it."""
-        index = self.scan.indexes[number]
-        if index and not look and all(self._is_defined(channel_id) for channel_id in index):
-            return index
-        try:
-            return self._look(number)
-        except BadRecord:
-            return index or {}
-
-    def _is_defined(self, channel_id: int) -> bool:
-        channel = self.channels.get(channel_id)
-        return channel is not None and (channel.schema_id == 0 or channel.schema_id in self.schemas)
-
-    def _look(self, number: int) -> Mapping[int, Entries]:
-        """Walk through the records of a chunk; learn its channels and where its messages lie."""
-        chunk = self.chunks[number]
-        records = self.reader.read(chunk)
-        self._looked.add(number)
-        found: dict[int, array[int]] = {}
-        end, problem = 0, ""
-        usual = chunk.data_size // BYTES_PER_RECORD
-        allowed = usual + self._records_left // 2
-        for count, (opcode, offset, body, after, _) in enumerate(walk(records)):
-            if count == allowed:
-                problem = f"a chunk of so many records that only the first {allowed} were read"
-                self._records_left -= allowed - usual
-                break
-            end = after
-            if opcode == MESSAGE and after - body >= MESSAGE_HEAD.size:
-                head = records[body : body + MESSAGE_HEAD.size]
-                channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
-                found.setdefault(channel_id, array("Q")).extend((log_time, offset))
-            elif opcode in _DEFINITIONS:
-                self._define(opcode, records[body:after])
-            elif opcode < PRIVATE:
-                problem = "a chunk that holds more than messages, which is not read"
-        if end != len(records) and not chunk.cut:
-            problem = problem or "a chunk whose records do not add up"
-        if problem:
-            self.reader.kept.setdefault(chunk.offset, problem)
-        if chunk.cut:
-            self.saved_ns = max((max(values[::2]) for values in found.values()), default=None)
-        return {channel_id: _entries(values) for channel_id, values in found.items()}
-
-    def _define(self, opcode: int, body: Buffer) -> None:
-        """Learn a schema or channel; of a damaged one, its messages show that it is missing."""
+        if number in self.scan.seen:
+            return self.scan.seen[number]
+        index = self.scan.indexes[number] or {}
+        for channel, schema in map(self._described, index):
+            look = look or channel is None or (schema is None and channel.schema_id != 0)
         with suppress(BadRecord):
-            record = parse(opcode, body)
-            known: dict[int, Any] = self.schemas if opcode == Opcode.SCHEMA else self.channels
-            known.setdefault(record.id, record)
+            return self.scan.look(number) if look or not index else index
+        return index
 
-    def _define_by_remains(self) -> None:
-        """Learn the channels that are described in damaged chunks alone."""
-        for chunk in self.chunks:
-            if chunk.offset in self.reader.bad:
-                records = self.reader.remains(chunk)
-                for opcode, _, body, end, _ in islice(walk(records), RECORDS):
-                    if opcode in _DEFINITIONS:
-                        self._define(opcode, records[body:end])
+    def _described(self, channel_id: int) -> tuple[Channel | None, Schema | None]:
+        channel = self.channels.get(channel_id)
+        return channel, self.schemas.get(channel.schema_id) if channel else None
 
     def _redefine(self, logs: Mapping[int, ChannelLog]) -> bool:
         """Where a topic is described twice, choose by its messages; return whether any was changed.
 
         Messages were written by the descriptions in the data, which stand in the first chunk or in
         that of a channel's first message. Only those of a chunk with a checksum are believed where
-        the messages do not tell.
+        the messages fit both.
         """
+        before = {**self.schemas}, {**self.channels}
         conflicts = [(offset, record, False) for offset, record in self.scan.conflicts]
         first = {0} | {log.blocks[0][0] for log in logs.values() if log.blocks}
         for number in sorted(first - {OUTSIDE}) if self.chunks else []:
             chunk = self.chunks[number]
             if not chunk.cut and chunk.crc and chunk.size <= IN_MEMORY:
                 with suppress(BadRecord):
-                    found = _definitions(self.reader.read(chunk))
+                    found = definitions(self.reader.read(chunk))
                     conflicts += [(chunk.offset, record, True) for record in found]
-        changed = False
         for offset, record, checked in conflicts:
             known: dict[int, Any] = self.schemas if isinstance(record, Schema) else self.channels
-            changed |= record.id not in known
             other = known.setdefault(record.id, record)
             if other == record:
                 continue
@@ -333,22 +276,20 @@ class Container:
             own_fit = self._fit(record, logs)
             if own_fit < fit or (own_fit == fit and not checked):
                 known[record.id] = other
-            changed |= known[record.id] is record
-            told, names = "a topic is described here in another way than before", ("that", "this")
+            said, names = "a topic is described here in another way than before", ("that", "this")
             if checked:
-                told = "the summary describes topics in another way than the data"
+                said = "the summary describes topics in another way than the data"
                 names = "the summary", "the data"
             name = names[known[record.id] is record]
             doubt = "either may be wrong" if fit == own_fit else "messages fit it better"
-            self.redefined[offset] = f"{told}; {name} is believed; {doubt}"
-        return changed
+            self.redefined[offset] = f"{said}; {name} is believed; {doubt}"
+        return before != (self.schemas, self.channels)
 
     def _fit(self, record: Schema | Channel, logs: Mapping[int, ChannelLog]) -> tuple[int, int]:
         """Count the messages that a description decodes, and sum up how near their stamps are."""
         decoded = nearness = 0
         for channel_id, log in logs.items():
-            channel = self.channels.get(channel_id)
-            schema = self.schemas.get(channel.schema_id) if channel else None
+            channel, schema = self._described(channel_id)
             if channel is None or record not in (channel, schema):
                 continue
             for chunk, entries in log.blocks[:TRIED] if self._wanted(channel, schema) else ():
@@ -360,32 +301,187 @@ class Container:
         return decoded, nearness
 
 
-def _definitions(records: Bytes) -> Iterator[Any]:
-    """Yield the schemas and channels of a chunk."""
-    for opcode, _, body, end, _ in walk(records):
-        if opcode in _DEFINITIONS:
-            with suppress(BadRecord):
-                yield parse(opcode, records[body:end])
-
-
 def _unlisted(records: Bytes, index: Mapping[int, Entries]) -> int:
     """Count the records of a chunk that are no definitions and that no message index lists."""
-    listed = np.sort(np.concatenate([entries[:, 1] for entries in index.values()]))
-    if not isinstance(records, memoryview) or listed[-1] + HEAD.size > len(records):
+    places = np.unique(np.concatenate([entries[:, 1] for entries in index.values()]))
+    if not isinstance(records, memoryview) or places[-1] > len(records) - HEAD.size:
         return 0
-    data = np.frombuffer(records, np.uint8)
-    lengths = data[listed[:, None] + np.arange(1, HEAD.size)].view("<i8")[:, 0]
-    begins = np.append(0, listed + HEAD.size + lengths)
-    ends = np.append(listed, len(records))
-    # Between two messages that are not neighbours lie definitions, or what is not listed.
-    between = begins < ends
+    lengths = np.frombuffer(records, np.uint8)[places[:, None] + np.arange(1, HEAD.size)].view(
+        "<i8"
+    )
+    if lengths.sum() + HEAD.size * len(places) == len(records):
+        return 0
+    listed = set(places.tolist())
     return sum(
-        opcode < PRIVATE and opcode not in _DEFINITIONS
-        for begin, end in zip(begins[between].tolist(), ends[between].tolist(), strict=True)
-        for opcode, *_ in walk(records[:end], begin)
+        each.offset not in listed and each.opcode not in DEFINITIONS and each.opcode < PRIVATE
+        for each in walk(records)
     )
 
 
-def _entries(values: array[int]) -> Entries:
-    """``(n, 2)`` of a flat row of log times and offsets."""
-    return np.frombuffer(values, np.int64).reshape(-1, 2)
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """Something wrong with a file."""
+
+    path: Path
+    offset: int
+    """The byte where it begins."""
+    reason: str
+    lossy: bool = True
+    """Whether messages are, or may be, lost or wrong by it."""
+    start_ns: int | None = None
+    end_ns: int | None = None
+    """Log times of the messages before and after what is lost, None where unknown."""
+    lost: tuple[tuple[str, int], ...] = ()
+    """Topics and numbers of messages that are known to be lost."""
+    log_start_ns: int = 0
+    """Log time from which the sentence counts seconds."""
+    unsure_ns: int | None = None
+    """Log time from which messages may have other positions than those they were written at."""
+
+    def __str__(self) -> str:
+        start, end = (
+            None if time is None else f"{(time - self.log_start_ns) / NS:.3f}"
+            for time in (self.start_ns, self.end_ns)
+        )
+        span = f", {start} to {end} s" if start and end else ""
+        if not span and (start or end):
+            span = f", after {start} s" if start else f", before {end} s"
+        text = f"{self.path.name}: {self.reason} (byte {self.offset}{span})"
+        if self.lost:
+            listed = ", ".join(f"{count} of {topic}" for topic, count in self.lost)
+            text += f"; lost: {listed}"
+        return text if self.lossy else f"{text}; no message is lost"
+
+
+def damage_of(container: Container) -> tuple[Damage, ...]:
+    """List what is wrong with a log, as far as it is known by now, in the file's order."""
+    found = [*_gaps(container), *_chunks(container), *_absent(container), *_channels(container)]
+    if not any(damage.unsure_ns is not None for damage in found) and not container.reader.bad:
+        found += _missing(container)
+    found += _wrong_sums(container)
+    begin = container.source.begin
+    if begin:
+        reason = "another log begins here, behind the one before; its messages are read as well"
+        found.append(Damage(container.path, 0, reason, lossy=False))
+    found = [replace(damage, offset=begin + damage.offset) for damage in found]
+    return tuple(sorted(found, key=lambda damage: damage.offset))
+
+
+def sure_until(container: Container) -> int | None:
+    """Return the log time up to which messages have the positions at which they were written.
+
+    Where an unknown number of messages is lost, those after them have other positions. None where
+    all are sure; damage that may lie anywhere gives a time before all others.
+    """
+    doubts = (damage.unsure_ns for damage in damage_of(container))
+    return min((time - 1 for time in doubts if time is not None), default=None)
+
+
+def _gaps(container: Container) -> Iterator[Damage]:
+    scan, chunks = container.scan, container.chunks
+    if not scan.gaps:
+        return
+    places = [(chunk.offset, chunk.start, chunk.end) for chunk in chunks if not chunk.cut]
+    for flat in scan.loose.values():
+        places += [(at, time, time) for time, at in zip(flat[::2], flat[1::2], strict=True)]
+    places.sort()
+    least = [*accumulate((start for _, start, _ in reversed(places)), min)][::-1]
+    # Each listed chunk that is not there is reported by itself.
+    listed = bool(container.summary.checked and container.summary.chunks and not scan.loose)
+    for offset, _, reason, lossy in scan.gaps:
+        if not lossy and offset in container.reader.bad:
+            continue
+        number = bisect_left(places, (offset,))
+        before, after, least_after = None, None, BEFORE_ALL
+        if chunks and chunks[-1].cut and chunks[-1].offset == offset:
+            before = scan.saved_ns
+        if before is None and number:
+            before = places[number - 1][2]
+        if number < len(places):
+            after, least_after = places[number][1], least[number]
+        lossy = lossy and not listed  # noqa: PLW2901
+        unsure = None if not lossy else BEFORE_ALL if before is None else before + 1
+        if unsure is not None and before is not None and after is not None:
+            unsure = min(before, least_after)
+        yield Damage(container.path, offset, reason, lossy, before, after, unsure_ns=unsure)
+
+
+def _chunks(container: Container) -> Iterator[Damage]:
+    """Chunks that cannot be read, or whose content is not what is said of it."""
+    path, reader = container.path, container.reader
+    for number, chunk in enumerate(container.chunks):
+        at, start, end = chunk.offset, chunk.start, chunk.end
+        if number in container.misled:
+            yield Damage(path, at, "the message index of a chunk is wrong", lossy=False)
+        if number in container.unlisted:
+            count = f"{container.unlisted[number]} records that its message indexes do not list"
+            reason = f"a chunk with {count}, and which are not read"
+            yield Damage(path, at, reason, True, start, end, unsure_ns=start)
+        reason = reader.bad.get(at) or reader.kept.get(at, "")
+        if reason:
+            index = container.scan.indexes[number] or {}
+            lost = tuple((container.topic(key), len(found)) for key, found in index.items())
+            lost *= at in reader.bad
+            unsure: int | None = start
+            if at in reader.kept:
+                unsure = BEFORE_ALL  # times that were kept may be wrong
+            if index and number not in container.looked_into:
+                unsure = None
+            yield Damage(path, at, reason, True, start, end, lost, unsure_ns=unsure)
+
+
+def _absent(container: Container) -> Iterator[Damage]:
+    """Chunks that the summary lists and that were not found."""
+    found = Counter((chunk.start, chunk.end, chunk.size) for chunk in container.chunks)
+    listed = container.summary.chunks.values() if container.summary.checked else ()
+    for chunk in listed:
+        start, end, size = chunk.start, chunk.end, chunk.size
+        found[start, end, size] -= 1
+        if found[start, end, size] < 0:
+            reason = "a chunk that the summary lists is not there"
+            yield Damage(container.path, chunk.offset, reason, True, start, end, unsure_ns=start)
+
+
+def _missing(container: Container) -> Iterator[Damage]:
+    """Messages that the file's own statistics count, where nothing else explains the loss."""
+    for channel_id, expected in container.expected.items():
+        log = container.logs.get(channel_id)
+        missing = expected - (log.count if log else 0)
+        if missing > 0 and channel_id not in container.channels_left_out:
+            lost = ((container.topic(channel_id), missing),)
+            reason = "messages that the file's own statistics count are missing"
+            end = len(container.source)
+            yield Damage(container.path, end, reason, lost=lost, unsure_ns=BEFORE_ALL)
+
+
+def _channels(container: Container) -> Iterator[Damage]:
+    path, left_out = container.path, len(container.channels_left_out)
+    for offset, reason in container.redefined.items():
+        yield Damage(path, offset, reason)
+    if left_out:
+        count = left_out + len(container.channels)
+        yield Damage(path, 0, f"{count} channels, of which {CHANNELS} are read")
+    for channel_id, log in container.logs.items():
+        if channel_id not in container.channels:  # its number may be what is damaged
+            reason = f"{log.count} messages of a channel {channel_id} that is defined nowhere"
+            span = log.first_ns, log.last_ns
+            yield Damage(path, 0, reason, True, *span, unsure_ns=log.first_ns)
+
+
+def _wrong_sums(container: Container) -> Iterator[Damage]:
+    path, scan, summary = container.path, container.scan, container.summary
+    if scan.data_end is not None and summary.problem:
+        start, after = summary.start, scan.after_data
+        shift = 0 if start is None or after is None else start - after
+        change = "are missing" if shift > 0 else "too many lie"
+        reason = summary.problem + f", and {abs(shift)} bytes {change} before it" * bool(shift)
+        unsure = BEFORE_ALL if shift and not container.is_complete else None
+        yield Damage(path, scan.data_end, reason, lossy=bool(shift), unsure_ns=unsure)
+    if container.data_is_right is False:
+        unchecked = bool(scan.loose) or not all(chunk.crc for chunk in container.chunks)
+        reason = "the checksum of all data is wrong"
+        if unchecked:
+            reason += ", and nothing tells which message is; any may be"
+        elif summary.problem:
+            reason += ", and no summary tells whether messages are missing"
+        yield Damage(path, scan.data_end or 0, reason, unchecked or bool(summary.problem))

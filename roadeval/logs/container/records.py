@@ -1,4 +1,4 @@
-"""Bytes by position, and the records of an MCAP file in them.
+"""Bytes by position, the records of an MCAP file in them, and chunks of records.
 
 The layouts are those of https://mcap.dev/spec. The `mcap` library reads all records but messages,
 chunks and message indexes: those are read here from a few bytes, so that a file can be walked
@@ -7,11 +7,16 @@ through without reading its data. Whatever does not add up raises a `BadRecord`.
 
 from __future__ import annotations
 
-import io
 import struct
 import sys
+import zlib
+from collections import OrderedDict
 from collections.abc import Callable, Iterator
-from typing import IO, Any, Final, NamedTuple
+from contextlib import suppress
+from functools import partial
+from io import BytesIO
+from tempfile import SpooledTemporaryFile
+from typing import IO, Any, Final, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -29,23 +34,36 @@ MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
 """Channel, sequence, log time, publish time."""
 CHUNK_HEAD: Final = struct.Struct("<QQQII")
 """Start time, end time, uncompressed size, CRC, length of the compression's name."""
-INDEX_HEAD: Final = struct.Struct("<HI")
+_INDEX_HEAD: Final = struct.Struct("<HI")
 """Channel, bytes of entries."""
 LARGEST: Final = 1 << 28
 """Bytes of a message or definition; one that claims more is damaged."""
-LONGEST_NAME: Final = 64
-"""No compression has a longer name; a chunk that claims so is damaged."""
+_LONGEST_NAME: Final = 64
+"""Bytes of a compression's name; a chunk that claims more is damaged."""
+DEFINITIONS: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
 CHUNK, MESSAGE, MESSAGE_INDEX = Opcode.CHUNK, Opcode.MESSAGE, Opcode.MESSAGE_INDEX
 """Kinds that are asked for at every record: an enumeration takes ten times as long to ask."""
+COMPRESSIONS: Final = ("", "zstd", "lz4")
+_MAGIC: Final = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
 PRIVATE: Final = 0x80
 """Opcodes from here on belong to applications."""
 PADDING: Final = 4
 """A message may be padded at its end to a multiple of so many bytes, as CDR does."""
 
-WINDOW: Final = 64 << 10
-"""Bytes read at once while walking from record to record."""
-GLANCE: Final = 1 << 10
-"""Bytes read at once after a leap, as over the data of a chunk."""
+BUFFER: Final = 16 << 10
+"""Bytes that are read at once while walking from record to record."""
+BLOCK: Final = 1 << 20
+"""Bytes to uncompress at a time."""
+LARGEST_CHUNK: Final = 1 << 30
+"""Most bytes that are uncompressed of a chunk: a few of them can become any number."""
+IN_MEMORY: Final = 16 << 20
+"""A chunk of more bytes is held in a temporary file; writers make chunks of about a megabyte."""
+CACHE: Final = 16 << 20
+"""Bytes of uncompressed chunks to keep: topics that run side by side share their chunks."""
+KEEP: Final = 64
+"""Chunks to keep at most."""
+DOUBTED: Final = 256 << 20
+"""Bytes that are tried in vain in a file of no size; a bigger one has four more for each byte."""
 
 Buffer = bytes | memoryview
 Entries = npt.NDArray[np.int64]
@@ -63,8 +81,7 @@ class FileBytes:
         self._file = file
         self.begin = begin
         self._size = file.seek(0, 2) - begin if size is None else size
-        self._window = memoryview(b"")
-        self._window_at = self._at = 0
+        self._at = 0
 
     def part(self, begin: int, end: int) -> FileBytes:
         """Return a part of this part."""
@@ -73,31 +90,20 @@ class FileBytes:
     def __len__(self) -> int:
         return self._size
 
-    def __getitem__(self, part: slice, /) -> Buffer:
-        start, stop = min(part.start, self._size), min(part.stop, self._size)
-        at, end = start - self._window_at, stop - self._window_at
-        if at < 0 or end > len(self._window):
-            if stop - start > GLANCE:
-                return self._read(start, stop - start)
-            walks_on = 0 <= at <= len(self._window) + GLANCE
-            window = min(WINDOW if walks_on else GLANCE, self._size - start)
-            self._window, self._window_at = memoryview(self._read(start, window)), start
-            at, end = 0, max(stop - start, 0)
-        return self._window[at:end]
-
-    def _read(self, offset: int, length: int) -> bytes:
+    def __getitem__(self, part: slice, /) -> bytes:
+        start, stop = part.start, part.stop
+        stop = min(stop, self._size)
+        if start >= stop:
+            return b""
         try:
-            self._file.seek(self.begin + offset)
-            data = self._file.read(length)
-            while len(data) < length and (more := self._file.read(length - len(data))):
-                data += more
+            self._file.seek(self.begin + start)
+            return self._file.read(stop - start)
         except OSError as error:
             raise BadRecord(f"unreadable on its disk ({error.strerror})") from error
-        return data
 
     def read(self, size: int) -> bytes:
         """Return the next bytes, as a file does; none at the end."""
-        data = bytes(self[self._at : self._at + size])
+        data = self[self._at : self._at + size]
         self._at += len(data)
         return data
 
@@ -149,6 +155,8 @@ class Chunk(NamedTuple):
     """Whether it continues beyond the end of the file."""
     repaired: bool = False
     """Whether its own head is damaged, and what it says was found out otherwise."""
+    proven: bool = False
+    """Whether its checksum or the summary says that it lies here, of this length."""
 
     @property
     def data_end(self) -> int:
@@ -159,6 +167,11 @@ class Chunk(NamedTuple):
     def listing(self) -> tuple[object, ...]:
         """What the summary says of it as well, but for its place."""
         return self.start, self.end, self.size, self.compression, self.data_size
+
+    @property
+    def record(self) -> Record:
+        """The record that it is."""
+        return Record(CHUNK, self.offset, self.offset + HEAD.size, self.data_end, self)
 
 
 class _Strict(ReadDataStream):
@@ -183,42 +196,43 @@ def parse(opcode: int, body: Buffer) -> Any:
     if opcode not in _READERS:
         raise BadRecord(f"a record of unknown kind {opcode}")
     try:
-        return _READERS[opcode](_Strict(io.BytesIO(body)))
+        return _READERS[opcode](_Strict(BytesIO(body)))
     except (EndOfFile, struct.error, UnicodeDecodeError) as error:
         raise BadRecord(f"a {Opcode(opcode).name.lower()} record that does not add up") from error
 
 
 def parse_chunk(source: Bytes, record: Record) -> Chunk:
     """Read a chunk's head; the length that it says of its data may contradict the record's own."""
-    head = source[record.body : record.body + CHUNK_HEAD.size + LONGEST_NAME + 8]
+    head = source[record.body : record.body + CHUNK_HEAD.size + _LONGEST_NAME + 8 + 4]
     if len(head) < CHUNK_HEAD.size:
         raise BadRecord("a chunk without a head")
     start, end, size, crc, name_length = CHUNK_HEAD.unpack_from(head)
     data_at = CHUNK_HEAD.size + name_length + 8
-    if name_length > LONGEST_NAME or len(head) < data_at:
+    if name_length > _LONGEST_NAME or len(head) < data_at:
         raise BadRecord("a chunk whose head is damaged")
     name = bytes(head[CHUNK_HEAD.size : data_at - 8]).decode("utf-8", "replace")
     (data_size,) = struct.unpack_from("<Q", head, data_at - 8)
+    if name not in COMPRESSIONS:  # it is damaged, and the data has a name of its own
+        name = _MAGIC.get(bytes(head[data_at : data_at + 4]), name)
     return Chunk(record.offset, start, end, size, crc, name, record.body + data_at, data_size)
 
 
 def parse_message_index(body: Buffer) -> tuple[int, Entries]:
     """Read a message index: the channel, and its messages."""
-    channel_id, length = INDEX_HEAD.unpack_from(body) if len(body) >= INDEX_HEAD.size else (0, 1)
-    if length % 16 or INDEX_HEAD.size + length > len(body):
+    channel_id, length = _INDEX_HEAD.unpack_from(body) if len(body) >= _INDEX_HEAD.size else (0, 1)
+    if length % 16 or _INDEX_HEAD.size + length > len(body):
         raise BadRecord("a message index whose lengths contradict each other")
-    entries = bytes(body[INDEX_HEAD.size : INDEX_HEAD.size + length])
+    entries = bytes(body[_INDEX_HEAD.size : _INDEX_HEAD.size + length])
     return channel_id, np.frombuffer(entries, "<i8").reshape(-1, 2)
 
 
 def message_at(records: Bytes, offset: int) -> Message:
     """Read the message whose record begins at ``offset``."""
-    head = records[offset : offset + HEAD.size]
-    opcode, length = HEAD.unpack(head) if len(head) == HEAD.size else (0, 0)
-    if opcode != MESSAGE or not MESSAGE_HEAD.size <= length <= LARGEST:
+    opcode, _, begin, end, _ = record_at(records, offset)
+    if opcode != MESSAGE or not MESSAGE_HEAD.size <= end - begin <= LARGEST:
         raise BadRecord("no message where the index says")
-    body = memoryview(records[offset + HEAD.size : offset + HEAD.size + length])
-    if len(body) < length:
+    body = memoryview(records[begin:end])
+    if len(body) < end - begin:
         raise BadRecord("a message that is cut off")
     channel_id, sequence, log_time, publish_time = MESSAGE_HEAD.unpack_from(body)
     return Message(channel_id, sequence, log_time, publish_time, body[MESSAGE_HEAD.size :])
@@ -233,15 +247,151 @@ def record_at(records: Bytes, offset: int) -> Record:
     return Record(opcode, offset, offset + HEAD.size, offset + HEAD.size + length)
 
 
-def walk(records: Bytes, offset: int = 0) -> Iterator[Record]:
-    """Yield the records of a chunk from ``offset`` on, as far as they are whole.
+def walk(records: Bytes) -> Iterator[Record]:
+    """Yield the records of a chunk, as far as they are whole.
 
     Zeros end them, too: a million would be as many records of no kind and no length.
     """
-    size = len(records)
+    offset, size = 0, len(records)
     while offset + HEAD.size <= size:
         record = record_at(records, offset)
         if record.opcode == 0 or record.end > size:
             return
         yield record
         offset = record.end
+
+
+class ChunkReader:
+    """Reads the chunks of a file, the last few from memory.
+
+    Parameters
+    ----------
+    keep_corrupt
+        Whether to read what is left of a chunk whose checksum is wrong.
+    """
+
+    def __init__(self, source: FileBytes, *, keep_corrupt: bool = False) -> None:
+        self._source = source
+        self._keep_corrupt = keep_corrupt
+        self._cache: OrderedDict[int, Bytes] = OrderedDict()
+        self._doubts_left = DOUBTED + 4 * len(source)
+        self.bad: dict[int, str] = {}
+        """Why a chunk could not be read, by its offset."""
+        self.kept: dict[int, str] = {}
+        """What is wrong with a chunk that was read nevertheless, by its offset."""
+
+    def read(self, chunk: Chunk) -> Bytes:
+        """Read the records of a chunk; of one that is cut off, those before the cut."""
+        at = chunk.offset
+        if at in self.bad:
+            raise BadRecord(self.bad[at])
+        if at not in self._cache:
+            try:
+                records = self.remains(chunk) if chunk.cut else self._whole(chunk)
+            except BadRecord as error:
+                if not self._keep_corrupt:
+                    self.bad[at] = str(error)
+                    raise
+                self.kept[at] = f"{error}, used all the same"
+                records = self.remains(chunk)
+            self._keep(at, records)
+        self._cache.move_to_end(at)
+        return self._cache[at]
+
+    def remains(self, chunk: Chunk) -> Bytes:
+        """Uncompress a chunk as far as possible."""
+        return self._uncompressed(chunk, whole=False)
+
+    def is_sound(self, chunk: Chunk) -> bool:
+        """Whether the content of a chunk is what its head says.
+
+        Without a checksum it must consist of whole records. Of a file that claims one wrong chunk
+        after the other only so many are looked at.
+        """
+        if self._doubts_left < 0 or chunk.data_end > len(self._source):
+            return False
+        with suppress(BadRecord):
+            records = self._whole(chunk)
+            if chunk.crc or max((each.end for each in walk(records)), default=0) == chunk.size:
+                self._keep(chunk.offset, records)
+                return True
+        self._doubts_left -= chunk.data_size
+        return False
+
+    def _whole(self, chunk: Chunk) -> Bytes:
+        doubts_left = self._doubts_left
+        records = self._uncompressed(chunk, whole=True)
+        if len(records) != chunk.size:
+            raise BadRecord(f"a chunk of {len(records)} bytes that claims to hold {chunk.size}")
+        if chunk.crc is None:
+            raise BadRecord("a chunk whose head is damaged")
+        if chunk.crc and crc_of(records) != chunk.crc:
+            raise BadRecord("a chunk whose checksum is wrong")
+        self._doubts_left = doubts_left
+        return records
+
+    def _uncompressed(self, chunk: Chunk, *, whole: bool) -> Bytes:
+        if chunk.compression == "" and whole and chunk.data_size > IN_MEMORY:
+            return self._source.part(chunk.data_offset, chunk.data_end)
+        small = whole and chunk.size <= IN_MEMORY
+        file = BytesIO() if small else SpooledTemporaryFile(max_size=IN_MEMORY)  # noqa: SIM115
+        try:
+            for block in blocks(self._source, chunk):
+                self._doubts_left -= len(block)
+                file.write(block)
+                if whole and file.tell() > chunk.size:
+                    raise BadRecord(f"a chunk of more than the {chunk.size} bytes that it claims")
+        except BadRecord:
+            if whole:
+                raise
+        return file.getbuffer() if isinstance(file, BytesIO) else FileBytes(cast("IO[bytes]", file))
+
+    def _keep(self, offset: int, records: Bytes) -> None:
+        self._cache[offset] = records
+        held = sum(map(len, self._cache.values()))
+        while (held > CACHE and len(self._cache) > 2) or len(self._cache) > KEEP:
+            held -= len(self._cache.popitem(last=False)[1])
+
+
+def crc_of(records: Bytes) -> int:
+    """Compute the CRC-32 of bytes."""
+    crc, step = 0, BLOCK if isinstance(records, FileBytes) else max(len(records), 1)
+    for offset in range(0, len(records), step):
+        crc = zlib.crc32(records[offset : offset + step], crc)
+    return crc
+
+
+def blocks(source: FileBytes, chunk: Chunk) -> Iterator[bytes]:
+    """Uncompress a chunk into blocks of a bounded size, whatever they were compressed from."""
+    import zstandard
+
+    data, left = source.part(chunk.data_offset, chunk.data_end), LARGEST_CHUNK
+    found: Iterator[bytes]
+    try:
+        if chunk.compression == "zstd":
+            stream = cast("IO[bytes]", data)
+            found = zstandard.ZstdDecompressor().read_to_iter(stream, BLOCK, BLOCK)
+        elif chunk.compression == "lz4":
+            found = _lz4_blocks(data)
+        elif chunk.compression == "":
+            found = iter(partial(data.read, BLOCK), b"")
+        else:
+            raise BadRecord(f"a chunk compressed by {chunk.compression!r}, which is unknown")
+        for block in found:
+            left -= len(block)
+            if left < 0:
+                raise BadRecord(f"a chunk of more than {LARGEST_CHUNK >> 20} MiB")
+            yield block
+    except (zstandard.ZstdError, RuntimeError) as error:
+        raise BadRecord(f"a chunk that {chunk.compression} cannot uncompress") from error
+
+
+def _lz4_blocks(data: FileBytes) -> Iterator[bytes]:
+    import lz4.frame
+
+    frame = lz4.frame.LZ4FrameDecompressor()
+    while not frame.eof:
+        block = data.read(BLOCK) if frame.needs_input else b""
+        if frame.needs_input and not block:
+            return
+        yield frame.decompress(block, BLOCK)

@@ -2,7 +2,7 @@
 
 A record is taken when the next one adds up as well. Else one of the two is damaged, or bytes are
 missing: the next record that makes sense is looked for from just behind the head of the one in
-doubt, for its end may be false. Of a chunk its checksum decides.
+doubt, for its end may be false. A chunk is taken when its checksum or the summary confirms it.
 """
 
 from __future__ import annotations
@@ -11,19 +11,20 @@ import re
 import struct
 from array import array
 from bisect import bisect_right
-from collections import deque
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from math import inf
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
+import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 
-from roadeval.logs.container.chunks import COMPRESSIONS, DOUBTED, ChunkReader, crc_of
 from roadeval.logs.container.records import (
     CHUNK,
+    COMPRESSIONS,
+    DEFINITIONS,
+    DOUBTED,
     HEAD,
     LARGEST,
     MAGIC,
@@ -32,16 +33,20 @@ from roadeval.logs.container.records import (
     MESSAGE_INDEX,
     PADDING,
     PRIVATE,
+    Bytes,
     Chunk,
+    ChunkReader,
     Entries,
     FileBytes,
     Message,
     Record,
+    crc_of,
     message_at,
     parse,
     parse_chunk,
     parse_message_index,
     record_at,
+    walk,
 )
 from roadeval.logs.container.summary import SUMMARY_RECORDS, Summary, read_summary
 from roadeval.logs.errors import BadRecord
@@ -50,13 +55,10 @@ END: Final = -1
 """In place of an opcode: the end of the file."""
 BORDER: Final = -2
 """In place of an opcode: the eight bytes at which a log begins or ends."""
-_FIRST: Final = MAGIC[0]
-_ATTACHMENT: Final = Opcode.ATTACHMENT
-DAY: Final = 86_400 * 10**9
-"""A message logged more than so many nanoseconds from all the recent ones is none."""
-BLOCK: Final = 1 << 20
+ATTACHMENT: Final = Opcode.ATTACHMENT
+_BLOCK: Final = 1 << 20
 """Bytes to look through at a time."""
-TRIED: Final = 256
+_TRIED: Final = 256
 """Bytes for which a place counts at which no record begins, besides those that one there claims."""
 _CANDIDATE: Final = re.compile(
     rb"(?=[\x02-\x0f].{4}\x00{4}|\x89MCAP0\r\n\x01|\x06\xff{8})", re.DOTALL
@@ -67,44 +69,37 @@ _LAST_RECORD: Final = re.compile(
 )
 _NOT_IN_CHUNKS: Final = (CHUNK, MESSAGE_INDEX, Opcode.DATA_END, Opcode.FOOTER)
 """Records that are never found inside a chunk, unlike messages and their descriptions."""
-_AFTER_DATA: Final = tuple(bytes([kind]) for kind in (*SUMMARY_RECORDS, Opcode.FOOTER))
-RECENT: Final = 8
-"""Messages with whose log times another one's is compared."""
+_AFTER_DATA: Final = {*SUMMARY_RECORDS, Opcode.FOOTER, MAGIC[0]}
+"""The first bytes that can follow the end of the data."""
+RECORDS: Final = 1 << 18
+"""Records that chunks may hold beyond one for every few of their bytes: a bomb holds millions."""
+BYTES_PER_RECORD: Final = 4
+"""Bytes that a message takes at least, however well a chunk is compressed: its times differ."""
 
 StampOf = Callable[[Channel, Schema | None, Message], int | None]
 """Return the header stamp of a message, None if it is not as long as its own fields say."""
 
 
-@dataclass(slots=True)
-class Gap:
-    """Bytes that make no sense, to ``end`` (excluded), and the log times around them."""
+class Gap(NamedTuple):
+    """Bytes that make no sense, to ``end`` (excluded)."""
 
     offset: int
     end: int
     reason: str
-    before_ns: int | None = None
-    after_ns: int | None = None
-    lossy: bool = True
+    lossy: bool
 
 
 class Scan:
-    """What there is in a file.
+    """What there is in a file."""
 
-    Parameters
-    ----------
-    strict
-        Whether to verify each chunk before it is believed: where bytes are missing, a wrong length
-        can end by chance where a later record begins.
-    """
-
-    def __init__(
-        self, source: FileBytes, reader: ChunkReader, stamp_of: StampOf, *, strict: bool = False
-    ) -> None:
+    def __init__(self, source: FileBytes, reader: ChunkReader, stamp_of: StampOf) -> None:
         self.summary = read_summary(source)
         self.chunks: list[Chunk] = []
         """In the order of the file."""
         self.indexes: list[dict[int, Entries] | None] = []
         """For each chunk, its messages by channel; None where its message indexes are damaged."""
+        self.seen: dict[int, Mapping[int, Entries]] = {}
+        """The same of the chunks that were looked into."""
         self.loose: dict[int, array[int]] = {}
         """Log times and offsets, in turn, of the messages outside chunks, by channel."""
         self.schemas = dict(self.summary.schemas)
@@ -112,28 +107,20 @@ class Scan:
         self.conflicts: list[tuple[int, Schema | Channel]] = []
         """Other descriptions than these outside chunks, with their offsets."""
         self.gaps: list[Gap] = []
-        self._open_gaps: list[Gap] = []
         self.data_end: int | None = None
         self.after_data: int | None = None
         """Where the data section ends, None if the file ends before; and what comes after it."""
         self.data_crc = 0
         """Its checksum, 0 if not given."""
+        self.saved_ns: int | None = None
+        """Log time of the last message saved from a chunk that is cut off."""
         self.next_log: int | None = None
         """Where another log begins in the same file."""
         self._source, self._reader, self._stamp_of = source, reader, stamp_of
-        self._strict = strict
         self._stop = None if self.summary.problem else self.summary.start
-        self._recent_ns: deque[int] = deque(maxlen=RECENT)
-        self._finder = RecordFinder(source, reader, self.summary, self.channels, self._recent_ns)
+        self._records_left = RECORDS
+        self._finder = RecordFinder(source, reader, self.summary, self.channels)
         self._walk()
-
-    @property
-    def is_shifted(self) -> bool:
-        """Whether bytes may be missing or inserted, so that lengths may end at a wrong record."""
-        if self.summary.moved or not self.chunks:
-            return bool(self.chunks)
-        broken = any(gap.lossy and gap.end < len(self._source) for gap in self.gaps)
-        return broken and not (self.summary.in_place and self.summary.chunks)
 
     def _walk(self) -> None:
         record = Record(BORDER, 0, 0, len(MAGIC))
@@ -156,9 +143,7 @@ class Scan:
 
     def _following(self, record: Record) -> Record:
         """Read the record behind one; refuse where that shows that either is damaged."""
-        if record.opcode == CHUNK and (
-            record.content.cut or (self._strict and not self._is_proven(record))
-        ):
+        if record.opcode == CHUNK and not record.content.proven:
             raise BadRecord("a chunk that is not whole")
         if record.end != self._stop:
             return self._finder.record(record.end)
@@ -184,7 +169,7 @@ class Scan:
         if following is None:
             following = self._finder.next(record.end if proven else record.body, record)
         if is_chunk and not proven:
-            record = self._wreck(record, following.offset)
+            record = self._remains(record.content, following.offset)
         kept = proven or is_chunk or following.offset > record.end - PADDING
         if record.opcode == MESSAGE:
             kept = kept and self._is_whole(record)
@@ -195,17 +180,16 @@ class Scan:
             if self.indexes and record.opcode in (CHUNK, MESSAGE_INDEX):
                 self.indexes[-1] = None
             if self.data_end is None or following.opcode in (CHUNK, MESSAGE):
-                listed = self.summary.checked and self.summary.chunks and not self.loose
-                self._gap(begin, following.offset, reason, lossy=not listed)
+                self._gap(begin, following.offset, reason)
         return following
 
     def _is_proven(self, record: Record) -> bool:
         """Whether a record surely ends where it says."""
-        if record.opcode == _ATTACHMENT:
+        if record.opcode == ATTACHMENT:
             crc = crc_of(self._source.part(record.body, record.end - 4))
             return crc.to_bytes(4, "little") == self._source[record.end - 4 : record.end]
         if record.opcode == CHUNK:
-            return not record.content.cut and self._reader.is_sound(record.content)
+            return self._reader.is_sound(record.content)
         return record.opcode == BORDER
 
     def _is_whole(self, record: Record) -> bool:
@@ -216,18 +200,17 @@ class Scan:
         message = message_at(self._source, record.offset)
         return self._stamp_of(channel, self.schemas.get(channel.schema_id), message) is not None
 
-    def _wreck(self, record: Record, end: int) -> Record:
+    def _remains(self, chunk: Chunk, end: int) -> Record:
         """Return what is left of a chunk that is not whole, where the next record begins."""
-        chunk: Chunk = record.content
-        left = chunk._replace(data_size=max(end - chunk.data_offset, 0), cut=False, repaired=True)
-        if end != record.end and self._reader.is_sound(left):
-            return record_of(left)
-        if chunk.cut and end == record.end:
-            return record
-        left = chunk._replace(data_size=min(chunk.data_size, left.data_size), cut=False)
+        if chunk.cut and end == chunk.data_end:
+            return chunk.record
+        left = chunk._replace(data_size=max(end - chunk.data_offset, 0), cut=False)
+        if end != chunk.data_end and self._reader.is_sound(left):
+            return left._replace(repaired=True, proven=True).record
+        left = left._replace(data_size=min(chunk.data_size, left.data_size))
         with suppress(BadRecord):
             self._reader.read(left)
-        return record_of(left)
+        return left.record
 
     def _take(self, record: Record) -> None:
         """Note what a record says."""
@@ -237,12 +220,11 @@ class Scan:
             if channel_id not in self.loose:
                 self.loose[channel_id] = array("Q")
             self.loose[channel_id].extend((log_time, record.offset))
-            self._saw(log_time, log_time)
         elif opcode == CHUNK:
             self._take_chunk(content)
         elif opcode == MESSAGE_INDEX and self.indexes:
             self._take_index(*content)
-        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+        elif opcode in DEFINITIONS:
             known: dict[int, Any] = self.schemas if opcode == Opcode.SCHEMA else self.channels
             if known.setdefault(content.id, content) != content and self.data_end is None:
                 self.conflicts.append((record.offset, content))
@@ -260,8 +242,9 @@ class Scan:
         self.indexes.append({})
         if chunk.cut:
             self._gap(chunk.offset, chunk.data_end, "the file ends inside a chunk")
-        else:
-            self._saw(chunk.start, chunk.end)
+        if self.summary.statistics is None:  # while it is uncompressed
+            with suppress(BadRecord):
+                self.look(len(self.chunks) - 1)
 
     def _take_index(self, channel_id: int, entries: Entries) -> None:
         """File a message index, unless it does not agree with its chunk."""
@@ -276,24 +259,71 @@ class Scan:
             index[channel_id] = entries
 
     def _gap(self, offset: int, end: int, reason: str, *, lossy: bool = True) -> None:
-        before = self._recent_ns[-1] if self._recent_ns else None
-        self.gaps.append(Gap(offset, end, reason, before, None, lossy))
-        self._open_gaps.append(self.gaps[-1])
+        self.gaps.append(Gap(offset, end, reason, lossy))
 
-    def _saw(self, first_ns: int, last_ns: int) -> None:
-        while self._open_gaps:
-            self._open_gaps.pop().after_ns = first_ns
-        self._recent_ns.append(last_ns)
+    def define(self, *records: Any) -> None:
+        """Learn schemas and channels, unless they are known."""
+        for record in records:
+            known: dict[int, Any] = self.schemas if isinstance(record, Schema) else self.channels
+            known.setdefault(record.id, record)
+
+    def look(self, number: int) -> Mapping[int, Entries]:
+        """Walk through the records of a chunk; learn its channels and where its messages lie."""
+        chunk = self.chunks[number]
+        records = self._reader.read(chunk)
+        found: dict[int, array[int]] = {}
+        end, problem = 0, ""
+        usual = chunk.data_size // BYTES_PER_RECORD
+        allowed = usual + self._records_left // 2
+        for count, (opcode, offset, body, after, _) in enumerate(walk(records)):
+            if count == allowed:
+                problem = f"a chunk of so many records that only the first {allowed} were read"
+                self._records_left -= allowed - usual
+                break
+            end = after
+            if opcode == MESSAGE and after - body >= MESSAGE_HEAD.size:
+                head = records[body : body + MESSAGE_HEAD.size]
+                channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
+                found.setdefault(channel_id, array("Q")).extend((log_time, offset))
+            elif opcode in DEFINITIONS:
+                with suppress(BadRecord):  # its messages will show that it is missing
+                    self.define(parse(opcode, records[body:after]))
+            elif opcode < PRIVATE:
+                problem = "a chunk that holds more than messages, which is not read"
+        if end != len(records) and not chunk.cut:
+            problem = problem or "a chunk whose records do not add up"
+        if problem:
+            self._reader.kept.setdefault(chunk.offset, problem)
+        if chunk.cut:
+            self.saved_ns = max((max(values[::2]) for values in found.values()), default=None)
+        self.seen[number] = {channel_id: entries_of(found[channel_id]) for channel_id in found}
+        return self.seen[number]
+
+
+def definitions(records: Bytes) -> list[Any]:
+    """Return the schemas and channels of a chunk."""
+    found = []
+    for count, (opcode, _, body, end, _) in enumerate(walk(records)):
+        if count == RECORDS:
+            break
+        if opcode in DEFINITIONS:
+            with suppress(BadRecord):
+                found.append(parse(opcode, records[body:end]))
+    return found
+
+
+def entries_of(values: array[int]) -> Entries:
+    """Return rows of a flat array of log times and offsets."""
+    return np.frombuffer(values, np.int64).reshape(-1, 2)
 
 
 class RecordFinder:
-    """Reads the record at a byte, if its parts agree, and looks for the next one that does.
+    """Reads the record at a byte, if its parts agree, and finds the next one that does.
 
     Parameters
     ----------
-    channels, recent_ns
-        Numbers of the known channels, and log times of the last messages, as the walk through the
-        file finds them: both grow while this object is used.
+    channels
+        Numbers of the known channels; they grow while this object is used.
     """
 
     def __init__(
@@ -302,20 +332,16 @@ class RecordFinder:
         reader: ChunkReader,
         summary: Summary,
         channels: Collection[int],
-        recent_ns: Collection[int],
     ) -> None:
         self._source, self._reader, self._summary = source, reader, summary
         self._size = len(source)
-        self._channels, self._recent_ns = channels, recent_ns
+        self._channels = channels
         self._listings = {chunk.listing for chunk in summary.chunks.values() if summary.checked}
-        self._known = summary.chunks if summary.in_place else {}
+        self._proven: dict[int, Chunk] = {}
+        self._known = summary.chunks if summary.checked else {}
         self._borders = sorted(self._known)
         if self._known and summary.start is not None:
             self._borders.append(summary.start)
-        self._first_ns, self._last_ns = 0, 1 << 64
-        if summary.checked and summary.statistics and summary.statistics.message_count:
-            self._first_ns = summary.statistics.message_start_time
-            self._last_ns = summary.statistics.message_end_time
         self._tries_left = DOUBTED + 4 * len(source)
 
     def record(self, offset: int, *, chained: bool = True) -> Record:
@@ -330,20 +356,19 @@ class RecordFinder:
             return self._tail(offset)
         opcode, length = HEAD.unpack(self._source[offset : offset + HEAD.size])
         body = offset + HEAD.size
-        end = body + length
-        if opcode == _FIRST and self._source[offset : offset + len(MAGIC)] == MAGIC:
+        record = Record(opcode, offset, body, body + length)
+        if opcode == MAGIC[0] and self._source[offset : offset + len(MAGIC)] == MAGIC:
             return Record(BORDER, offset, offset, offset + len(MAGIC))
         if opcode == CHUNK or offset in self._known:
-            return self._chunk(Record(opcode, offset, body, end), chained=chained)
-        if opcode == _ATTACHMENT:
-            return self._attachment(Record(opcode, offset, body, end), chained=chained)
-        if end > self._size:
+            return self._chunk(record, chained=chained).record
+        if opcode == ATTACHMENT:
+            return self._attachment(record, chained=chained)
+        if record.end > self._size:
             raise BadRecord("a record that goes on beyond the end of the file")
-        if self._borders and end > self._border(offset):
+        if self._borders and record.end > self._border(offset):
             raise BadRecord("a record that goes on into the next chunk")
-        if opcode == MESSAGE:
-            return Record(opcode, offset, body, end, self._message(offset, body, end))
-        return Record(opcode, offset, body, end, self._content(Record(opcode, offset, body, end)))
+        content = self._message(record) if opcode == MESSAGE else self._content(record)
+        return Record(opcode, offset, body, record.end, content)
 
     def _tail(self, offset: int) -> Record:
         """Read what is shorter than any record: the last eight bytes, or none."""
@@ -360,26 +385,33 @@ class RecordFinder:
 
     def _content(self, record: Record) -> Any:
         """Read what a record says that is no chunk, no attachment and no message."""
-        opcode, _, body, end, _ = record
+        opcode, offset, body, end, _ = record
         if opcode >= PRIVATE and not self._is_likely_message(record):
             return None
         if end - body > LARGEST:
             raise BadRecord("a record of a length that cannot be")
         if opcode == MESSAGE_INDEX:
             return parse_message_index(self._source[body:end])
-        self._check_place(record)
+        # What begins or ends a part of the file has its place.
+        before = self._source[max(offset - len(MAGIC), 0) : offset]
+        elsewhere = self._summary.checked and end != self._summary.start
+        after = self._source[end : end + len(MAGIC)]
+        if (
+            (opcode == Opcode.HEADER and before != MAGIC and offset > len(MAGIC))
+            or (opcode == Opcode.FOOTER and (elsewhere or after != MAGIC))
+            or (opcode == Opcode.DATA_END and (elsewhere or not {*after[:1]} <= _AFTER_DATA))
+        ):
+            raise BadRecord("a record that should not be here")
         return parse(opcode, self._source[body:end])
 
-    def _message(self, offset: int, body: int, end: int) -> tuple[int, int]:
+    def _message(self, record: Record) -> tuple[int, int]:
         """Read the channel and the log time of a message outside chunks."""
-        if not MESSAGE_HEAD.size <= end - body <= LARGEST:
+        if not MESSAGE_HEAD.size <= record.end - record.body <= LARGEST:
             raise BadRecord("a message of a length that cannot be")
-        if self._known and self._is_index_here(offset):
+        if self._known and self._is_index_here(record.offset):
             raise BadRecord("a message where a message index should be")
-        head = self._source[body : body + MESSAGE_HEAD.size]
+        head = self._source[record.body : record.body + MESSAGE_HEAD.size]
         channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
-        if not self._first_ns <= log_time <= self._last_ns:
-            raise BadRecord("a message of a time outside the log's")
         return channel_id, log_time
 
     def _is_index_here(self, offset: int) -> bool:
@@ -388,26 +420,11 @@ class RecordFinder:
         return offset < self._summary.index_ends.get(chunk, 0)
 
     def _is_likely_message(self, record: Record) -> bool:
-        """Whether this is a message of a known channel, logged within a day of a recent one."""
-        head = self._source[record.body : record.body + MESSAGE_HEAD.size]
-        if not MESSAGE_HEAD.size == len(head) <= record.end - record.body <= LARGEST:
+        """Whether this is a message of a known channel."""
+        if not MESSAGE_HEAD.size <= record.end - record.body <= LARGEST:
             return False
-        channel_id, _, log_time, _ = MESSAGE_HEAD.unpack(head)
-        near = not self._recent_ns or any(abs(log_time - time) < DAY for time in self._recent_ns)
-        return near and (channel_id in self._channels or not self._channels)
-
-    def _check_place(self, record: Record) -> None:
-        """Refuse what begins or ends a part of the file where there is none."""
-        before = self._source[max(record.offset - len(MAGIC), 0) : record.offset]
-        after = bytes(self._source[record.end : record.end + len(MAGIC)])
-        elsewhere = self._summary.in_place and record.end != self._summary.start
-        misplaced = {
-            Opcode.HEADER: record.offset > len(MAGIC) and before != MAGIC,
-            Opcode.FOOTER: elsewhere or after != MAGIC,
-            Opcode.DATA_END: elsewhere or after[:1] not in (b"", MAGIC[:1], *_AFTER_DATA),
-        }
-        if any(record.opcode == opcode and is_so for opcode, is_so in misplaced.items()):
-            raise BadRecord("a record that should not be here")
+        channel_id = int.from_bytes(self._source[record.body : record.body + 2], "little")
+        return not self._channels or channel_id in self._channels
 
     def _attachment(self, record: Record, *, chained: bool) -> Record:
         """Find where an attachment ends: by its own length, that of its data, or the summary."""
@@ -419,52 +436,44 @@ class RecordFinder:
         border = min(self._border(record.offset), self._size)
         if own <= record.end <= border:
             return record
-        known = self._summary.attachments.get(record.offset, 0)
-        for end in (int(each) for each in (known, own, record.end) if chained and each <= border):
-            with suppress(BadRecord):
-                if end > record.body and self.record(end, chained=False):
-                    return record._replace(end=end)
+        for end in (self._summary.attachments.get(record.offset, 0), own, record.end):
+            if chained and record.body < end <= border:
+                with suppress(BadRecord):
+                    self.record(int(end), chained=False)
+                    return record._replace(end=int(end))
         raise BadRecord("an attachment whose lengths contradict each other")
 
-    def _chunk(self, record: Record, *, chained: bool) -> Record:
+    def _chunk(self, record: Record, *, chained: bool) -> Chunk:
         """Read a chunk's head, which gives its length twice, and the summary a third time."""
-        size, heads = self._size, self._heads(record)
-        own = heads[0] if heads else None
-        if own is not None and not own.repaired:
-            if record.end > size:
-                return self._cut(own)
-            if record.end <= self._border(record.offset) or self._reader.is_sound(own):
-                return record_of(own)
-        for chunk in heads:
-            if self._reader.is_sound(chunk):
-                return record_of(chunk._replace(repaired=True))
-        for chunk in heads if chained else []:
-            with suppress(BadRecord):
-                if self.record(chunk.data_end, chained=False):
-                    return record_of(chunk._replace(repaired=True))
-        if own is not None and min(own.data_end, record.end) > size:
-            return self._cut(own._replace(repaired=False))
-        raise BadRecord("a chunk whose lengths contradict each other")
-
-    def _heads(self, record: Record) -> list[Chunk]:
-        """Return what a chunk's head may be: the first is not repaired if nothing contradicts."""
-        listed, found = self._known.get(record.offset), list[Chunk]()
+        offset, heads = record.offset, list[Chunk]()
+        if offset in self._proven:
+            return self._proven[offset]
+        listed, agrees = self._summary.chunks.get(offset), False
         with suppress(BadRecord):
             own = parse_chunk(self._source, record)
             agrees = own.data_end == record.end and record.opcode == CHUNK
-            agrees = agrees and (listed is None or own.listing == listed.listing)
-            by_record = own._replace(data_size=record.end - own.data_offset, repaired=True)
-            found = [own._replace(repaired=not agrees), by_record]
-        if listed is not None and (not found or found[0].repaired):
+            if agrees and listed and own.listing == listed.listing:
+                return own._replace(proven=True)
+            heads = [own, own._replace(data_size=record.end - own.data_offset)]
+        if offset in self._known:
             crc = int.from_bytes(self._source[record.body + 24 : record.body + 28], "little")
-            found.insert(0, listed._replace(crc=crc or None, repaired=True))
-        return [chunk for chunk in found if chunk.data_size >= 0]
-
-    def _cut(self, chunk: Chunk) -> Record:
-        data_size = self._size - chunk.data_offset
-        if data_size < 0:
-            raise BadRecord("a chunk without a head")
-        return record_of(chunk._replace(data_size=data_size, cut=True))
+            heads.append(self._known[offset]._replace(crc=crc or None))
+        for chunk in heads:
+            # Zeros would be an empty chunk.
+            if chunk.data_size >= 0 and (chunk.size or agrees) and self._reader.is_sound(chunk):
+                repaired = not agrees or chunk != heads[0]
+                self._proven[offset] = chunk._replace(repaired=repaired, proven=True)
+                return self._proven[offset]
+        ends = [chunk.data_end for chunk in heads[:2]]
+        if agrees and record.end <= min(self._border(offset), self._size):
+            return heads[0]
+        if ends and min(ends) > self._size >= heads[0].data_offset:
+            return heads[0]._replace(data_size=self._size - heads[0].data_offset, cut=True)
+        for chunk in heads if chained else []:
+            with suppress(BadRecord):
+                self.record(chunk.data_end, chained=False)
+                return chunk._replace(repaired=True)
+        raise BadRecord("a chunk whose lengths contradict each other")
 
     def hidden_chunk(self, offset: int) -> Record | None:
         """Find a chunk here whose kind or lengths are damaged, by its checksum."""
@@ -475,7 +484,7 @@ class RecordFinder:
                 for end in (chunk.data_end, self.next(chunk.data_offset, anything).offset):
                     found = chunk._replace(data_size=end - chunk.data_offset, repaired=True)
                     if found.data_size > 0 and self._reader.is_sound(found):
-                        return record_of(found)
+                        return found._replace(proven=True).record
         return None
 
     def next(self, begin: int, doubted: Record) -> Record:
@@ -491,14 +500,14 @@ class RecordFinder:
         kinds = {doubted.opcode, *self._source[doubted.end : doubted.end + 1]}
         for offset in self._candidates(begin):
             if self._source[offset : offset + len(MAGIC)] == MAGIC:
-                if _ATTACHMENT in kinds:
+                if ATTACHMENT in kinds:
                     log_end = max(log_end, self._end_of_log(offset))
                 elif self._is_another_log(offset):
                     return Record(BORDER, offset, offset, offset + len(MAGIC))
                 continue
             with suppress(BadRecord):
                 claimed = record_at(self._source, offset).end - offset
-                self._tries_left -= TRIED + (claimed if claimed <= size - offset else 0)
+                self._tries_left -= _TRIED + (claimed if claimed <= size - offset else 0)
                 if self._tries_left < 0:
                     break
                 record = self.record(offset)
@@ -508,30 +517,28 @@ class RecordFinder:
 
     def _candidates(self, begin: int) -> Iterator[int]:
         """Yield the bytes at or after ``begin`` where a record may begin."""
-        for at in range(begin, self._size, BLOCK):
-            block = self._source[at : at + BLOCK + HEAD.size]
+        for at in range(begin, self._size, _BLOCK):
+            block = self._source[at : at + _BLOCK + HEAD.size]
             found = {at + match.start() for match in _CANDIDATE.finditer(block)}
-            found.update(border for border in self._borders if at <= border < at + BLOCK)
-            yield from sorted(each for each in found if each < at + BLOCK)
+            found.update(border for border in self._borders if at <= border < at + _BLOCK)
+            yield from sorted(each for each in found if each < at + _BLOCK)
 
     def _is_believed(self, record: Record, doubted: Record, log_end: int) -> bool:
         """Whether it is more than chance that this looks like a record of the log."""
         opcode, content = record.opcode, record.content
-        if opcode in (END, BORDER, Opcode.HEADER) or record.offset < log_end:
-            return opcode == CHUNK and content.listing in self._listings
         in_chunk = doubted.opcode == CHUNK and record.offset < doubted.end
         if opcode == CHUNK:
             ours = content.listing in self._listings
             if not self._listings:
-                ours = content.compression in COMPRESSIONS
-            return ours and (not in_chunk or self._reader.is_sound(content))
-        if in_chunk and opcode not in _NOT_IN_CHUNKS:
+                ours = content.compression in COMPRESSIONS and record.offset >= log_end
+            return ours and (content.proven or not in_chunk)
+        misplaced = opcode in (END, BORDER, Opcode.HEADER) or record.offset < log_end
+        if misplaced or (in_chunk and opcode not in _NOT_IN_CHUNKS):
             return False
         if opcode == MESSAGE_INDEX and content[1].nbytes + 6 == record.end - record.body:
             return not self._known or self._is_index_here(record.offset)
-        return (opcode != MESSAGE or self._is_likely_message(record)) and self._is_followed(record)
-
-    def _is_followed(self, record: Record) -> bool:
+        if opcode == MESSAGE and not self._is_likely_message(record):
+            return False
         with suppress(BadRecord):
             return bool(self.record(record.end, chained=False))
         return False
@@ -540,17 +547,11 @@ class RecordFinder:
         """Whether these are the first bytes of a log behind this one, and none that were moved."""
         if self._source[offset - len(MAGIC) : offset] == MAGIC:
             return True
-        begins = self._source[0 : len(MAGIC)] == MAGIC
-        return begins and (not self._summary.checked or offset == self._summary.moved)
+        return not self._summary.checked and self._source[0 : len(MAGIC)] == MAGIC
 
     def _end_of_log(self, offset: int) -> int:
-        for at in range(offset, self._size, BLOCK):
-            found = _LAST_RECORD.search(self._source[at : at + BLOCK + 64])
+        for at in range(offset, self._size, _BLOCK):
+            found = _LAST_RECORD.search(self._source[at : at + _BLOCK + 64])
             if found is not None:
                 return at + found.end()
         return self._size
-
-
-def record_of(chunk: Chunk) -> Record:
-    """Return the record that a chunk is."""
-    return Record(CHUNK, chunk.offset, chunk.offset + HEAD.size, chunk.data_end, chunk)

@@ -12,8 +12,7 @@ import numpy.typing as npt
 from mcap.records import Channel, Schema
 
 from roadeval.images import Limits
-from roadeval.logs.container.damage import sure_until
-from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container
+from roadeval.logs.container.file import OUTSIDE, ChannelLog, Container, sure_until
 from roadeval.logs.container.records import Message
 from roadeval.logs.errors import BadMessage, BadRecord, FrameError
 from roadeval.logs.messages.pictures import Decoder, LoggedPicture, decoder_for

@@ -8,12 +8,11 @@ from typing import Any
 import pytest
 from mcap.opcode import Opcode
 
-from roadeval.logs.container.chunks import ChunkReader
-from roadeval.logs.container.damage import damage_of
-from roadeval.logs.container.file import containers_in
+from roadeval.logs.container.file import containers_in, damage_of
 from roadeval.logs.container.records import (
     MAGIC,
     Bytes,
+    ChunkReader,
     FileBytes,
     Message,
     message_at,

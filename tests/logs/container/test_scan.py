@@ -10,8 +10,7 @@ import zstandard
 from mcap.opcode import Opcode
 
 from roadeval.logs import FrameSettings, LogConfig, LogError, TopicSettings, open_log
-from roadeval.logs.container.chunks import BLOCK, _blocks
-from roadeval.logs.container.records import Chunk, FileBytes, parse
+from roadeval.logs.container.records import BLOCK, Chunk, FileBytes, blocks, parse
 from roadeval.logs.errors import BadRecord
 from tests.fixtures.broken import mended
 from tests.logs.making import CAMERA, FRAMES, START, small_log
@@ -196,7 +195,7 @@ def test_zeros_in_place_of_records_are_told_and_not_walked_through(
 def test_a_chunk_that_grows_beyond_all_bounds_is_given_up(
     tmp_path: Path, compression: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("roadeval.logs.container.chunks.LARGEST_CHUNK", 10 << 20)
+    monkeypatch.setattr("roadeval.logs.container.records.LARGEST_CHUNK", 10 << 20)
     path = tmp_path / "log.mcap"
     with_chunk(path, compression, COMPRESSED_ZEROS[compression], SIZE)
     assert kept(path) == [*range(FRAMES)]
@@ -208,9 +207,9 @@ def test_a_chunk_that_grows_beyond_all_bounds_is_given_up(
 def test_a_chunk_is_uncompressed_in_blocks_of_bounded_size(compression: str) -> None:
     data = COMPRESSED_ZEROS[compression]
     chunk = Chunk(0, 0, 0, SIZE, 0, compression, 0, len(data))
-    blocks = list(_blocks(FileBytes(io.BytesIO(data)), chunk))
-    assert max(map(len, blocks)) <= BLOCK
-    assert sum(map(len, blocks)) == SIZE
+    found = list(blocks(FileBytes(io.BytesIO(data)), chunk))
+    assert max(map(len, found)) <= BLOCK
+    assert sum(map(len, found)) == SIZE
 
 
 def test_two_descriptions_of_a_topic_outside_chunks_are_told(unchunked: Path) -> None:
