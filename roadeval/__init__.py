@@ -16,9 +16,9 @@ Nothing here touches the process's own streams: what a C library of a codec writ
 by itself stays there, while the command line drops it.
 """
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from roadeval.runtime.on_demand import on_demand
+from roadeval.runtime.imports import on_demand
 from roadeval.version import VERSION
 
 if TYPE_CHECKING:
@@ -71,28 +71,8 @@ __all__ = [
     "write_report",
 ]
 
-_NAMED: Final = ("compare", "demo", "info", "pack", "replay", "serve", "train")
-_HOMES: Final = {
-    **{name: f"jobs.{name}" for name in _NAMED},
-    **dict.fromkeys(("RunConfig", "configure", "load_config"), "config"),
-    **dict.fromkeys(("Model", "load_model", "save_model"), "training"),
-    "Fleet": "results.fleet.folder",
-    "FleetOutcome": "jobs.fleet",
-    "FleetProgress": "jobs.fleet",
-    "Outcome": "jobs.replay",
-    "Progress": "jobs.progress",
-    "Recording": "recording",
-    "Result": "jobs.result",
-    "RoadevalError": "errors",
-    "config_toml": "jobs.config",
-    "replay_fleet": "jobs.fleet",
-    "run_frame": "jobs.frame",
-    "write_report": "jobs.report",
-}
-
-
 if not TYPE_CHECKING:  # there every name is known
-    __getattr__ = on_demand(__name__, _HOMES)
+    __getattr__ = on_demand(__name__)
 
 
 def __dir__() -> list[str]:

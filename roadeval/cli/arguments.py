@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,7 +13,7 @@ from roadeval.cli.options import FLAGS, Given, with_flags
 from roadeval.errors import RoadevalError
 
 if TYPE_CHECKING:
-    from roadeval.config import DriveSettings, RunConfig, Variant
+    from roadeval.config import RunConfig, Variant
     from roadeval.logs import LogConfig
     from roadeval.report.pdf.typeset import Paper
 
@@ -41,8 +41,8 @@ TrustSources = Annotated[
     bool,
     typer.Option(
         "--trust-sources",
-        help="Of a fleet: read logs, masks, networks and recordings wherever its folder says that "
-        "they lie, files and URLs alike. Without it nothing outside the folder is read.",
+        help="Of a fleet: read logs, masks, networks and recordings from places that its folder "
+        "names, files and URLs alike. Without it nothing outside the folder is read.",
     ),
 ]
 PaperSize = Annotated[
@@ -92,36 +92,43 @@ Conditions = Annotated[
 def configuration(given: Given) -> RunConfig:
     """Return the configuration of a preset, a file, and options on top of both.
 
-    What can be seen to be wrong without opening a file is wrong usage.
-
     Raises
     ------
     typer.BadParameter
-        For an option's value that cannot be used, or options that do not go together.
+        For a value that can be seen to be wrong without opening a file, or options that do not go
+        together.
     RoadevalError
         For a file that cannot be used.
     """
-    from roadeval.config import configure
+    from roadeval.config import ConfigError, DriveSettings, configure, network_variant, read_tables
 
-    options = ("variants", "nets", "topics.masks", "masks")
-    named = [each for option in options for each in given.get(option, ())]
+    preset = {"preset": given["preset"]} if "preset" in given else {}
     with usage():
-        _check_names([name for name, _ in named])
-        base = configure(_preset(given)) if "config" not in given else None
-    config = _from_file(given) if base is None else base
+        _check_names(given, "variants", "nets", "topics.masks", "masks")
+        config = configure(preset)
+    if path := given.get("config"):
+        tables = read_tables(path)
+        if preset and tables.get("preset", given["preset"]) != given["preset"]:
+            raise ConfigError(
+                f"{path}: starts from preset {tables['preset']}, not from {given['preset']}"
+            )
+        config = configure({**preset, **tables}, where=str(path))
     variants = [_variant(*each) for each in given.get("variants", ())]
-    variants += [_network(*each) for each in given.get("nets", ())]
-    masks = {"masks": dict(_masks(*each) for each in given.get("masks", ()))}
+    variants += [network_variant(*each) for each in given.get("nets", ())]
+    masks = {name: _masks(name, path) for name, path in given.get("masks", ())}
     with usage():
-        whole = config.override(_tables(given) | masks).with_variants(variants)
-    whole = whole.with_drives(_drive(*each) for each in given.get("drives", ()))
+        config = config.override({**_tables(given), "masks": masks}).with_variants(variants)
+    config = config.with_drives(
+        DriveSettings.of({**read_tables(file), "path": drive}, file)
+        for drive, file in given.get("drives", ())
+    )
     chosen = {"training.frames", "training.placement", "training.gap"}
-    if whole.training.model and not whole.training.adapt and chosen & given.keys():
+    if config.training.model and not config.training.adapt and chosen & given.keys():
         raise typer.BadParameter(
             "--train-frames, --train-on and --train-gap do not go with a model "
-            f"({whole.training.model})"
+            f"({config.training.model})"
         )
-    return whole
+    return config
 
 
 def of_a_log(given: Given) -> LogConfig:
@@ -129,23 +136,8 @@ def of_a_log(given: Given) -> LogConfig:
     from roadeval.config import log_config
 
     with usage():
-        _check_names([name for name, _ in given.get("topics.masks", ())])
+        _check_names(given, "topics.masks")
         return log_config(_tables(given))
-
-
-def _preset(given: Given) -> dict[str, str]:
-    return {"preset": given["preset"]} if "preset" in given else {}
-
-
-def _from_file(given: Given) -> RunConfig:
-    from roadeval.config import ConfigError, configure, read_tables
-
-    path = given["config"]
-    tables = read_tables(path)
-    preset = given.get("preset")
-    if preset is not None and tables.get("preset", preset) != preset:
-        raise ConfigError(f"{path}: starts from preset {tables['preset']}, not from {preset}")
-    return configure({**_preset(given), **tables}, where=str(path))
 
 
 def _variant(name: str, path: str | None) -> Variant:
@@ -159,35 +151,26 @@ def _variant(name: str, path: str | None) -> Variant:
         return Variant.of(name, {"preset": preset}, f"{FLAGS['variants']} {name} names no file")
 
 
-def _network(name: str, path: str) -> Variant:
-    from roadeval.config import network_variant
-
-    return network_variant(name, path)
-
-
-def _masks(name: str, path: str) -> tuple[str, dict[str, Any]]:
-    """Return the table of masks that lie under a path, or that a file describes."""
-    from roadeval.config import read_tables, with_masks
+def _masks(name: str, path: str) -> dict[str, Any]:
+    """Return the table of masks of a folder or log, or of a file that describes them."""
+    from roadeval.config import in_file, read_tables, with_masks
 
     if not path.endswith(".toml"):
-        return name, {"path": path}
+        return {"path": path}
     tables = read_tables(path)
-    with_masks({}, {name: tables}, path)
-    return name, tables
+    with in_file(path):
+        with_masks({}, {name: tables})
+    return tables
 
 
-def _drive(path: str, file: str) -> DriveSettings:
-    from roadeval.config import DriveSettings, read_tables
-
-    return DriveSettings.of({**read_tables(file), "path": path}, file)
-
-
-def _check_names(names: Sequence[str]) -> None:
+def _check_names(given: Given, *options: str) -> None:
     from roadeval.config import check_variant_name
     from roadeval.data import FILTERED, UNFILTERED
 
-    for place, name in enumerate(names):
-        check_variant_name(name, [FILTERED, UNFILTERED, *names[:place]])
+    taken = [FILTERED, UNFILTERED]
+    for name, _ in (each for option in options for each in given.get(option, ())):
+        check_variant_name(name, taken)
+        taken.append(name)
 
 
 def _tables(given: Given) -> dict[str, dict[str, Any]]:

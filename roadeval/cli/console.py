@@ -1,4 +1,4 @@
-"""The two streams: results on stdout, everything said to the person on stderr."""
+"""The two streams: results on stdout, messages to the person on stderr."""
 
 from __future__ import annotations
 
@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
+NARROWEST: Final = 20
+STANDARD: Final = 80
+"""Columns. No terminal is narrower than the first, whatever ``COLUMNS`` says; the second is taken
+then."""
 _PADDING: Final = re.compile(r" +((?:\x1b\[0m)?\n)")
 
 
@@ -26,20 +30,33 @@ class OutputError(RoadevalError):
 
 def diagnostics() -> Console:
     """Return a console on stderr, for progress, warnings and errors."""
-    from roadeval.cli.terminal import Terminal
-
-    return Terminal()
+    return _terminal()
 
 
 def results() -> Console:
     """Return a console on stdout, for what the user asked for."""
-    from roadeval.cli.terminal import Terminal
+    return _terminal(cast("IO[str]", _Trimmed(sys.stdout)))
 
-    return Terminal(cast("IO[str]", _Trimmed(sys.stdout)))
+
+def _terminal(file: IO[str] | None = None) -> Console:
+    """Return Rich's console on a stream, standard error by default, with every string escaped.
+
+    A `Text` is not escaped: only the program itself makes one.
+    """
+    from rich.console import Console
+
+    class Terminal(Console):
+        def render_str(self, text: str, **options: Any) -> Text:
+            return super().render_str(visible(text), **options)
+
+    made = Terminal(file=file, stderr=file is None, highlight=False, markup=False, emoji=False)
+    if made.width < NARROWEST:
+        made.width = STANDARD
+    return made
 
 
 class _Trimmed:
-    """A stream without the spaces at the ends of lines that tables and wrapped sentences leave."""
+    """A stream that drops the spaces at the ends of lines, which tables and sentences leave."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -57,19 +74,19 @@ class _Trimmed:
 
 
 def emit(text: str) -> None:
-    """Write lines to stdout, however long: for machines, and for paths to copy."""
+    """Write lines to stdout without wrapping: for machines, and for paths to copy."""
     with _explained():
         sys.stdout.write(f"{visible_lines(text)}\n")
 
 
 def flush() -> None:
-    """Write what waits for stdout; an `OutputError` if that fails."""
+    """Flush stdout; an `OutputError` if that fails."""
     with _explained():
         sys.stdout.flush()
 
 
 def drop() -> None:
-    """Send nowhere what still waits for stdout: the interpreter flushes it as it ends."""
+    """Drop what is still buffered for stdout: the interpreter would flush it at its end."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

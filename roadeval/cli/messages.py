@@ -15,29 +15,26 @@ from roadeval.runtime.text import visible, visible_lines, without_secrets
 
 PROGRAM: Final = "roadeval"
 LONGEST: Final = 5_000
-"""Letters of a sentence that are shown: a damaged or hostile file may hold names of any length."""
+"""Letters of a sentence; a damaged or hostile file may hold names of any length."""
 
 
 def error(sentence: object) -> None:
-    """Write what went wrong: ``roadeval: error: ...``."""
+    """Write an error: ``roadeval: error: ...``."""
     _write("error", "bold red", sentence)
 
 
 def warning(sentence: object) -> None:
-    """Write what the user should know although the work goes on: ``roadeval: warning: ...``."""
+    """Write a warning: ``roadeval: warning: ...``."""
     _write("warning", "bold yellow", with_flags(str(sentence)))
 
 
 def note(sentence: object) -> None:
-    """Write what happens now, where somebody waits for it: ``roadeval: note: ...``."""
+    """Write what happens now, where it takes long: ``roadeval: note: ...``."""
     _write("note", "bold", with_flags(str(sentence)))
 
 
 def losses(sentences: Sequence[str]) -> ExitCode:
-    """Write which parts of a log could not be read: ``roadeval: lost: ...``.
-
-    Returns the exit code that follows from them.
-    """
+    """Write which parts of a log were lost, ``roadeval: lost: ...``, and return the exit code."""
     for sentence in sentences:
         _write("lost", "bold yellow", with_flags(sentence))
     return ExitCode.LOSS if sentences else ExitCode.DONE
@@ -64,7 +61,7 @@ def loops_missing() -> None:
 
 
 def interrupted(sentence: object) -> None:
-    """Write what is left after a signal: ``roadeval: interrupted: ...``."""
+    """Write that a signal ended the command: ``roadeval: interrupted: ...``."""
     _write("interrupted", "bold yellow", sentence)
 
 
@@ -74,7 +71,7 @@ def one_line(sentence: object) -> str:
 
 
 def _shortened(sentence: str) -> str:
-    """Leave out the middle of a sentence that nobody would read to its end."""
+    """Leave out the middle of a long sentence."""
     half = LONGEST // 2
     return sentence if len(sentence) <= LONGEST else f"{sentence[:half]} ... {sentence[-half:]}"
 

@@ -1,8 +1,7 @@
-"""The options that give settings of a run's configuration their values.
+"""The options that give the settings of a run their values.
 
-An option is made of a setting's field: its flag, its type and its meaning stand there. Only what is
-no single setting is declared here. No other module knows a flag: errors name settings, and
-`with_flags` replaces these names.
+An option is made of a setting's field: its flag, its type and its meaning stand there. No other
+module knows a flag: errors name settings, and `with_flags` replaces these names.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ import re
 import types
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_hints
@@ -25,67 +25,76 @@ from roadeval.logs.settings import FrameSettings, LabelSettings, TopicSettings
 from roadeval.runtime.settings import Flag, meanings
 from roadeval.training.settings import TrainingSettings
 
-GROUPS: Final = {
-    "output": "Output",
-    "methods": "Methods",
-    "training": "Training",
-    "topics": "Truth",
-    "labels": "Truth",
-    "frames": "Range",
-    "input": "Input",
-    "run": "Execution",
-    "fleet": "Fleet",
-}
-"""The parts of the help, in their order, by the tables whose settings stand there."""
-SETTINGS: Final = {
-    "output": OutputSettings,
-    "training": TrainingSettings,
-    "topics": TopicSettings,
-    "labels": LabelSettings,
-    "frames": FrameSettings,
-    "run": ExecutionSettings,
-    "fleet": FleetSettings,
-}
-"""The settings that flags set, by the names of their tables."""
-
 Given = Mapping[str, Any]
-"""Values of options by the names of their settings; one that was not typed is not there."""
+"""Values of options by the names of their settings, without those that were not typed."""
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
+class MethodSettings:
+    """Options that are more than one setting of a run; `roadeval.cli.arguments` reads them."""
+
+    preset: Annotated[
+        str | None, Flag("--preset", "paper|printed|printed_order|hsi|gated|robust")
+    ] = None
+    """The equations as meant (the default); the misprints taken literally; the paper with its own
+    order of post-processing, or with shadow compensated in HSI; a more careful shadow filter; or
+    for use on a road."""
+    config: Annotated[Path | None, Flag("--config", "FILE.toml")] = None
+    """Settings on top of the preset: all that 'roadeval config' prints, the run.toml of an earlier
+    run, or its recording."""
+    variants: Annotated[
+        Mapping[str, str | None], Flag("--variant", "NAME=FILE.toml|NAME=PRESET|PRESET")
+    ] = dataclasses.field(default_factory=dict)
+    """One more variant beside filtered and unfiltered: of a file, or a preset by its name."""
+    nets: Annotated[Mapping[str, str], Flag("--net", "NAME=FILE")] = dataclasses.field(
+        default_factory=dict
+    )
+    """One more variant: the network of an ONNX file, or of a TOML file with its settings, as the
+    size of its input."""
+    masks: Annotated[Mapping[str, str], Flag("--masks", "NAME=FOLDER|LOG:TOPIC|FILE.toml")] = (
+        dataclasses.field(default_factory=dict)
+    )
+    """Score the masks of a folder, or of another log, as one more variant; a file holds their path
+    and more, as a threshold of confidences."""
+    drives: Annotated[Mapping[str, str], Flag("--drive", "DRIVE=FILE.toml", "Input")] = (
+        dataclasses.field(default_factory=dict)
+    )
+    """A file with the [topics], [labels] or [frames] of one drive, by its path or its file's name,
+    or of several, as 'monday*.mcap'."""
+
+
+GROUPS: Final = ("Output", "Methods", "Training", "Truth", "Range", "Input", "Execution", "Fleet")
+"""The parts of the help, in their order."""
+TABLES: Final[Mapping[str, tuple[type, str]]] = {
+    "": (MethodSettings, "Methods"),
+    "output": (OutputSettings, "Output"),
+    "training": (TrainingSettings, "Training"),
+    "topics": (TopicSettings, "Truth"),
+    "labels": (LabelSettings, "Truth"),
+    "frames": (FrameSettings, "Range"),
+    "run": (ExecutionSettings, "Execution"),
+    "fleet": (FleetSettings, "Fleet"),
+}
+"""The settings that flags set, by the names of their tables, and their parts of the help."""
+
+
+@dataclass(frozen=True, slots=True)
 class Option:
     """An option of the command line that gives a setting its value."""
 
     setting: str
-    """``table.key`` in a run's configuration; the others are read by `roadeval.cli.arguments`."""
+    """``table.key`` in a run's configuration, or a field of `MethodSettings`."""
     flags: tuple[str, ...]
-    """As they are typed; the last one is named in messages."""
+    """The last one is named in messages."""
     metavar: str | None
-    """Stands for the value in the help; none for a switch."""
+    """The placeholder of the value in the help; none for a switch."""
     help: str
-    kind: Any = str
+    kind: Any
     """The type of what is typed; a list for an option that can be repeated."""
-    read: Callable[[str], Any] | None = None
+    read: Callable[[str], Any] | None
     """Turns a word of such a list into a value."""
-    group: str = "Methods"
+    group: str
     """Its part of the help."""
-
-    @classmethod
-    def of(cls, table: str, key: str, hint: Any, default: Any, meaning: str) -> Option | None:
-        """Return the option of a setting that has a flag, by the type of its field."""
-        flag = next((each for each in get_args(hint)[1:] if isinstance(each, Flag)), None)
-        if flag is None:
-            return None
-        sentences = re.split(r"(?<=[.:]) (?=[A-Z])", " ".join(meaning.replace("``", "").split()))
-        told = [sentences[0], *(each for each in sentences[1:] if each.startswith("Default"))]
-        kind, read = _kind(hint)
-        if get_origin(kind) is list:
-            told.append("Repeatable.")
-        elif default and kind is not bool:
-            told.append(f"Default: {default}.")
-        group = flag.group or GROUPS[table]
-        names = tuple(flag.names.split())
-        return cls(f"{table}.{key}", names, flag.metavar or None, " ".join(told), kind, read, group)
 
     @property
     def argument(self) -> str:
@@ -94,13 +103,12 @@ class Option:
 
     def parameter(self) -> inspect.Parameter:
         """Return the parameter that Typer makes the option of."""
-        # Whoever opens a file tells whether it can be read, as of any other problem with it.
         option = typer.Option(
             *self.flags,
             metavar=self.metavar,
             show_default=False,
             help=self.help,
-            readable=False,
+            readable=False,  # whoever opens a file says what is wrong with it
             rich_help_panel=self.group,
         )
         return inspect.Parameter(
@@ -117,6 +125,36 @@ class Option:
         return [self.read(word) for word in typed] if typed else None
 
 
+def _options() -> Iterator[Option]:
+    for table, (settings, group) in TABLES.items():
+        hints, texts = get_type_hints(settings, include_extras=True), meanings(settings)
+        for field in dataclasses.fields(settings):
+            hint = hints[field.name]
+            flag = next((each for each in get_args(hint)[1:] if isinstance(each, Flag)), None)
+            if flag is not None:
+                kind, read = _kind(hint)
+                yield Option(
+                    f"{table}.{field.name}".removeprefix("."),
+                    tuple(flag.names.split()),
+                    flag.metavar or None,
+                    _help(texts[field.name], kind, field.default),
+                    kind,
+                    read,
+                    flag.group or group,
+                )
+
+
+def _help(meaning: str, kind: Any, default: Any) -> str:
+    """Return the first sentence of a setting's meaning, and what its default is."""
+    sentences = re.split(r"(?<=[.:]) (?=[A-Z])", " ".join(meaning.replace("``", "").split()))
+    shown = [sentences[0], *(each for each in sentences[1:] if each.startswith("Default"))]
+    if get_origin(kind) is list:
+        shown.append("Repeatable.")
+    elif default and default is not dataclasses.MISSING and kind is not bool:
+        shown.append(f"Default: {default}.")
+    return " ".join(shown)
+
+
 def _kind(hint: Any) -> tuple[Any, Callable[[str], Any] | None]:
     """Return what is typed for a value of a type, and how its words are read."""
     kind = _bare(hint)
@@ -128,7 +166,7 @@ def _kind(hint: Any) -> tuple[Any, Callable[[str], Any] | None]:
         case builtins.tuple:
             return (list[int], None) if _bare(get_args(kind)[0]) is int else (list[str], color)
         case _:
-            return list[str], named
+            return list[str], named if get_args(kind)[1] is str else _maybe_named
 
 
 def _bare(hint: Any) -> Any:
@@ -156,84 +194,12 @@ def named(text: str) -> tuple[str, str]:
     return name, value
 
 
-def _variant(text: str) -> tuple[str, str | None]:
-    """Read ``NAME=FILE.toml`` or ``NAME=PRESET``, or the name of a preset alone."""
+def _maybe_named(text: str) -> tuple[str, str | None]:
     return named(text) if "=" in text else (text, None)
 
 
-METHODS: Final = (
-    Option(
-        "preset",
-        ("--preset",),
-        "paper|printed|printed_order|hsi|gated|robust",
-        "The equations as meant (the default); the misprints taken literally; the paper with its "
-        "own order of post-processing, or with shadow compensated in HSI; a more careful shadow "
-        "filter; or for use on a road.",
-    ),
-    Option(
-        "config",
-        ("--config",),
-        "FILE.toml",
-        "Settings on top of the preset: all that 'roadeval config' prints, the run.toml of an "
-        "earlier run, or its recording.",
-        Path,
-    ),
-    Option(
-        "variants",
-        ("--variant",),
-        "NAME=FILE.toml|NAME=PRESET|PRESET",
-        "One more variant beside filtered and unfiltered: of a file, or a preset by its name. "
-        "Repeatable.",
-        list[str],
-        _variant,
-    ),
-    Option(
-        "nets",
-        ("--net",),
-        "NAME=FILE",
-        "One more variant: the network of an ONNX file, or of a TOML file with its settings, as "
-        "the size of its input. Repeatable.",
-        list[str],
-        named,
-    ),
-    Option(
-        "masks",
-        ("--masks",),
-        "NAME=FOLDER|LOG:TOPIC|FILE.toml",
-        "Score masks that lie in a folder, or in another log, as one more variant; of a file with "
-        "a path and more, as a threshold of confidences. Repeatable.",
-        list[str],
-        named,
-    ),
-    Option(
-        "drives",
-        ("--drive",),
-        "DRIVE=FILE.toml",
-        "A file with the [topics], [labels] or [frames] of one drive, by its path or its file's "
-        "name, or of several, as 'monday*.mcap'. Repeatable.",
-        list[str],
-        named,
-        "Input",
-    ),
-)
-"""The options that are more than one setting."""
-
-
-def _of_settings() -> Iterator[Option]:
-    for table, kind in SETTINGS.items():
-        hints, texts = get_type_hints(kind, include_extras=True), meanings(kind)
-        for field in dataclasses.fields(kind):
-            default = None if field.default is dataclasses.MISSING else field.default
-            option = Option.of(table, field.name, hints[field.name], default, texts[field.name])
-            if option is not None:
-                yield option
-
-
-OPTIONS: Final = tuple(
-    sorted((*METHODS, *_of_settings()), key=lambda option: [*GROUPS.values()].index(option.group))
-)
+OPTIONS: Final = tuple(sorted(_options(), key=lambda option: GROUPS.index(option.group)))
 """In the order of the help."""
-
 FLAGS: Final[Mapping[str, str]] = {option.setting: option.flags[-1] for option in OPTIONS} | {
     "trust_sources": "--trust-sources"
 }
@@ -243,8 +209,6 @@ _MARKED: Final = re.compile(r"`(\w+(?:\.\w+)?)`")
 def with_flags(text: str) -> str:
     """Replace the settings in a message, between backticks, by the flags that give them values.
 
-    Examples
-    --------
     >>> with_flags("nothing is left to evaluate; lower `training.frames`")
     'nothing is left to evaluate; lower --train-frames'
     """
@@ -257,17 +221,12 @@ def takes(*settings: str) -> Callable[[Callable[..., int]], Callable[..., int]]:
     Parameters
     ----------
     settings
-        Names of settings in `OPTIONS`, or of whole tables.
-
-    Raises
-    ------
-    ValueError
-        For a name that is none of them.
+        Names of settings in `OPTIONS`, or of whole tables. For any other name a ValueError.
     """
-    known = {name for o in OPTIONS for name in (o.setting, o.setting.partition(".")[0])}
-    if unknown := {*settings} - known:
+    named_by = {option: {option.setting, option.setting.partition(".")[0]} for option in OPTIONS}
+    if unknown := {*settings}.difference(*named_by.values()):
         raise ValueError(f"no option sets {', '.join(sorted(unknown))}")
-    chosen = [o for o in OPTIONS if {o.setting, o.setting.partition(".")[0]} & {*settings}]
+    chosen = [option for option, names in named_by.items() if names & {*settings}]
 
     def decorate(command: Callable[..., int]) -> Callable[..., int]:
         @wraps(command)

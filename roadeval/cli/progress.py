@@ -8,34 +8,29 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.cli import console
+from roadeval.jobs.progress import Progress
 
 if TYPE_CHECKING:
-    from roadeval.jobs.progress import OnProgress, Progress
+    from roadeval.jobs.fleet import FleetProgress
 
 LINE_PERIOD_S: Final = 10.0
 """At most one plain line in this time, so that a log file of a long run stays short."""
 
 
 @contextmanager
-def watched(quiet: bool = False) -> Iterator[OnProgress]:
+def watched(quiet: bool = False) -> Iterator[Callable[[Progress | FleetProgress], None]]:
     """Yield the function that a job calls with its progress; the display ends with the block."""
     if quiet:
         yield lambda _progress: None
         return
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+    from rich.progress import BarColumn, TextColumn
     from rich.progress import Progress as Display
 
     stderr = console.diagnostics()
-    columns = (
-        TextColumn("{task.description:<9}"),
-        BarColumn(bar_width=None),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[pace]}"),
-    )
+    columns = (BarColumn(bar_width=None), TextColumn("{task.description}"))
     lines = not stderr.is_terminal
     with Display(*columns, console=stderr, transient=True, expand=True, disable=lines) as display:
-        write = (lambda line: stderr.print(line, soft_wrap=True)) if lines else None
-        yield Watch(display, write)
+        yield Watch(display, lambda line: stderr.print(line, soft_wrap=True), lines=lines)
 
 
 class Watch:
@@ -46,43 +41,82 @@ class Watch:
     display
         A `rich.progress.Progress`; it measures the pace even where it shows nothing.
     write
-        Writes a line: one as a stage begins, then one in `LINE_PERIOD_S`. None: no lines.
+        Writes a line.
+    lines
+        Whether to write plain lines: when a stage begins or ends, and one in `LINE_PERIOD_S`.
     """
 
-    def __init__(self, display: Any, write: Callable[[str], None] | None) -> None:
+    def __init__(self, display: Any, write: Callable[[str], None], *, lines: bool) -> None:
         self._display = display
-        self._task = display.add_task("opening", total=None, pace="")
+        self._task = display.add_task("opening", total=None)
         self._write = write
+        self._lines = lines
         self._stage = ""
         self._written = 0.0
+        self._dashboard: str | None = None
 
-    def __call__(self, progress: Progress) -> None:
+    def __call__(self, progress: Progress | FleetProgress) -> None:
         """Show how far a job is."""
         begins = progress.stage != self._stage
         if begins:
             self._stage = progress.stage
-            self._display.reset(self._task, description=progress.stage, completed=progress.done)
-        # Before the first frame nothing is known; the bar shows that something moves.
+            self._display.reset(self._task, completed=progress.done)
+        # Before the first item nothing is known; the bar shows that something moves.
         total = progress.total if progress.done else None
         self._display.update(self._task, completed=progress.done, total=total)
-        pace = self._pace()
-        self._display.update(self._task, pace="  ".join(pace))
-        if self._write and (begins or time.monotonic() - self._written >= LINE_PERIOD_S):
+        text = self._frames(progress) if isinstance(progress, Progress) else self._drives(progress)
+        self._display.update(self._task, description=text)
+        due = time.monotonic() - self._written >= LINE_PERIOD_S
+        if self._lines and (begins or due or progress.done == progress.total):
             self._written = time.monotonic()
-            self._write(line(progress, pace))
+            self._write(text)
 
-    def _pace(self) -> tuple[str, ...]:
-        """Return rate and time left for a person, as ``("23.4 frames/s", "12 s left")``."""
+    def _frames(self, progress: Progress) -> str:
+        """Describe a job on one drive: ``replaying: 4 of 10 frames, 23.4 frames/s, 12 s left``."""
+        if not progress.done:
+            return progress.stage
+        of = f" of {progress.total}" if progress.total is not None else ""
+        parts = [f"{progress.done}{of} frames"]
         (task,) = self._display.tasks
-        if not task.speed:
-            return ()
-        left = task.time_remaining
-        return f"{task.speed:.1f} frames/s", *([] if left is None else [f"{left:.0f} s left"])
+        if task.speed:
+            parts.append(f"{task.speed:.1f} frames/s")
+            if task.time_remaining is not None:
+                parts.append(f"{task.time_remaining:.0f} s left")
+        return f"{progress.stage}: {', '.join(parts)}"
+
+    def _drives(self, progress: FleetProgress) -> str:
+        """Describe a fleet, and write where its dashboard is."""
+        if progress.dashboard is not None and progress.dashboard != self._dashboard:
+            self._dashboard = progress.dashboard
+            self._write(f"workers   {progress.dashboard}")
+        return drives_line(progress)
 
 
-def line(progress: Progress, pace: tuple[str, ...] = ()) -> str:
-    """Write a job's progress as a line."""
-    if not progress.done:
+def drives_line(progress: FleetProgress) -> str:
+    """Describe the progress of a fleet."""
+    if progress.stage != "replaying":
         return progress.stage
-    of = f" of {progress.total}" if progress.total is not None else ""
-    return f"{progress.stage}: {', '.join((f'{progress.done}{of} frames', *pace))}"
+    parts = [f"{progress.done} of {progress.total} drives"]
+    if progress.failed:
+        parts.append(f"{progress.failed} failed")
+    if progress.running:
+        parts.append(f"{progress.running} running")
+    if progress.frames:
+        parts.append(f"{progress.frames / progress.seconds:.1f} frames/s")
+    own = progress.done - progress.kept
+    if own and progress.done < progress.total:
+        left = progress.seconds / own * (progress.total - progress.done)
+        parts.append(f"{duration(left)} left")
+    return ", ".join(parts)
+
+
+def duration(seconds: float) -> str:
+    """Write a duration for a person.
+
+    >>> duration(42.3), duration(600), duration(9000)
+    ('42 s', '10 min', '2 h 30 min')
+    """
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"

@@ -18,8 +18,8 @@ EXIT_CODES: Final = {
 
 
 GRACE_S: Final = 0.05
-"""Signals so soon after the first are the same wish: ``timeout`` sends one to the process and
-another to its group."""
+"""Signals so soon after the first count as one: ``timeout`` sends one to the process and another
+to its group."""
 
 
 class Stopped(SystemExit):

@@ -1,4 +1,4 @@
-"""The three streams of the process, made fit before anything is written to them."""
+"""The three streams of the process, prepared before anything is written to them."""
 
 from __future__ import annotations
 
@@ -16,15 +16,14 @@ from typing import Any, Final
 from roadeval.runtime.text import UNENCODABLE
 
 MISLEADING: Final = ("MPLBACKEND", "RERUN")
-"""Variables for programs that draw on a screen or show what they log to a viewer as an aside. Here
-they would only stop the figures and the recording."""
+"""Variables for programs with windows or a viewer; here they would stop figures and recording."""
 
 
 def take_over(*, debug: bool) -> None:
-    """Make the streams of this process fit, and keep other libraries off them.
+    """Prepare the streams of this process, and keep other libraries off them.
 
-    What C libraries, Rerun and Python's warnings say on their own is dropped: the rooms know what
-    of it concerns the user, and where. Only what kills the process is written as it comes.
+    Messages of C libraries, of Rerun and of Python's warnings are dropped: the rooms report what
+    concerns the user. Only the reason of a crash is written.
 
     Parameters
     ----------
@@ -57,13 +56,13 @@ def leave_word(sentence: str) -> None:
 
 
 def taken_over() -> bool:
-    """Return whether the process is the command's own, and not that of who calls it from Python."""
+    """Return whether the process is the command's own, and not a caller's in Python."""
     buffer = getattr(sys.stderr, "buffer", None)
     return isinstance(getattr(buffer, "raw", None), _Lossy)
 
 
 def _fill_closed() -> None:
-    """Open what the process was started without, so that no file of ours takes its number.
+    """Open missing streams, so that no other file takes their numbers.
 
     Writing to standard output then still fails, as it should.
     """
@@ -87,7 +86,7 @@ def _stderr(number: int) -> TextIOWrapper:
 
 
 class _Lossy(FileIO):
-    """A file that accepts what it cannot write: that nobody listens must not stop the work."""
+    """A file that ignores errors of writing: a closed stderr must not stop the work."""
 
     def write(self, content: Any) -> int:
         try:
@@ -97,7 +96,7 @@ class _Lossy(FileIO):
 
 
 def _close_to_libraries() -> None:
-    """Let nothing through but what this program itself says, and the reason of a crash."""
+    """Drop all messages but this program's own and the reason of a crash."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
     os.close(nowhere)

@@ -3,9 +3,9 @@
 Names are imported when they are first used: a command that reads settings needs little else.
 """
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from roadeval.runtime.on_demand import on_demand
+from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
     from roadeval.config.document import documented, run_toml
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
         log_config,
     )
     from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
-    from roadeval.config.tables import ConfigError, read_tables
+    from roadeval.config.tables import ConfigError, in_file, read_tables
     from roadeval.config.variants import (
         PRESETS,
         Variant,
@@ -40,6 +40,7 @@ __all__ = [
     "check_variant_name",
     "configure",
     "documented",
+    "in_file",
     "load_config",
     "log_config",
     "network_variant",
@@ -48,26 +49,5 @@ __all__ = [
     "with_masks",
 ]
 
-_MODULES: Final = {
-    "OF_A_LOG": "run",
-    "PRESETS": "variants",
-    "ConfigError": "tables",
-    "DriveSettings": "run",
-    "ExecutionSettings": "settings",
-    "FleetSettings": "settings",
-    "OutputSettings": "settings",
-    "RunConfig": "run",
-    "Variant": "variants",
-    "check_variant_name": "variants",
-    "configure": "run",
-    "documented": "document",
-    "load_config": "run",
-    "log_config": "run",
-    "network_variant": "variants",
-    "read_tables": "tables",
-    "run_toml": "document",
-    "with_masks": "variants",
-}
-
 if not TYPE_CHECKING:  # there every name is known
-    __getattr__ = on_demand(__name__, _MODULES)
+    __getattr__ = on_demand(__name__)

@@ -1,4 +1,4 @@
-"""Configurations as TOML files: that of a run, and one to edit that explains every setting."""
+"""Configurations as TOML: the file of a run, and one that explains every setting."""
 
 from __future__ import annotations
 
@@ -21,35 +21,26 @@ _BOUNDS: Final = {"ge": "at least {}", "gt": "above {}", "le": "at most {}", "lt
 
 
 def run_toml(config: RunConfig, drive: str, version: str, command: str = "replay") -> str:
-    """Write the TOML file that makes a run again, with every effective setting.
+    """Write the TOML file that repeats a run, with every effective setting.
 
     Parameters
     ----------
     config, drive, version
-        Of the run; for a person the drive's name, or how many there are.
+        Of the run; the drive's name, or how many there are, is for people.
     command
         That takes the file.
     """
-    import tomlkit
-
-    document = tomlkit.document()
-    document.add(
-        tomlkit.comment(
-            f"The configuration of a {command} of {visible(drive)} by roadeval {version}."
-        )
+    head = (
+        f"# The configuration of a {command} of {visible(drive)} by roadeval {version}.\n"
+        f"# To repeat the run, give this file to roadeval {command} as its configuration."
     )
-    document.add(
-        tomlkit.comment(
-            f"To repeat the run, give this file to roadeval {command} as its configuration."
-        )
-    )
-    for key, value in _without_none(config.as_dict()).items():
-        document.add(key, value)
-    return visible_lines(tomlkit.dumps(document))
+    lines = [each for each in documented(config).splitlines() if each and each[0] != "#"]
+    text = "\n".join(f"\n{each}" if each[0] == "[" else each for each in lines)
+    return visible_lines(f"{head}\n{text}\n")
 
 
 def _without_none(value: Any) -> Any:
-    """Return plain data as TOML has it: without settings that are None, and with lists."""
+    """Return plain data for TOML: without settings that are None, and with lists."""
     if isinstance(value, Mapping):
         return {key: _without_none(item) for key, item in value.items() if item is not None}
     return [_without_none(item) for item in value] if isinstance(value, list | tuple) else value
@@ -58,7 +49,7 @@ def _without_none(value: Any) -> Any:
 def documented(config: RunConfig) -> str:
     """Write a configuration as TOML that can be edited, each setting with its meaning and range.
 
-    A setting without a value stands in a comment.
+    A setting without a value is a comment.
     """
     import tomlkit
 
@@ -85,7 +76,7 @@ def _stages(pipeline: Pipeline, prefix: str) -> list[str]:
 
 
 def _table(name: str, settings: Any) -> str:
-    """Write the table of a settings dataclass; those within it follow as tables of their own."""
+    """Write the table of a settings dataclass; dataclasses in it follow as tables."""
     texts = meanings(type(settings))
     hints = get_type_hints(type(settings), include_extras=True)
     title = (inspect.getdoc(type(settings)) or "").partition("\n\n")[0]
@@ -119,7 +110,7 @@ def _comment(text: str) -> list[str]:
 
 
 def _allowed(hint: Any) -> str:
-    """Describe the values that a setting's type admits; empty where every one of its kind is."""
+    """Describe the allowed values of a setting's type; empty where all are allowed."""
     if get_origin(hint) in (Union, types.UnionType):
         known = (_allowed(each) for each in get_args(hint) if each is not type(None))
         return next(filter(None, known), "")

@@ -10,7 +10,7 @@ In a TOML file, and in the mapping that `configure` takes, it has this shape::
     [variants.wide]         # a further variant: a preset, a chain, tables of its stages
     preset = "gated"
 
-    [masks.net]             # masks of another method, beside the log
+    [masks.net]             # masks of another method, from files
     path = "net/{drive}"
 
     [frames]                # and [topics], [labels], [training], [evaluation], [output], [run]
@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from roadeval.config.settings import SECTIONS, ExecutionSettings, FleetSettings, OutputSettings
-from roadeval.config.tables import ConfigError, override, prefix, read_tables
+from roadeval.config.tables import ConfigError, in_file, override, read_tables
 from roadeval.config.variants import (
     PRESETS,
     Variant,
@@ -59,14 +59,13 @@ OF_A_LOG: Final[tuple[str, ...]] = ("topics", "labels", "frames", "masks")
 
 @dataclass(frozen=True, slots=True)
 class DriveSettings:
-    """What is asked of some drives in place of what is asked of all."""
+    """Settings of some drives, in place of those of all drives."""
 
     path: str
-    """Of the drives: a path, or the end of one, as a file's name; ``*`` and ``?`` stand for any
-    text within a name."""
+    """A path, or the end of one, as a file's name; ``*`` and ``?`` match any text in a name."""
     tables: Mapping[str, Mapping[str, Any]]
-    """``topics``, ``labels``, ``frames`` and ``masks`` in the shape of a TOML file. Labels take the
-    place of the run's as a whole, the others key by key."""
+    """``topics``, ``labels``, ``frames`` and ``masks`` in the shape of a TOML file. Labels replace
+    the run's as a whole, the others key by key."""
     where: str = field(default="", compare=False)
     """Begins a message about them."""
 
@@ -74,17 +73,15 @@ class DriveSettings:
     def of(cls, tables: Mapping[str, Any], where: str) -> DriveSettings:
         """Make the settings from an entry of ``[[drives]]``; `RunConfig` validates its tables.
 
-        Raises
-        ------
-        ConfigError
-            If the entry has no path, or a table that holds for the whole run.
+        A `ConfigError` if the entry has no path, or a table that holds for the whole run.
         """
         path = tables.get("path")
         if not isinstance(path, str) or not path or "\0" in path:
             raise ConfigError(f"{where}: path must name a log, or several as *.mcap")
         rest = {key: value for key, value in tables.items() if key != "path"}
         path = public_url(path)
-        check_tables(rest, OF_A_LOG, f"{where} {path}")
+        with in_file(f"{where} {path}"):
+            check_tables(rest, OF_A_LOG)
         return cls(path, rest, f"{where} {path}")
 
     def holds_for(self, drive: str | os.PathLike[str]) -> bool:
@@ -98,16 +95,8 @@ class DriveSettings:
         return {"path": self.path, **self.tables}
 
 
-def drives_of(entries: Any, where: str) -> Iterable[DriveSettings]:
-    """Read the entries of ``[[drives]]``; a `ConfigError` for what cannot be used."""
-    begin = prefix(where)
-    if not isinstance(entries, list | tuple) or not all(isinstance(e, Mapping) for e in entries):
-        raise ConfigError(f"{begin}drives must be tables, each under [[drives]]")
-    return [DriveSettings.of(entry, f"{begin}[[drives]]") for entry in entries]
-
-
 def _paper() -> Pipeline:
-    return pipeline_of(None, PRESETS["paper"], "")
+    return pipeline_of(None, PRESETS["paper"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +116,7 @@ class RunConfig(LogConfig):
     extra: tuple[Variant, ...] = ()
     """Further variants."""
     drives: tuple[DriveSettings, ...] = ()
-    """What is asked of some logs instead; later ones override earlier ones."""
+    """Settings of some drives alone; later ones override earlier ones."""
     training: TrainingSettings = field(default_factory=TrainingSettings)
     evaluation: EvaluationSettings = field(default_factory=EvaluationSettings)
     """How every variant is trained and scored."""
@@ -177,7 +166,7 @@ class RunConfig(LogConfig):
         }
 
     def resolved(self) -> RunConfig:
-        """Return the configuration with settings stated that stages find in files.
+        """Return the configuration with the settings that stages find in files.
 
         A `RoadevalError` if a file cannot be used, or a variant's final stage has no mask to start
         from.
@@ -191,48 +180,41 @@ class RunConfig(LogConfig):
         return self._with_pipelines(Pipeline.resolved)
 
     def without_places(self) -> RunConfig:
-        """Return the configuration without the stages' settings that say where files lie."""
+        """Return the configuration without the stages' settings that are paths of files."""
         return self._with_pipelines(Pipeline.without_places)
 
     def _with_pipelines(self, change: Callable[[Pipeline], Pipeline]) -> RunConfig:
         extra = tuple(replace(each, pipeline=change(each.pipeline)) for each in self.extra)
         return replace(self, pipeline=change(self.pipeline), extra=extra)
 
-    def override(self, tables: Mapping[str, Any], where: str = "") -> RunConfig:
+    def override(self, tables: Mapping[str, Any]) -> RunConfig:
         """Return the configuration with the values of some tables in place.
+
+        A `ConfigError` for a key or a value that cannot be used names it, and what is allowed.
 
         Parameters
         ----------
         tables
             In the shape of a TOML file, without ``preset``. A variant of a name that is there is
             replaced.
-        where
-            The file, for messages.
-
-        Raises
-        ------
-        ConfigError
-            For a key or a value that cannot be used; names it, and what is allowed.
         """
-        pipeline = pipeline_of(self.pipeline, tables, where)
+        pipeline = pipeline_of(self.pipeline, tables)
         check_tables(
-            tables, ("chain", *pipeline.settings, "variants", "masks", "drives", *SECTIONS), where
+            tables, ("chain", *pipeline.settings, "variants", "masks", "drives", *SECTIONS)
         )
-        try:
-            return replace(
-                self,
-                pipeline=pipeline,
-                extra=self._with_variants(tables.get("variants", {}), where),
-                masks=with_masks(self.masks, tables.get("masks", {}), where),
-                **{name: override(getattr(self, name), tables, name, where) for name in SECTIONS},
-            ).with_drives(drives_of(tables.get("drives", ()), where))
-        except ConfigError as error:
-            if not where:
-                raise
-            # In a file a setting is no flag.
-            message = str(error).replace("`", "")
-            begins = message.startswith(where)
-            raise ConfigError(message if begins else f"{where}: {message}") from error
+        config = replace(
+            self,
+            pipeline=pipeline,
+            extra=self._with_variants(tables.get("variants", {})),
+            masks=with_masks(self.masks, tables.get("masks", {})),
+            **{
+                name: override(getattr(self, name), tables.get(name, {}), name) for name in SECTIONS
+            },
+        )
+        drives = tables.get("drives", ())
+        if not isinstance(drives, list | tuple) or not all(isinstance(e, Mapping) for e in drives):
+            raise ConfigError("drives must be tables, each under [[drives]]")
+        return config.with_drives(DriveSettings.of(entry, "[[drives]]") for entry in drives)
 
     def with_variants(self, variants: Iterable[Variant]) -> RunConfig:
         """Return the configuration with further variants; one of a name that is there replaces it.
@@ -253,7 +235,7 @@ class RunConfig(LogConfig):
         return replace(self, drives=(*self.drives, *made))
 
     def for_drive(self, path: str | os.PathLike[str]) -> RunConfig:
-        """Return the configuration of one drive: what is asked of it stands in place."""
+        """Return the configuration of one drive, with its own settings in place."""
         config = replace(self, drives=())
         for drive in self.drives:
             if drive.holds_for(path):
@@ -263,15 +245,16 @@ class RunConfig(LogConfig):
     def _with_drive(self, drive: DriveSettings) -> RunConfig:
         labels = LabelSettings() if "labels" in drive.tables else self.labels
         base = replace(self, labels=labels)
-        return base.override(drive.tables, drive.where)
+        with in_file(drive.where):
+            return base.override(drive.tables)
 
     def unused(self, drives: Iterable[str | os.PathLike[str]]) -> list[str]:
-        """Return the paths of those settings of single drives that hold for none of these."""
+        """Return the paths of the settings of single drives that match none of these drives."""
         there = [*drives]
         return [own.path for own in self.drives if not any(map(own.holds_for, there))]
 
     def ignored(self) -> tuple[str, ...]:
-        """Name what presets of further variants ask for, and what holds for the whole run."""
+        """Return a warning for each setting of a variant's preset that the run does not follow."""
         return tuple(
             f"{variant.name}: preset {variant.preset} asks for {section}.{key} = {value}, but all "
             f"variants of a run are trained and scored alike ({getattr(own, key)})"
@@ -300,14 +283,13 @@ class RunConfig(LogConfig):
     def _masks(self) -> dict[str, Any]:
         return {name: dataclasses.asdict(own) for name, own in self.masks.items()}
 
-    def _with_variants(self, tables: Any, where: str) -> tuple[Variant, ...]:
-        begin = prefix(where)
+    def _with_variants(self, tables: Any) -> tuple[Variant, ...]:
         if not isinstance(tables, Mapping):
-            raise ConfigError(f"{begin}[variants] must hold a table for each variant")
+            raise ConfigError("[variants] must hold a table for each variant")
         for name, own in tables.items():
             if not isinstance(own, Mapping):
-                raise ConfigError(f"{begin}[variants.{name}] must be a table")
-        made = [Variant.of(name, own, f"{begin}[variants.{name}]") for name, own in tables.items()]
+                raise ConfigError(f"[variants.{name}] must be a table")
+        made = [Variant.of(name, own, f"[variants.{name}]") for name, own in tables.items()]
         return self.with_variants(made).extra
 
 
@@ -333,9 +315,10 @@ def configure(tables: Mapping[str, Any] | None = None, *, where: str = "") -> Ru
     ('gated', 'similarity', 'svm', 'post')
     """
     tables = tables or {}
-    name = preset_of(tables, "paper", where)
-    base = replace(RunConfig(), preset=name).override(PRESETS[name], f"preset {name}")
-    return base.override({key: value for key, value in tables.items() if key != "preset"}, where)
+    with in_file(where):
+        name = preset_of(tables)
+        base = replace(RunConfig(), preset=name).override(PRESETS[name])
+        return base.override({key: value for key, value in tables.items() if key != "preset"})
 
 
 def load_config(path: str | Path, preset: str | None = None, *, trusted: bool = True) -> RunConfig:
@@ -348,8 +331,8 @@ def load_config(path: str | Path, preset: str | None = None, *, trusted: bool = 
     preset
         The preset to start from where the file names none; ``paper`` otherwise.
     trusted
-        Whether the user has named the file; one that came with results, or lies in a recording,
-        loads no code.
+        Whether the user has named the file. One that came with results, or in a recording, loads
+        no code.
 
     Raises
     ------
@@ -361,14 +344,13 @@ def load_config(path: str | Path, preset: str | None = None, *, trusted: bool = 
 
 
 def log_config(tables: Mapping[str, Any]) -> LogConfig:
-    """Return what some tables ask of a log alone, without stages and their settings.
+    """Return the settings of a log in some tables, without stages and their settings.
 
-    Raises
-    ------
-    ConfigError
-        For a key or a value that cannot be used; names it, and what is allowed.
+    A `ConfigError` for a key or a value that cannot be used.
     """
     asked = LogConfig()
-    tables_of_a_log = ("topics", "labels", "frames")
-    found = {name: override(getattr(asked, name), tables, name) for name in tables_of_a_log}
+    found = {
+        name: override(getattr(asked, name), tables.get(name, {}), name)
+        for name in ("topics", "labels", "frames")
+    }
     return replace(asked, **found)

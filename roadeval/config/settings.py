@@ -32,7 +32,7 @@ def _failures(value: object) -> object:
 
 @dataclass(frozen=True)
 class OutputSettings:
-    """Where the results of a run are written, and which pictures are recorded."""
+    """Where the results of a run are written, and which images are recorded."""
 
     save: Annotated[str | None, Flag("--save", "OUT.rrd")] = None
     """The recording. Default: ``recordings/<drive>.rrd``."""

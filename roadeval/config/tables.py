@@ -1,9 +1,10 @@
-"""Tables of TOML files: read, and put in the place of settings; messages name the key."""
+"""From the tables of a TOML file to settings; messages name the file and the key."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from itertools import takewhile
 from json import dumps
 from pathlib import Path
@@ -34,12 +35,11 @@ PLAIN_WORDS: Final[Mapping[str, str]] = {
     "too_long": "must be a list of at most {max_length}",
     "missing": "is too short a list",
 }
-"""What is wrong with a value, by how the validating library's name of the problem begins."""
+"""Messages by the beginning of the validating library's name of a problem."""
 NOT_UTF8: Final = (
     "its bytes are not UTF-8, which no configuration can hold: choose another name, or set "
     "PYTHONUTF8=1 where the system speaks another encoding"
 )
-NUL: Final = "holds a zero byte, which no name and no path can"
 QUOTED: Final = 60
 """Letters of a wrong value that a message quotes."""
 
@@ -53,6 +53,20 @@ class ConfigError(RoadevalError):
     """A setting that cannot be used: which file, which key, and what is allowed."""
 
 
+@contextmanager
+def in_file(where: str) -> Iterator[None]:
+    """Begin the message of a `ConfigError` in the block with a file, or another place, if any.
+
+    In a file a setting is not marked as one that a flag may set.
+    """
+    try:
+        yield
+    except ConfigError as error:
+        if not where:
+            raise
+        raise ConfigError(f"{where}: {str(error).replace('`', '')}") from error
+
+
 def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
     """Read the tables of a TOML file, or of the ``run.toml`` that a recording holds.
 
@@ -61,23 +75,17 @@ def read_tables(path: str | Path, *, trusted: bool = True) -> dict[str, Any]:
     """
     try:
         tables = read_toml(_text(Path(path)))
-    except FileNotFoundError as error:
-        raise ConfigError(f"{path}: there is no such configuration file") from error
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(f"{path}: cannot be read: {error}") from error
     except ValueError as error:
-        raise ConfigError(f"{path}: not valid TOML: {error}") from error
-    except RecursionError as error:
-        raise ConfigError(f"{path}: its values are nested too deeply") from error
+        raise ConfigError(f"{path}: cannot be read as TOML: {error}") from error
     if not trusted or Path(path).suffix == ".rrd":
         _refuse_code(tables, path)
     return tables
 
 
 def _refuse_code(tables: Mapping[str, Any], path: str | Path) -> None:
-    """Refuse, as a `ConfigError`, a chain that names a module: the file may be anybody's."""
+    """Raise a `ConfigError` for a chain that names a module: the file may be anybody's."""
     variants = tables.get("variants", {})
     asked = [tables, *(variants.values() if isinstance(variants, Mapping) else ())]
     for each in asked:
@@ -105,46 +113,25 @@ def _text(path: Path) -> str:
     return text
 
 
-def override(settings: Any, tables: Mapping[str, Any], table: str, where: str = "") -> Any:
-    """Return a settings dataclass with the values of one table in place, validated as a whole.
+def override(settings: Any, values: Any, table: str) -> Any:
+    """Return a settings dataclass with the values of its table in place, validated as a whole.
 
-    Parameters
-    ----------
-    settings
-        A dataclass.
-    tables
-        Tables by name; that of this name may be missing.
-    table
-        The name of the settings' table.
-    where
-        The file, for messages; without one they name settings between backticks.
-
-    Raises
-    ------
-    ConfigError
-        For an unknown key or a value out of range; names the key.
+    A `ConfigError` for an unknown key or a value out of range names the key.
     """
-    values = tables.get(table, {})
     if not isinstance(values, Mapping):
-        raise ConfigError(f"{prefix(where)}[{table}] must be a table")
+        raise ConfigError(f"`{table}`: must be a table")
     if not values:
         return settings
     if problem := _unusable(values, settings):
-        keys, message = problem
-        raise ConfigError(_named(table, keys, where) + message)
+        raise ConfigError(_named(table, *problem))
     merged = _merged(dataclasses.asdict(settings), values)
     try:
-        # As JSON, for then a list is a tuple and a table a dataclass, but true is no number.
+        # In JSON a strict check accepts a list for a tuple, but no text for a number, and no true.
         json = _JSON.dump_json(merged, fallback=str)
         return TypeAdapter(type(settings)).validate_json(json, strict=True)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        raise ConfigError(_named(table, first["loc"], where) + _plainly(first)) from error
-
-
-def prefix(where: str) -> str:
-    """Begin a message with the file that it is about, if there is one."""
-    return f"{where}: " if where else ""
+        raise ConfigError(_named(table, first["loc"], _plainly(first))) from error
 
 
 def either(names: Iterable[str]) -> str:
@@ -153,7 +140,7 @@ def either(names: Iterable[str]) -> str:
 
 
 def quoted(value: Any) -> str:
-    """Write a value as it stands in a file, and no more of it than a message can hold.
+    """Write a value as in a file, shortened for a message.
 
     >>> quoted(True)
     'true'
@@ -162,25 +149,22 @@ def quoted(value: Any) -> str:
     return text if len(text) <= QUOTED else f"{text[:QUOTED]}..."
 
 
-def _named(table: str, keys: Sequence[str | int], where: str) -> str:
-    """Begin a message with the setting that it is about, in a file or on its own.
+def _named(table: str, keys: Sequence[str | int], problem: str) -> str:
+    """Name the setting that a problem is about, unless the problem does.
 
-    >>> _named("labels", ("road", 0), "")
-    '`labels.road`, item 1: '
-    >>> _named("post", ("patch", "top"), "wide.toml")
-    'wide.toml: [post] patch.top: '
+    >>> _named("labels", ("road", 0), "must be text")
+    '`labels.road`, item 1: must be text'
     """
     # After an item's number comes which of its types the validating library tried.
     names = list(takewhile(lambda part: isinstance(part, str), keys))
-    key, rest = ".".join(map(str, names)), keys[len(names) :]
-    item = f", item {int(rest[0]) + 1}" if rest else ""
-    if where:
-        return f"{where}: [{table}] {key}{item}{': ' if key else ''}"
-    return f"`{table}.{key}`{item}: " if key else ""
+    item = f", item {int(keys[len(names)]) + 1}" if len(names) < len(keys) else ""
+    if not keys and "`" in problem:
+        return problem
+    return f"`{'.'.join(map(str, (table, *names)))}`{item}: {problem}"
 
 
 def _unusable(values: Mapping[str, Any], settings: Any, keys: Keys = ()) -> tuple[Keys, str] | None:
-    """Return the first key without a setting, or text that none can hold, and what is wrong."""
+    """Return the first key without a setting, or with text that none can hold, and the problem."""
     known = None
     if dataclasses.is_dataclass(settings):
         known = [field.name for field in dataclasses.fields(settings)]
@@ -196,7 +180,7 @@ def _unusable(values: Mapping[str, Any], settings: Any, keys: Keys = ()) -> tupl
             if not is_utf8(value):
                 return here, NOT_UTF8
             if "\0" in value:
-                return here, NUL
+                return here, "holds a zero byte, which no name and no path can"
     return None
 
 
@@ -212,7 +196,7 @@ def _merged(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any
 
 
 def _plainly(problem: Mapping[str, Any]) -> str:
-    """Say what a value must be, in other words than the validating library's, and what it is."""
+    """Describe a problem in plain words, with the value that was given."""
     message, given = str(problem["msg"]).removeprefix("Value error, "), problem["input"]
     for begin, words in PLAIN_WORDS.items():
         if problem["type"].startswith(begin):

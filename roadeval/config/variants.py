@@ -1,6 +1,6 @@
-"""Variants, named methods that run side by side, and the presets that they start from.
+"""Variants, which are named methods that run side by side, and the presets that they start from.
 
-A variant is a pipeline, a network, or masks that another method has made.
+A variant is a pipeline, a network, or the masks of another method.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from roadeval.config.settings import SECTIONS
-from roadeval.config.tables import ConfigError, either, override, prefix, read_tables
+from roadeval.config.tables import ConfigError, either, in_file, override, read_tables
 from roadeval.data import (
     ERRORS,
     FILTERED,
@@ -61,17 +61,17 @@ show beside it, as variants, what that thing does.
 LONGEST: Final = 64
 """Letters of a variant's name: it is printed in the columns of tables."""
 DRIVE: Final = "{drive}"
-"""Stands in a path of masks for the name of the drive."""
+"""The placeholder of the drive's name in a path of masks."""
 AS_IT_IS: Final[Mapping[str, Any]] = {"operations": (), "region": "all", "fill": False}
 """Settings of phase 4 that leave a mask as it is."""
 
 Masks = Mapping[str, MaskSettings]
-"""Settings of masks that lie beside the log, by the variant's name."""
+"""Settings of masks in files, by the variant's name."""
 
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """A name, a pipeline, and the preset that it started from."""
+    """A named method: its pipeline, and the preset that it started from."""
 
     name: str
     pipeline: Pipeline
@@ -81,32 +81,29 @@ class Variant:
     def of(cls, name: str, tables: Mapping[str, Any], where: str = "") -> Variant:
         """Make a variant from tables in the shape of a TOML file: ``preset``, ``chain``, stages.
 
-        Raises
-        ------
-        ConfigError
-            For a key or a value that cannot be used. ``where`` begins the message.
+        A `ConfigError` for a key or a value that cannot be used; ``where`` begins its message.
         """
-        preset = preset_of(tables, "paper", where)
-        rest = {key: value for key, value in tables.items() if key != "preset"}
-        base = pipeline_of(None, PRESETS[preset], where)
-        for section in SECTIONS:
-            if section in rest:
-                raise ConfigError(
-                    f"{prefix(where)}[{section}] holds for the whole run: it belongs in the "
-                    "configuration of the run"
-                )
-        pipeline = pipeline_of(base, rest, where)
-        check_tables(rest, ("chain", *pipeline.settings), where)
+        with in_file(where):
+            preset = preset_of(tables)
+            rest = {key: value for key, value in tables.items() if key != "preset"}
+            for section in SECTIONS:
+                if section in rest:
+                    raise ConfigError(
+                        f"[{section}] holds for the whole run: it belongs in the configuration of "
+                        "the run"
+                    )
+            pipeline = pipeline_of(pipeline_of(None, PRESETS[preset]), rest)
+            check_tables(rest, ("chain", *pipeline.settings))
         return cls(name, pipeline, preset)
 
     def layout(self) -> VariantLayout:
-        """Describe the variant as recording and tables need to know it beforehand."""
+        """Return the layout of the variant, which recording and tables need beforehand."""
         return VariantLayout(
             self.name, self._title(), self.pipeline.masks(), self.pipeline.layers()
         )
 
     def _title(self) -> str:
-        """Return in a few words what tells the variant from others."""
+        """Describe the variant in a few words."""
         found = self.pipeline.stages()
         if filters := [stage.title for stage in found if stage.is_filter]:
             return f"with {', '.join(filters)}"
@@ -133,75 +130,71 @@ def variants_of(pipeline: Pipeline, extra: Iterable[Variant]) -> tuple[Variant, 
     return tuple(variants)
 
 
-def preset_of(tables: Mapping[str, Any], default: str, where: str) -> str:
+def preset_of(tables: Mapping[str, Any]) -> str:
     """Return the name of the preset that tables start from; a `ConfigError` if there is none."""
-    name = tables.get("preset", default)
+    name = tables.get("preset", "paper")
     if not isinstance(name, str) or name not in PRESETS:
-        raise ConfigError(f"{prefix(where)}preset: there is no {name!r}; choose {either(PRESETS)}")
+        raise ConfigError(f"preset: there is no {name!r}; choose {either(PRESETS)}")
     return name
 
 
-def check_tables(tables: Mapping[str, Any], known: Collection[str], where: str) -> None:
-    """Refuse, as a `ConfigError`, a table or key at the top that is not known."""
+def check_tables(tables: Mapping[str, Any], known: Collection[str]) -> None:
+    """Raise a `ConfigError` for a table or key at the top that is not known."""
     for key in tables:
         if key not in known:
             names = either(name for name in known if name != "chain")
             if isinstance(tables[key], Mapping):
-                raise ConfigError(f"{prefix(where)}[{key}] is no table here; choose {names}")
-            raise ConfigError(
-                f"{prefix(where)}{key} stands in no table; put it below one of {names}"
-            )
+                raise ConfigError(f"[{key}] is no table here; choose {names}")
+            raise ConfigError(f"{key} is in no table; put it below one of {names}")
 
 
-def pipeline_of(base: Pipeline | None, tables: Mapping[str, Any], where: str) -> Pipeline:
+def pipeline_of(base: Pipeline | None, tables: Mapping[str, Any]) -> Pipeline:
     """Override a pipeline's chain and its stages' settings by tables in the shape of a TOML file.
 
-    Raises
-    ------
-    ConfigError
-        For a chain that cannot run, or a setting that cannot be used.
+    A `ConfigError` for a chain that cannot run, or a setting that cannot be used.
     """
-    chain = _chain(tables.get("chain", base.chain if base else ()), where)
+    chain = _chain(tables.get("chain", base.chain if base else ()))
     current = {} if base is None else base.settings
     settings = {
-        each.name: override(current.get(each.name) or each.settings(), tables, each.name, where)
+        each.name: override(
+            current.get(each.name) or each.settings(), tables.get(each.name, {}), each.name
+        )
         for each in stages.stages_of(chain)
     }
     pipeline = Pipeline(chain, settings)
     layers = [spec.name for spec in (*pipeline.layers(), ERRORS)]
     for name in layers:
         if layers.count(name) > 1:
-            raise ConfigError(f"{prefix(where)}chain: two layers are called {name}")
+            raise ConfigError(f"chain: two layers are called {name}")
     return pipeline
 
 
-def _chain(names: Any, where: str) -> tuple[str, ...]:
+def _chain(names: Any) -> tuple[str, ...]:
     """Check a chain: known stages, each once, one mask of a name, and the final one last."""
-    begin = f"{prefix(where)}chain"
     if not isinstance(names, list | tuple) or not names:
-        raise ConfigError(f"{begin} must be a list of stages; choose {either(stages.names())}")
+        raise ConfigError(f"chain must be a list of stages; choose {either(stages.names())}")
     for name in names:
         if not isinstance(name, str):
             choice = either(stages.names())
-            raise ConfigError(f"{begin}: there is no stage {name!r}; choose {choice}")
+            raise ConfigError(f"chain: there is no stage {name!r}; choose {choice}")
     try:
         found = stages.stages_of(names)
     except stages.UnknownStageError as error:
-        raise ConfigError(f"{begin}: {error}") from error
+        raise ConfigError(f"chain: {error}") from error
     if len({stage.name for stage in found}) < len(found):
-        raise ConfigError(f"{begin}: a stage can occur only once")
+        raise ConfigError("chain: a stage can occur only once")
     masks = [stage.reported for stage in found if stage.yields_mask]
-    if len(set(masks)) < len(masks):
-        twice = next(mask for mask in masks if masks.count(mask) > 1)
-        both = [stage.name for stage in found if stage.reported == twice]
-        raise ConfigError(f"{begin}: {' and '.join(both)} both make the mask {twice}")
+    for mask in masks:
+        if masks.count(mask) > 1:
+            both = [stage.name for stage in found if stage.reported == mask]
+            raise ConfigError(f"chain: {' and '.join(both)} both make the mask {mask}")
     if names[-1] != FINAL_STAGE:
-        raise ConfigError(f"{begin} must end with {FINAL_STAGE}, whose mask is the answer")
+        raise ConfigError(f"chain must end with {FINAL_STAGE}, whose mask is the answer")
     return tuple(names)
 
 
 def check_variant_name(name: str, taken: Collection[str]) -> None:
-    """Refuse, as a `ConfigError`, a variant's name that results cannot hold, or that is taken.
+    """Raise a `ConfigError` for a variant's name that results cannot hold, or that is taken.
 
     A spreadsheet takes a cell that begins with ``-`` for a formula, and Matplotlib leaves what
     begins with ``_`` out of a legend.
@@ -221,6 +214,8 @@ def check_variant_name(name: str, taken: Collection[str]) -> None:
 def network_variant(name: str, path: str) -> Variant:
     """Return the variant of a network: its mask, which phase 4 leaves as it is.
 
+    A `ConfigError` if a TOML file cannot be used. The network itself is opened when it is run.
+
     Parameters
     ----------
     name
@@ -228,11 +223,6 @@ def network_variant(name: str, path: str) -> Variant:
     path
         An ONNX file, or a TOML file with the settings of the stage ``net``, whose ``file`` is
         found from the folder of the TOML file. Its table ``[post]`` asks for post-processing.
-
-    Raises
-    ------
-    ConfigError
-        If the TOML file cannot be used. The network itself is opened when it is run.
     """
     tables: Mapping[str, Any] = {"file": path}
     if in_a_file := Path(path).suffix == ".toml":
@@ -249,21 +239,20 @@ def network_variant(name: str, path: str) -> Variant:
     return Variant.of(name, chain, path if in_a_file else "")
 
 
-def with_masks(current: Masks, tables: Any, where: str) -> Masks:
-    """Return settings with those of further tables: key by key where the name is there.
+def with_masks(current: Masks, tables: Any) -> Masks:
+    """Return settings of masks with those of further tables: key by key where the name is there.
 
-    Raises
-    ------
-    ConfigError
-        For a key or a value that cannot be used.
+    A `ConfigError` for a key or a value that cannot be used.
     """
     if not isinstance(tables, Mapping):
-        raise ConfigError(f"{prefix(where)}[masks] must hold a table for each variant")
-    found = dict(current)
-    for name, own in tables.items():
-        table = f"masks.{name}"
-        found[name] = override(found.get(name, MaskSettings()), {table: own}, table, where)
-    return found
+        raise ConfigError("[masks] must hold a table for each variant")
+    return {
+        **current,
+        **{
+            name: override(current.get(name, MaskSettings()), own, f"masks.{name}")
+            for name, own in tables.items()
+        },
+    }
 
 
 def masks_of(masks: Masks, drive: str | os.PathLike[str]) -> Masks:

@@ -30,11 +30,11 @@ Costs = npt.NDArray[np.uint16]
 Distances = npt.NDArray[np.int32]
 """``(H, W)``: what the cheapest path to each pixel costs."""
 Indices = npt.NDArray[np.int32]
-"""``(n, m)``: the place of each in a list."""
+"""``(n, m)``: indices into a list."""
 Masks = npt.NDArray[np.uint32]
-"""``(n, m)``: a bit for each of something, 32 of each."""
+"""``(n, m)``: 32 bits each."""
 Flags = npt.NDArray[np.bool_]
-"""``(n,)``: whether something holds of each of something."""
+"""``(n,)``: one flag each."""
 Sums = npt.NDArray[np.int64]
 """``(n, ...)``: whole numbers by label or kind."""
 Values = npt.NDArray[np.float32]
@@ -48,7 +48,7 @@ Bits = npt.NDArray[np.uint64]
 """``(H, words)`` of an ``(H, W)`` mask, C-contiguous, 64 pixels a word, the leftmost in the lowest
 bit; those beyond the width are 0. ``(K, H, words)`` of K masks."""
 Words = npt.NDArray[np.uint64]
-"""``(n,)``: a bit for each of something, 64 a word."""
+"""``(n,)``: 64 bits a word."""
 Reach = npt.NDArray[np.int64]
 """A structuring element that is symmetric in both directions, ``(r + 1,)``: how many pixels it
 extends to either side in its own row and in each of the r rows above and below, never more in a row
@@ -59,8 +59,7 @@ TP: Final = 1
 FP: Final = 2
 FN: Final = 3
 IGNORED: Final = 4
-"""How a pixel came out, where a plane holds that of each. These stand in recordings, and do not
-change."""
+"""The outcome of a pixel, as a code. Recordings hold these codes: they do not change."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

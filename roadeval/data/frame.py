@@ -67,14 +67,14 @@ class Frame:
         return Moment(self.number, self.stamp_ns)
 
     def digest(self) -> str:
-        """Hash of the image as logged: equal for equal images, whatever log they lie in."""
+        """Return a hash of the image as logged: equal images in two logs have the same."""
         return hashlib.blake2b(self.payload, digest_size=16).hexdigest()
 
 
 class Role(StrEnum):
     """The use of a frame in a run. Only `EVALUATED` frames are ever counted.
 
-    A `COPY` shows the same picture as a training frame of a model file, encoded anew.
+    A `COPY` is a re-encoded image of a training frame of a model file.
     """
 
     EVALUATED = "evaluated"

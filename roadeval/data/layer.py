@@ -18,8 +18,8 @@ from roadeval.data.frame import IGNORE, NON_ROAD, ROAD
 class LayerKind(StrEnum):
     """How a layer's array is to be read.
 
-    `MASK`: one class or a few, told apart by their colours alone. `LABELS`: classes whose names a
-    viewer is to show. `SCALAR`: a map of numbers. `RGB`: a colour image.
+    `MASK`: one class or a few, shown by colour alone. `LABELS`: classes with names in the viewer.
+    `SCALAR`: a map of numbers. `RGB`: a colour image.
     """
 
     RGB = "rgb"

@@ -1,4 +1,4 @@
-"""Results of a frame: what each variant's stages computed, its score, and the names they bear."""
+"""Results of a frame: the outputs of each variant's stages, their score, and their names."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RESERVED: Final = frozenset(
         *("roadeval", "state", "timing", "true_shadow", "truth"),
     }
 )
-"""Names that no variant may bear: the tables or the recording use them for something else."""
+"""Reserved names, which no variant may have: tables and recordings use them otherwise."""
 
 _PLAIN: Final = re.compile(r"[A-Za-z0-9_-]{1,200}")
 """No longer than the name of a file can be, with an ending."""
@@ -36,7 +36,7 @@ OUTCOMES: Final = ("TP", "TN", "FP", "FN")
 
 
 def is_plain(name: str) -> bool:
-    """Return whether a name of a variant, stage or region is one that results can hold.
+    """Return whether results can hold a name of a variant, stage or region.
 
     It is a column's cell, a part of a path in the recording, and a word in figures and tables.
     """
@@ -102,7 +102,7 @@ Transition = tuple[str, str, str, str]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Output:
-    """What a stage makes of a frame."""
+    """The output of a stage for a frame."""
 
     layers: tuple[Layer, ...] = ()
     """Named arrays to record."""
@@ -129,14 +129,14 @@ class StageResult:
     seconds: float
 
     def without_layers(self) -> StageResult:
-        """Return what is still needed once the layers are encoded: the mask and the facts."""
+        """Return the mask and the facts, which are needed after the layers are encoded."""
         kept = Output(mask=self.output.mask, facts=self.output.facts)
         return StageResult(self.stage, kept, self.seconds)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VariantResult:
-    """What one variant made of one frame, stage by stage in the order they ran.
+    """The outputs of a variant's stages for one frame, in the order they ran.
 
     ``oracles`` holds, by the name of a stage that was replaced by the truth, the road masks of
     the stages after it by theirs. They are no results: see `roadeval.pipeline.chain.Chain`.

@@ -1,29 +1,19 @@
-"""Many drives: which there are, and where their bytes lie. Nothing here replays one.
+"""Many drives: how they are found, where their files are, and who replays them.
 
 Names are imported when they are first used.
 """
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from roadeval.runtime.on_demand import on_demand
+from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
     from roadeval.fleet.entry import DriveEntry
-    from roadeval.fleet.errors import FleetError
     from roadeval.fleet.remote import staged, stamp
     from roadeval.fleet.sources import find_drives
-    from roadeval.fleet.urls import shown
+    from roadeval.fleet.urls import FleetError, shown
 
 __all__ = ["DriveEntry", "FleetError", "find_drives", "shown", "staged", "stamp"]
 
-_MODULES: Final = {
-    "DriveEntry": "entry",
-    "FleetError": "errors",
-    "find_drives": "sources",
-    "shown": "urls",
-    "staged": "remote",
-    "stamp": "remote",
-}
-
 if not TYPE_CHECKING:  # there every name is known
-    __getattr__ = on_demand(__name__, _MODULES)
+    __getattr__ = on_demand(__name__)

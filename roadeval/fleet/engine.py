@@ -1,8 +1,7 @@
-"""Who replays the drives: worker processes of Dask, here or of a cluster that is there.
+"""Worker processes that replay the drives: of Dask, on this machine or of a cluster.
 
-Everybody else sees a `concurrent.futures.Executor`, and may bring another one. Of those that come
-with Python none survives the death of a worker; Dask's does, and begins its task once more
-elsewhere.
+All other code sees a `concurrent.futures.Executor`, and may use another one. Python's own do not
+survive the death of a worker; Dask's does, and starts the task again on another worker.
 """
 
 from __future__ import annotations
@@ -17,24 +16,24 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any, Final
 
-from roadeval.fleet.errors import FleetError
+from roadeval.fleet.urls import FleetError
 
 ATTEMPTS: Final = 2
-"""How often a drive is begun whose worker dies; on a cluster the scheduler's own settings say."""
+"""Attempts at a drive whose worker dies; on a cluster the scheduler's settings decide."""
 ANSWER_S: Final = 15
-"""So long a scheduler may take to answer."""
+"""Limit of a scheduler's answer."""
 _LOCAL: Final = {
     "distributed.scheduler.allowed-failures": ATTEMPTS - 1,
-    # No drive waits at a busy worker while another one is idle.
+    # No drive waits for a busy worker while another one is idle.
     "distributed.scheduler.worker-saturation": 1.0,
-    # A worker is bounded by its end alone: it holds no results that could be written to a disk, and
-    # one that pauses would wait for ever.
+    # A worker with too much memory is ended: it holds no results that could be written to a disk,
+    # and a paused one would wait for ever.
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
     "distributed.worker.memory.terminate": 0.95,
-    # Without Dask's own MALLOC_TRIM_THRESHOLD_: with it every image is mapped and cleared anew, and
-    # a drive takes twice as long.
+    # Without Dask's own MALLOC_TRIM_THRESHOLD_: with it every image is mapped and cleared again,
+    # and a drive takes twice as long.
     "distributed.nanny.pre-spawn-environ": dict.fromkeys(
         ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), 1
     ),
@@ -48,9 +47,9 @@ class Engine:
     executor: Executor
     """Takes tasks."""
     workers: int | None
-    """How many work at once, as far as that is known."""
+    """How many work at once, if that is known."""
     dashboard: str | None = None
-    """Address of a page that shows them at work, if there is one."""
+    """Address of a page that shows their work, if there is one."""
 
 
 @contextmanager
@@ -59,15 +58,15 @@ def started(
 ) -> Iterator[Engine]:
     """Start worker processes here, or connect to a scheduler, until the block ends.
 
-    Whatever still runs then is cancelled; workers that were started here end.
+    Tasks that still run then are cancelled; workers that were started here end.
 
     Parameters
     ----------
     workers
         Processes here; one a processor by default.
     memory_gib
-        What each may take; by default its share of the machine's. One that takes more is ended,
-        which costs its drive one more attempt.
+        Limit of each; by default its share of the machine's. A process that takes more is ended,
+        which costs its drive one attempt.
     scheduler
         Address of a Dask scheduler, ``tcp://host:8786``, or the file that it has written.
 
@@ -90,13 +89,13 @@ def started(
             count = len(client.scheduler_info(n_workers=-1)["workers"])
         executor = client.get_executor(pure=False)
         stack.callback(executor.shutdown, wait=False)
-        # Without Bokeh there is an address, and nothing to see there.
+        # Without Bokeh the address shows nothing.
         page = client.dashboard_link if find_spec("bokeh") else None
         yield Engine(executor, count, page or None)
 
 
 def died(error: BaseException) -> bool:
-    """Return whether an error says that the processes that worked on a task have died."""
+    """Return whether an error means that the workers of a task have died."""
     return type(error).__name__ in ("KilledWorker", "BrokenProcessPool", "TerminatedWorkerError")
 
 
@@ -104,7 +103,7 @@ def died(error: BaseException) -> bool:
 def _safe_path() -> Iterator[None]:
     """Let Python processes that begin in the block import nothing from the current folder.
 
-    A worker is told this process's own path, but only by modules that it has to import first.
+    A worker receives this process's own path, but only after it has imported some modules.
     """
     before = os.environ.get("PYTHONSAFEPATH")
     os.environ["PYTHONSAFEPATH"] = "1"
@@ -143,7 +142,7 @@ def _local(distributed: Any, count: int, memory_gib: float | None) -> Iterator[A
 
 @contextmanager
 def _connected(distributed: Any, scheduler: str) -> Iterator[Any]:
-    # The library tells of every attempt to connect.
+    # The library logs every attempt to connect.
     log = logging.getLogger("distributed")
     before = log.level
     log.setLevel(logging.CRITICAL)

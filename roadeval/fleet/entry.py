@@ -1,4 +1,4 @@
-"""A drive of a fleet: where it lies, how it is called, what is known of it; which files are one."""
+"""A drive of a fleet: its source, name, group and tags; and which files count as one."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from roadeval.runtime.text import visible
 DIGEST: Final = 4
 """Bytes of the digest in an identity."""
 LONGEST: Final = 40
-"""Letters of a name that its identity keeps: it is part of the names of files and folders."""
+"""Letters of a name in an identity, which is part of the names of files and folders."""
 HEAD: Final = 4096
-"""Bytes of rosbag2's `METADATA` in which its heading stands."""
+"""Bytes of rosbag2's `METADATA` that hold its heading."""
 BAG: Final = b"rosbag2_bagfile_information"
 OF_THE_SYSTEM: Final = ("lost+found", "System Volume Information")
-"""Folders at the top of a disk that nobody may read."""
+"""Folders at the top of a disk that cannot be read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,18 +30,18 @@ class DriveEntry:
     """A drive of a fleet."""
 
     source: str = field(repr=False)
-    """An absolute path, or a URL. It may hold a password or a signature, so whatever shows or keeps
-    it takes `shown` instead."""
+    """An absolute path, or a URL. It may hold a password or a signature: messages and files get
+    `shown` instead."""
     id: str
     """Its identity in the fleet: letters, digits, ``-`` and ``_`` alone."""
     name: str
-    """Its name for people, fit to be shown; several drives may have one name."""
+    """Its name for people, safe to show; several drives may have the same."""
     group: str | None = None
-    """What it shares with other drives, as a day or a route; None for a drive on its own."""
+    """The same for drives that share a day or a route; None for a single drive."""
     tags: Mapping[str, str] = field(default_factory=dict)
-    """What is known of it, as ``{"weather": "rain"}``."""
+    """Facts about it, as ``{"weather": "rain"}``."""
     settings: DriveSettings | None = field(default=None, repr=False)
-    """What is asked of it in place of what is asked of all; None if nothing is."""
+    """Settings of it alone, in place of those of all drives."""
 
     @property
     def path(self) -> Path | None:
@@ -50,7 +50,7 @@ class DriveEntry:
 
     @property
     def shown(self) -> str:
-        """The source without what is secret in it."""
+        """The source without its secrets."""
         return shown(self.source)
 
     @property
@@ -85,19 +85,19 @@ def entry_of(
     tags: Mapping[str, str] | None = None,
     settings: DriveSettings | None = None,
 ) -> DriveEntry:
-    """Make the entry of a drive from its source and what is known of it."""
+    """Make the entry of a drive."""
     name = visible(stem_of(source)) or "drive"
     return DriveEntry(source, identity(source), name, group, dict(tags or {}), settings)
 
 
 def counts(name: str) -> bool:
-    """Return whether a file or folder is looked at: it is not hidden, and is complete."""
+    """Return whether a file or folder is not hidden, and complete."""
     hidden = name.startswith(".") or name in OF_THE_SYSTEM
     return not hidden and PurePath(name.lower()).suffixes[-2:-1] != [".partial"]
 
 
 def is_log(name: str) -> bool:
-    """Return whether a file that nobody named is a log."""
+    """Return whether a file that is found in a folder is a log."""
     return name.lower().endswith(".mcap") and counts(name)
 
 
@@ -107,7 +107,7 @@ def is_heading(head: bytes) -> bool:
 
 
 def is_bag(folder: Path) -> bool:
-    """Return whether a recorder of ROS 2 wrote a folder: its files are one drive."""
+    """Return whether a folder is rosbag2's, whose files are one drive."""
     try:
         with (folder / METADATA).open("rb") as file:
             return is_heading(file.read(HEAD))

@@ -1,4 +1,4 @@
-"""Drives dealt into folds: each is scored by a model that learnt from the others."""
+"""Drives split into folds: each is scored by a model that was trained on the others."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from pathlib import Path
 
 from roadeval.errors import RoadevalError
 from roadeval.fleet.entry import DriveEntry
-from roadeval.fleet.errors import FleetError
+from roadeval.fleet.urls import FleetError
 from roadeval.logs import files_of, identity_of
 
 
 def groups_of(entries: Sequence[DriveEntry]) -> dict[str, str]:
-    """Return the group of each drive by its ID; one that stands alone is its own.
+    """Return the group of each drive by its ID; a single drive is its own group.
 
     Logs with the same bytes are in one group, together with all other drives of their groups; those
     behind URLs are not compared.
@@ -29,7 +29,7 @@ def groups_of(entries: Sequence[DriveEntry]) -> dict[str, str]:
 
 
 def _alike(entries: Sequence[DriveEntry]) -> list[list[DriveEntry]]:
-    """Return drives whose files are the same, in their order. Only those of one size are read."""
+    """Return lists of drives with the same files. Only files of equal size are read."""
     same_size = defaultdict[tuple[int, ...], list[tuple[DriveEntry, list[Path]]]](list)
     for entry in entries:
         # A drive that cannot be read is reported when it is replayed.
@@ -54,16 +54,15 @@ def _content(file: Path) -> str:
 
 
 def deal(groups: Mapping[str, str], folds: int, seed: int) -> dict[str, int]:
-    """Deal drives into folds; those of a group stay together.
+    """Split drives into folds; those of a group stay together.
 
     The groups are shuffled by the digest of seed and name, which depends neither on their order
-    nor on the other groups', and dealt like cards, so that the folds' numbers of groups differ by
-    one at most.
+    nor on the other groups, and distributed in turn: the numbers of groups differ by one at most.
 
     Parameters
     ----------
     groups
-        The group of each drive; one that stands alone is its own.
+        The group of each drive; a single drive is its own group.
     folds
         2 at least.
     seed
@@ -95,7 +94,7 @@ def deal(groups: Mapping[str, str], folds: int, seed: int) -> dict[str, int]:
 
 
 def shuffled(names: Iterable[str], seed: int) -> list[str]:
-    """Return names in an order that the seed draws, whatever order they came in."""
+    """Return names in an order that depends on the seed alone, not on their own order."""
 
     def drawn(name: str) -> bytes:
         return hashlib.blake2b(f"{seed} {name}".encode("utf-8", "surrogateescape")).digest()

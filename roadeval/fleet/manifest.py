@@ -1,4 +1,4 @@
-"""Manifests: files that list drives, and what is known of each.
+"""Manifests: files that list drives, with their groups, tags and settings.
 
 A TOML file has a ``[[drives]]`` for each::
 
@@ -6,10 +6,10 @@ A TOML file has a ``[[drives]]`` for each::
     path = "monday/*.mcap"              # relative to the manifest; or a URL
     group = "2026-11-16"
     tags = { weather = "rain", vehicle = 7 }
-    labels = { road = [3] }             # and topics, frames: in place of what is asked of all
+    labels = { road = [3] }             # and topics, frames: in place of the run's
 
 A CSV file has a row for each, with the columns ``path``, ``group``, ``tag.weather``,
-``topics.image``, ``labels.road`` and so on; an empty cell says nothing.
+``topics.image``, ``labels.road`` and so on; empty cells are ignored.
 """
 
 from __future__ import annotations
@@ -23,15 +23,14 @@ from typing import Any, Final
 
 from roadeval.config import OF_A_LOG, DriveSettings, RunConfig, read_tables
 from roadeval.data import is_plain
-from roadeval.fleet.errors import FleetError
-from roadeval.fleet.urls import shown
+from roadeval.fleet.urls import FleetError, shown
 from roadeval.runtime.documents import read_toml
 from roadeval.runtime.files import check_input
 
 _KEYS: Final = ("path", "group", "tags", *OF_A_LOG)
 _COLUMNS: Final = ("path", "group", "tag.KEY", *(f"{table}.KEY" for table in OF_A_LOG))
 _TEXTS: Final = ("topics.image", "topics.truth", "topics.shadow", "topics.masks")
-"""Columns whose cells are text, even if it looks like a number."""
+"""Columns whose cells are text, even if they look like numbers."""
 _LISTS: Final = ("labels.road", "labels.ignore")
 """Columns whose cells are numbers, with spaces, commas or semicolons between them."""
 
@@ -41,12 +40,11 @@ class ManifestEntry:
     """An entry of a manifest."""
 
     path: str
-    """Of one drive or several, as it is written."""
+    """Of one drive or several, as in the file."""
     group: str | None
     tags: Mapping[str, str]
-    """What is known of them."""
     settings: DriveSettings | None
-    """What is asked of them in place of what is asked of all; None if nothing is."""
+    """Settings of them alone, in place of those of all drives."""
     where: str
     """Begins a message about the entry."""
 
@@ -130,7 +128,7 @@ def _row(columns: Sequence[str], cells: Sequence[str], where: str) -> dict[str, 
 
 
 def _value(column: str, cell: str) -> Any:
-    """Return a cell as a TOML file would have it: a number, true or false, a list; or else text."""
+    """Return a cell as in a TOML file: a number, true or false, a list, or else text."""
     if column in _LISTS and re.fullmatch(r"[\d\s,;]+", cell):
         return [int(number) for number in re.findall(r"\d+", cell)]
     if column in ("path", "group"):
@@ -179,7 +177,7 @@ def _settings(row: Mapping[str, Any], where: str, base: RunConfig) -> DriveSetti
     if not tables:
         return None
     settings = DriveSettings(row["path"], tables, where)
-    base.with_drives([settings])  # refuses what no run can use, before the first drive is replayed
+    base.with_drives([settings])  # checked before the first drive is replayed
     return settings
 
 

@@ -1,41 +1,86 @@
-"""Drives in object stores and on web servers: listed, copied to this machine, told apart.
+"""Drives in object stores and on web servers: listed, copied, and checked for changes.
 
 obstore reads them. For ``s3://`` and ``gs://`` it takes credentials, endpoint and region from the
 environment, as ``AWS_ACCESS_KEY_ID``, ``AWS_ENDPOINT_URL``, ``AWS_ALLOW_HTTP`` for an endpoint
 without TLS, ``AWS_SKIP_SIGNATURE`` for a public bucket, ``GOOGLE_SERVICE_ACCOUNT``. Signed URLs
-and ``user:password@`` work for ``https://``. A stream that breaks goes on where it broke.
+and ``user:password@`` work for ``https://``. A stream that breaks is continued.
+
+fsspec, which Dask brings, reads none of these by itself. Its stores are a package and an SDK each,
+and do not continue a stream.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
-from collections.abc import Iterator, Mapping
+from base64 import b64encode
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future, wait
 from contextlib import contextmanager
-from hashlib import md5
+from dataclasses import dataclass
+from datetime import timedelta
+from http import HTTPStatus
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
-from typing import Any, Final
+from threading import Thread
+from typing import Any, Final, TypeVar
+from urllib.parse import unquote, urlsplit, urlunsplit
 
 from roadeval.fleet.entry import HEAD, in_order, is_heading, is_log
-from roadeval.fleet.errors import FleetError
-from roadeval.fleet.stores import Place, ask, is_open, place_of
-from roadeval.fleet.urls import BUCKETS, file_of, is_url, last_part, scheme_of, shown
+from roadeval.fleet.urls import (
+    BUCKETS,
+    FleetError,
+    bucket_and_key,
+    file_of,
+    is_url,
+    last_part,
+    scheme_of,
+    shown,
+)
 from roadeval.logs import METADATA
 
+Answer = TypeVar("Answer")
+
+TIMES: Final[dict[str, str]] = {"connect_timeout": "10s", "read_timeout": "30s", "timeout": "1d"}
+"""Limits: of connecting, of waiting for the next bytes, and of the whole answer."""
+RETRIES: Final[dict[str, Any]] = {"max_retries": 4, "retry_timeout": timedelta(minutes=2)}
+_PREFIXES: Final = {"s3": "AWS_", "gs": "GOOGLE_"}
+_OPTIONS: Final = (
+    *("allow_http", "allow_invalid_certificates", "connect_timeout", "proxy_url", "read_timeout"),
+    *("proxy_ca_certificate", "proxy_excludes", "timeout", "user_agent"),
+)
+"""Options of connections in the environment, as AWS_PROXY_URL. obstore itself ignores them where
+any option is given."""
+_PATIENCE_S: Final = 0.2
+"""Between two looks whether an answer has come."""
 _BLOCK: Final = 4 << 20
 """Bytes that are in memory at once."""
-_MIB: Final = 1 << 20
 _NAME: Final = 100
 """Letters of a name that a copy keeps."""
+_REASONS: Final = (
+    (r"dns error", "no host of this name is known"),
+    (r"ConnectionRefused|kind: Connect\b", "the host cannot be reached"),
+    (r"BadScheme", "the endpoint is without TLS, which only AWS_ALLOW_HTTP=true allows"),
+    (r"TimedOut|kind: Timeout|timed out", "the server stopped answering"),
+    (r"RangeNotSupported", "ended early, and the server cannot continue it"),
+    (r"Content-Length", "the server does not state its length"),
+    (r"Precondition", "it changed while it was read"),
+    (r"kind: (Body|Decode|Interrupted)|IncompleteMessage|UnexpectedEof", "ended early"),
+)
+"""What obstore's messages mean."""
+_STATUSES: Final = {
+    401: "the server asks who you are",
+    403: "the server denies access",
+    404: "there is no such file",
+}
 
 
 @contextmanager
 def staged(source: str, folder: Path | None = None) -> Iterator[Path]:
     """Yield a drive as a file or folder of this machine.
 
-    That is a path itself; what a URL leads to is copied into a folder of its own, which is removed
-    when the block ends, whatever ends it.
+    A URL is copied into a folder of its own, which is removed when the block ends.
 
     Parameters
     ----------
@@ -49,9 +94,8 @@ def staged(source: str, folder: Path | None = None) -> Iterator[Path]:
     FleetError
         If it cannot be read, its copy is not whole, or the disk is full.
     """
-    here = _local(source)
-    if here is not None:
-        yield here
+    if not is_url(source) or scheme_of(source) == "file":
+        yield file_of(source) if is_url(source) else Path(source)
         return
     try:
         if folder is not None:
@@ -68,35 +112,29 @@ def staged(source: str, folder: Path | None = None) -> Iterator[Path]:
 
 
 def stamp(url: str) -> Mapping[str, Mapping[str, Any]]:
-    """Return what tells at little cost whether a drive behind a URL has changed, by file.
+    """Return size, tag and time of the files of a drive, by name, to notice that it has changed.
 
     Plain data: ``size``, ``etag`` and ``last_modified``, the last two None where the server does
-    not tell them.
-
-    Raises
-    ------
-    FleetError
-        If it is not there, or cannot be asked.
+    not state them. A `FleetError` if it is not there, or cannot be asked.
     """
-    return {_file_name(each): _facts(place_of(each)) for each in _files(url)}
+    return {_file_name(each): _facts(_place(each)) for each in _files(url)}
 
 
 def drives_below(url: str) -> list[str]:
     """Return the URLs of the logs and rosbag2 folders below a folder's, in natural order.
 
-    Raises
-    ------
-    FleetError
-        If it holds none, or cannot be listed; no web server's can.
+    A `FleetError` if it holds none, or cannot be listed; no web server's can.
     """
     place = _listable(url)
-    keys = [PurePosixPath(key) for key in _keys(place)]
+    keys = _keys(place)
     below = len(PurePosixPath(place.key).parts)
     bags = {key.parent for key in keys if key.name == METADATA and _heads_a_bag(place, key)}
     logs = {
         key
         for key in keys
-        if key.parent not in bags and all(map(_seen, key.parts[below:-1])) and is_log(key.name)
+        if key.parent not in bags
+        and is_log(key.name)
+        and not any(part.startswith(".") for part in key.parts[below:-1])
     }
     if not bags | logs:
         raise FleetError(f"{shown(url)}: no log there or below")
@@ -105,38 +143,20 @@ def drives_below(url: str) -> list[str]:
     return [f"{place.root}{'/'.join(key.parts)}{ends.get(key, '')}" for key in found]
 
 
-def _seen(folder: str) -> bool:
-    return not folder.startswith(".")
+# --- Files of a drive -----------------------------------------------------------------------------
 
 
-def _local(source: str) -> Path | None:
-    if not is_url(source):
-        return Path(source)
-    return file_of(source) if scheme_of(source) == "file" else None
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where an object is: its store, its key there, and the URL of the store's root."""
 
+    url: str
+    store: Any
+    key: str = ""
+    root: str = ""
 
-def _listable(url: str) -> Place:
-    if scheme_of(url) not in BUCKETS:
-        raise FleetError(
-            f"{shown(url)}: a web server does not list its folders; name the files, or a manifest "
-            "of them"
-        )
-    return place_of(url)
-
-
-def _keys(place: Place) -> list[str]:
-    import obstore
-
-    prefix = place.key.rstrip("/")
-    listing = obstore.list(place.store, prefix or None)
-    return [each["path"] for each in ask(place.url, listing.collect)]
-
-
-def _heads_a_bag(place: Place, key: PurePosixPath) -> bool:
-    import obstore
-
-    result = ask(place.url, obstore.get, place.store, str(key))
-    return is_heading(bytes(ask(place.url, next, iter(result.stream(HEAD)), b""))[:HEAD])
+    def ask(self, function: Callable[..., Answer], *arguments: Any) -> Answer:
+        return _ask(self.url, function, *arguments)
 
 
 def _files(url: str) -> list[str]:
@@ -145,11 +165,45 @@ def _files(url: str) -> list[str]:
         return [url]
     place = _listable(url)
     folder = PurePosixPath(place.key)
-    keys = [PurePosixPath(key) for key in _keys(place)]
-    files = [key for key in keys if key.parent == folder and is_log(key.name)]
+    files = [key for key in _keys(place) if key.parent == folder and is_log(key.name)]
     if not files:
         raise FleetError(f"{shown(url)}: a folder without *.mcap files")
     return [f"{place.root}{key}" for key in sorted(files, key=in_order)]
+
+
+def _listable(url: str) -> _Place:
+    if scheme_of(url) not in BUCKETS:
+        raise FleetError(
+            f"{shown(url)}: a web server does not list its folders; name the files, or a manifest "
+            "of them"
+        )
+    return _place(url)
+
+
+def _keys(place: _Place) -> list[PurePosixPath]:
+    import obstore
+
+    listing = obstore.list(place.store, place.key.rstrip("/") or None)
+    return [PurePosixPath(each["path"]) for each in place.ask(listing.collect)]
+
+
+def _heads_a_bag(place: _Place, key: PurePosixPath) -> bool:
+    import obstore
+
+    result = place.ask(obstore.get, place.store, str(key))
+    return is_heading(bytes(place.ask(next, iter(result.stream(HEAD)), b""))[:HEAD])
+
+
+def _facts(place: _Place) -> dict[str, Any]:
+    import obstore
+
+    try:
+        meta = place.ask(obstore.head, place.store, place.key)
+    except FleetError:  # a signed URL may be good for reading alone
+        meta = place.ask(obstore.get, place.store, place.key).meta
+    known = meta["last_modified"].timestamp() > 0
+    modified = meta["last_modified"].isoformat() if known else None
+    return {"size": meta["size"], "etag": meta["e_tag"], "last_modified": modified}
 
 
 def _copy(url: str, stage: Path) -> Path:
@@ -164,49 +218,22 @@ def _copy(url: str, stage: Path) -> Path:
 
 
 def _copy_file(url: str, target: Path) -> None:
-    place = place_of(url)
-    etag, digest = _read(place, target)
-    told = etag.strip('"')
-    checked = is_open(place) and re.fullmatch("[0-9a-f]{32}", told) and told != digest
-    # The tag of an S3 object is its MD5, unless the store encrypts: then the same bytes come again.
-    if checked and digest != (again := _read(place, target)[1]) and told != again:
-        raise FleetError(f"{shown(url)}: its bytes arrive changed; the network or the store fails")
-
-
-def _read(place: Place, target: Path) -> tuple[str, str]:
-    """Read an object into a file as one stream; return its tag, and the MD5 of what arrived."""
     import obstore
 
-    digest, arrived = md5(usedforsecurity=False), 0
-    result = ask(place.url, obstore.get, place.store, place.key)
-    size = result.meta["size"]
-    free = shutil.disk_usage(target.parent).free
+    place, arrived = _place(url), 0
+    result = place.ask(obstore.get, place.store, place.key)
+    size, free = result.meta["size"], shutil.disk_usage(target.parent).free
     if size > free:
         raise FleetError(
-            f"{shown(place.url)}: no copy of its {size // _MIB} MiB fits in {target.parent}, where "
-            f"{free // _MIB} MiB are free; TMPDIR names another folder"
+            f"{shown(url)}: no copy of its {size >> 20} MiB fits in {target.parent}, where "
+            f"{free >> 20} MiB are free; TMPDIR names another folder"
         )
     blocks = iter(result.stream(_BLOCK))
     with target.open("wb") as file:
-        while block := ask(place.url, next, blocks, b""):
-            file.write(block)
-            digest.update(block)
-            arrived += len(block)
+        while block := place.ask(next, blocks, b""):
+            arrived += file.write(block)
     if arrived != size:
-        raise FleetError(f"{shown(place.url)}: ended early, after {arrived} of {size} bytes")
-    return result.meta["e_tag"] or "", digest.hexdigest()
-
-
-def _facts(place: Place) -> dict[str, Any]:
-    import obstore
-
-    try:
-        meta = ask(place.url, obstore.head, place.store, place.key)
-    except FleetError:  # a signed URL may be good for reading alone
-        meta = ask(place.url, obstore.get, place.store, place.key).meta
-    known = meta["last_modified"].timestamp() > 0
-    modified = meta["last_modified"].isoformat() if known else None
-    return {"size": meta["size"], "etag": meta["e_tag"], "last_modified": modified}
+        raise FleetError(f"{shown(url)}: ended early, after {arrived} of {size} bytes")
 
 
 def _file_name(url: str) -> str:
@@ -220,3 +247,75 @@ def _file_name(url: str) -> str:
 def _no_copy(url: str, error: OSError) -> str:
     at = f" {error.filename}" if error.filename else ""
     return f"{shown(url)}: cannot be copied to this machine:{at}: {error.strerror or error}"
+
+
+# --- Stores ---------------------------------------------------------------------------------------
+
+
+def _place(url: str) -> _Place:
+    """Open the store that a URL leads to, without a request.
+
+    A `FleetError` if the URL cannot be one, or obstore is not installed.
+    """
+    scheme = scheme_of(url)
+    try:
+        from obstore import store as stores
+    except ImportError as error:
+        raise FleetError(
+            f"{shown(url)}: URLs are read by obstore: pip install 'roadeval[remote]'"
+        ) from error
+    if scheme in _PREFIXES:
+        bucket, key = bucket_and_key(url)
+        named = {each: f"{_PREFIXES[scheme]}{each.upper()}" for each in _OPTIONS}
+        given = {each: os.environ[name] for each, name in named.items() if os.environ.get(name)}
+        kind = stores.S3Store if scheme == "s3" else stores.GCSStore
+        store = _ask(url, kind, bucket, client_options={**TIMES, **given}, retry_config=RETRIES)
+        return _Place(url, store, key, f"{scheme}://{bucket}/")
+    parts = urlsplit(url)
+    user, at, host = parts.netloc.rpartition("@")
+    plain = urlunsplit((parts.scheme, host, parts.path, parts.query, ""))
+    options: dict[str, Any] = {**TIMES, "allow_http": scheme == "http"}
+    if at:
+        basic = b64encode(unquote(user).encode()).decode()
+        options["default_headers"] = {"authorization": f"Basic {basic}"}
+    store = _ask(url, stores.HTTPStore, plain, client_options=options, retry_config=RETRIES)
+    return _Place(url, store)
+
+
+def _ask(url: str, function: Callable[..., Answer], *arguments: Any, **options: Any) -> Answer:
+    """Call a function of obstore; its errors become one line without a URL's secrets.
+
+    It runs in a thread of its own, for obstore does not notice Ctrl-C while it waits for a server.
+    """
+    answer: Future[Answer] = Future()
+
+    def call() -> None:
+        try:
+            answer.set_result(function(*arguments, **options))
+        except BaseException as error:
+            answer.set_exception(error)
+
+    Thread(target=call, name="roadeval-url", daemon=True).start()
+    # In pieces: a signal that another thread receives does not end one long wait.
+    while not wait([answer], _PATIENCE_S).done:
+        pass
+    try:
+        return answer.result()
+    except Exception as error:
+        raise FleetError(f"{shown(url)}: {_reason(error)}") from None
+
+
+def _reason(error: Exception) -> str:
+    text = str(error)
+    if re.search(r"169\.254\.169\.254|metadata\.google\.internal", text):  # of cloud machines
+        return (
+            "no credentials: the environment has them, as AWS_ACCESS_KEY_ID and "
+            "AWS_SECRET_ACCESS_KEY; AWS_SKIP_SIGNATURE=true reads a public bucket"
+        )
+    if match := re.search(r"non-2xx status code: (\d{3})", text):
+        status = int(match[1])
+        known = {each.value: each.phrase for each in HTTPStatus}
+        words = _STATUSES.get(status, "the server cannot give it")
+        return f"{words} ({status} {known.get(status, '')})"
+    found = (words for pattern, words in _REASONS if re.search(pattern, text))
+    return next(found, f"cannot be read ({type(error).__name__})")

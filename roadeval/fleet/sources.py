@@ -1,4 +1,4 @@
-"""Which drives a fleet has: from logs, folders, globs, URLs and manifests to a list of drives."""
+"""From logs, folders, globs, URLs and manifests to a list of drives."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ from typing import Final
 
 from roadeval.errors import RoadevalError
 from roadeval.fleet.entry import DriveEntry, counts, entry_of, identity, in_order, is_bag, is_log
-from roadeval.fleet.errors import FleetError
 from roadeval.fleet.manifest import ManifestEntry, is_manifest, read_manifest
 from roadeval.fleet.remote import drives_below
-from roadeval.fleet.urls import file_of, is_url, last_part, scheme_of
+from roadeval.fleet.urls import FleetError, file_of, is_url, last_part, scheme_of
 from roadeval.logs import files_of
 from roadeval.runtime.text import visible
 
 _LONGER: Final = 8
-"""Bytes of the digests of sources whose shorter ones are equal."""
+"""Bytes of a digest where shorter ones are equal."""
 
 
 def find_drives(words: Sequence[str]) -> list[DriveEntry]:
@@ -28,9 +27,9 @@ def find_drives(words: Sequence[str]) -> list[DriveEntry]:
 
     A word is a log (a file of any name), a rosbag2 folder, a folder that is searched through for
     logs and rosbag2 folders, a glob, a URL, or a manifest (``.toml``, ``.csv``). A folder's drives
-    come in natural order; hidden files and those that are not complete yet are left out. Whoever
-    names every file of a rosbag2 folder names the folder. A drive that is named twice counts once,
-    and what a manifest says of it holds.
+    come in natural order, without hidden and incomplete files. All files of a rosbag2 folder
+    together mean the folder. A drive that is named twice counts once, with what a manifest says of
+    it.
 
     Raises
     ------
@@ -107,12 +106,12 @@ def _below(folder: Path) -> list[Path]:
 
 
 def _none_below(folder: Path) -> list[Path]:
-    files_of(folder)  # tells what there is instead, and how to convert it
+    files_of(folder)  # an error that names what is there, and how to convert it
     raise FleetError(f"{visible(str(folder))}: no log that is complete, here or below")
 
 
 def _matches(word: str, base: Path) -> list[Path]:
-    """Return the drives that a glob matches; of ``*`` and ``**`` by themselves only logs."""
+    """Return the drives that a glob matches; ``*`` and ``**`` match only logs."""
     paths = [base / each for each in glob.glob(word, root_dir=base, recursive=True)]  # noqa: PTH207
     files = [path for path in paths if not path.is_dir() and counts(path.name)]
     if Path(word).name in ("*", "**"):
@@ -129,12 +128,12 @@ def _refuse(error: OSError) -> None:
 
 
 def _absolute(path: Path) -> Path:
-    """Return where a file or folder lies, under its own name, which may be a link's."""
+    """Return the absolute path of a file or folder; a link keeps its own name."""
     return path.resolve() if path.name in ("", "..") else path.parent.resolve() / path.name
 
 
 def _whole_bags(entries: Sequence[DriveEntry]) -> list[DriveEntry]:
-    """Return rosbag2 folders in place of their files, where all of them, or the folder, are named.
+    """Replace the files of a rosbag2 folder by the folder, where all of them, or it, are named.
 
     Its files would be several drives that share a day, a road and a camera.
     """
@@ -172,7 +171,7 @@ def _once(entries: Iterable[DriveEntry]) -> list[DriveEntry]:
 
 
 def _told_apart(entries: Sequence[DriveEntry]) -> list[DriveEntry]:
-    """Return drives whose identities differ; by chance two short digests are equal."""
+    """Return drives with different identities; two short digests may be equal by chance."""
     times = Counter(entry.id for entry in entries)
     return [
         replace(entry, id=identity(entry.source, _LONGER)) if times[entry.id] > 1 else entry

@@ -8,7 +8,7 @@ from typing import Final
 from urllib.parse import unquote, urlsplit
 from urllib.request import url2pathname
 
-from roadeval.fleet.errors import FleetError
+from roadeval.errors import RoadevalError
 from roadeval.runtime.text import public_url, visible, without_secrets
 
 BUCKETS: Final = ("s3", "gs")
@@ -18,38 +18,38 @@ SCHEMES: Final = (*BUCKETS, "https", "http", "file")
 _URL: Final = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*)://")
 
 
+class FleetError(RoadevalError):
+    """Drives that cannot be found or fetched, or a manifest that cannot be used."""
+
+
 def is_url(source: str) -> bool:
     """Return whether a drive's source is a URL, and no path."""
     return _URL.match(source) is not None
 
 
 def scheme_of(url: str) -> str:
-    """Return the scheme of a URL; a `FleetError` if it is none of `SCHEMES`."""
+    """Return the scheme of a URL; a `FleetError` if it is none of `SCHEMES`, or has no host."""
     match = _URL.match(url)
     scheme = match[1].lower() if match else ""
     if scheme not in SCHEMES:
         known = ", ".join(f"{each}://" for each in SCHEMES)
         raise FleetError(f"{shown(url)}: no scheme that is known; choose {known}")
-    if scheme not in (*BUCKETS, "file") and not _has_host(url):
-        raise FleetError(
-            f"{shown(url)}: no host in it; in a user's name or password write / ? # @ as "
-            "%2F %3F %23 %40"
-        )
+    if scheme in ("https", "http"):
+        try:
+            parts = urlsplit(url)
+            whole = bool(parts.hostname) and parts.port != 0
+        except ValueError:
+            whole = False
+        if not whole:
+            raise FleetError(
+                f"{shown(url)}: no host in it; in a user's name or password write / ? # @ as "
+                "%2F %3F %23 %40"
+            )
     return scheme
-
-
-def _has_host(url: str) -> bool:
-    try:
-        parts = urlsplit(url)
-        return bool(parts.hostname) and (parts.port is None or parts.port > 0)
-    except ValueError:
-        return False
 
 
 def shown(source: str) -> str:
     """Return a drive's source as it may be shown: a URL without user, password and query.
-
-    The query of a signed URL is as good as a password.
 
     >>> shown("https://me:secret@host/a.mcap?X-Amz-Signature=5d1c")
     'https://host/a.mcap'
@@ -68,7 +68,7 @@ def file_of(url: str) -> Path:
 def bucket_and_key(url: str) -> tuple[str, str]:
     """Split the URL of an object, or of a folder in a bucket.
 
-    Its key is taken as it is written: nothing in it is encoded, and ``?`` and ``#`` are letters.
+    Nothing in the key is encoded: ``%``, ``?`` and ``#`` are letters.
     """
     bucket, _, key = url.partition("://")[2].partition("/")
     if "@" in bucket:

@@ -5,9 +5,9 @@ checked and refused alike. Names are imported when they are first used: a comman
 settings needs little else.
 """
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from roadeval.runtime.on_demand import on_demand
+from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
     from roadeval.images.decoding import (
@@ -44,13 +44,5 @@ __all__ = [
     "without_colours",
 ]
 
-_FORMATS: Final = (
-    *("MAX_PIXELS", "DamagedImageError", "ImageError", "ImageFormat", "Limits", "format_of"),
-)
-_MODULES: Final = {
-    **dict.fromkeys(__all__, "decoding"),
-    **dict.fromkeys(_FORMATS, "formats"),
-}
-
 if not TYPE_CHECKING:  # there every name is known
-    __getattr__ = on_demand(__name__, _MODULES)
+    __getattr__ = on_demand(__name__)

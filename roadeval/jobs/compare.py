@@ -31,7 +31,7 @@ from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.comparison import as_dict, judged, warnings
 from roadeval.results.rows import as_arrays, window_rows
 from roadeval.results.summary import json_text, plain
-from roadeval.runtime.paths import Paths, listed
+from roadeval.runtime.files import Paths, listed
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:

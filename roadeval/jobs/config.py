@@ -11,9 +11,8 @@ def config_toml(config: RunConfig | None = None) -> str:
     Parameters
     ----------
     config
-        The configuration; the defaults of ``roadeval replay`` otherwise. What can be set stands in
-        the text whether it was or not, so that the file, edited, can be given to
-        `roadeval.load_config`.
+        The configuration; the defaults of ``roadeval replay`` otherwise. The text holds every
+        setting, and can be edited and given to `roadeval.load_config`.
 
     Examples
     --------

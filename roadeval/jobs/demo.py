@@ -7,8 +7,7 @@ from typing import Final
 
 from roadeval.errors import RoadevalError
 from roadeval.jobs.outputs import holding
-from roadeval.runtime.files import put
-from roadeval.runtime.paths import AnyPath
+from roadeval.runtime.files import AnyPath, put
 
 _PACKAGE: Final = Path(__file__).parents[1]
 _PLACES: Final = (_PACKAGE / "demo.mcap", _PACKAGE.parent / "recordings" / "demo.mcap")

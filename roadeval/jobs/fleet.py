@@ -17,9 +17,9 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation.comparison import Condition
 from roadeval.fleet.engine import ATTEMPTS, died, started
 from roadeval.fleet.entry import DriveEntry
-from roadeval.fleet.errors import FleetError
 from roadeval.fleet.folds import deal, groups_of, shuffled
 from roadeval.fleet.sources import find_drives
+from roadeval.fleet.urls import FleetError
 from roadeval.jobs.fleet_work import (
     Done,
     DriveTask,
@@ -39,7 +39,7 @@ from roadeval.results.fleet.record import DAMAGED, FAILED, recording_path
 from roadeval.results.fleet.tables import Member
 from roadeval.results.fleet.writing import FleetWriter
 from roadeval.runtime.discovery import code_of
-from roadeval.runtime.paths import AnyPath, Paths, listed
+from roadeval.runtime.files import AnyPath, Paths, listed
 from roadeval.version import VERSION
 
 

@@ -20,8 +20,8 @@ from roadeval.config import ExecutionSettings, OutputSettings, RunConfig
 from roadeval.data import Frame
 from roadeval.errors import RoadevalError
 from roadeval.fleet.entry import DriveEntry, in_order
-from roadeval.fleet.errors import FleetError
 from roadeval.fleet.remote import staged, stamp
+from roadeval.fleet.urls import FleetError
 from roadeval.jobs.fleet_frames import FrameGatherer
 from roadeval.jobs.identity import asked, content_of, software
 from roadeval.jobs.replay import replay

@@ -1,4 +1,4 @@
-"""The files and folders that a command writes: it holds them before it computes anything."""
+"""The files and folders that a command writes, claimed before it computes anything."""
 
 from __future__ import annotations
 
@@ -14,8 +14,14 @@ from roadeval.recording import RecordRule
 from roadeval.results.fleet.kind import FILES, is_fleet
 from roadeval.results.folder import CONTENT, belonging
 from roadeval.results.summary import SUMMARY
-from roadeval.runtime.files import claimed_file, claimed_folder, own_names, remove, target_of
-from roadeval.runtime.paths import AnyPath
+from roadeval.runtime.files import (
+    AnyPath,
+    claimed_file,
+    claimed_folder,
+    own_names,
+    remove,
+    target_of,
+)
 
 if TYPE_CHECKING:
     from roadeval.config import OutputSettings
@@ -30,11 +36,11 @@ class Outputs:
     reports: Path
     """The folder of tables and figures."""
     mcap: Path | None
-    """The log of masks; None where nobody asked for it."""
+    """The log of masks, if it is written."""
 
     @classmethod
     def of(cls, settings: OutputSettings, drive: str) -> Outputs:
-        """Return where a drive's results land: where the settings say, or under its name."""
+        """Return the places of a drive's results: from the settings, or by its name."""
         saved = Path(settings.save or Path("recordings", f"{drive}.rrd"))
         return cls(
             saved if RecordRule.parse(settings.record).recorded else None,

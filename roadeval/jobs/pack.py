@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from roadeval import logs
 from roadeval.jobs.outputs import holding
-from roadeval.runtime.paths import AnyPath
+from roadeval.runtime.files import AnyPath
 
 
 def pack(
@@ -49,5 +49,5 @@ def pack(
     problem = logs.describe(packed.path).problem if truth is not None else ""
     if not problem:
         return packed
-    told = f"packed, but replay needs to be told more: {problem}"
-    return replace(packed, warnings=(*packed.warnings, told))
+    warning = f"packed, but replay needs more settings: {problem}"
+    return replace(packed, warnings=(*packed.warnings, warning))

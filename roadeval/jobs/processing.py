@@ -68,7 +68,7 @@ def _process(
     try:
         frame = replace(logged.decode(), camera=run.key.camera)
     except logs.FrameError:
-        return None  # it stands in the log's accounting, with the reason
+        return None  # the log's accounting has it, with the reason
     use = run.schedule.use(frame)
     known = (frame.truth, frame.shadow_truth) if use.role is Role.EVALUATED else (None, None)
     shared: dict[Any, Any] = {}

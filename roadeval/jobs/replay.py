@@ -24,8 +24,8 @@ from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import as_arrays, csv_lines, effect_rows, score_rows, sum_rows
 from roadeval.results.schema import TABLES
 from roadeval.results.summary import summary_text
+from roadeval.runtime.files import AnyPath
 from roadeval.runtime.memory import trim
-from roadeval.runtime.paths import AnyPath
 from roadeval.version import VERSION
 
 OnFrame = Callable[[FrameResult], None]

@@ -19,8 +19,8 @@ from roadeval.report.blocks import Document, Heading, LinkList
 from roadeval.report.findings import Commands
 from roadeval.report.page.render import SCRIPT, STYLE, Place, code, page
 from roadeval.results.fleet.kind import is_fleet
+from roadeval.runtime.files import Paths, listed
 from roadeval.runtime.local_server import NOT_FOUND, PAGE, LocalServer, Request, Response, told
-from roadeval.runtime.paths import Paths, listed
 
 MakeCommands = Callable[[DriveResult | Path], Commands]
 """Returns the commands that a page names, of a drive's result or of a fleet's folder."""
@@ -56,7 +56,7 @@ def serve(
     """
     with serving(results, trust_sources=trust_sources, commands=commands) as server:
         on_address(server.address)
-        server.serve()
+        server.serve_forever(0.1)
 
 
 @contextmanager
@@ -68,7 +68,7 @@ def serving(
     Yields
     ------
     LocalServer
-        Its ``serve`` answers.
+        Its ``serve_forever`` answers.
     """
     with ExitStack() as stack:
         replayer = Replayer()
@@ -80,7 +80,7 @@ def serving(
         stack.callback(viewer.close)
         stack.callback(replayer.cancel)
         server = LocalServer(_Site(opened, viewer).answer)
-        stack.callback(server.close)
+        stack.callback(server.server_close)
         yield server
 
 

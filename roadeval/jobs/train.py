@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from roadeval.config import ConfigError, RunConfig
 from roadeval.data import Frame
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.progress import OnProgress, Progress, ignore
-from roadeval.runtime.paths import AnyPath, Paths, listed
+from roadeval.runtime.files import AnyPath, Paths, listed
 from roadeval.training import Model, TrainingError, learning, save_model
 from roadeval.training.learning import HeldFrames
 
@@ -27,9 +27,9 @@ def train(
 
     From each drive ``training.frames`` labelled frames are taken, spread evenly over the
     selected range. Frames without truth are taken where ``training.source`` is ``patch``, or
-    ``auto`` and no drive has truth. Labels that are given hold for every drive that has none of
-    its own (`RunConfig.drives`); where they do not occur, a 0/255 mask is understood by itself.
-    Frames that cannot be decoded are left out, and `Model.losses` tells of them.
+    ``auto`` and no drive has truth. The labels hold for every drive without its own
+    (`RunConfig.drives`); where they do not occur, a 0/255 mask is recognised. Frames that cannot be
+    decoded are left out, and listed in `Model.losses`.
 
     Raises
     ------
@@ -37,103 +37,81 @@ def train(
         If some drives have truth and others none, or there is nothing to learn.
     """
     config, paths = config or RunConfig(), listed(drives)
+    settings = config.training
+    for path in config.unused(paths):
+        names = ", ".join(map(str, paths))
+        raise ConfigError(f"`drives` {path}: is none of the drives {names}")
+    if settings.seeds > 1:
+        raise TrainingError(
+            "`training.seeds`: a model file holds one training; set training.seed for another"
+        )
+    held, total = HeldFrames(), settings.frames * len(paths)
+
+    def show() -> None:
+        on_progress(Progress(len(held.frames), total, "training"))
+
     with holding(output, inputs=paths):
-        model = _learnt(paths, config, on_progress)
+        drawn = [_draw(path, config, held, show, several=len(paths) > 1) for path in paths]
+        frames = {each.path: each.frames for each in drawn}
+        warnings = [sentence for each in drawn for sentence in each.warnings]
+        model = learning.from_drives(frames, config.pipelines(), settings, warnings)
+        model = replace(model, losses=tuple(_losses(drawn)))
         save_model(model, Path(output))
         return model
 
 
 @dataclass(frozen=True, slots=True)
 class _Drawn:
-    """The training frames of a drive, what to know of them, and what of the drive was lost."""
+    """The training frames of a drive."""
 
+    path: Path
     frames: Sequence[Frame]
-    told: tuple[str, ...]
-    losses: tuple[str, ...]
-
-
-def _learnt(drives: Sequence[AnyPath], config: RunConfig, on_progress: OnProgress) -> Model:
-    """Train on frames of all drives."""
-    settings = config.training
-    _require_a_drive_for_each(config, drives)
-    if settings.seeds > 1:
-        raise TrainingError(
-            "`training.seeds`: a model file holds one training; set training.seed for another"
-        )
-    total = settings.frames * len(drives)
-    held = HeldFrames()
-
-    def show() -> None:
-        on_progress(Progress(len(held.frames), total, "training"))
-
-    drawn: dict[Path, _Drawn] = {}
-    for drive in drives:
-        own = config.for_drive(drive)
-        several = len(drives) > 1 and own.labels == config.labels
-        with logs.open_log(drive, replace(own, masks={})) as log:
-            selection = log.select(several=several)
-            drawn[log.path] = _draw(log, selection, own, held, show)
-    frames = {path: each.frames for path, each in drawn.items()}
-    told = [sentence for each in drawn.values() for sentence in each.told]
-    model = learning.from_drives(frames, config.pipelines(), settings, told)
-    return replace(model, losses=tuple(_lost(drawn)))
+    warnings: Sequence[str]
+    losses: Sequence[str]
+    """What of the drive could not be read."""
 
 
 def _draw(
-    log: logs.Log,
-    selection: logs.Selection,
-    own: RunConfig,
-    held: HeldFrames,
-    show: Callable[[], None],
+    drive: AnyPath, config: RunConfig, held: HeldFrames, show: Callable[[], None], *, several: bool
 ) -> _Drawn:
     """Decode the training frames of a drive and hold them."""
-    settings = own.training
-    frames: list[Frame] = []
-    streams: list[logs.FrameStream] = []
+    own, frames, streams = config.for_drive(drive), list[Frame](), list[logs.FrameStream]()
+    with logs.open_log(drive, replace(own, masks={})) as log:
+        selection = log.select(several=several and own.labels == config.labels)
 
-    def begin() -> logs.FrameStream:
-        streams.append(log.frames(selection))
-        return streams[-1]
+        def begin() -> logs.FrameStream:
+            streams.append(log.frames(selection))
+            return streams[-1]
 
-    labelled = settings.source != "patch"
-    for frame in learning.spread(begin, settings.frames, labelled=labelled):
-        if not held.add(frame):
-            raise TrainingError(
-                f"{held.full()}; lower `training.frames`, or reduce them with `frames.scale`"
-            )
-        frames.append(frame)
-        show()
-    losses = (*log.losses, *_left_out(streams[-1], frames))
-    if losses and not frames:
-        raise TrainingError(f"{log.path.name}: no training frame could be decoded: {losses[0]}")
-    told = (*_understood(selection, own), *streams[-1].oddities)
-    return _Drawn(frames, tuple(f"{log.name}: {each}" for each in told), losses)
-
-
-def _left_out(stream: logs.FrameStream, frames: Sequence[Frame]) -> Iterator[str]:
-    """Name and count the training frames that are damaged."""
-    yield from stream.accounting.losses
-    if missing := len(stream.accounting.undecodable):
-        yield f"{missing} of {missing + len(frames)} training frames could not be decoded"
+        labelled = own.training.source != "patch"
+        for frame in learning.spread(begin, own.training.frames, labelled=labelled):
+            if not held.add(frame):
+                raise TrainingError(
+                    f"{held.full()}; lower `training.frames`, or reduce them with `frames.scale`"
+                )
+            frames.append(frame)
+            show()
+        account = streams[-1].accounting
+        losses = [*log.losses, *account.losses]
+        if missing := len(account.undecodable):
+            total = missing + len(frames)
+            losses.append(f"{missing} of {total} training frames could not be decoded")
+        if losses and not frames:
+            raise TrainingError(f"{log.path.name}: no training frame could be decoded: {losses[0]}")
+        warnings = [*_understood(selection, own), *streams[-1].oddities]
+        return _Drawn(log.path, frames, [f"{log.name}: {each}" for each in warnings], losses)
 
 
-def _lost(drawn: Mapping[Path, _Drawn]) -> Iterator[str]:
+def _losses(drawn: Sequence[_Drawn]) -> Iterator[str]:
     """Yield what was lost; of several drives, with the drive's name before it."""
-    for path, each in drawn.items():
+    for each in drawn:
         for sentence in each.losses:
-            names_it = len(drawn) == 1 or sentence.startswith(f"{path.name}: ")
-            yield sentence if names_it else f"{path.name}: {sentence}"
-
-
-def _require_a_drive_for_each(config: RunConfig, drives: Sequence[AnyPath]) -> None:
-    """Refuse settings of single drives that hold for none of these."""
-    for path in config.unused(drives):
-        names = ", ".join(map(str, drives))
-        raise ConfigError(f"`drives` {path}: is none of the drives {names}")
+            names_it = len(drawn) == 1 or sentence.startswith(f"{each.path.name}: ")
+            yield sentence if names_it else f"{each.path.name}: {sentence}"
 
 
 def _understood(selection: logs.Selection, own: RunConfig) -> Iterator[str]:
-    """Return a warning for a mask that was understood by itself although labels were given."""
+    """Yield a warning for a mask that was recognised, although labels were given."""
     if selection.truth and own.labels.road and selection.truth.meaning.by_itself:
         yield (
             f"none of the given labels occurs in {selection.truth.where}, which "

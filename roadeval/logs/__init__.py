@@ -8,9 +8,9 @@ puts them together. ``writing`` writes logs.
 Names are imported when they are first used: a command that reads settings needs little else.
 """
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from roadeval.runtime.on_demand import on_demand
+from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
     from roadeval.logs.container.file import Damage
@@ -68,38 +68,5 @@ __all__ = [
     "parse_time",
 ]
 
-_MODULES: Final = {
-    "METADATA": "files",
-    "Accounting": "frames",
-    "Damage": "container.damage",
-    "FrameError": "errors",
-    "FrameSettings": "settings",
-    "FrameStream": "frames",
-    "LabelSettings": "settings",
-    "LabelSource": "truth.source",
-    "Log": "log",
-    "LogConfig": "settings",
-    "LogDescription": "log",
-    "LogError": "errors",
-    "LogWriter": "writing.writer",
-    "LoggedFrame": "frames",
-    "MaskSettings": "settings",
-    "NoSidecar": "writing.sidecar",
-    "PackResult": "writing.pack",
-    "Selection": "selection",
-    "SidecarWriter": "writing.sidecar",
-    "TopicInfo": "topics.description",
-    "TopicKind": "messages.encoding",
-    "TopicSettings": "settings",
-    "describe": "log",
-    "files_of": "files",
-    "identity_of": "identity",
-    "mask_files": "truth.source",
-    "natural": "files",
-    "open_log": "log",
-    "pack": "writing.pack",
-    "parse_time": "settings",
-}
-
 if not TYPE_CHECKING:  # there every name is known
-    __getattr__ = on_demand(__name__, _MODULES)
+    __getattr__ = on_demand(__name__)

@@ -3,9 +3,9 @@
 Names are imported when they are first used: Rerun takes a second, and a `RecordRule` needs none.
 """
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from roadeval.runtime.on_demand import on_demand
+from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
     from roadeval.recording.layout import DamagedError, Layout, RecordingError, RecordRule
@@ -25,18 +25,5 @@ __all__ = [
     "recorder_for",
 ]
 
-_MODULES: Final = {
-    "DamagedError": "layout",
-    "EncodedFrame": "write.encoding",
-    "Layout": "layout",
-    "NullRecorder": "write.recorder",
-    "RecordRule": "layout",
-    "Recorder": "write.recorder",
-    "Recording": "read.recording",
-    "RecordingError": "layout",
-    "recorder_for": "write.recorder",
-}
-
-
 if not TYPE_CHECKING:  # there every name is known
-    __getattr__ = on_demand(__name__, _MODULES)
+    __getattr__ = on_demand(__name__)

@@ -1,4 +1,4 @@
-"""Modules: those of a folder, so that adding one file adds one thing; and their code."""
+"""What the modules of a folder define, so that one file adds one thing; and the code of modules."""
 
 from __future__ import annotations
 
@@ -19,17 +19,13 @@ _IMPORTS: Final = re.compile(
     r"""|(?:import_module|__import__)\(\s*["'](\w+)""",
     re.MULTILINE,
 )
-"""What imports; a line of a text that looks like it costs a look and nothing else."""
+"""An import in a source file. A line of a text that looks like one does no harm."""
+_INSTALLED: Final = frozenset({"site-packages", "dist-packages"})
+"""Folders of installed packages."""
 
 
 def by_name(things: Iterable[Any]) -> dict[str, Any]:
-    """Return things by their ``name``, in their order.
-
-    Raises
-    ------
-    ValueError
-        If two have the same.
-    """
+    """Return things by their ``name``, in their order; a ValueError if two have the same."""
     named: dict[str, Any] = {}
     for thing in things:
         if named.setdefault(thing.name, thing) is not thing:
@@ -40,19 +36,7 @@ def by_name(things: Iterable[Any]) -> dict[str, Any]:
 def found_in(package: ModuleType, name: str) -> tuple[Any, ...]:
     """Return what the modules of a package call ``name``, in the order of the modules' names.
 
-    Modules without the name, and those whose own name begins with ``_``, are passed over.
-
-    Parameters
-    ----------
-    package
-        An imported package.
-    name
-        As ``STAGE``.
-
-    Raises
-    ------
-    Exception
-        Whatever a module raises when it is imported.
+    Modules without the name, and those whose own name begins with ``_``, are left out.
     """
     names = sorted(module.name for module in iter_modules(package.__path__))
     modules = [import_module(f"{package.__name__}.{each}") for each in names if each[0] != "_"]
@@ -61,11 +45,11 @@ def found_in(package: ModuleType, name: str) -> tuple[Any, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Code:
-    """The code of some modules, and what tells whether it has changed."""
+    """The code of some modules, to notice that it has changed."""
 
     modules: tuple[str, ...]
     digest: str
-    """Of the files that count and the packages' versions, in hexadecimal; empty without a file."""
+    """Of the files and the packages' versions, in hexadecimal; empty without a file."""
     files: tuple[str, ...]
     """The files that count, as ``mine/net/weights.npz``."""
     packages: Mapping[str, str] = field(hash=False)
@@ -75,14 +59,12 @@ class Code:
 def code_of(names: Iterable[str]) -> Code:
     """Return the code of modules as their files are now. None of them is imported.
 
-    Of each module its top-level package counts whole, data included; a module without a package
-    counts as its file. What a counted file imports counts in the same way where nobody has
-    installed it, as a module beside it. Of an installed package the version counts, and nothing of
-    what that requires in turn. Python's own modules and roadeval's do not count. Not seen are
-    modules that are imported by a computed name, files outside the packages, and what compiled
-    modules load.
+    The top-level package of each module counts whole, data included; a module without a package
+    counts as its file. What a counted file imports counts in the same way, but of an installed
+    package only the version. Python's own modules and roadeval's do not count. Modules that are
+    imported by a computed name are not seen.
     """
-    from importlib.metadata import packages_distributions
+    from importlib.metadata import packages_distributions, version
 
     roots = {name.partition(".")[0] for name in names}
     installed = packages_distributions() if roots else {}
@@ -93,13 +75,13 @@ def code_of(names: Iterable[str]) -> Code:
         seen |= todo
         for name in sorted(todo):
             places = _places(name)
-            versions = _versions(places, installed.get(name, ()))
-            packages |= versions
-            if name in roots or not versions:
+            if name not in roots and any(_INSTALLED & {*place.parts} for place in places):
+                packages |= {each: version(each) for each in installed.get(name, ())}
+            else:
                 files |= _files(name, places)
         todo = {name for path in files.values() for name in _imported(path)}
     parts = [f"{name} {_digest(files[name])}" for name in sorted(files)]
-    parts += [f"{name}=={version}" for name, version in sorted(packages.items())]
+    parts += [f"{name}=={packages[name]}" for name in sorted(packages)]
     digest = hashlib.sha256("\n".join(parts).encode()).hexdigest() if files else ""
     return Code(tuple(sorted(roots)), digest, tuple(sorted(files)), dict(sorted(packages.items())))
 
@@ -116,20 +98,6 @@ def _places(name: str) -> list[Path]:
     return [Path(place) for place in spec.submodule_search_locations or file]
 
 
-def _versions(places: Iterable[Path], distributions: Iterable[str]) -> dict[str, str]:
-    """Return the versions of the distributions that have put a module where it lies."""
-    from importlib.metadata import distribution
-
-    found = {name: distribution(name) for name in distributions}
-    return {
-        name: each.version
-        for name, each in found.items()
-        # Without a list of its files it may be somebody's work, which is named by its folder alone.
-        if each.read_text("RECORD")
-        and any(place.is_relative_to(str(each.locate_file(""))) for place in places)
-    }
-
-
 def _files(name: str, places: Iterable[Path]) -> Iterator[tuple[str, Path]]:
     """Yield the files of a module or package, each with its name."""
     for place in places:
@@ -144,9 +112,7 @@ def _files(name: str, places: Iterable[Path]) -> Iterator[tuple[str, Path]]:
 
 def _imported(path: Path) -> Iterator[str]:
     """Yield the names of the top-level modules that a source file may import."""
-    if path.suffix != ".py":
-        return
-    for found in _IMPORTS.findall(path.read_text(errors="replace")):
+    for found in _IMPORTS.findall(path.read_text(errors="replace")) if path.suffix == ".py" else ():
         for name in "".join(found).split(","):
             yield from re.findall(r"\w+", name)[:1]
 

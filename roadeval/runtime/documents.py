@@ -1,6 +1,6 @@
-"""JSON and TOML from anybody: what is read of a document is bounded.
+"""JSON and TOML from elsewhere, read within limits.
 
-A few kilobytes can nest more than any program unpacks, name a table by twenty thousand words, or
+A few kilobytes can nest deeper than any program unpacks, name a table by twenty thousand words, or
 hold a word that takes minutes to typeset.
 """
 
@@ -16,7 +16,7 @@ from typing import Any, Final
 from roadeval.runtime.files import check_input
 
 LONGEST: Final = 12_000
-"""Letters of a text; what is written is shortened to as many."""
+"""Letters of a text."""
 LONG: Final = 1_000
 LONG_TOGETHER: Final = 500_000
 """Letters of all texts of more than `LONG` letters."""
@@ -25,14 +25,15 @@ LISTED: Final = 1_000_000
 VALUES: Final = 2_000_000
 DEPTH: Final = 32
 """Tables and lists inside one another."""
+_TOO_DEEP: Final = f"it nests more than {DEPTH} tables and lists inside one another"
 BYTES: Final = 64 << 20
 TOML_BYTES: Final = 1 << 20
 DOTS: Final = 2_000
-"""Parts of a name of TOML: reading one takes time by the square of their number."""
+"""Parts of a name in TOML; the time to read one grows with the square of their number."""
 
 
 def read_bounded(path: Path) -> bytes:
-    """Return the bytes of a document; an OSError or ValueError if it is none, or too large."""
+    """Return the bytes of a document; an OSError if it is no file, a ValueError if too large."""
     check_input(path)
     with path.open("rb") as file:
         content = file.read(BYTES + 1)
@@ -41,7 +42,7 @@ def read_bounded(path: Path) -> bytes:
 
 
 def read_json(content: str | bytes, values: int = VALUES) -> Any:
-    """Read a JSON document; a ValueError if it is damaged, or holds more than is read of one."""
+    """Read a JSON document; a ValueError if it is damaged or beyond a limit."""
     _check_size(len(content), BYTES)
     comma, bracket, brace = (",", "[", "{") if isinstance(content, str) else (b",", b"[", b"{")
     if sum(map(content.count, (comma, bracket, brace))) > 2 * values:  # type: ignore[arg-type]
@@ -49,20 +50,20 @@ def read_json(content: str | bytes, values: int = VALUES) -> Any:
     try:
         found = json.loads(content)
     except RecursionError as error:
-        raise ValueError(_too_deep()) from error
+        raise ValueError(_TOO_DEEP) from error
     _check(found, values)
     return found
 
 
 def read_toml(text: str) -> dict[str, Any]:
-    """Read a TOML document; a ValueError if it is damaged, or holds more than is read of one."""
+    """Read a TOML document; a ValueError if it is damaged or beyond a limit."""
     _check_size(len(text), TOML_BYTES)
     if sum(line.count(".") ** 2 for line in text.splitlines()) > DOTS**2:
         raise ValueError(f"a name in it has more than {DOTS:,} parts, or several have so many")
     try:
         found = tomllib.loads(text)
     except RecursionError as error:
-        raise ValueError(_too_deep()) from error
+        raise ValueError(_TOO_DEEP) from error
     except ValueError as error:
         if re.search("limit .* for integer string", str(error)):
             raise ValueError("a number in it has thousands of digits") from error
@@ -72,7 +73,7 @@ def read_toml(text: str) -> dict[str, Any]:
 
 
 def check_texts(texts: Iterable[str]) -> None:
-    """Refuse, as a ValueError, texts that would take too long to show."""
+    """Raise a ValueError for texts that would take too long to show."""
     together = 0
     for text in (line for each in texts for line in each.split("\n")):
         if len(text) > LONGEST:
@@ -90,7 +91,7 @@ def _check_size(size: int, most: int) -> None:
 
 
 def _check(document: Any, most: int) -> None:
-    """Refuse, as a ValueError, what is too deep, too much, or too long to be shown."""
+    """Raise a ValueError for a document that is too deep, too large or too long to be shown."""
     texts: list[str] = []
     level: list[Any] = [document]
     depth = values = 0
@@ -98,7 +99,7 @@ def _check(document: Any, most: int) -> None:
         depth, values = depth + 1, values + len(level)
         inner: list[Any] = []
         if depth > DEPTH:
-            raise ValueError(_too_deep())
+            raise ValueError(_TOO_DEEP)
         if values > most:
             raise ValueError(f"it holds more than {most:,} values")
         for each in level:
@@ -114,7 +115,3 @@ def _check(document: Any, most: int) -> None:
                         raise ValueError(f"a list in it has more than {LISTED:,} letters")
         level = inner
     check_texts(texts)
-
-
-def _too_deep() -> str:
-    return f"it nests more than {DEPTH} tables and lists inside one another"

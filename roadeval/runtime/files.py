@@ -18,12 +18,16 @@ import shutil
 import stat
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Final
+
+AnyPath = str | Path
+Paths = AnyPath | Sequence[AnyPath]
+"""One path, or some."""
 
 _MOVING: Final = "-moving"
 """Ends the name of a complete folder while its files are moved into the one that it replaces."""
@@ -40,6 +44,11 @@ _KINDS: Final = {
 }
 
 # --- Names and kinds ------------------------------------------------------------------------------
+
+
+def listed(paths: Paths) -> list[AnyPath]:
+    """Return one path or some as a list; a text is a path, not a sequence of letters."""
+    return [paths] if isinstance(paths, str | Path) else list(paths)
 
 
 def check_input(path: str | Path) -> None:
@@ -80,7 +89,7 @@ def own_name(path: Path, *, hidden: bool = True) -> Path:
 def own_names(path: Path, *, hidden: bool = True) -> list[Path]:
     """List the files and folders with an `own_name` of an output, the newest last.
 
-    A name may go on with a hyphen and a word.
+    A name may end in a hyphen and a word.
     """
     dot, stem, suffix = r"\." if hidden else "", re.escape(path.stem), re.escape(path.suffix)
     pattern = re.compile(rf"{dot}{stem}\.[0-9a-f]{{8}}\.partial{suffix}(-\w+)?")
@@ -185,7 +194,7 @@ class Content:
     """The files of a folder that are replaced; all others stay."""
 
     seal: str
-    """The file without which nobody takes the folder for whole."""
+    """The file that makes the folder a whole result."""
     names: Callable[[Path], frozenset[str]]
     """Reads the names of the files from a seal, which may be missing."""
 

@@ -1,9 +1,9 @@
 """A web server for the browsers of this machine's user alone.
 
-It listens on 127.0.0.1, and answers only who knows the token in its address. A page of another
-origin that asks the browser to ask, also under a name of its own for 127.0.0.1 (DNS rebinding), is
-refused by what the browser tells of it. It has no folder: whatever it gives comes from one
-function, so that no path of a request is ever a path on the disk.
+It listens on 127.0.0.1, and answers only requests that know the token in its address. Requests from
+pages of other origins are refused, also where such a page has a name of its own for 127.0.0.1 (DNS
+rebinding). It serves no folder: all content comes from one function, so that no path of a request
+is ever a path on the disk.
 
 The standard library's server is enough for that: few requests, no bodies, one function.
 """
@@ -16,7 +16,6 @@ import secrets
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Final
@@ -24,7 +23,7 @@ from urllib.parse import urlsplit
 
 HOST: Final = "127.0.0.1"
 _SEGMENT: Final = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{,199}")
-"""A part of a path: it begins with no dot, and is no longer than any name or number here."""
+"""A part of a path: it begins with no dot, and has at most 200 letters."""
 _HEADERS: Final = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
@@ -39,34 +38,31 @@ PAGE: Final = "text/html; charset=utf-8"
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is asked for."""
+    """What a browser asks for."""
 
     parts: tuple[str, ...]
-    """Of the path below the token, without empty ones."""
+    """Parts of the path below the token, without empty ones."""
     acts: bool
-    """Whether it asks that something be done (POST), not only for something to see."""
+    """Whether something is to be done (POST), not only read."""
     folder: bool
     """Whether the path ends with a slash."""
 
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """What is answered."""
+    """An answer."""
 
     content: bytes
-    """The body."""
     media: str = TEXT
-    """Its media type."""
     status: HTTPStatus = HTTPStatus.OK
-    """The status."""
     headers: Mapping[str, str] = field(default_factory=dict)
-    """More than every answer has."""
+    """Headers beside those of every answer."""
     kept: bool = False
-    """Whether the browser may keep it: under this address there will never be anything else."""
+    """Whether the browser may keep it, as the content of this address never changes."""
 
     @property
     def succeeded(self) -> bool:
-        """Whether it is what was asked for."""
+        """Whether it is the content that was asked for."""
         return self.status is HTTPStatus.OK
 
 
@@ -80,52 +76,30 @@ _REFUSED: Final = told(
     HTTPStatus.FORBIDDEN, "Refused: open the address that the terminal shows, token included."
 )
 _NO_BODY: Final = told(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "Nothing is taken here.")
-Answer = Callable[[Request], Response]
 
 
-class LocalServer:
-    """The server; what it gives comes from ``answer``, which several threads may call at once.
+class LocalServer(ThreadingHTTPServer):
+    """The server; several threads may call ``answer`` at once. An OSError if the port is taken.
 
     Parameters
     ----------
     answer
-        Returns what is answered.
+        Returns the response to a request.
     port
         0 for any that is free.
-
-    Raises
-    ------
-    OSError
-        If the port is taken.
     """
 
-    def __init__(self, answer: Answer, port: int = 0) -> None:
-        self._token: Final = secrets.token_urlsafe(24)
-        handler = partial(_Handler, answer=answer, token=self._token)
-        self._server: Final = _Server((HOST, port), handler)
+    daemon_threads = True
+
+    def __init__(self, answer: Callable[[Request], Response], port: int = 0) -> None:
+        self.answer: Final = answer
+        self.token: Final = secrets.token_urlsafe(24)
+        super().__init__((HOST, port), _Handler)
 
     @property
     def address(self) -> str:
         """The address to open, with the token."""
-        return f"http://{HOST}:{self._server.server_port}/{self._token}/"
-
-    def serve(self) -> None:
-        """Answer until the process is told to end, or `stop` is called by another thread."""
-        self._server.serve_forever(poll_interval=0.1)
-
-    def stop(self) -> None:
-        """Answer no more."""
-        self._server.shutdown()
-
-    def close(self) -> None:
-        """Close the socket, so that its port is free."""
-        self._server.server_close()
-
-
-class _Server(ThreadingHTTPServer):
-    """Takes connections, each in a thread."""
-
-    daemon_threads = True
+        return f"http://{HOST}:{self.server_port}/{self.token}/"
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Print the traceback of a failed connection, unless the browser has just left."""
@@ -140,18 +114,14 @@ class _Handler(BaseHTTPRequestHandler):
     server_version = "roadeval"
     sys_version = ""
     timeout = 30
-
-    def __init__(self, *args: object, answer: Answer, token: str) -> None:
-        self._answer = answer
-        self._token = token
-        super().__init__(*args)  # type: ignore[arg-type]
+    server: LocalServer
 
     def do_GET(self) -> None:
-        """Answer what only asks."""
+        """Answer a request that only reads."""
         self._respond(acts=False)
 
     def do_POST(self) -> None:
-        """Answer what asks that something be done."""
+        """Answer a request that something be done."""
         self._respond(acts=True)
 
     def log_message(self, *_: object) -> None:
@@ -164,13 +134,11 @@ class _Handler(BaseHTTPRequestHandler):
         elif not self._is_ours(acts=acts) or (request := self._request(acts=acts)) is None:
             self._send(_REFUSED)
         else:
-            self._send(self._answer(request))
+            self._send(self.server.answer(request))
 
     def _is_ours(self, *, acts: bool) -> bool:
         """Return whether the request comes from a page of this server, or from the user."""
-        server = self.server
-        assert isinstance(server, ThreadingHTTPServer)
-        hosts = {f"{name}:{server.server_port}" for name in (HOST, "localhost")}
+        hosts = {f"{name}:{self.server.server_port}" for name in (HOST, "localhost")}
         host, origin = self.headers.get("Host"), self.headers.get("Origin")
         site = self.headers.get("Sec-Fetch-Site", "same-origin")
         if host not in hosts or site not in ("same-origin", "none"):
@@ -181,7 +149,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Return what is asked for; None without the token."""
         path = urlsplit(self.path).path
         _, token, *parts = path.split("/") if path.startswith("/") else ("", "")
-        if not hmac.compare_digest(token.encode(), self._token.encode()):
+        if not hmac.compare_digest(token.encode(), self.server.token.encode()):
             return None
         folder = bool(parts) and parts[-1] == ""
         named = tuple(parts[:-1] if folder else parts)

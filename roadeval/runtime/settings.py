@@ -1,6 +1,6 @@
 """Settings: the fields of a dataclass, each with its meaning, its checks and the flag that sets it.
 
-A field's meaning is the string after it; range, checks and flag are metadata of its type.
+The meaning of a field is the string after it; range, checks and flag are metadata of its type.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ class Flag:
     """The flag of the command line that sets a field."""
 
     names: str
-    """As they are typed, with spaces between them; messages name the last one."""
+    """Separated by spaces; messages name the last one."""
     metavar: str = ""
-    """Stands for the value in the help; empty for a switch."""
+    """The placeholder of the value in the help; empty for a switch."""
     group: str = ""
-    """Its part of the help, where that is not the part of its table."""
+    """Its part of the help, if that differs from the part of its table."""
 
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """A function that a field's value passes through: it raises ValueError, or returns a value."""
+    """A function that checks a field's value: it returns the value, or raises a ValueError."""
 
     function: Callable[[Any], Any]
 
@@ -41,13 +41,13 @@ class Checked:
 
 
 def meanings(kind: type) -> Mapping[str, str]:
-    """Return the string that follows each field in the source of a class; none without a source."""
+    """Return the string after each field in the source of a class; none without a source."""
     return _meanings(kind.__module__).get(kind.__qualname__, {})
 
 
 @cache
 def _meanings(module: str) -> Mapping[str, Mapping[str, str]]:
-    """Return the strings that follow the fields of a module's classes."""
+    """Return the strings after the fields of a module's classes."""
     try:
         source = inspect.getsource(sys.modules[module])
     except (KeyError, OSError, TypeError):

@@ -1,8 +1,7 @@
 """Text from elsewhere, as names of topics and files, made safe to show.
 
-A name can hold what a terminal takes for a command, what turns the direction of the text around it,
-or a line break that begins a false message. Whatever shows text to a person passes it through
-`visible` as it goes out.
+A name can hold a terminal's command, a mark that turns the direction of the text around it, or a
+line break that begins a false message. All text for people passes through `visible` on its way out.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from typing import Final
 from unicodedata import category
 
 _JOINERS: Final = "\N{ZERO WIDTH NON-JOINER}\N{ZERO WIDTH JOINER}"
-"""Parts of words in some scripts, and of some emoji."""
+"""Letters of words in some scripts, and of some emoji."""
 _MARKUP: Final = frozenset("\\`*_[]<>|#&~$@")
 _URL: Final = re.compile(
     r"((?:[A-Za-z][A-Za-z0-9+.-]+:/(?:/|(?=[^\s/@]*@))|(?:https?|gs|s3):/))(\S*)"
@@ -22,15 +21,15 @@ _URL: Final = re.compile(
 """A URL in a text; also one that passed for a path and lost a slash."""
 
 UNENCODABLE: Final = "roadeval.visible"
-"""An error handler for streams: what their encoding lacks is written as `visible` writes it."""
+"""An error handler for streams: letters that the encoding lacks are escaped as by `visible`."""
 
 
 def visible(text: str) -> str:
-    r"""Return a line of text with what cannot be seen escaped as in JSON.
+    r"""Return a line of text with invisible characters escaped as in JSON.
 
-    That is: control characters, line breaks, marks of direction, characters that Unicode does not
-    define, and bytes of a file's name that are not UTF-8. Text without them is returned as it is;
-    in a string of JSON or TOML the result means the same.
+    These are control characters, line breaks, marks of direction, characters that Unicode does not
+    define, and bytes of a file's name that are not UTF-8. In a string of JSON or TOML the result
+    means the same.
 
     >>> print(visible("/camera\x1b[2J\nroadeval: done"))
     /camera\u001b[2J\nroadeval: done
@@ -46,7 +45,7 @@ def visible_lines(text: str) -> str:
 
 
 def elided(name: str, letters: int) -> str:
-    """Return a name, its middle left out where it is long: both ends tell names apart."""
+    """Return a name, shortened in the middle where it is long, as names differ at both ends."""
     name = visible(name)
     if len(name) <= letters:
         return name
@@ -55,7 +54,7 @@ def elided(name: str, letters: int) -> str:
 
 
 def without_secrets(text: str) -> str:
-    """Return text whose URLs have no user, password, query and fragment.
+    """Return text with the user, password, query and fragment of its URLs removed.
 
     The query of a signed URL is as good as a password.
 
@@ -72,7 +71,7 @@ def public_url(url: str) -> str:
 
 
 def _public(rest: str) -> str:
-    """Return what follows a URL's scheme without the parts that may be secret."""
+    """Return the part of a URL after its scheme without user, password, query and fragment."""
     host = re.split("[/?#]", rest, maxsplit=1)[0]
     if "@" not in host and re.search(r"^[^\[]*:(?!\d*\W*$)", host):
         # No port: a password with one of those letters in it, or the beginning of one.
@@ -90,7 +89,7 @@ def is_utf8(text: str) -> bool:
 
 
 def as_markdown(text: str) -> str:
-    r"""Return a line of text as Markdown that shows it as it is, whatever it looks like.
+    r"""Return a line of text as Markdown that shows it literally.
 
     >>> print(as_markdown("a*b"))
     a\*b

@@ -12,7 +12,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 AHEAD: Final = 2
-"""Items begun beyond those being worked on, so that no worker waits for the consumer."""
+"""Items in the queue beyond those in work, so that no worker waits for the consumer."""
 
 
 def ordered(work: Callable[[T], R], items: Iterable[T], jobs: int) -> Iterator[R]:
@@ -20,8 +20,8 @@ def ordered(work: Callable[[T], R], items: Iterable[T], jobs: int) -> Iterator[R
 
     The items are drawn as results are taken, at most ``jobs + 2`` ahead (back-pressure: memory
     does not grow with their number). The first exception, of ``work`` or of ``items``, is
-    raised in its place; what is in flight then is waited for, and nothing new is begun. The same
-    happens when the caller stops early.
+    raised at its place in the order, after the items in work have finished. The same happens when
+    the caller stops early.
     """
     with one_thread_each(), ThreadPoolExecutor(jobs, thread_name_prefix="roadeval") as pool:
         waiting: deque[Future[R]] = deque()
@@ -40,8 +40,8 @@ def ordered(work: Callable[[T], R], items: Iterable[T], jobs: int) -> Iterator[R
 def one_thread_each() -> Iterator[None]:
     """Keep BLAS and OpenCV from starting threads of their own while `ordered` runs.
 
-    Theirs would only compete with ours: on a busy machine BLAS threads that spin, waiting for
-    each other, made an item ten times slower.
+    They would compete with the threads here: on a busy machine BLAS threads that spin while they
+    wait for each other made an item ten times slower.
     """
     import cv2
     from threadpoolctl import threadpool_limits

@@ -3,9 +3,9 @@
 Names are imported when they are first used: a command that reads settings needs little else.
 """
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
-from roadeval.runtime.on_demand import on_demand
+from roadeval.runtime.imports import on_demand
 
 if TYPE_CHECKING:
     from roadeval.training.fitting import TrainingError, fit
@@ -21,14 +21,5 @@ __all__ = [
     "save_model",
 ]
 
-_MODULES: Final = {
-    "Model": "model",
-    "TrainingError": "fitting",
-    "TrainingSettings": "settings",
-    "fit": "fitting",
-    "load_model": "model",
-    "save_model": "model",
-}
-
 if not TYPE_CHECKING:  # there every name is known
-    __getattr__ = on_demand(__name__, _MODULES)
+    __getattr__ = on_demand(__name__)

@@ -29,18 +29,6 @@ def test_a_table_is_not_padded_on_the_right(shown):
     assert shown(table) == ["a long cell", "short", ""]
 
 
-def test_nor_is_a_bold_line_of_a_terminal(shown, monkeypatch):
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    table = Table.grid()
-    table.add_row("a long cell")
-    table.add_row("short", style="bold")
-    assert shown(table) == ["a long cell", "\x1b[1mshort\x1b[0m", ""]
-
-
-def test_spaces_inside_a_line_and_before_it_stay(shown):
-    assert shown("  a   b") == ["  a   b", ""]
-
-
 HOSTILE = "\x1b[2Ja\nb\u202e"
 ESCAPED = r"\u001b[2Ja\nb\u202e"
 

@@ -75,20 +75,6 @@ def test_the_traceback_is_there_for_who_asks(capsys, monkeypatch):
     assert lines(capsys)[0] == "Traceback (most recent call last):"
 
 
-def test_every_error_of_a_command_is_explained(capsys, monkeypatch):
-    def broken(**_):
-        raise RoadevalError("this log cannot be used")
-
-    monkeypatch.setattr(cli, "app", broken)
-    assert main([]) == 1
-    assert lines(capsys) == ["roadeval: error: this log cannot be used"]
-
-
-def test_the_line_is_coloured_at_a_terminal_only(capsys):
-    explain(RoadevalError("[bold]not markup[/bold]"))
-    assert lines(capsys) == ["roadeval: error: [bold]not markup[/bold]"]
-
-
 @pytest.mark.parametrize("length", [1, 1_000_000], ids=["buffered", "written"])
 def test_a_reader_of_stdout_who_has_gone_is_no_error(length, monkeypatch):
     program = (
@@ -109,12 +95,6 @@ def test_a_reader_of_stdout_who_has_gone_is_no_error(length, monkeypatch):
 def test_text_from_elsewhere_cannot_fake_a_line(capsys):
     explain(RoadevalError("/cam\x1b[2K\r\nroadeval: done: no image"))
     assert lines(capsys) == [r"roadeval: error: /cam\u001b[2K\r\nroadeval: done: no image"]
-
-
-def test_nor_can_it_in_a_traceback(capsys, monkeypatch):
-    monkeypatch.setenv("ROADEVAL_DEBUG", "1")
-    explain(RoadevalError("a\x1b[2K"))
-    assert "\x1b" not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

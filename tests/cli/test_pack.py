@@ -49,8 +49,3 @@ def test_masks_in_colours_are_packed_with_a_word_on_what_replay_needs(folder, ca
     (line,) = (line for line in capsys.readouterr().err.splitlines() if "replay" in line)
     assert "/truth/road holds the colours 128,64,128" in line
     assert line.endswith("with --road-color")
-
-
-def test_masks_that_replay_understands_are_packed_without_a_word(folder, capsys):
-    main(["pack", f"{folder}/imgs", "--truth", f"{folder}/masks", "-o", f"{folder}/d.mcap"])
-    assert "replay" not in capsys.readouterr().err

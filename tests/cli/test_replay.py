@@ -152,7 +152,7 @@ def test_a_value_that_cannot_be_is_named_by_its_flag(words, said, capsys):
 def test_in_a_file_a_setting_is_no_flag(tmp_path, capsys):
     (tmp_path / "c.toml").write_text("[labels]\nignore = [3]\n")
     assert main(["replay", "d.mcap", "--config", str(tmp_path / "c.toml")]) == 1
-    assert "[labels] labels.ignore needs labels.road" in capsys.readouterr().err
+    assert "c.toml: labels.ignore needs labels.road" in capsys.readouterr().err
 
 
 def test_a_file_that_is_called_like_a_setting_keeps_its_name(tmp_path, capsys, monkeypatch):
@@ -177,7 +177,7 @@ def test_every_option_s_words_are_a_setting_s_value(asked):
     [
         ("lower `training.frames` or `frames.scale`", "lower --train-frames or --scale"),
         ("name it with `topics.truth`.", "name it with --truth-topic."),
-        ("a.toml: [frames] every: bad", "a.toml: [frames] every: bad"),
+        ("a.toml: frames.every: bad", "a.toml: frames.every: bad"),
         ("output.mcap: No such file", "output.mcap: No such file"),
         ("`training.source` has no flag", "`training.source` has no flag"),
     ],

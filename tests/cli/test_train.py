@@ -68,4 +68,4 @@ def test_a_bad_setting_of_a_drive_is_named_with_its_file(tmp_path, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.toml").write_text("[labels]\nroad = [-1]")
     assert main(["train", "a.mcap", "-o", "m.model", "--drive", "a.mcap=a.toml"]) == 1
-    assert "error: a.toml a.mcap: [labels] road, item 1: must be" in capsys.readouterr().err
+    assert "error: a.toml a.mcap: labels.road, item 1: must be" in capsys.readouterr().err

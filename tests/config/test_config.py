@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from roadeval.config import PRESETS, ConfigError, RunConfig, Variant, configure, load_config
+from roadeval.config import ConfigError, RunConfig, configure, load_config
 from roadeval.config.settings import SECTIONS
 from roadeval.data import RESERVED
 from roadeval.pipeline.stages import STAGES
@@ -64,85 +64,60 @@ def test_a_file_may_start_from_a_preset(tmp_path):
     assert config.pipeline.settings["svm"].c == 3
 
 
-def test_the_caller_s_preset_is_used_where_the_file_names_none(tmp_path):
-    config = load_config(write(tmp_path, "[svm]\nc = 3"), preset="printed")
-    assert config.pipeline.settings["svm"].kernel == "linear"
-
-
 def test_a_nested_table_overrides_a_part(tmp_path):
     post = load_config(write(tmp_path, "[post.patch]\ntop = 0.6")).pipeline.settings["post"]
     assert post.patch.top == 0.6
     assert post.patch.bottom == RunConfig().pipeline.settings["post"].patch.bottom
 
 
-def test_overriding_twice_keeps_what_the_first_said():
-    config = configure({"frames": {"every": 2}}).override({"frames": {"max_frames": 7}})
-    assert (config.frames.every, config.frames.max_frames) == (2, 7)
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[shadow]\nring_width = 0", r"\[shadow\] ring_width: .* \(given: 0\)"),
-        ("[shadow]\nring = 1", r"\[shadow\] ring: there is no such setting; choose .*ring_width"),
+        ("[shadow]\nring_width = 0", r"shadow\.ring_width: .* \(given: 0\)"),
+        ("[shadow]\nring = 1", r"shadow\.ring: there is no such setting; choose .*ring_width"),
         ("[shadows]\nring_width = 1", r"\[shadows\] is no table here; choose .*shadow"),
-        ("shadow = 3", r"\[shadow\] must be a table"),
-        ("[svm]\ngamma = nan", r"\[svm\] gamma: .*finite"),
-        ("[svm]\nkernel = 'poly'", r"\[svm\] kernel: .*'rbf' or 'linear'"),
-        ("[post]\nelement = 4", r"\[post\] element: must be odd"),
-        ("[post.patch]\ntop = 0.99", r"\[post\] patch: top must lie above bottom"),
-        (
-            "[training]\nframes = 'ten'",
-            r"\[training\] frames: must be a whole number",
-        ),
-        ("[frames]\nevery = true", r"\[frames\] every: must be a whole number \(given: true\)"),
-        ("[frames]\nevery = '2'", r"\[frames\] every: must be a whole number"),
-        ("[frames]\nkeep_corrupt = 1", r"\[frames\] keep_corrupt: must be true or false"),
-        ("[labels]\nroad = 3", r"\[labels\] road: must be a list \(given: 3\)"),
-        ("[topics]\nimage = 3", r"\[topics\] image: must be text"),
+        ("shadow = 3", r"shadow: must be a table"),
+        ("[svm]\ngamma = nan", r"svm\.gamma: .*finite"),
+        ("[svm]\nkernel = 'poly'", r"svm\.kernel: .*'rbf' or 'linear'"),
+        ("[post]\nelement = 4", r"post\.element: must be odd"),
+        ("[post.patch]\ntop = 0.99", r"post\.patch: top must lie above bottom"),
+        ("[frames]\nevery = true", r"frames\.every: must be a whole number \(given: true\)"),
+        ("[labels]\nroad = 3", r"labels\.road: must be a list \(given: 3\)"),
         (f"[topics]\nimage = ['{'x' * 999}']", r"must be text \(given: \[\"x{58}\.\.\.\)$"),
-        ("[evaluation]\nwindow = 0", r"\[evaluation\] window: "),
-        ("[frames]\nscale = 1.5", r"\[frames\] scale: .*\(given: 1.5\)"),
+        ("[frames]\nscale = 1.5", r"frames\.scale: .*\(given: 1.5\)"),
         ("[frames]\nstart = 'noon'", "'noon' is no time"),
         ("[labels]\nroad = [3]\nignore = [3]", "label 3 cannot mean road and ignore at once"),
         (
             "[labels]\nroad_colors = [[1, 2]]",
-            r"\[labels\] road_colors, item 1: is too short",
+            r"labels\.road_colors, item 1: is too short",
         ),
-        ("[labels]\nroad = [3, -1]", r"\[labels\] road, item 2: .*\(given: -1\)"),
-        ("[training.patch]\nx = 1", r"\[training\] patch.x: .*choose bottom, bottom_width, top"),
+        ("[labels]\nroad = [3, -1]", r"labels\.road, item 2: .*\(given: -1\)"),
+        ("[training.patch]\nx = 1", r"training\.patch.x: .*choose bottom, bottom_width, top"),
         ("[frames]\nstart = 2013-05-01T12:00:00", "'2013-05-01T12:00:00' is no time"),
-        ("[training]\ngap = 100000000000000000000", r"\[training\] gap: must be at most"),
         ("chain = [['post']]", r"no stage \['post'\]"),
-        ("chain = [{a = 1}]", "no stage"),
-        ("frames = 3", r"\[frames\] must be a table"),
-        ("ring_width = 3", "ring_width stands in no table; put it below one of .*shadow"),
+        ("ring_width = 3", "ring_width is in no table; put it below one of .*shadow"),
         ("[output]\nsave = 'g.toml'", r"output.save g.toml: name a file that ends in .rrd"),
         (
             "[fleet]\nmax_failures = '101%'",
-            r"\[fleet\] max_failures: must be a number .*100%",
+            r"fleet\.max_failures: must be a number .*100%",
         ),
         (
             "[variants.n]\nchain = ['net', 'post']\n[variants.n.net]\nroad = ['a', -1]",
-            r"\[net\] road, item 2: must be at least 0",
+            r"net\.road, item 2: must be at least 0",
         ),
         ("[output]\nrecord = 'some'", "choose all, masks, worst:K, every:N or none"),
-        ("[run]\njobs = 0", r"\[run\] jobs: "),
         ("[output]\nmcap = 'm.mcap'\n[frames]\nscale = 0.5", "output.mcap and frames.scale do not"),
         ("[topics.masks]\ntruth = '/x'", "variant 'truth': the name is reserved"),
         ("variants = 3", r"\[variants\] must hold a table for each variant"),
         ("[variants]\nwide = 3", r"\[variants.wide\] must be a table"),
-        ("[variants.wide.svm]\nc = 0", r"\[variants.wide\]: \[svm\] c: "),
+        ("[variants.wide.svm]\nc = 0", r"\[variants.wide\]: svm\.c: "),
         ("[variants.wide.training]\nframes = 3", r"\[training\] holds for the whole run"),
-        ("[variants.wide.shadows]\nx = 3", r"\[shadows\] is no table here"),
         ("[variants.filtered]\nchain = ['svm', 'post']", "the name is taken"),
         ("chain = ['svm', 'blur', 'post']", r"no stage 'blur'; choose .*shadow"),
         ("chain = ['svm']", "chain must end with post"),
         ("chain = ['svm', 'svm', 'post']", "a stage can occur only once"),
-        ("chain = 'svm'", "chain must be a list"),
         ("preset = 'best'", r"preset: there is no 'best'; choose .*paper"),
-        ("preset = 3", "preset: there is no 3"),
-        ("x = ", "not valid TOML"),
+        ("x = ", "cannot be read as TOML"),
     ],
 )
 def test_a_bad_key_or_value_is_named(tmp_path, text, message):
@@ -166,7 +141,7 @@ def test_a_time_may_be_a_number_or_a_date(tmp_path, text, start):
 
 
 def test_a_missing_file_is_one_line(tmp_path):
-    with pytest.raises(ConfigError, match="no such configuration file"):
+    with pytest.raises(ConfigError, match="cannot be read: No such file"):
         load_config(tmp_path / "none.toml")
 
 
@@ -174,12 +149,6 @@ def test_a_file_that_is_no_text_is_one_line(tmp_path):
     (tmp_path / "c.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ConfigError, match="cannot be read"):
         load_config(tmp_path / "c.toml")
-
-
-def test_a_chain_may_leave_stages_out(tmp_path):
-    pipeline = load_config(write(tmp_path, 'chain = ["svm", "post"]')).pipeline
-    assert pipeline.chain == ("svm", "post")
-    assert not pipeline.has_filter
 
 
 def test_the_two_variants_differ_by_the_filter_alone():
@@ -243,12 +212,6 @@ def test_a_layout_lists_layers_and_masks_in_order():
         *("ndi", "shadow", "rings", "compensated"),
         *("distance", "similarity", "svm", "post", "boundary"),
     ]
-
-
-def test_a_variant_starts_from_its_own_preset():
-    variant = Variant.of("mine", {"preset": "gated", "svm": {"c": 3}})
-    assert variant.pipeline.chain == PRESETS["gated"]["chain"]
-    assert variant.pipeline.settings["svm"].c == 3
 
 
 def test_no_stage_is_called_like_a_table_of_the_run():

@@ -73,15 +73,15 @@ def test_a_later_entry_overrides_an_earlier_one():
             "[[drives]]\npath = 'a'\ntraining = {}",
             "[[drives]] a: [training] is no table here; choose frames, labels, masks, topics",
         ),
-        ("[[drives]]\npath = 'a'\nroad = 3", "[[drives]] a: road stands in no table"),
-        ("[[drives]]\npath = 'a'\nlabels = 3", "[[drives]] a: [labels] must be a table"),
+        ("[[drives]]\npath = 'a'\nroad = 3", "[[drives]] a: road is in no table"),
+        ("[[drives]]\npath = 'a'\nlabels = 3", "[[drives]] a: labels: must be a table"),
         (
             "[[drives]]\npath = 'a'\nlabels = {road = [3, -1]}",
-            "[[drives]] a: [labels] road, item 2: must be at least 0",
+            "[[drives]] a: labels.road, item 2: must be at least 0",
         ),
         (
             "[[drives]]\npath = 'a'\nlabels = {ignore = [3]}",
-            "[[drives]] a: [labels] labels.ignore needs labels.road",
+            "[[drives]] a: labels.ignore needs labels.road",
         ),
     ],
 )

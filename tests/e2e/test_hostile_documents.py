@@ -36,7 +36,7 @@ def test_toml_that_nests_too_deep_is_one_line(tmp_path, words, text):
     (tmp_path / "a.mcap").write_text("none")
     done = here(*words, cwd=tmp_path)
     assert done.returncode == 1
-    assert done.stderr.startswith("roadeval: error: it.toml: not valid TOML: ")
+    assert done.stderr.startswith("roadeval: error: it.toml: cannot be read as TOML: ")
     assert done.stderr.count("\n") == 1
 
 

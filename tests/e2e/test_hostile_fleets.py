@@ -132,7 +132,7 @@ def looked_into(fleet, *, trusted=False):
         }
         try:
             with serving([fleet], trust_sources=trusted) as server:
-                Thread(target=server.serve, daemon=True).start()
+                Thread(target=server.serve_forever, daemon=True).start()
                 origin = re.match(r"http://[^/]+", server.address)[0]
                 for address in ("0/", "0/drive/0/"):
                     status(f"{server.address}{address}")
@@ -140,7 +140,7 @@ def looked_into(fleet, *, trusted=False):
                 while (code := status(view, method="POST", Origin=origin)) == 202:
                     time.sleep(0.1)
                 runs["button"] = code
-                server.stop()
+                server.shutdown()
         except roadeval.RoadevalError:
             pass
     assert outside(fleet) == before

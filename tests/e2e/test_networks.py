@@ -60,7 +60,7 @@ def test_a_missing_network(refused, tmp_path):
 
 
 def test_missing_settings(refused, tmp_path):
-    assert "there is no such configuration file" in refused(tmp_path / "none.toml")
+    assert "cannot be read: No such file" in refused(tmp_path / "none.toml")
 
 
 def test_settings_that_name_no_network(refused, tmp_path):
@@ -69,12 +69,12 @@ def test_settings_that_name_no_network(refused, tmp_path):
 
 def test_a_setting_that_is_not_known(refused, tmp_path):
     said = refused(toml(tmp_path, 'file = "n.onnx"\nsise = [8, 8]\n'))
-    assert "mine.toml: [net] sise: there is no such setting" in said
+    assert "mine.toml: net.sise: there is no such setting" in said
 
 
 def test_a_value_that_cannot_be(refused, tmp_path):
     said = refused(toml(tmp_path, 'file = "n.onnx"\nresize = "squash"\n'))
-    assert "mine.toml: [net] resize" in said
+    assert "mine.toml: net.resize" in said
 
 
 def test_a_file_that_is_no_network(refused, drive):

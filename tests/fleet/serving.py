@@ -53,8 +53,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _content(self, kind: str, *, body: bool) -> None:
         start = self._start(kind)
-        tag = "0" * 32 if kind in ("encrypted", "changing") else hashlib.md5(CONTENT).hexdigest()
-        headers = {"ETag": f'"{tag}"'}
+        headers = {"ETag": f'"{hashlib.md5(CONTENT).hexdigest()}"'}
         if kind != "dateless":
             headers["Last-Modified"] = "Wed, 21 Oct 2015 07:28:00 GMT"
         if start:
@@ -74,8 +73,6 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.write(CONTENT[:HALF])
             self.wfile.flush()
             time.sleep(SLOW if kind == "stalled" else 0)
-        elif kind == "changing":
-            self.wfile.write(bytes([len(self.server.asked)]) + CONTENT[1:])
         else:
             self.wfile.write(CONTENT[start:])
 

@@ -71,24 +71,20 @@ def test_quoted_cells_and_empty_lines_are_read(entries):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("drives = [", r"fleet\.toml: not valid TOML"),
+        ("drives = [", r"fleet\.toml: cannot be read as TOML"),
         ("", r"fleet\.toml: names no drive"),
         ("drives = 3", "drives must be tables"),
         ("[frames]\nevery = 2", "frames: a manifest has only"),
         ("[[drives]]\ngroup = 'a'", "number 1: path must name a log"),
-        ("[[drives]]\npath = 3", "path must name a log"),
         (
             "[[drives]]\npath = 'a'\nwether = 'x'",
             "wether: there is no such key; choose path, group",
         ),
         ("[[drives]]\npath = 'a'\ntags = 'x'", "tags must be a table"),
         ("[[drives]]\npath = 'a'\ntags = { b = [1] }", "tag b: must be text, a number, true or"),
-        ("[[drives]]\npath = 'a'\ntags = { b = 2026-11-22 }", "tag b: must be text, a number"),
         ("[[drives]]\npath = 'a'\ntags = { 'b c' = 1 }", "tag 'b c': a tag's name is made of"),
-        ("[[drives]]\npath = 'a'\ngroup = []", "group: must be text"),
-        ("[[drives]]\npath = 'a'\nframes = 3", r"\[frames\] must be a table"),
-        ("[[drives]]\npath = 'a'\nframes = { evry = 3 }", r"\[frames\] evry: there is no such"),
-        ("[[drives]]\npath = 'a'\nframes = { every = 0 }", r"\[frames\] every: must be at least 1"),
+        ("[[drives]]\npath = 'a'\nframes = { evry = 3 }", r"frames\.evry: there is no such"),
+        ("[[drives]]\npath = 'a'\nframes = { every = 0 }", r"frames\.every: must be at least 1"),
         ("[[drives]]\npath = 'a'\ntraining = {}", "training: there is no such key"),
     ],
 )
@@ -103,17 +99,13 @@ def test_a_wrong_manifest_in_toml_is_named_in_one_line(entries, text, message):
     ("text", "message"),
     [
         ("", "no column is called 'path'; choose path, group, tag.KEY, topics.KEY"),
-        ("group\na", "no column is called 'path'"),
         ("path\n", "names no drive"),
         ("path,weather\na,rain", "no column can be called 'weather'; choose path, group, tag.KEY"),
-        ("path,tag\na,rain", "no column can be called 'tag'"),
         ("path,training.seed\na,1", "no column can be called 'training.seed'"),
         ("path,path\na,b", "two columns are called 'path'"),
         ("path,group\na", "line 2: 1 cells below 2 columns"),
-        ("path,group\na,b,c", "line 2: 3 cells below 2 columns"),
-        ("path,tag.b c\na,1", "tag 'b c'"),
         ("path,group\n,b", "line 2: path must name a log"),
-        ("path,frames.every\na,often", r"line 2, a: \[frames\] every: must be a whole number"),
+        ("path,frames.every\na,often", r"line 2, a: frames\.every: must be a whole number"),
         ('path\n"a', "cannot be read as CSV"),
     ],
 )
@@ -122,8 +114,3 @@ def test_a_wrong_manifest_in_csv_is_named_in_one_line(entries, text, message):
         entries(text, ".csv")
     assert "\n" not in str(error.value)
     assert "fleet.csv" in str(error.value)
-
-
-def test_a_table_in_another_encoding_is_refused(entries):
-    with pytest.raises(RoadevalError, match="cannot be read as CSV in UTF-8"):
-        entries("path\na.mcap\n", ".csv", "utf-16")

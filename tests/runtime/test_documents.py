@@ -13,7 +13,6 @@ from roadeval.runtime.documents import (
     read_json,
     read_toml,
 )
-from tests.fixtures.shared import shared
 
 BIG = "x" * (LONGEST + 1)
 MANY = "y" * 1_001
@@ -69,12 +68,6 @@ def test_toml_that_holds_too_much_is_refused_at_once(text, reason):
     with pytest.raises(ValueError, match=reason):
         read_toml(text)
     assert time.process_time() - begun < 2
-
-
-@pytest.mark.parametrize("path", shared("failures", "nested_arrays.toml"))
-def test_the_nested_arrays_that_were_a_defect_are_refused(path):
-    with pytest.raises(ValueError, match="nests more than 32"):
-        read_toml(path.read_text())
 
 
 def test_lines_are_texts_of_their_own():

@@ -16,13 +16,6 @@ def test_the_c_library_is_asked_where_it_can_be(monkeypatch):
     assert asked == [0]
 
 
-@pytest.mark.parametrize("platform", ["linux", "win32", "darwin"])
-def test_without_such_a_call_nothing_happens(platform, monkeypatch):
-    monkeypatch.setattr("ctypes.CDLL", lambda name: SimpleNamespace())
-    monkeypatch.setattr("sys.platform", platform)
-    memory.trim()
-
-
 @pytest.mark.parametrize(
     "error",
     [

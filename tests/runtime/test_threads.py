@@ -44,21 +44,8 @@ def test_an_error_in_the_work_stands_in_its_items_place():
         next(results)
 
 
-def test_an_error_among_the_items_comes_through():
-    def items():
-        yield 1
-        raise OSError("the log is gone")
-
-    with pytest.raises(OSError, match="the log is gone"):
-        list(ordered(lambda n: n, items(), jobs=2))
-
-
 def test_no_thread_outlives_a_caller_that_stops_early():
     results = ordered(lambda n: n, range(1000), jobs=3)
     next(results)
     results.close()
     assert not [t for t in threading.enumerate() if t.name.startswith("roadeval")]
-
-
-def test_nothing_in_gives_nothing_out():
-    assert list(ordered(lambda n: n, [], jobs=2)) == []

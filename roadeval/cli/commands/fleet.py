@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 import typer
 
-from roadeval.cli import arguments, console, messages
+from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
 from roadeval.cli.options import Given, takes
 
@@ -55,12 +55,11 @@ def fleet(
     then, and 4 where a --fail-if condition holds on a drive.
     """
     config = arguments.configuration(given)
-    from roadeval.cli import fleet_progress
     from roadeval.cli.screens import fleet as screen
     from roadeval.jobs.fleet import replay_fleet as run
     from roadeval.results.summary import json_text, plain
 
-    with fleet_progress.watched(quiet) as watch:
+    with progress.watched(quiet) as watch:
         found = run(
             paths,
             output,

@@ -50,7 +50,7 @@ def replay(
 def _spare_pandas(config: RunConfig) -> None:
     """Let the recording be made without pandas, unless code of somebody else may need it."""
     if streams.taken_over() and config.output.record != "none" and not config.others_code():
-        from roadeval.runtime.arrow import leave_out_pandas
+        from roadeval.runtime.imports import leave_out_pandas
 
         leave_out_pandas()
 

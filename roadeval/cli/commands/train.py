@@ -38,7 +38,7 @@ def train(
 
     The training frames are labelled ones, spread evenly over each drive. Where no drive has road
     truth, or training.source is "patch", the ground in front of the vehicle is taken for road.
-    Replay never evaluates the training frames, on whatever drive it meets them.
+    Replay never evaluates the training frames, on any drive.
     """
     config = arguments.configuration(given)
     from roadeval.jobs.train import train as run

@@ -31,7 +31,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.runtime.extensions import special
+from roadeval.runtime.imports import special
 
 Series = npt.NDArray[np.float64]
 

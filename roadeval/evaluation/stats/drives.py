@@ -40,7 +40,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.evaluation.stats.difference import Difference, holm
-from roadeval.runtime.extensions import special
+from roadeval.runtime.imports import special
 
 Values = npt.NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from roadeval.data.arrays import Flags, Floats, Indices, Masks, Values
 from roadeval.kernels import KERNELS
 from roadeval.kernels.plain import LEAVES
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
-from roadeval.runtime.extensions import whole
+from roadeval.runtime.imports import whole
 
 NODES: Final = LEAVES
 """Places for the nodes of a tree, which uses ``LEAVES - 1`` at most. Nothing exceeds the threshold

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from roadeval.data.arrays import Flags, Floats, Values
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
-from roadeval.runtime.extensions import whole
+from roadeval.runtime.imports import whole
 
 CODES: Final = 256
 """Equal steps of a feature between its outer percentiles; each has a rank."""

@@ -14,7 +14,7 @@ from roadeval.data import Layer, LayerKind, LayerSpec, Packed, mask_spec
 from roadeval.kernels import KERNELS
 from roadeval.pipeline.parameters import check_arrays, check_covariance, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, stage_settings
-from roadeval.runtime.extensions import special
+from roadeval.runtime.imports import special
 
 RIDGE: Final = 1.0
 """Added to the covariance's diagonal, in squared grey levels: a grey camera's covariance is

@@ -23,7 +23,7 @@ from roadeval.pipeline.colour_table import (
 )
 from roadeval.pipeline.parameters import GREATEST, check_arrays, check_range
 from roadeval.pipeline.stage import Output, Stage, TrainingSet, View, perfect_mask, stage_settings
-from roadeval.runtime.extensions import extension, whole
+from roadeval.runtime.imports import extension, whole
 
 SVM: Final = mask_spec("svm", "SVM: road (Eq. 16)")
 
@@ -52,7 +52,7 @@ class SvmSettings:
 
 # Of scipy.linalg's BLAS, which libsvm and liblinear call, the compiled part is enough.
 NOT_RUN: Final = ("sklearn", "sklearn.svm", "sklearn.utils", "scipy.linalg")
-"""The packages around scikit-learn's libsvm and liblinear: see `roadeval.runtime.extensions`."""
+"""The packages around scikit-learn's libsvm and liblinear: see `roadeval.runtime.imports`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

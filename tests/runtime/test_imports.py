@@ -1,15 +1,16 @@
-"""Compiled modules of a library without the library: each case in a process of its own."""
+"""Imports on demand, parts of libraries without the whole: each case in a process of its own."""
 
 import subprocess
 import sys
+from importlib import import_module
 
 import pytest
 
-from roadeval.runtime.extensions import extension, special
+from roadeval.runtime.imports import extension, special
 
 LIBSVM = """
 import sys
-from roadeval.runtime.extensions import extension
+from roadeval.runtime.imports import extension
 def libsvm():
     return extension(
         "sklearn.svm._libsvm", "sklearn", "sklearn.svm", "sklearn.utils", "scipy.linalg"
@@ -26,7 +27,9 @@ LEFT = "[name for name in list(sys.modules) if name.startswith(('sklearn', 'scip
 
 
 def run(code: str) -> str:
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    """Return what a process of its own prints."""
+    words = [sys.executable, "-c", code]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert not done.returncode, done.stderr
     return done.stdout.strip()
 
@@ -46,13 +49,6 @@ def test_a_library_that_was_there_before_stays_as_it_was():
     )
 
 
-def test_a_part_of_the_library_that_was_there_before_stays_as_it_was():
-    run(
-        f"import scipy.linalg as before\n{LIBSVM}\nmodule = libsvm()\n{LIBRARY}"
-        "assert before is sys.modules['scipy.linalg']"
-    )
-
-
 NEEDS_MORE = """
 import importlib.abc
 class OnlyAfter(importlib.abc.MetaPathFinder):
@@ -67,19 +63,6 @@ def test_where_the_module_cannot_be_had_alone_the_library_is_imported_with_it():
     run(f"{LIBSVM}{NEEDS_MORE}\nmodule = libsvm()\n{LIBRARY}")
 
 
-MEANWHILE = """
-class Name(str):
-    def startswith(self, _):
-        sys.modules["imported_meanwhile"] = sys
-        return False
-sys.modules[Name("of_another_thread")] = sys
-"""
-
-
-def test_another_thread_may_import_something_else_meanwhile():
-    assert run(f"{LIBSVM}{MEANWHILE}\nprint(libsvm().fit.__name__, {LEFT})") == "fit []"
-
-
 def test_what_is_not_there_is_told():
     with pytest.raises(ModuleNotFoundError, match="no_such"):
         extension("sklearn.svm.no_such", "sklearn", "sklearn.svm")
@@ -90,12 +73,6 @@ def test_special_functions_are_scipys_own(name):
     import scipy.special
 
     assert special(name) is getattr(scipy.special, name)
-
-
-def test_a_special_function_that_is_not_compiled_is_found_too():
-    import scipy.special
-
-    assert special("logsumexp") is scipy.special.logsumexp
 
 
 TOGETHER = """
@@ -115,10 +92,70 @@ begun.wait()
 
 def test_who_needs_all_of_the_library_waits_until_the_module_is_loaded():
     run(
-        f"{LIBSVM}{TOGETHER}\nfrom roadeval.runtime.extensions import whole\n"
+        f"{LIBSVM}{TOGETHER}\nfrom roadeval.runtime.imports import whole\n"
         f"assert whole('sklearn.svm').SVC\nalone.join()\nmodule = libsvm()\n{LIBRARY}"
     )
 
 
 def test_two_threads_that_need_the_module_both_get_all_of_it():
     run(f"{LIBSVM}{TOGETHER}\nassert libsvm().fit\nalone.join()")
+
+
+PACKAGES = (
+    "roadeval",
+    *(f"roadeval.{room}" for room in ("config", "logs", "recording", "training")),
+)
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_every_public_name_is_there_and_no_other(name):
+    package = import_module(name)
+    for each in package.__all__:
+        assert getattr(package, each) is not None
+    with pytest.raises(AttributeError, match=f"module '{name}' has no attribute 'nothing'"):
+        package.nothing  # noqa: B018
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_a_package_by_itself_imports_no_library(name):
+    code = f"import sys, {name}; print({{'numpy', 'pydantic', 'rerun'}} & {{*sys.modules}} or '')"
+    assert not run(code)
+
+
+def test_results_are_compared_without_rerun_and_without_matplotlib():
+    libraries = "{'rerun', 'matplotlib'}"
+    assert not run(
+        f"import sys, roadeval.jobs.compare; print({libraries} & {{*sys.modules}} or '')"
+    )
+
+
+LEFT_OUT = "import sys; from roadeval.runtime.imports import leave_out_pandas; leave_out_pandas()\n"
+
+
+def test_arrays_lists_and_recordings_import_no_pandas(tmp_path):
+    code = f"""
+import numpy as np, pyarrow as pa, rerun as rr
+pa.array(np.arange(3)), pa.array(["a", None]), pa.scalar(1.5), pa.table({{"a": [1]}})
+recording = rr.RecordingStream("test")
+recording.save({str(tmp_path / "a.rrd")!r})
+recording.log("a", rr.Scalars(1.0))
+recording.log("b", rr.AnyValues(c="d", e=2))
+print("pandas" in sys.modules)
+"""
+    assert run(LEFT_OUT + code) == "False"
+
+
+def test_pandas_itself_is_imported_and_converts_both_ways(tmp_path):
+    code = f"""
+import pandas as pd, pyarrow as pa
+frame = pd.DataFrame({{"a": [1.5, None], "b": ["x", None]}})
+frame.to_parquet({str(tmp_path / "a.parquet")!r})
+print(pd.read_parquet({str(tmp_path / "a.parquet")!r}).equals(frame))
+print(pa.Table.from_pandas(frame).to_pandas().equals(frame))
+"""
+    assert run(LEFT_OUT + code).split() == ["True", "True"]
+
+
+def test_pandas_that_is_there_already_is_found():
+    code = 'import pyarrow as pa\nprint(pa.array(pd.Series([1.0, float("nan")])).null_count)'
+    assert run(f"import pandas as pd; {LEFT_OUT}{code}") == "1"
