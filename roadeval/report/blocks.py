@@ -7,7 +7,7 @@ text, never markup: the name of a log, a topic or a path is printed as it is.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Final
 
@@ -157,15 +157,34 @@ class Table(Block):
     small: bool = False
     """Whether it is set in small type."""
 
-    def markdown(self) -> list[str]:
-        """Return its lines in Markdown."""
-        places = range(len(self.columns))
-        sides = ["---" if place in self.text_columns else "---:" for place in places]
-        rows = [
-            [as_markdown(cell.text if isinstance(cell, Cell) else cell) for cell in row]
-            for row in self.rows
-        ]
-        return [f"| {' | '.join(cells)} |" for cells in (self.columns, sides, *rows)]
+
+def markdown(blocks: Iterable[Block]) -> str:
+    """Return headings, texts, lists and tables as Markdown; other blocks are left out."""
+    lines: list[str] = []
+    for block in blocks:
+        match block:
+            case Heading():
+                lines += [f"{'#' * (block.level + 1)} {as_markdown(block.text)}", ""]
+            case Text():
+                lines += [as_markdown(block.text), ""]
+            case BulletList():
+                lines += [f"**{as_markdown(block.title)}**", ""]
+                lines += [*(f"- {as_markdown(item)}" for item in block.items), ""]
+            case Table():
+                lines += [as_markdown(block.caption), ""] if block.caption else []
+                lines += [*_table_lines(block), ""]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _table_lines(table: Table) -> list[str]:
+    sides = ["---" if p in table.text_columns else "---:" for p in range(len(table.columns))]
+    rows = [[as_markdown(plain(cell)) for cell in row] for row in table.rows]
+    return [f"| {' | '.join(cells)} |" for cells in (table.columns, sides, *rows)]
+
+
+def plain(cell: Cell | str) -> str:
+    """Return the text of a table's cell."""
+    return cell.text if isinstance(cell, Cell) else cell
 
 
 # --- Pictures -------------------------------------------------------------------------------------

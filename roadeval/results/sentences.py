@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from enum import Enum, auto
 from typing import Any, Final
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED
-from roadeval.data.words import in_percent, plain_points
+from roadeval.data.words import in_percent, interval, plain_points
 from roadeval.evaluation.score import TESTED, Effect, final_stages
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference
@@ -133,6 +134,19 @@ def _count(count: int | None, noun: str) -> str:
 def stands(p_holm: float | None, confidence: float) -> bool:
     """Return whether a difference stands after Holm's correction."""
     return p_holm is not None and p_holm < 1 - confidence
+
+
+def marked_interval(found: Difference | Mapping[str, Any]) -> str:
+    """Return the interval of a difference, with a mark where it excludes 0 after correction.
+
+    Parameters
+    ----------
+    found
+        A difference, or one as in ``summary.json``.
+    """
+    own = asdict(found) if isinstance(found, Difference) else found
+    mark = f" {MARK}" if stands(own["p_holm"], own["confidence"]) else ""
+    return interval(own["low"], own["high"]) + mark
 
 
 def correction(differences: Iterable[Difference | Mapping[str, Any]]) -> str:

@@ -168,7 +168,7 @@ def test_fleets_are_written_as_files_too(fleets, tmp_path):
     document, markdown, content, _ = (name.read_bytes() for name in names)
     told = json.loads(content)
     assert told["verdict"] == json.loads(here("compare", *fleets, "--json").stdout)["verdict"]
-    assert "**FAIL**" in markdown.decode()
+    assert "**Limits exceeded**" in markdown.decode()
     assert "Which drives changed" in text(document)
 
 

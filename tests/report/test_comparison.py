@@ -53,12 +53,12 @@ def over_drive():
     return [Chart("ERR", ChartKind.LINES, series)]
 
 
-def test_markdown_tells_failures_first_and_keeps_names_from_breaking_the_table():
+def test_markdown_has_exceeded_limits_first_and_names_do_not_break_its_tables():
     lines = markdown(a_comparison(), LIMITS).splitlines()
-    assert f"- **FAIL**: {FAILED}".replace("|", "\\|").replace(">", "\\>") in lines
-    assert (
-        "| new\\|er | filtered | post | 10.00 | 11.20 | +1.20 | +0.50 to +2.00 | +1.20 | +1.20 |"
-    ) in lines
+    exceeded = lines.index("**Limits exceeded**")
+    assert lines[exceeded + 2] == f"- {FAILED}".replace("|", "\\|").replace(">", "\\>")
+    assert "new\\|er against base" in lines[exceeded:]
+    assert "| filtered | post | ERR | 10.00 | 11.20 | +1.20 | +0.50 to +2.00 |" in lines
     assert "| new\\|er | filtered | 7 | 0.000 s | 10.00 | 40.00 | +30.00 |" in lines
     assert "| --- | --- | ---: | --- | ---: | ---: | ---: |" in lines
     assert "- the \\<gap\\> does not say which log it is of: nothing is subtracted" in lines
@@ -70,7 +70,7 @@ def test_the_document_has_the_numbers_and_the_frames():
         assert wanted in words
 
 
-def test_limits_that_are_exceeded_and_kept_are_told_apart():
+def test_exceeded_and_kept_limits_are_two_lists():
     lists = blocks(BulletList, a_comparison())
     assert [(each.title, list(each.items)) for each in lists[:2]] == [
         ("Limits exceeded", [FAILED]),
@@ -78,13 +78,31 @@ def test_limits_that_are_exceeded_and_kept_are_told_apart():
     ]
 
 
-def test_a_rule_stands_where_another_result_begins_and_its_name_only_where_it_is_needed():
-    rows = CHANGE, replace(CHANGE, stage="svm"), replace(CHANGE, result="newest")
-    table, _ = blocks(Table, a_comparison(changes=rows))
-    assert table.breaks == [2]
-    assert table.columns[:3] == ["result", "variant", "stage"]
-    table, _ = blocks(Table, a_comparison(replace(CHANGE, result="filtered")))
-    assert table.columns[:2] == ["variant", "stage"]
+def test_each_result_has_a_table_of_every_rate_of_final_masks_and_of_err_of_others():
+    svm = replace(CHANGE, stage="svm", final=False)
+    rows = svm, CHANGE, replace(CHANGE, variant="wide"), replace(CHANGE, result="newest")
+    first, second, *_ = blocks(Table, a_comparison(changes=rows))
+    assert [each.caption for each in (first, second)] == [
+        "new|er against base",
+        "newest against base",
+    ]
+    assert [row[:3] for row in plain_rows(first)] == [
+        ["filtered", "svm", "ERR"],
+        ["", "post", "ERR"],
+        ["", "", "FPR"],
+        ["", "", "FNR"],
+        ["wide", "post", "ERR"],
+        ["", "", "FPR"],
+        ["", "", "FNR"],
+    ]
+    assert first.breaks == [4]
+
+
+def test_the_variants_of_a_single_result_are_in_one_table():
+    rows = [replace(CHANGE, result=name, variant=name) for name in ("filtered", "wide")]
+    table, *_ = blocks(Table, a_comparison(changes=rows))
+    assert table.caption == "against base"
+    assert {row[0] for row in table.rows} == {"filtered", "wide", ""}
 
 
 def test_it_opens_with_the_changed_settings():
@@ -105,10 +123,10 @@ def test_different_drives_are_laid_side_by_side():
         "variant": "filtered",
         "stage": "post",
         "frames": "12",
-        "ERR": "11.20",
-        "FPR": "11.20",
-        "FNR": "11.20",
-        "IoU": "11.20",
+        "ERR %": "11.20",
+        "FPR %": "11.20",
+        "FNR %": "11.20",
+        "IoU %": "11.20",
     }
     assert table.text_columns == [0, 1, 2]
     words = text(pdf(document(comparison, (), [])))
@@ -171,13 +189,13 @@ def made_of(kind):
     return [b for b in document(COMPARED, JUDGED, []).blocks if isinstance(b, kind)]
 
 
-def test_over_drives_what_stands_is_marked_and_the_drives_are_counted():
+def test_over_drives_the_drives_are_counted_and_what_is_sure_is_marked():
     table = made_of(Table)[0]
-    rows = plain_rows(table)
-    assert table.columns[:5] == ["result", "variant", "stage", "drives", "base"]
-    assert [(row[1], row[3], row[7].endswith(" *")) for row in rows] == [
-        ("filtered", "30", True),
-        ("unfiltered", "30", False),
+    assert table.caption == "new against base: 30 drives in common"
+    rows = [row for row in plain_rows(table) if row[2] == "ERR"]
+    assert [(row[0], row[-1].endswith(" *")) for row in rows] == [
+        ("filtered", True),
+        ("unfiltered", False),
     ]
 
 
@@ -191,7 +209,7 @@ def test_drives_that_changed_are_listed_the_surest_first():
 
 
 def test_the_document_has_the_plots_and_what_changed_by_tag():
-    assert [b.title for b in made_of(BulletList)] == ["Limits exceeded", "Limits kept"]
+    assert [b.title for b in made_of(BulletList)] == ["Limits exceeded", "Limits kept", "Where"]
     assert len(made_of(Figure)) == 2
     headings = [b.text for b in made_of(Heading)]
     assert "Which drives changed" in headings
@@ -201,8 +219,8 @@ def test_the_document_has_the_plots_and_what_changed_by_tag():
     assert "Holm's correction for the 2 differences of ERR" in words
 
 
-def test_markdown_names_the_drives():
+def test_markdown_names_the_drives_that_changed():
     lines = markdown(COMPARED, JUDGED).splitlines()
-    assert "Drives that changed:" in lines
+    assert "### Drives on which filtered changed, the surest first" in lines
     assert "| drive\\_27 |" in "\n".join(lines)
-    assert f"- **FAIL**: {judged(JUDGED[0])}".replace(">", "\\>") in lines
+    assert f"- {judged(JUDGED[0])}".replace(">", "\\>") in lines

@@ -8,8 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.cli.screens import tables
-from roadeval.cli.screens.tables import Row, interval, percent, points
+from roadeval.data.words import interval, percent, points
 from roadeval.evaluation.metrics import FULL
+from roadeval.report.blocks import Table
 from roadeval.results.fleet.record import DAMAGED, FAILED, SCORED, UNSCORED
 
 if TYPE_CHECKING:
@@ -53,33 +54,31 @@ def show(outcome: FleetOutcome, out: Console) -> None:
 
 def show_rates(rates: Sequence[Mapping[str, Any]], out: Console) -> None:
     """Print the rates of the final masks: the drives' means."""
-    out.print("Final masks: the mean of the drives' mean rates")
     rows = [
-        Row([row["variant"], str(row["drives"]), *(percent(row[rate]) for rate in RATES)])
+        [row["variant"], str(row["drives"]), *(percent(row[rate]) for rate in RATES)]
         for row in rates
     ]
-    tables.show(("variant",), ("drives", *RATES.values()), rows, out)
+    caption = "Final masks: the mean of the drives' mean rates"
+    tables.show_table(Table(["variant", "drives", *RATES.values()], rows, caption=caption), out)
 
 
 def show_effects(effects: Sequence[Mapping[str, Any]], out: Console) -> None:
     """Print the differences of ERR over drives."""
     tested = [each for each in effects if each["metric"] == TESTED]
     (confidence,) = {each["confidence"] for each in tested}
-    out.print(f"Change of ERR in percentage points, over drives ({confidence:.0%} interval)")
-    titles = ("mean", "interval", "worse", "better", "pooled")
     rows = [
-        Row(
-            [
-                f"{each['variant']} - {each['base']}",
-                points(each["mean"]),
-                interval(each["low"], each["high"]),
-                *("-" if each[name] is None else str(each[name]) for name in ("worse", "better")),
-                points(each["pooled"]),
-            ]
-        )
+        [
+            f"{each['variant']} - {each['base']}",
+            points(each["mean"]),
+            interval(each["low"], each["high"]),
+            *("-" if each[name] is None else str(each[name]) for name in ("worse", "better")),
+            points(each["pooled"]),
+        ]
         for each in tested
     ]
-    tables.show(("variants",), titles, rows, out)
+    titles = ["variants", "mean", "interval", "worse", "better", "pooled"]
+    caption = f"Change of ERR in percentage points, over drives ({confidence:.0%} interval)"
+    tables.show_table(Table(titles, rows, caption=caption), out)
 
 
 def problems(outcome: FleetOutcome) -> Iterator[str]:

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 from roadeval.cli.screens import tables
-from roadeval.cli.screens.tables import percent
+from roadeval.data.words import percent
+from roadeval.report.blocks import Table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,9 +25,8 @@ def show(fleet: str, found: Sequence[FleetFrame], out: Console) -> None:
     out.print()
     rates = list(found[0].rates)
     titles = (*(f"{rate} %" for rate in rates), *LIGHT.values(), "kept")
-    table = tables.grid(("", "drive"), ("frame", *titles))
-    for each in found:
-        table.add_row(
+    rows = [
+        [
             str(each.rank),
             each.drive,
             str(each.frame),
@@ -34,8 +34,10 @@ def show(fleet: str, found: Sequence[FleetFrame], out: Console) -> None:
             *(percent(each.light[name], 0) for name in ("luminance", "shadow")),
             _sun(each.light["sun"]),
             "yes" if each.recording else "-",
-        )
-    out.print(table)
+        ]
+        for each in found
+    ]
+    tables.show_table(Table(["", "drive", "frame", *titles], rows, text_columns=(0, 1)), out)
     if not all(each.recording for each in found):
         out.print()
         out.print("Where no recording was kept, --worst K --trust-sources replays the drive first.")

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.cli import console
 from roadeval.cli.screens import seeds, tables, thresholds
-from roadeval.cli.screens.tables import Row, marked, percent, points
 from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
-from roadeval.data.words import defined
+from roadeval.data.words import defined, percent, points
 from roadeval.evaluation.metrics import FULL, SHORT
 from roadeval.evaluation.score import final_stages
-from roadeval.results.sentences import correction
+from roadeval.report.blocks import Cell, Table
+from roadeval.results.sentences import correction, marked_interval
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -59,15 +59,13 @@ def accounting(summary: Mapping[str, Any]) -> str:
 
 
 def _show_scores(summary: Mapping[str, Any], out: Console) -> None:
-    tables.show(("variant", "stage"), ("frames", *RATES.values()), scores(summary["totals"]), out)
+    tables.show_table(scores(summary["totals"]), out)
     out.print()
     out.print(best(summary["totals"]))
     repeats = summary.get("seeds", {})
     if pairs := dict(_pairs(summary)):
         out.print()
-        confidence = percent(next(iter(pairs.values()))["ERR"]["confidence"], 0)
-        titles = ("ERR, pp", f"{confidence} % interval", *(f"{rate}, pp" for rate in OTHERS))
-        tables.show(("final masks",), titles, differences(pairs), out)
+        tables.show_table(differences(pairs), out)
         out.print(correction(by_rate["ERR"] for by_rate in pairs.values()))
         for rate, told in seeds.differences(repeats).items():
             out.print(f"{FILTERED} - {UNFILTERED}, {rate}, pp, {told}")
@@ -85,23 +83,20 @@ def _why_nothing(frames: Mapping[str, Any]) -> str:
     return "no frame that was read has road truth"
 
 
-def scores(totals: Totals) -> list[Row]:
-    """Return a row of rates for each variant and stage; the best final mask's is bold."""
+def scores(totals: Totals) -> Table:
+    """Tabulate the rates of each variant and stage; the best final mask's are bold."""
     winner = _lowest(totals)
-    return [
-        Row(
-            [
-                "" if place else variant,
-                stage,
-                str(total["frames"]),
-                *(percent(total.get(name)) for name in RATES),
-            ],
-            bold=(variant, stage) == (winner, FINAL_STAGE),
-            ends=place == len(stages) - 1,
-        )
-        for variant, stages in totals.items()
-        for place, (stage, total) in enumerate(stages.items())
-    ]
+    rows: list[list[Cell]] = []
+    breaks = []
+    for variant, stages in totals.items():
+        breaks.append(len(rows))
+        for place, (stage, total) in enumerate(stages.items()):
+            texts = ["" if place else variant, stage, str(total["frames"])]
+            texts += [percent(total.get(name)) for name in RATES]
+            best = (variant, stage) == (winner, FINAL_STAGE)
+            rows.append([Cell(text, bold=best) for text in texts])
+    titles = ["variant", "stage", "frames", *RATES.values()]
+    return Table(titles, rows, text_columns=(0, 1), breaks=breaks)
 
 
 def best(totals: Totals) -> str:
@@ -122,19 +117,21 @@ def _pairs(summary: Mapping[str, Any]) -> Iterator[tuple[str, ByRate]]:
         yield f"{variant} - {BASELINE}", difference
 
 
-def differences(pairs: Mapping[str, ByRate]) -> list[Row]:
-    """Return a row for each pair: the difference of ERR with its interval, and those of others."""
-    return [
-        Row(
+def differences(pairs: Mapping[str, ByRate]) -> Table:
+    """Tabulate for each pair the difference of ERR with its interval, and those of others."""
+    confidence = percent(next(iter(pairs.values()))["ERR"]["confidence"], 0)
+    return Table(
+        ["final masks", "ERR, pp", f"{confidence} % interval", *(f"{rate}, pp" for rate in OTHERS)],
+        [
             [
                 name,
                 points(by_rate["ERR"]["mean"]),
-                marked(by_rate["ERR"]),
+                marked_interval(by_rate["ERR"]),
                 *(points(by_rate[rate]["mean"]) for rate in OTHERS),
             ]
-        )
-        for name, by_rate in pairs.items()
-    ]
+            for name, by_rate in pairs.items()
+        ],
+    )
 
 
 def _show_files(outcome: Outcome, out: Console) -> None:

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from roadeval.cli.screens import tables
-from roadeval.cli.screens.tables import Row, interval, percent
 from roadeval.data import FINAL_STAGE
+from roadeval.data.words import interval, percent
+from roadeval.report.blocks import Table
 from roadeval.results.seeds import Spread, in_words, seeds_in_words, sentence, spreads
 
 if TYPE_CHECKING:
@@ -31,11 +32,11 @@ def show(seeds: Mapping[str, Any], titles: Mapping[str, str], out: Console) -> N
         "to the greatest)"
     )
     rows = [
-        Row([variant, *(_cell(own.get(rate)) for rate in titles)])
+        [variant, *(_cell(own.get(rate)) for rate in titles)]
         for variant, stages in seeds["totals"].items()
         for own in (spreads(stages[FINAL_STAGE]),)
     ]
-    tables.show(("variant",), [*titles.values()], rows, out)
+    tables.show_table(Table(["variant", *titles.values()], rows), out)
     out.print()
     out.print(sentence(seeds))
 
@@ -44,9 +45,10 @@ def differences(seeds: Mapping[str, Any]) -> dict[str, str]:
     """Return by rate from where to where the filter's effect goes; nothing without seeds."""
     by_rate = spreads(seeds.get("difference", {}).get(FINAL_STAGE, {}))
     return {
-        rate: f"{seeds_in_words(seeds)}: {interval(spread.least, spread.greatest)}"
+        rate: f"{seeds_in_words(seeds)}: {tables.ascii_of(told)}"
         for rate, spread in by_rate.items()
         if spread
+        for told in [interval(spread.least, spread.greatest)]
     }
 
 

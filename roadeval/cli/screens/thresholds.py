@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from roadeval.cli.screens import tables
-from roadeval.cli.screens.tables import Row, percent
+from roadeval.data.words import percent
+from roadeval.report.blocks import Table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,8 +25,9 @@ COLUMNS: Final = {
 def show(curves: Mapping[str, Mapping[str, Mapping[str, Any]]], out: Console) -> None:
     """Print a row for each variant and stage that says how probable road is."""
     rows = [
-        Row([variant, stage, *(percent(own[name]) for name in COLUMNS)])
+        [variant, stage, *(percent(own[name]) for name in COLUMNS)]
         for variant, stages in curves.items()
         for stage, own in stages.items()
     ]
-    tables.show(("over thresholds", "stage"), [*COLUMNS.values()], rows, out)
+    titles = ["over thresholds", "stage", *COLUMNS.values()]
+    tables.show_table(Table(titles, rows, text_columns=(0, 1)), out)

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from roadeval.data import BASELINE
-from roadeval.data.words import DASH, defined, interval, listing, number, percent, points
+from roadeval.data.words import DASH, defined, listing, number, percent, points
 from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import Block, Cell, Figure, Heading, Table, Text
 from roadeval.report.charts.differences import difference
 from roadeval.report.findings import Findings, PairedComparison
 from roadeval.report.sections.common import sampled_frames, variant_cell
-from roadeval.results.sentences import MARK, correction, stands
+from roadeval.results.sentences import correction, marked_interval
 
 
 def section(findings: Findings) -> Iterator[Block]:
@@ -62,7 +62,7 @@ def _differences(findings: Findings, pair: PairedComparison) -> Table:
                 rate,
                 *(percent(findings.total(name)[rate]) for name in names),
                 Cell(points(change["mean"]), bold=True),
-                _interval(change),
+                marked_interval(change),
                 number(change["units"]),
                 DASH if (worth := change["effective"]) is None else f"{worth:.0f}",
             ]
@@ -73,12 +73,6 @@ def _differences(findings: Findings, pair: PairedComparison) -> Table:
             "and percentage points with their interval."
         ),
     )
-
-
-def _interval(change: Mapping[str, Any]) -> str:
-    """Return an interval, with a mark where the difference stands after correction."""
-    mark = f" {MARK}" if stands(change["p_holm"], change["confidence"]) else ""
-    return interval(change["low"], change["high"]) + mark
 
 
 def _method(change: Mapping[str, Any]) -> str:
@@ -153,7 +147,7 @@ def _against_baseline(findings: Findings, blind: Sequence[PairedComparison]) -> 
                 variant_cell(pair.treated, [*findings.finals]),
                 percent(findings.total(pair.treated)["ERR"]),
                 Cell(points((change := pair.differences["ERR"])["mean"]), bold=True),
-                _interval(change),
+                marked_interval(change),
                 number(int((pair.frames["ERR"] < 0).sum())),
                 number(int((pair.frames["ERR"] > 0).sum())),
             ]

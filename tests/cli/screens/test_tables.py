@@ -1,20 +1,20 @@
-"""Tables and numbers for the terminal."""
+"""Tables on a terminal."""
 
 import io
-import math
 
 from rich.console import Console
 
-from roadeval.cli.screens import tables
-from roadeval.cli.screens.tables import Row
+from roadeval.cli.screens.tables import show_table
+from roadeval.data.words import DASH, MINUS
+from roadeval.report.blocks import Cell, Table
 
-NUMBERS = ("ERR %", "FPR %", "pooled ERR %")
-ROWS = [Row(["filtered", "post", "1.00", "2.00", "3.00"])]
+TITLES = ["variant", "stage", "ERR %", "FPR %", "pooled ERR %"]
+ROW = ["filtered", "post", "1.00", Cell("2.00", bold=True), "3.00"]
 
 
-def printed(width, numbers=NUMBERS, rows=ROWS):
+def printed(width, row=ROW):
     out = Console(file=io.StringIO(), width=width)
-    tables.show(("variant", "stage"), numbers, rows, out)
+    show_table(Table(TITLES, [row], text_columns=(0, 1)), out)
     return [line.split() for line in out.file.getvalue().splitlines() if line and "─" not in line]
 
 
@@ -35,18 +35,15 @@ def test_columns_that_do_not_fit_stand_below_with_the_names_again():
 
 
 def test_a_long_name_is_folded_rather_than_parting_the_numbers():
-    rows = [Row(["a-network-with-a-name-that-is-longer-than-others", *ROWS[0].cells[1:]])]
-    assert ["variant", "stage", "ERR", "%", "FPR", "%", "pooled", "ERR", "%"] in printed(
-        60, rows=rows
-    )
+    row = ["a-network-with-a-name-that-is-longer-than-others", *ROW[1:]]
+    assert ["variant", "stage", "ERR", "%", "FPR", "%", "pooled", "ERR", "%"] in printed(60, row)
 
 
 def test_numbers_are_ascii_alone():
-    shown = (
-        tables.percent(None),
-        tables.percent(0.5),
-        tables.points(-0.125),
-        tables.interval(-0.01, math.nan),
-        tables.interval(-0.02, -0.01),
-    )
-    assert shown == ("-", "50.00", "-12.50", "none given", "-2.00 to -1.00")
+    out = Console(file=io.StringIO(), width=80)
+    rows = [["a", f"{MINUS}2.00 to {MINUS}1.00 *"], ["b", DASH]]
+    show_table(Table(["", "interval"], rows), out)
+    assert [line.split() for line in out.file.getvalue().splitlines()[2:]] == [
+        ["a", "-2.00", "to", "-1.00", "*"],
+        ["b", "-"],
+    ]
