@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from roadeval.data import BASELINE
-from roadeval.data.rows import joined
 from roadeval.errors import RoadevalError
-from roadeval.evaluation import comparison, score
+from roadeval.evaluation import comparison
 from roadeval.evaluation.comparison import (
     Comparison,
     Condition,
@@ -24,27 +19,20 @@ from roadeval.evaluation.comparison import (
     judge,
     one_drive,
 )
-from roadeval.evaluation.score import TESTED
 from roadeval.evaluation.settings import settings_of
 from roadeval.jobs.result import Result
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.comparison import as_dict, judged, warnings
-from roadeval.results.rows import as_arrays, window_rows
 from roadeval.results.summary import json_text, plain
 from roadeval.runtime.files import Paths, listed
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     from roadeval.report.blocks import Document
-    from roadeval.report.chart import Chart
     from roadeval.report.sections.browse import BrowsedFrames
 
 Inspect = Callable[[Path, int], str]
 """Returns the command that opens a frame of a recording."""
-Writer = Callable[["Compared", Paper, Inspect | None], bytes]
-"""Returns a comparison as the content of a file."""
-ROWS: Final = 60
-"""Points of the figure over the drive, at most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,24 +45,6 @@ class Compared:
     """The results with the one drive that is compared; none where several are."""
     recordings: Mapping[str, Path]
     """By the results' labels; a folder has none."""
-
-    def over_drive(self) -> list[Chart]:
-        """Return ERR over the one drive that is compared, of the masks that all results have."""
-        from roadeval.jobs.page_comparison import looks_of, masks_of, table_of
-        from roadeval.report.chart import looks
-        from roadeval.report.charts.rates import over_windows
-
-        frames = {side.label: side.rows(side.parts[0], "frames") for side in self.sides}
-        masks = masks_of(self.sides, frames)
-        if not masks:
-            return []
-        blind = score.finals(frames[self.sides[0].label].of_variant(BASELINE))
-        rows = table_of(masks, frames)
-        rows = joined([rows, blind.take(np.isin(blind["frame"], rows["frame"]))])
-        size = self.comparison.settings.window
-        size *= max(-(-len(rows.distinct("frame")) // (size * ROWS)), 1)
-        windows = as_arrays("windows", window_rows(score.windows(rows, size)))
-        return over_windows(windows, [TESTED], looks_of(masks) | looks([BASELINE]))
 
     @property
     def content(self) -> dict[str, Any]:
@@ -126,7 +96,7 @@ def compare(
         sides = comparison.variants_as_sides(whole, opened[0].variants, variants)
         opened *= len(sides)
     else:
-        sides = _sides(opened, labels_of(paths), variants)
+        sides = _sides(opened, _labels(paths), variants)
     settings = settings_of(opened[0].summary)
     found = comparison.compare(sides, settings, across_variants=across)
     labelled = [*zip(sides, opened, strict=True)]
@@ -161,13 +131,12 @@ def _sides(
     return sides
 
 
-def labels_of(paths: Sequence[Path]) -> list[str]:
-    """Call each result by its file's name, or where that is not its own by its whole path."""
+def _labels(paths: Sequence[Path]) -> list[str]:
+    """Name each result by its file, or by its whole path where another has the same name."""
     stems = [visible(path.stem or path.resolve().stem or str(path)) for path in paths]
-    counted = Counter(stems)
     labels: list[str] = []
     for stem, path in zip(stems, paths, strict=True):
-        label = stem if counted[stem] == 1 else visible(str(path))
+        label = stem if stems.count(stem) == 1 else visible(str(path))
         labels.append(f"{label} ({labels.count(label) + 1})" if label in labels else label)
     return labels
 
@@ -196,33 +165,23 @@ def write(
     RoadevalError
         If the ending is another, or the file cannot be written.
     """
-    return write_file(path, writer(path)(compared, paper, inspect))
+    match path.suffix.lower():
+        case ".pdf":
+            content = pdf(_document(compared, inspect), paper)
+        case ".html":
+            content = _page(compared, inspect)
+        case ".md":
+            from roadeval.report.comparison import markdown
+
+            content = markdown(compared.comparison, compared.judgements).encode()
+        case ".json":
+            content = as_json(compared).encode()
+        case _:
+            raise RoadevalError(f"{path}: a comparison is written as .pdf, .html, .md, .json")
+    return write_file(path, content)
 
 
-def writer(path: Path) -> Writer:
-    """Choose what writes a file by its ending.
-
-    Raises
-    ------
-    RoadevalError
-        If nothing does.
-    """
-    known: dict[str, Writer] = {
-        ".pdf": _pdf,
-        ".html": _page,
-        ".md": _markdown,
-        ".json": lambda compared, *_: as_json(compared).encode(),
-    }
-    if path.suffix.lower() not in known:
-        raise RoadevalError(f"{path}: a comparison is written as {', '.join(known)}")
-    return known[path.suffix.lower()]
-
-
-def _pdf(compared: Compared, paper: Paper, inspect: Inspect | None) -> bytes:
-    return pdf(_document(compared, inspect), paper)
-
-
-def _page(compared: Compared, _: Paper, inspect: Inspect | None) -> bytes:
+def _page(compared: Compared, inspect: Inspect | None) -> bytes:
     from roadeval.jobs.page_comparison import browsed
     from roadeval.report.page.render import page
     from roadeval.report.sections import browse
@@ -238,6 +197,7 @@ def _page(compared: Compared, _: Paper, inspect: Inspect | None) -> bytes:
 
 
 def _document(compared: Compared, inspect: Inspect | None) -> Document:
+    from roadeval.jobs.page_comparison import over_drive
     from roadeval.report.comparison import document
 
     def command(result: str, frame: int) -> str:
@@ -247,15 +207,9 @@ def _document(compared: Compared, inspect: Inspect | None) -> Document:
     return document(
         compared.comparison,
         compared.judgements,
-        compared.over_drive(),
+        over_drive(compared.comparison, compared.sides),
         command if inspect and compared.recordings else None,
     )
-
-
-def _markdown(compared: Compared, *_: object) -> bytes:
-    from roadeval.report.comparison import markdown
-
-    return markdown(compared.comparison, compared.judgements).encode()
 
 
 def as_json(compared: Compared) -> str:

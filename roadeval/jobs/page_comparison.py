@@ -1,4 +1,4 @@
-"""The frames of compared results on a page: what each result makes of them, beside each other."""
+"""The frames of compared results: rates over the drive, and a page with all masks side by side."""
 
 from __future__ import annotations
 
@@ -14,33 +14,85 @@ from roadeval.data.rows import joined
 from roadeval.evaluation import score
 from roadeval.evaluation.comparison import Comparison, Side
 from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.score import TESTED
 from roadeval.evaluation.settings import NOTEWORTHY
 from roadeval.jobs.page_frames import BYTES, PICTURED, fitting
 from roadeval.jobs.report_frames import rates_by_frame
 from roadeval.jobs.result import DriveResult
-from roadeval.recording import Recording
 from roadeval.report.blocks import Strip
-from roadeval.report.chart import Look, looks_of_results
-from roadeval.report.charts.rates import over_frames
+from roadeval.report.chart import Chart, Look, looks, looks_of_results
+from roadeval.report.charts.rates import over_frames, over_windows
 from roadeval.report.findings import NotableFrame
 from roadeval.report.images import LayerImage, faded
 from roadeval.report.sections.browse import BrowsedFrames, FrameFacts, strip
+from roadeval.results.rows import as_arrays, window_rows
 
 Inspect = Callable[[Path, int], str]
 """Returns the command that opens a frame of a recording."""
+ROWS: Final = 60
+"""Points of the figure over the drive, at most."""
 
 
 @dataclass(frozen=True, slots=True)
 class ComparedMask:
-    """A final mask that is compared: of which result and variant, and what the page calls it.
-
-    ``own`` is what the result itself calls the variant.
-    """
+    """A final mask that is compared."""
 
     name: str
+    """What the page calls it."""
     result: str
     variant: str
     own: str
+    """What the result itself calls the variant."""
+
+
+def compared_masks(sides: Sequence[Side]) -> tuple[list[ComparedMask], Rows] | None:
+    """Return the final masks that all results have, and their rows in the order of the frames.
+
+    Each mask's rows have its name as variant; of a variant they are those of the frames on which
+    all results have its mask. Where the variants of one result are compared, each is a result.
+    None where there is none.
+    """
+    finals = {side.label: score.finals(side.rows(side.parts[0], "frames")) for side in sides}
+    alone = all(rows.distinct("variant") == [label] for label, rows in finals.items())
+    masks, parts = [], []
+    for variant in dict.fromkeys(v for rows in finals.values() for v in rows.distinct("variant")):
+        own = [side for side in sides if variant in finals[side.label].distinct("variant")]
+        if not alone and (variant == BASELINE or len(own) < len(sides)):
+            continue
+        found = [finals[side.label].of_variant(variant) for side in own]
+        common = [*set.intersection(*(set(rows["frame"].tolist()) for rows in found))]
+        for side, rows in zip(own, found, strict=True) if common else ():
+            name = side.label if alone else f"{side.label}: {variant}"
+            kept = rows.take(np.isin(rows["frame"], common))
+            masks.append(ComparedMask(name, side.label, variant, side.own_name(variant)))
+            columns = (np.full(len(kept), text) for text in (name, "final"))
+            parts.append(kept.replace(**dict(zip(("variant", "stage"), columns, strict=True))))
+    if not parts:
+        return None
+    rows = joined(parts)
+    return masks, rows.take(np.argsort(rows["frame"], kind="stable"))
+
+
+def _looks_of(masks: Sequence[ComparedMask]) -> dict[str, Look]:
+    """Return how masks are drawn: a hue a variant, a dash a result."""
+    return looks_of_results({mask.name: (mask.result, mask.variant) for mask in masks})
+
+
+def over_drive(comparison: Comparison, sides: Sequence[Side]) -> list[Chart]:
+    """Return ERR over the one drive that is compared, and the baseline's; none without a side."""
+    if (found := compared_masks(sides)) is None:
+        return []
+    masks, rows = found
+    base = sides[0].rows(sides[0].parts[0], "frames").of_variant(BASELINE)
+    blind = score.finals(base)
+    rows = joined([rows, blind.take(np.isin(blind["frame"], rows["frame"]))])
+    size = comparison.settings.window
+    size *= max(-(-len(rows.distinct("frame")) // (size * ROWS)), 1)
+    windows = as_arrays("windows", window_rows(score.windows(rows, size)))
+    return over_windows(windows, [TESTED], _looks_of(masks) | looks([BASELINE]))
+
+
+# --- The page -------------------------------------------------------------------------------------
 
 
 def browsed(
@@ -68,138 +120,71 @@ def browsed(
         Returns the bytes of a page with these frames and none of their pictures: of those as many
         are there as keep it below `roadeval.jobs.page_frames.BYTES`.
     """
-    rows = {side.label: side.rows(side.parts[0], "frames") for side in sides}
-    masks = masks_of(sides, rows)
-    if not masks:
+    if (found := compared_masks(sides)) is None:
         return None
-    table = table_of(masks, rows)
-    masks = [mask for mask in masks if mask.name in table.distinct("variant")]
-    if not masks:
-        return None
-    facts = list(_facts(table, masks))
-    album = _Album(masks, recordings, facts, inspect)
-    wanted = dict.fromkeys(
-        [each.frame for each in comparison.moved]
-        + [each.frame for each in comparison.disagreements]
-    )
+    masks, rows = found
+    facts = {each.frame: each for each in _facts(rows, masks)}
+    newest = recordings.get(masks[-1].result)
+    command = (lambda frame: inspect(newest, frame)) if inspect and newest else None
     without = BrowsedFrames(
-        frames=facts,
+        frames=[*facts.values()],
         variants=[mask.name for mask in masks],
         pictured=frozenset(),
         strips=[],
-        charts=over_frames(
-            table,
-            [*SHORT],
-            looks_of(masks),
-        ),
-        inspect=album.command if inspect and album.newest else None,
+        charts=over_frames(rows, [*SHORT], _looks_of(masks)),
+        inspect=command,
     )
-    made = (strip for frame in [*wanted][:PICTURED] if (strip := album.strip(frame)))
+    by_path = {path: DriveResult(path) for path in dict.fromkeys(recordings.values())}
+    opened = {label: by_path[path] for label, path in recordings.items()}
+    masks = [mask for mask in masks if mask.result in opened]
+    frames = [each.frame for each in comparison.moved]
+    frames += [each.frame for each in comparison.disagreements]
+    pictured = [
+        facts[frame]
+        for frame in dict.fromkeys(frames)
+        if opened and frame in facts and all(frame in each.pictured for each in opened.values())
+    ]
+    made = (_strip(each, masks, opened, command) for each in pictured[:PICTURED])
     strips = sorted(fitting(made, BYTES - taken(without)), key=lambda each: each.frame)
     return replace(without, strips=strips, pictured=frozenset(each.frame for each in strips))
 
 
-def masks_of(sides: Sequence[Side], rows: Mapping[str, Rows]) -> list[ComparedMask]:
-    """Return the final masks that all results have, one result after the other for each variant."""
-    there = {label: own.distinct("variant") for label, own in rows.items()}
-    if all(names == [label] for label, names in there.items()):
-        return [ComparedMask(label, label, label, label) for label in there]
-    found = []
-    for variant in next(iter(there.values())):
-        if variant != BASELINE and all(variant in names for names in there.values()):
-            for side in sides:
-                own = side.own_name(variant)
-                found.append(ComparedMask(f"{side.label}: {variant}", side.label, variant, own))
-    return found
-
-
-def looks_of(masks: Sequence[ComparedMask]) -> dict[str, Look]:
-    """Return how the masks are drawn: a hue a variant, a dash a result."""
-    return looks_of_results({mask.name: (mask.result, mask.variant) for mask in masks})
-
-
-def table_of(masks: Sequence[ComparedMask], frames: Mapping[str, Rows]) -> Rows:
-    """Return the rows of the masks, each under its name as variant.
-
-    Of a variant they are those of the frames on which all results have its mask.
-    """
-    parts = []
-    for variant in dict.fromkeys(mask.variant for mask in masks):
-        own = [mask for mask in masks if mask.variant == variant]
-        found = [score.finals(frames[mask.result].of_variant(variant)) for mask in own]
-        common = [*set.intersection(*(set(rows["frame"].tolist()) for rows in found))]
-        for mask, rows in zip(own, found, strict=True):
-            there = rows.take(np.isin(rows["frame"], common))
-            named = {"variant": mask.name, "stage": "final"}
-            parts.append(
-                there.replace(**{key: np.full(len(there), name) for key, name in named.items()})
-            )
-    whole = joined(parts)
-    return whole.take(np.argsort(whole["frame"], kind="stable"))
-
-
-def _facts(table: Rows, masks: Sequence[ComparedMask]) -> Iterator[FrameFacts]:
+def _facts(rows: Rows, masks: Sequence[ComparedMask]) -> Iterator[FrameFacts]:
     """Yield each frame with the masks' rates, and whether the first of them got worse or better."""
     base, new = masks[0].name, masks[1].name
-    for frame, stamp, rates in rates_by_frame(table, [*SHORT]):
-        said = []
+    for frame, stamp, rates in rates_by_frame(rows, [*SHORT]):
+        conditions = []
         if base in rates and new in rates:
             change = rates[new]["ERR"] - rates[base]["ERR"]
             if abs(change) >= NOTEWORTHY:
-                said = [f"{new} {'worse' if change > 0 else 'better'}"]
-        yield FrameFacts(frame, stamp, rates, said)
+                conditions = [f"{new} {'worse' if change > 0 else 'better'}"]
+        yield FrameFacts(frame, stamp, rates, conditions)
 
 
-class _Album:
-    """The pictures of frames as every result has them."""
+def _strip(
+    facts: FrameFacts,
+    masks: Sequence[ComparedMask],
+    opened: Mapping[str, DriveResult],
+    command: Callable[[int], str] | None,
+) -> Strip:
+    """Return a frame with its pictures."""
+    *_, last = (mask.name for mask in masks if mask.name in facts.rates)
+    images = [*_images(facts, masks, opened)]
+    found = NotableFrame(facts.frame, facts.stamp_ns, last, facts.rates, images=images)
+    return strip(found, [*facts.rates], command(facts.frame) if command else "")
 
-    def __init__(
-        self,
-        masks: Sequence[ComparedMask],
-        recordings: Mapping[str, Path],
-        facts: Sequence[FrameFacts],
-        inspect: Inspect | None,
-    ) -> None:
-        self._masks: Final = [mask for mask in masks if mask.result in recordings]
-        self._paths: Final = recordings
-        self._facts: Final = {each.frame: each for each in facts}
-        self._inspect: Final = inspect
-        opened = {path: DriveResult(path) for path in dict.fromkeys(recordings.values())}
-        self._opened: Final = {label: opened[path] for label, path in recordings.items()}
-        self.newest: Final = recordings.get(masks[-1].result) if masks else None
 
-    def command(self, frame: int) -> str:
-        """Return the command that opens a frame of the newest result."""
-        assert self._inspect is not None
-        assert self.newest is not None
-        return self._inspect(self.newest, frame)
-
-    def strip(self, frame: int) -> Strip | None:
-        """Return a frame with its pictures; None where a result has none of it."""
-        found = self._opened.values()
-        facts = self._facts.get(frame)
-        if facts is None or not found or not all(frame in each.pictured for each in found):
-            return None
-        *_, last = (mask.name for mask in self._masks if mask.name in facts.rates)
-        made = NotableFrame(
-            frame, facts.stamp_ns, last, facts.rates, images=list(self._images(facts))
-        )
-        command = self.command(frame) if self._inspect and self.newest else ""
-        return strip(made, list(facts.rates), command)
-
-    def _images(self, facts: FrameFacts) -> Iterator[LayerImage]:
-        first, frame = self._recording(self._masks[0]), facts.frame
-        image = first.image(frame)
-        yield LayerImage("camera", image)
-        yield LayerImage("truth", image, TRUTH, first.truth(frame))
-        for mask in self._masks:
-            if mask.name not in facts.rates:
-                yield LayerImage(f"{mask.name}: no mask", faded(image))
-                continue
-            errors: Any = self._recording(mask).layer(mask.own, ERRORS.name, frame)
+def _images(
+    facts: FrameFacts, masks: Sequence[ComparedMask], opened: Mapping[str, DriveResult]
+) -> Iterator[LayerImage]:
+    recordings = {label: own for label, each in opened.items() if (own := each.recording)}
+    first, frame = recordings[masks[0].result], facts.frame
+    image = first.image(frame)
+    yield LayerImage("camera", image)
+    yield LayerImage("truth", image, TRUTH, first.truth(frame))
+    for mask in masks:
+        if mask.name in facts.rates:
+            errors: Any = recordings[mask.result].layer(mask.own, ERRORS.name, frame)
             yield LayerImage(f"{mask.name}: errors", image, ERRORS, errors)
-
-    def _recording(self, mask: ComparedMask) -> Recording:
-        recording = self._opened[mask.result].recording
-        assert recording is not None
-        return recording
+        else:
+            yield LayerImage(f"{mask.name}: no mask", faded(image))
