@@ -16,7 +16,6 @@ from time import perf_counter
 
 import roadeval
 from benchmarks.processes import ROADEVAL
-from roadeval.results.fleet.folder import Fleet
 
 DEMO = Path(__file__).resolve().parents[1] / "recordings" / "demo.mcap"
 HOURS = 5_000
@@ -87,7 +86,7 @@ def _show(walls: dict[int, float], again: float, frame_s: float, frames: int) ->
 
 def _extrapolate(folder: Path, walls: dict[int, float], frame_s: float) -> None:
     """Print what `HOURS` of video would take, in drives of `DRIVE_HOURS`."""
-    fleet = Fleet(folder)
+    fleet = roadeval.Result(folder)
     drives, frames = len(fleet.drives), int(fleet.drives["read"].sum())
     per_drive = (walls[1] - frames * frame_s) / drives
     count = HOURS // DRIVE_HOURS

@@ -19,8 +19,8 @@ import cv2
 import numpy as np
 
 from roadeval import Recording, RoadevalError
+from roadeval.results.facts import Facts
 from roadeval.results.schema import TABLES
-from roadeval.results.summary import read_summary
 
 OF_THE_RUN: Final = ("seconds", "versions", "run", "settings", "tables", "format")
 """Parts of a summary that hold how it was made, not what was found."""
@@ -57,7 +57,7 @@ def differences(old: Path, new: Path) -> Iterator[str]:
         theirs, ours = (cv2.imread(str(folder / figure)) for folder in (old, new))
         if ours is None or not np.array_equal(theirs, ours):
             yield figure
-    before, after = (read_summary(folder / "summary.json") for folder in (old, new))
+    before, after = (Facts.read(folder / "summary.json").as_dict() for folder in (old, new))
     yield from _values("summary", _found(before), _found(after))
     yield from _recordings(Recording(f"{old}.rrd"), Recording(f"{new}.rrd"))
 

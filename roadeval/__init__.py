@@ -38,13 +38,11 @@ if TYPE_CHECKING:
     from roadeval.jobs.serve import serve
     from roadeval.jobs.train import train
     from roadeval.recording import Recording
-    from roadeval.results.fleet.folder import Fleet
     from roadeval.training import Model, load_model, save_model
 
 __version__ = VERSION
 
 __all__ = [
-    "Fleet",
     "FleetOutcome",
     "FleetProgress",
     "Model",

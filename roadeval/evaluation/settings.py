@@ -1,13 +1,9 @@
 """Every choice of the evaluation that is not fixed by the paper, with its reason."""
 
-from collections.abc import Mapping
-from dataclasses import fields
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
-
-from roadeval.errors import RoadevalError
 
 FAILED_ERR: Final = 0.25
 """A frame with at least this ERR has failed: a quarter of its pixels are wrong."""
@@ -43,23 +39,3 @@ class EvaluationSettings:
     negligible: Annotated[float, Field(gt=0, le=1)] = 0.01
     """A change of a drive's mean rate by no more than this matters to nobody: an interval that ends
     within it is the answer that there is no larger effect."""
-
-
-def settings_of(summary: Mapping[str, Any]) -> EvaluationSettings:
-    """Return the settings that a summary was made with; the defaults where it states none.
-
-    A setting that this version does not know is left out.
-
-    Raises
-    ------
-    RoadevalError
-        If they are damaged.
-    """
-    given = summary.get("run", {}).get("evaluation", {})
-    known = {field.name for field in fields(EvaluationSettings)}
-    try:
-        return EvaluationSettings(**{name: given[name] for name in known & {*given}})
-    except (TypeError, ValueError) as error:
-        raise RoadevalError(
-            "a summary is damaged (`run.evaluation` is not what it must be); make the results anew"
-        ) from error

@@ -19,11 +19,10 @@ from roadeval.evaluation.comparison import (
     judge,
     one_drive,
 )
-from roadeval.evaluation.settings import settings_of
 from roadeval.jobs.result import Result
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
 from roadeval.results.comparison import as_dict, judged, warnings
-from roadeval.results.summary import json_text, plain
+from roadeval.results.facts import json_text, plain
 from roadeval.runtime.files import Paths, listed
 from roadeval.runtime.text import visible
 
@@ -97,7 +96,7 @@ def compare(
         opened *= len(sides)
     else:
         sides = _sides(opened, _labels(paths), variants)
-    settings = settings_of(opened[0].summary)
+    settings = opened[0].facts.evaluation
     found = comparison.compare(sides, settings, across_variants=across)
     labelled = [*zip(sides, opened, strict=True)]
     cut = dict.fromkeys(

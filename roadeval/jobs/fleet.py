@@ -34,10 +34,10 @@ from roadeval.jobs.fleet_work import (
     train_fold,
 )
 from roadeval.jobs.identity import software
-from roadeval.results.fleet.conditions import check_conditions
-from roadeval.results.fleet.record import DAMAGED, FAILED, recording_path
-from roadeval.results.fleet.tables import Member
-from roadeval.results.fleet.writing import FleetWriter
+from roadeval.results.facts import FleetFacts, Member
+from roadeval.results.fleet import FleetWriter, recording_path
+from roadeval.results.over_drives import check_conditions
+from roadeval.results.schema import DAMAGED, FAILED
 from roadeval.runtime.discovery import code_of
 from roadeval.runtime.files import AnyPath, Paths, listed
 from roadeval.version import VERSION
@@ -84,23 +84,27 @@ class FleetOutcome:
     """How many of them this command has replayed."""
     problems: Mapping[str, str]
     """Why drives failed, by the drives' names in the fleet."""
-    summary: Mapping[str, Any]
-    """The content of ``fleet.json``."""
+    facts: FleetFacts
     unused: Sequence[str] = ()
     """Settings of single drives (`RunConfig.drives`) that hold for none of these: their paths."""
 
     @property
+    def summary(self) -> dict[str, Any]:
+        """The content of ``fleet.json``."""
+        return self.facts.as_dict()
+
+    @property
     def held(self) -> list[str]:
         """The sentences of the conditions that hold, a drive each."""
-        return [text for each in self.summary["conditions"] for text in each["holds"].values()]
+        return [text for each in self.facts.conditions for text in each.holds.values()]
 
     @property
     def unjudged(self) -> list[str]:
         """The conditions that could be judged on no drive, with the reason on the first."""
         return [
-            f"{each['condition']}: {next(iter(each['not_judged'].values()))}"
-            for each in self.summary["conditions"]
-            if each["not_judged"] and not each["judged"]
+            f"{each.condition}: {next(iter(each.not_judged.values()))}"
+            for each in self.facts.conditions
+            if each.not_judged and not each.judged
         ]
 
     @property
@@ -162,17 +166,18 @@ def replay_fleet(
     run = FleetRun(writer.folder, tuple(entries), config, on_progress, retry_failed)
     run.replay_all(executor)
     run.show("writing")
-    members = [
-        Member(e.id, e.name, e.shown, e.group, e.tags, run.done[e.id].asked) for e in entries
-    ]
+    members = [Member(e.id, e.name, e.shown, e.group, dict(e.tags)) for e in entries]
+    asked = {drive: done.asked for drive, done in run.done.items()}
     text = run_toml(config, f"{len(entries)} drives", VERSION, "fleet")
-    summary = writer.finish(members, config.evaluation, config.as_dict(), text, conditions)
+    facts = writer.finish(
+        members, config.evaluation, config.as_dict(), text, conditions=conditions, asked=asked
+    )
     _judge_failures(run, config.fleet.max_failures)
     counts = Counter(each.status for each in run.done.values())
     problems = {d.drive: d.reason for d in run.done.values() if d.status == FAILED}
     replayed = sum(not each.repeated for each in run.done.values())
     unused = config.unused(entry.source for entry in entries)
-    return FleetOutcome(writer.folder, counts, replayed, problems, summary, unused)
+    return FleetOutcome(writer.folder, counts, replayed, problems, facts, unused)
 
 
 def _judge_failures(run: FleetRun, allowed: str | None) -> None:

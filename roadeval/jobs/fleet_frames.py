@@ -13,7 +13,7 @@ import numpy as np
 from roadeval.data import BASELINE, ERRORS, FrameResult, Role, Tally
 from roadeval.evaluation.score import Light, final_stages, light_of
 from roadeval.report.images import LayerImage, jpeg, shrink
-from roadeval.results.fleet.record import PICTURES, frames_path
+from roadeval.results.fleet import PICTURES, frames_path
 from roadeval.results.rows import frame_rows
 from roadeval.results.tables import TableFile
 from roadeval.runtime.files import put

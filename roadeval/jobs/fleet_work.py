@@ -27,8 +27,8 @@ from roadeval.jobs.identity import asked, content_of, software
 from roadeval.jobs.replay import replay
 from roadeval.logs import METADATA, identity_of
 from roadeval.recording import RecordingError
-from roadeval.results.fleet.record import (
-    FAILED,
+from roadeval.results.facts import json_text
+from roadeval.results.fleet import (
     FRAMES,
     PICTURES,
     RECORDINGS,
@@ -41,8 +41,7 @@ from roadeval.results.fleet.record import (
     results_path,
 )
 from roadeval.results.rows import Key, cells, drive_row
-from roadeval.results.schema import ALL, TABLES
-from roadeval.results.summary import json_text
+from roadeval.results.schema import ALL, FAILED, TABLES
 from roadeval.runtime import memory
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import alone, own_names, put
@@ -290,18 +289,16 @@ def _replayed(task: DriveTask, path: Path, before: Mapping[str, Any] | None) -> 
         outcome = replay(path, _config(task, results), on_frame=gatherer.add)
         _remove(task, PICTURES, *(() if task.recorded else (RECORDINGS,)))
         gatherer.finish()
-    if not outcome.summary["frames"]["evaluated"]:
+    if not outcome.facts.frames.evaluated:
         _remove(task, FRAMES)
-    masks = {name: each["sha256"] for name, each in outcome.summary.get("masks", {}).items()}
+    masks = {name: each["sha256"] for name, each in outcome.facts.masks.items()}
     row = (
-        drive_row(outcome.summary, task.entry.name, task.entry.shown)
+        drive_row(outcome.facts, task.entry.name, task.entry.shown)
         | gatherer.facts()
         | {
             "fold": task.fold,
             "model": task.model or None,
-            "identity": asked(
-                task.config, task.model, of=outcome.summary["log"]["sha256"], masks=masks
-            ),
+            "identity": asked(task.config, task.model, of=outcome.facts.sha256 or "", masks=masks),
             "size_bytes": sum(
                 each.stat().st_size for each in ([path] if path.is_file() else path.iterdir())
             ),
@@ -311,7 +308,7 @@ def _replayed(task: DriveTask, path: Path, before: Mapping[str, Any] | None) -> 
         }
     )
     own = {"drives": [row], **outcome.rows, "worst": [*gatherer.worst_rows()]}
-    key = Key(drive, outcome.summary["drive"]["camera"])
+    key = Key(drive, outcome.facts.drive.camera)
     rows = {table: cells(table, key, each) for table, each in own.items()}
     return Record(drive, task.asked, before, rows)
 

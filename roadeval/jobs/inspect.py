@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,115 +14,154 @@ from roadeval.errors import RoadevalError
 from roadeval.evaluation import score
 from roadeval.evaluation.metrics import SHORT
 from roadeval.jobs.outputs import holding
-from roadeval.jobs.result import DriveResult
+from roadeval.jobs.result import DriveResult, Result
+from roadeval.results.fleet import FleetFolder, recording_path
+from roadeval.results.schema import LIGHT
 
 LISTED: Final = 10
-"""Frames that are listed when nobody says how many."""
+"""Frames that are listed by default."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorstFrame:
-    """A bad frame, and why it is one."""
+    """One of the worst frames of a drive, or of all drives of a fleet."""
 
     rank: int
     """1 is the worst."""
+    drive: str
     frame: int
     stamp_ns: int
     """Which."""
     variant: str
     stage: str
     """Whose final mask."""
-    rates: dict[str, float]
-    """Of the final mask, as short tables show them."""
-    parts: dict[str, float]
-    """How ERR came about, see `roadeval.evaluation.score.causes`."""
-    notes: tuple[str, ...]
+    rates: Mapping[str, float | None]
+    """Of the final mask."""
+    parts: Mapping[str, float] = field(default_factory=dict)
+    """The parts of ERR by stage, see `roadeval.evaluation.score.causes`; none in a fleet."""
+    notes: tuple[str, ...] = ()
     """What the recording says about it."""
+    light: Mapping[str, float | None] = field(default_factory=dict)
+    """In a fleet: the light of the image, see `roadeval.results.schema.LIGHT`."""
+    picture: str | None = None
+    """In a fleet: the file of its errors."""
+    recording: Path | None = None
+    """The drive's recording, where there is one."""
 
 
 def worst_frames(
-    result: DriveResult,
-    count: int = LISTED,
-    variant: str | None = None,
-    *,
-    among: Collection[int] | None = None,
+    result: Result, count: int | None = None, variant: str | None = None
 ) -> list[WorstFrame]:
-    """Rank the worst frames of a variant's final mask, the first variant's by default.
+    """Rank the worst frames by ERR of a final mask; of neighbouring frames only the worst counts.
 
-    With ``among``, only these frames are ranked: there may be none.
+    Parameters
+    ----------
+    result
+        One result: of a fleet the frames of all drives are ranked together.
+    count
+        How many, at most; all that are known of a fleet by default.
+    variant
+        The first by default, as always in a fleet.
 
     Raises
     ------
     RoadevalError
         If nothing was scored, or ERR is undefined on every frame, or there is no such variant.
     """
-    rows = result.rows
-    names = _scored(result)
+    if fleet := result.fleet:
+        rows = fleet.table("worst").to_pylist()
+        if not rows:
+            raise _nothing_scored(fleet.path)
+        return [_of_fleet(fleet, row) for row in rows[:count]]
+    assert result.drive is not None
+    found = _ranked(result.drive, count or LISTED, variant)
+    if not found:
+        raise RoadevalError(
+            f"{result.drive.path}: ERR of {variant or _scored(result.drive)[0]} is undefined on "
+            "every frame, so no frame is the worst"
+        )
+    return found
+
+
+def _of_fleet(fleet: FleetFolder, row: Mapping[str, Any]) -> WorstFrame:
+    names = ("rank", "drive", "frame", "stamp_ns", "variant", "stage")
+    recording = recording_path(fleet.path, row["drive"])
+    return WorstFrame(
+        **{name: row[name] for name in names},
+        rates={name: row[name] for name in ("ERR", "FPR", "FNR")},
+        light={column.name: row[column.name] for column in LIGHT},
+        picture=str(fleet.path / row["picture"]) if row["picture"] else None,
+        recording=recording if recording.exists() else None,
+    )
+
+
+def _ranked(
+    drive: DriveResult, count: int, variant: str | None, among: Collection[int] | None = None
+) -> list[WorstFrame]:
+    """Rank a drive's frames, or those ``among`` them; none where ERR is undefined on all."""
+    rows, names = drive.rows, _scored(drive)
     if not names:
-        raise RoadevalError(f"{result.path}: nothing was scored, so no frame is the worst")
+        raise _nothing_scored(drive.path)
     chosen = variant or names[0]
     if chosen not in names:
-        raise RoadevalError(f"{result.path}: no variant {chosen}; there are {', '.join(names)}")
+        raise RoadevalError(f"{drive.path}: no variant {chosen}; there are {', '.join(names)}")
     looked_at = rows if among is None else rows.take(np.isin(rows["frame"], [*among]))
     ranked = score.worst(looked_at, chosen, count)
-    if not len(ranked):
-        if among is None:
-            raise RoadevalError(
-                f"{result.path}: ERR of {chosen} is undefined on every frame, "
-                "so no frame is the worst"
-            )
-        return []
     causes = score.causes(rows, chosen)
     frames, stamps = ranked["frame"].tolist(), ranked["stamp_ns"].tolist()
     return [
         WorstFrame(
-            place + 1,
-            frame,
-            stamp,
-            chosen,
-            str(ranked["stage"][place]),
-            {rate: float(ranked[rate][place]) for rate in SHORT},
-            causes.of(frame),
-            result.notes(frame, chosen),
+            *(place + 1, drive.name, frame, stamp, chosen, str(ranked["stage"][place])),
+            rates={rate: float(ranked[rate][place]) for rate in SHORT},
+            parts=causes.of(frame),
+            notes=drive.notes(frame, chosen),
+            recording=drive.path if drive.recording else None,
         )
         for place, (frame, stamp) in enumerate(zip(frames, stamps, strict=True))
     ]
 
 
-def worst(result: DriveResult, variant: str | None = None) -> WorstFrame | None:
-    """Return the worst frame that has pictures, of a variant or else of the first one.
+def _nothing_scored(path: Path) -> RoadevalError:
+    return RoadevalError(f"{path}: nothing was scored, so no frame is the worst")
 
-    A recording may hold the pictures of few frames: the others do not count. None if no frame with
-    pictures was scored.
+
+def _scored(drive: DriveResult) -> list[str]:
+    """Name the variants that were scored, without the baseline."""
+    return [name for name in drive.rows.distinct("variant") if name != BASELINE]
+
+
+def of_rank(result: Result, rank: int, variant: str | None = None) -> WorstFrame:
+    """Return the frame of a rank among the worst.
 
     Raises
     ------
     RoadevalError
-        If a variant is asked for that was not scored.
+        If fewer are known of a fleet, or as of `worst_frames`.
     """
-    if variant is None and not _scored(result):
+    found = worst_frames(result, rank, variant)
+    if result.fleet and rank > len(found):
+        raise RoadevalError(f"{result.fleet.path}: only the worst {len(found)} frames are known")
+    return found[-1]
+
+
+def worst(drive: DriveResult, variant: str | None = None) -> WorstFrame | None:
+    """Return the worst frame that has pictures, of a variant or else of the first one.
+
+    None if no frame with pictures was scored. A `RoadevalError` if the variant was not scored.
+    """
+    if variant is None and not _scored(drive):
         return None
-    return next(iter(worst_frames(result, 1, variant, among=result.pictured)), None)
+    return next(iter(_ranked(drive, 1, variant, among=drive.pictured)), None)
 
 
-def without_pictures(result: DriveResult, frame: int) -> str:
-    """Return a sentence on a frame that was scored and whose pictures were not kept.
-
-    Empty for every other frame.
-    """
-    if result.recording is None or frame in result.pictured:
-        return ""
-    if frame not in result.rows["frame"]:
+def without_pictures(drive: DriveResult, frame: int) -> str:
+    """Return a sentence on a frame that was scored and whose pictures were not kept, else ""."""
+    if drive.recording is None or frame in drive.pictured or frame not in drive.rows["frame"]:
         return ""
     return f"the recording has no pictures of frame {frame}, so the views of them are empty"
 
 
-def _scored(result: DriveResult) -> list[str]:
-    """Name the variants that were scored, without the baseline."""
-    return [name for name in result.rows.distinct("variant") if name != BASELINE]
-
-
-def view(result: DriveResult, frame: int | None, picture: Path | None = None) -> int | None:
+def view(drive: DriveResult, frame: int | None, picture: Path | None = None) -> int | None:
     """Open the viewer at a frame, or draw it into a PNG file; return the frame that it drew.
 
     Without a frame it opens at the first evaluated one that has pictures.
@@ -134,31 +173,23 @@ def view(result: DriveResult, frame: int | None, picture: Path | None = None) ->
     """
     from roadeval.recording.screen import viewer
 
-    recording = result.recording
+    recording = drive.recording
     if recording is None:
         raise RoadevalError(
-            f"{result.path}: a results folder holds no pictures; give the recording (.rrd)"
+            f"{drive.path}: a results folder holds no pictures; give the recording (.rrd)"
         )
-    numbers = sorted({*result.pictured, *result.rows["frame"].tolist()})
+    counted = set(drive.rows["frame"].tolist())
+    numbers = sorted({*drive.pictured, *counted})
     if frame is not None and frame not in numbers:
         held = f"frames {numbers[0]} to {numbers[-1]}" if numbers else "none"
-        raise RoadevalError(f"{result.path}: no frame {frame}; the recording holds {held}")
+        raise RoadevalError(f"{drive.path}: no frame {frame}; the recording holds {held}")
     if frame is None:
-        frame = _first(result, recording.layout.first_frame)
+        begin = recording.layout.first_frame
+        evaluated = [number for number in drive.pictured if number in counted]
+        later = [number for number in drive.pictured if number >= (begin or 0)]
+        frame = next(iter([*evaluated, *later, *drive.pictured]), begin)
     if picture is None:
         viewer.show(recording.path, frame)
         return frame
-    with holding(picture, inputs=[result.path]):
+    with holding(picture, inputs=[drive.path]):
         return viewer.screenshot(recording.path, picture, frame)
-
-
-def _first(result: DriveResult, begin: int | None) -> int | None:
-    """Choose the frame to open at: the first with pictures that was evaluated.
-
-    Where none was it is the first with pictures of those that could be, from ``begin`` on, or
-    else the first with pictures at all; where none has any, ``begin``.
-    """
-    counted = set(result.rows["frame"].tolist())
-    evaluated = [number for number in result.pictured if number in counted]
-    later = [number for number in result.pictured if number >= (begin or 0)]
-    return next(iter([*evaluated, *later, *result.pictured]), begin)

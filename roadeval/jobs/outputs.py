@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from roadeval.errors import RoadevalError
 from roadeval.recording import RecordRule
-from roadeval.results.fleet.kind import FILES, is_fleet
+from roadeval.results.facts import SUMMARY, is_fleet
+from roadeval.results.fleet import FILES
 from roadeval.results.folder import CONTENT, belonging
-from roadeval.results.summary import SUMMARY
 from roadeval.runtime.files import (
     AnyPath,
     claimed_file,

@@ -20,10 +20,10 @@ from roadeval.jobs.progress import OnProgress, Progress, ignore
 from roadeval.jobs.run import Run, prepare
 from roadeval.recording import NullRecorder, Recorder, RecordRule, recorder_for
 from roadeval.report.images import ExampleFrame
+from roadeval.results.facts import Facts
 from roadeval.results.folder import ResultsWriter
 from roadeval.results.rows import as_arrays, csv_lines, effect_rows, score_rows, sum_rows
 from roadeval.results.schema import TABLES
-from roadeval.results.summary import summary_text
 from roadeval.runtime.files import AnyPath
 from roadeval.runtime.memory import trim
 from roadeval.version import VERSION
@@ -37,20 +37,23 @@ def pass_by(_result: FrameResult) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The result of a replay: where it lies, and the content of ``summary.json``.
-
-    ``tracebacks`` tell where in their code stages failed that are among the ``losses``. ``rows``
-    are those of the tables ``scores`` and ``effects``.
-    """
+    """The result of a replay: where it lies, and its facts."""
 
     recording: Path | None
     reports: Path | None
-    summary: dict[str, Any]
+    facts: Facts
     warnings: tuple[str, ...]
     losses: tuple[str, ...]
     files: tuple[Path, ...]
     tracebacks: tuple[str, ...] = ()
+    """Where in their code stages failed that are among the losses."""
     rows: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
+    """Those of the tables ``scores`` and ``effects``."""
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The content of ``summary.json``."""
+        return self.facts.as_dict()
 
 
 def replay(
@@ -117,8 +120,7 @@ def _written(
         sums = csv_lines(run.key, rows)
         results.append(sums)
         shown = [each.frame for each in examples]
-        facts = summary.of(run) | {"examples": shown, "tables": results.tables}
-        warnings, losses = summary.warnings(run), summary.losses(run)
+        facts = summary.of(run, shown, results.tables)
         of_drive = {
             "scores": list(score_rows(facts, run.board.regions())),
             "effects": list(effect_rows(facts)),
@@ -135,9 +137,10 @@ def _written(
                 windows = as_arrays("windows", rows["windows"])
                 write_figures(results.folder, log.name, windows, examples)
         facts = results.finish(facts, run_toml(config, log.name, VERSION))
-    files = [to.reports / name for name in facts["files"]] + ([to.mcap] if to.mcap else [])
+    files = [to.reports / name for name in facts.files] + ([to.mcap] if to.mcap else [])
     return Outcome(
-        *(to.recording, to.reports, facts, warnings, losses, tuple(files)),
+        *(to.recording, to.reports, facts, tuple(facts.warnings), tuple(facts.losses)),
+        tuple(files),
         tracebacks=tracebacks,
         rows=of_drive,
     )
@@ -166,14 +169,14 @@ def _record(
     return examples.kept
 
 
-def _texts(run: Run, facts: Mapping[str, Any], sums: Mapping[str, str]) -> dict[str, str]:
+def _texts(run: Run, facts: Facts, sums: Mapping[str, str]) -> dict[str, str]:
     """Return the results as the recording keeps them: the files' own text.
 
     What decides no number is left out, so that the same input gives the same recording.
     """
     config = deciding(run.config)
     return {
-        "summary": summary_text({**facts, "run": config.as_dict()}),
+        "summary": replace(facts, run=config.as_dict()).text(),
         "run": run_toml(config, run.log.name, VERSION),
         **{name: TABLES[name].header + text for name, text in sums.items()},
     }

@@ -1,20 +1,125 @@
-"""Drives of served fleets that are replayed when somebody wants to see them: one at a time."""
+"""A fleet's drive of which no recording was kept, replayed to be looked at."""
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from threading import Event, Lock, Thread
-from typing import Final
+from typing import Any, Final
 
+from roadeval.config import OutputSettings, RunConfig, load_config
 from roadeval.errors import RoadevalError
-from roadeval.jobs.progress import Progress
+from roadeval.fleet.remote import staged
+from roadeval.fleet.urls import is_url, shown
+from roadeval.jobs.fleet_work import model_path
+from roadeval.jobs.progress import OnProgress, Progress, ignore
+from roadeval.jobs.replay import replay
+from roadeval.results.fleet import FleetFolder
+from roadeval.results.folder import RUN
+from roadeval.results.schema import FAILED
 
+FEWEST: Final = "worst:10"
+"""The pictures that are recorded, where the fleet's settings ask for none."""
 PATIENCE_S: Final = 20.0
 """How long a replay that is cancelled may take to end: it looks after every frame."""
 Replay = Callable[[Callable[[Progress], None]], object]
-"""Replays a drive; it is given what to tell of its progress, and ends where that raises."""
+"""Replays a drive, reports its progress, and ends where that raises."""
+
+
+def recording_of(
+    fleet: FleetFolder,
+    drive: str,
+    on_progress: OnProgress = ignore,
+    on_replay: Callable[[str], None] = lambda _sentence: None,
+) -> tuple[Path, tuple[str, ...]]:
+    """Return the recording of a fleet's drive, made again from its log where it was not kept.
+
+    Parameters
+    ----------
+    fleet, drive
+        Which, by its name in the fleet.
+    on_progress
+        As of `roadeval.replay`.
+    on_replay
+        Called with a sentence where the drive is replayed.
+
+    Returns
+    -------
+    tuple
+        The file, and warnings.
+
+    Raises
+    ------
+    RoadevalError
+        If there is no such drive, its log has gone or may not be read, or it cannot be replayed.
+    """
+    row = _row(fleet, drive)
+    if (recording := fleet.recording(drive)).exists():
+        return recording, ()
+    recording = fleet.recording(drive, new=True)
+    named, source = str(row["source"]), shown(str(row["source"]))
+    if row["status"] == FAILED:
+        raise RoadevalError(f"{source}: has no recording, for it failed: {row['reason']}")
+    if not fleet.trust_sources:
+        raise RoadevalError(
+            f"{drive}: no recording was kept; `trust_sources` replays it from {source}, with the "
+            f"masks, networks and model of {fleet.results(drive) / RUN}"
+        )
+    if not is_url(named) and not Path(named).exists():
+        raise RoadevalError(
+            f"{source}: has gone, and no recording of it was kept; bring the log back, or see "
+            f"{fleet.path / 'pictures' / drive}"
+        )
+    config = _configuration(fleet, drive, row["fold"])
+    on_replay(f"{drive}: no recording was kept, so it is replayed from {source}")
+    if _replayed(named, config, recording, on_progress) == row["sha256"]:
+        return recording, ()
+    warning = f"{source}: has changed since the fleet was run, and its results may have, too"
+    return recording, (warning,)
+
+
+def _row(fleet: FleetFolder, drive: str) -> dict[str, Any]:
+    """Return a drive's row of ``drives``."""
+    columns = ["drive", "name", "source", "status", "reason", "sha256", "fold"]
+    rows: list[dict[str, Any]] = fleet.table("drives", columns).to_pylist()
+    for row in rows:
+        if row["drive"] == drive:
+            return row
+    named = [row["drive"] for row in rows if row["name"] == drive]
+    hint = f"; by that name there is {', '.join(named)}" if named else ""
+    raise RoadevalError(f"{fleet.path}: no drive {drive}{hint}; `drives.parquet` names all")
+
+
+def _configuration(fleet: FleetFolder, drive: str, fold: int | None) -> RunConfig:
+    """Return what a drive was replayed with; the model of its fold as it lies in the folder now."""
+    path = fleet.results(drive) / RUN
+    if not path.exists():
+        raise RoadevalError(f"{path}: is not there; run the fleet's command again")
+    config = load_config(path, trusted=False)
+    if fold is None:
+        return config
+    return config.override({"training": {"model": str(model_path(fleet.path, fold))}})
+
+
+def _replayed(
+    source: str, config: RunConfig, recording: Path, on_progress: OnProgress
+) -> str | None:
+    """Replay a drive for its recording alone; return its log's SHA-256.
+
+    The fleet's results stay as they are.
+    """
+    record = FEWEST if config.output.record == "none" else config.output.record
+    with tempfile.TemporaryDirectory(prefix="roadeval-") as reports, staged(source) as path:
+        output = OutputSettings(
+            save=str(recording), reports=str(Path(reports, "reports")), record=record, figures=False
+        )
+        made = replay(path, replace(config, output=output), on_progress=on_progress)
+        return made.facts.sha256
+
+
+# --- In a thread beside the server ----------------------------------------------------------------
 
 
 class CancelledReplayError(RoadevalError):

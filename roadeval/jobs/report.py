@@ -1,4 +1,4 @@
-"""A report of one drive, from its recording or results folder, or of a fleet."""
+"""The report of a result, as a PDF or as a page."""
 
 from __future__ import annotations
 
@@ -9,18 +9,13 @@ from typing import Final
 from roadeval.errors import RoadevalError
 from roadeval.jobs.outputs import holding
 from roadeval.jobs.page_frames import browsed, strips_of
-from roadeval.jobs.report_findings import collect
-from roadeval.jobs.report_fleet import collect_fleet
-from roadeval.jobs.result import DriveResult
+from roadeval.jobs.report_findings import WORST_OF_FLEET, collect, collect_fleet
+from roadeval.jobs.result import Result
 from roadeval.report.blocks import Document
-from roadeval.report.drive import document, page_document, with_frames
-from roadeval.report.findings import Commands
-from roadeval.report.fleet.document import document as fleet_document
-from roadeval.report.fleet.document import page_document as fleet_page_document
+from roadeval.report.document import document, page_document, with_frames
+from roadeval.report.findings import Commands, Findings, FleetFindings
 from roadeval.report.page.render import Beside, page, write_page
 from roadeval.report.pdf.typeset import Paper, pdf, write_file
-from roadeval.results.fleet.folder import Fleet
-from roadeval.results.fleet.kind import is_fleet
 from roadeval.runtime.files import leads_outside
 
 PAGES: Final = (".html", ".htm")
@@ -40,20 +35,20 @@ class PageSettings:
 
 
 def write_report(
-    result: str | Path | DriveResult,
+    result: str | Path | Result,
     output: str | Path | None = None,
     *,
     paper: Paper = Paper.A4,
     commands: Commands | None = None,
     as_page: PageSettings = PageSettings(),
 ) -> Path:
-    """Write the report of one drive, or of a fleet, as a PDF or as a page for a browser.
+    """Write the report of a drive, or of a fleet, as a PDF or as a page for a browser.
 
     Parameters
     ----------
     result
-        A recording, whole or partial, or a results folder, or either opened already, or a
-        fleet's folder. Without a recording there are no pictures of a single drive.
+        A recording, whole or partial, a results folder, or a fleet's folder; or one of these opened
+        already. Without a recording there are no pictures of a single drive.
     output
         By default ``report.pdf`` in the folder, or ``reports/<recording>.pdf``. A name that ends
         in ``.html`` gives a page.
@@ -74,16 +69,26 @@ def write_report(
     RoadevalError
         If there is nothing to read there, or the file cannot be written.
     """
-    if not isinstance(result, DriveResult) and is_fleet(result):
-        return _write_fleet(Fleet(result), output, paper, commands, as_page)
-    opened = result if isinstance(result, DriveResult) else DriveResult(result)
-    usual = Path("reports", f"{opened.path.stem}.pdf") if opened.recording else None
-    path = Path(output or usual or _beside(opened.path))
-    with holding(path, inputs=[opened.path]):
-        if is_page(path):
-            kept = Beside.ALL if as_page.assets else Beside.NOTHING
-            return write_page(path, drive_page(opened, commands, as_page.pictures), kept)
-        return write_file(path, pdf(document(collect(opened, commands)), paper))
+    opened = result if isinstance(result, Result) else Result(result)
+    (source,) = opened.paths
+    usual = Path("reports", f"{source.stem}.pdf") if opened.recording else None
+    path = Path(output or usual or _beside(source))
+    with holding(path, inputs=[source]):
+        if not is_page(path):
+            return write_file(path, pdf(document(findings_of(opened, commands)), paper))
+        kept = Beside.PICTURES if opened.fleet else Beside.NOTHING
+        made = page_of(opened, commands, as_page.pictures)
+        return write_page(path, made, Beside.ALL if as_page.assets else kept)
+
+
+def findings_of(
+    result: Result, commands: Commands | None, worst: int = WORST_OF_FLEET
+) -> Findings | FleetFindings:
+    """Collect what the report of a result shows, with so many of a fleet's worst frames."""
+    if result.fleet:
+        return collect_fleet(result.fleet, commands.inspect if commands else None, worst)
+    assert result.drive is not None
+    return collect(result.drive, commands)
 
 
 def _beside(folder: Path) -> Path:
@@ -99,40 +104,19 @@ def is_page(path: Path) -> bool:
     return path.suffix.lower() in PAGES
 
 
-def drive_page(
-    opened: DriveResult, commands: Commands | None = None, pictures: int | None = None
+def page_of(
+    result: Result, commands: Commands | None = None, pictures: int | None = None
 ) -> Document:
-    """Return the page of a drive as a document.
+    """Return the page of a result as a document, with so many pictured frames.
 
-    Parameters
-    ----------
-    opened
-        The drive's result.
-    commands
-        What the reader may type for more.
-    pictures
-        Frames with pictures, see `roadeval.jobs.page_frames.strips_of`.
+    Of a drive by default as many as `roadeval.jobs.page_frames.strips_of` says.
     """
-    inspect = commands.inspect if commands else None
-    findings, frames = collect(opened, commands), browsed(opened, inspect)
+    findings = findings_of(result, commands, pictures or PICTURED)
+    if result.drive is None:
+        return page_document(findings, None)
+    drive, inspect = result.drive, commands.inspect if commands else None
+    frames = browsed(drive, inspect)
     without = page_document(findings, frames)
     taken = len(page(without)) if pictures is None else 0
-    strips, left_out = strips_of(opened, inspect, pictures, taken)
+    strips, left_out = strips_of(drive, inspect, pictures, taken)
     return with_frames(without, replace(frames, strips=strips, left_out=left_out))
-
-
-def _write_fleet(
-    fleet: Fleet,
-    output: str | Path | None,
-    paper: Paper,
-    commands: Commands | None,
-    as_page: PageSettings,
-) -> Path:
-    path = Path(output or _beside(fleet.path))
-    with holding(path, inputs=[fleet.path]):
-        inspect = commands.inspect if commands else None
-        if is_page(path):
-            found = collect_fleet(fleet, inspect, as_page.pictures or PICTURED)
-            kept = Beside.ALL if as_page.assets else Beside.PICTURES
-            return write_page(path, fleet_page_document(found), kept)
-        return write_file(path, pdf(fleet_document(collect_fleet(fleet, inspect)), paper))

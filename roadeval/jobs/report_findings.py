@@ -1,19 +1,33 @@
-"""Findings for a report, collected from a result's tables and masks."""
+"""Findings for a report, collected from the tables and masks of a result."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Packed, Rows, TruthBits
 from roadeval.evaluation import score
-from roadeval.evaluation.settings import settings_of
+from roadeval.evaluation.score import TESTED
 from roadeval.jobs.report_frames import FramePicker, evenly, variants_but_baseline
 from roadeval.jobs.result import DriveResult
-from roadeval.report.findings import Commands, ErrorHeatmap, Findings, PairedComparison
+from roadeval.report.blocks import ImageFile
+from roadeval.report.findings import (
+    Commands,
+    ErrorHeatmap,
+    Findings,
+    FleetFindings,
+    PairedComparison,
+    Row,
+    WorstPicture,
+)
+from roadeval.results.facts import Facts
+from roadeval.results.fleet import FleetFolder
 from roadeval.results.rows import as_arrays, change_rows, heat_rows, window_rows
+from roadeval.results.schema import ALL
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,7 +43,7 @@ THUMBNAILS: Final = 8
 
 def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
     """Collect everything that the report of a result shows."""
-    frames, summary = result.frames, result.summary
+    frames, facts = result.frames, result.facts
     pictured = _pictured(result)
     changes, heat, sampled = _mask_sums(result, pictured)
     windows, window_size = _windows(result)
@@ -41,16 +55,15 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
         commands=commands,
         viewable=commands is not None and result.viewable is not None,
         pictured=len(pictured),
-        summary=summary,
+        facts=facts,
         properties=result.properties,
-        finals=score.stages_of(result.rows),
         windows=windows,
         window_size=window_size,
         paired=paired,
         regions=score.by_region(result.regions) if len(frames) else result.regions,
         overlap={
             variant: {stage: score.overlap(total) for stage, total in stages.items()}
-            for variant, stages in summary["totals"].items()
+            for variant, stages in facts.totals.items()
         },
         changes=_stage_changes(changes),
         error_parts={
@@ -60,10 +73,9 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
             _heatmap(str(name), cells) for name, cells in heat.groupby("variant", sort=False)
         ],
         oracles=score.perfect_stages(result.extra("oracles"), frames),
-        beyond=summary.get("beyond", {}),
         levels=result.levels,
         sampled=sampled,
-        examples=picker.examples(_examples(summary, result.pictured, pictured)),
+        examples=picker.examples(_examples(facts, result.pictured, pictured)),
         thumbnails=picker.thumbnails(evenly(pictured, THUMBNAILS)),
         worst=picker.worst(),
         helped=picker.moved(paired, harmed=False),
@@ -72,11 +84,9 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
     )
 
 
-def _examples(
-    summary: Mapping[str, Any], there: Collection[int], pictured: Sequence[int]
-) -> Sequence[int]:
+def _examples(facts: Facts, there: Collection[int], pictured: Sequence[int]) -> Sequence[int]:
     """Return the frames of the figure that the run drew, or where they have no pictures others."""
-    drawn: list[int] = summary.get("examples", [])
+    drawn = facts.examples
     return drawn if drawn and set(drawn) <= set(there) else evenly(pictured, EXAMPLES)
 
 
@@ -91,7 +101,7 @@ def _pictured(result: DriveResult) -> list[int]:
 
 def _windows(result: DriveResult) -> tuple[Rows, int]:
     """Return the drive's windows and their size; longer ones where the drive is long."""
-    size = settings_of(result.summary).window
+    size = result.facts.evaluation.window
     count = -(-result.frames["frame"].nunique() // size)
     if not count or (count <= WINDOWS and len(result.windows)):
         return result.windows, size
@@ -101,24 +111,11 @@ def _windows(result: DriveResult) -> tuple[Rows, int]:
 
 def _paired(result: DriveResult, changes: pd.DataFrame) -> Iterator[PairedComparison]:
     """Compare filtered against unfiltered, then every variant with the baseline."""
-    frames, summary = result.frames, result.summary
-    finals = score.stages_of(result.rows)
-    if change := summary["difference"].get(finals.get(FILTERED)):
-        yield _pair(frames, FILTERED, UNFILTERED, change, changes)
-    for variant, change in summary["against_blind"].items():
-        yield _pair(frames, variant, BASELINE, change, changes)
-
-
-def _pair(
-    frames: pd.DataFrame,
-    treated: str,
-    control: str,
-    differences: Mapping[str, Mapping[str, Any]],
-    changes: pd.DataFrame,
-) -> PairedComparison:
-    paired = score.pairs(frames, treated, control)
-    pixels = _changed_pixels(changes, treated, control)
-    return PairedComparison(treated, control, differences, paired, pixels)
+    for each in result.facts.effects:
+        if each.final and each.base in (BASELINE, UNFILTERED if each.variant == FILTERED else ""):
+            paired = score.pairs(result.frames, each.variant, each.base)
+            pixels = _changed_pixels(changes, each.variant, each.base)
+            yield PairedComparison(each.variant, each.base, each.rates, paired, pixels)
 
 
 def _changed_pixels(
@@ -219,3 +216,99 @@ def _coverage(result: DriveResult, numbers: Sequence[int]) -> pd.DataFrame:
         },
         index=pd.Index(chosen, name="frame"),
     )
+
+
+# --- Many drives ----------------------------------------------------------------------------------
+
+WORST_OF_FLEET: Final = 12
+"""Worst frames that are shown."""
+_DRIVES: Final = [
+    *("drive", "name", "group", "fold", "status", "reason", "sha256", "evaluated", "losses"),
+    *("trained_on", "model", "luminance", "contrast", "shadow", "sun"),
+]
+_EFFECTS: Final = [
+    *("drive", "base", "variant", "stage", "final", "metric"),
+    *("mean", "low", "high", "p", "frames"),
+]
+
+
+def collect_fleet(
+    fleet: FleetFolder, inspect: Callable[[int], str] | None = None, worst: int = WORST_OF_FLEET
+) -> FleetFindings:
+    """Collect what the report of a fleet is made of.
+
+    Parameters
+    ----------
+    fleet
+        The fleet.
+    inspect
+        Returns the command that opens one of the worst frames, by its rank.
+    worst
+        How many of these are shown, at most.
+
+    Raises
+    ------
+    ResultsError
+        If a table cannot be read.
+    """
+    drives = {row["drive"]: row for row in fleet.table("drives", _DRIVES).to_pylist()}
+    counted = Counter(row["name"] for row in drives.values())
+    return FleetFindings(
+        name=fleet.name,
+        folder=str(fleet.path),
+        facts=fleet.facts,
+        drives=drives,
+        names={
+            drive: row["name"] if counted[row["name"]] == 1 else drive
+            for drive, row in drives.items()
+        },
+        effects=_effects(fleet),
+        scores=_scores(fleet),
+        worst=list(_worst(fleet, worst)),
+        inspect=inspect,
+    )
+
+
+def _effects(fleet: FleetFolder) -> dict[tuple[str, str], list[Row]]:
+    from pyarrow import compute
+
+    table = fleet.table("effects", _EFFECTS)
+    wanted = compute.and_(table["final"], compute.equal(table["metric"], TESTED))
+    found: defaultdict[tuple[str, str], list[Row]] = defaultdict(list)
+    for row in table.filter(wanted).to_pylist():
+        if row["mean"] is not None:
+            found[row["base"], row["variant"]].append(row)
+    return dict(found)
+
+
+def _scores(fleet: FleetFolder) -> list[Row]:
+    from pyarrow import compute
+
+    rates = fleet.facts.rates
+    if not rates:
+        return []
+    columns = ["drive", "variant", "final", "region", "frames", "ERR", "FPR", "FNR", "boundary_f"]
+    table = fleet.table("scores", columns)
+    wanted = compute.and_(table["final"], compute.equal(table["region"], ALL))
+    wanted = compute.and_(wanted, compute.equal(table["variant"], rates[0]["variant"]))
+    rows: list[Row] = table.filter(wanted).to_pylist()
+    return rows
+
+
+def _worst(fleet: FleetFolder, count: int) -> Iterator[WorstPicture]:
+    for rank, row in enumerate(fleet.table("worst").to_pylist()[:count], 1):
+        rates = {name: row[name] for name in ("ERR", "FPR", "FNR")}
+        yield WorstPicture(rank, row["drive"], row["frame"], rates, _picture(fleet.path, row))
+
+
+def _picture(folder: Path, row: dict[str, Any]) -> ImageFile | None:
+    """Read a picture of the folder; one from elsewhere, or of another kind, is none."""
+    path = folder / (row["picture"] or "")
+    if not path.resolve().is_relative_to(folder.resolve()):
+        return None
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    whole = content.startswith(b"\xff\xd8\xff") and content.rstrip(b"\0").endswith(b"\xff\xd9")
+    return ImageFile(content) if whole else None

@@ -15,13 +15,19 @@ import numpy as np
 from roadeval.data import Rows
 from roadeval.errors import RoadevalError
 from roadeval.evaluation import score
-from roadeval.evaluation.score import as_parts, drive_effects
+from roadeval.evaluation.score import drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.recording.layout import DamagedError, RecordingError
-from roadeval.results.fleet.folder import Fleet
-from roadeval.results.fleet.kind import is_fleet
-from roadeval.results.fleet.record import frames_path
-from roadeval.results.fleet.tables import read_frames
+from roadeval.results.facts import (
+    DriveFacts,
+    Facts,
+    FleetFacts,
+    FrameAccount,
+    TrainingFacts,
+    as_parts,
+    is_fleet,
+)
+from roadeval.results.fleet import FleetFolder, frames_path
 from roadeval.results.folder import RUN, ResultsFolder
 from roadeval.results.rows import Key, as_arrays, cells, drive_row, effect_rows, score_rows
 from roadeval.results.schema import TABLES
@@ -70,7 +76,7 @@ class DriveResult:
     @property
     def name(self) -> str:
         """The drive's name."""
-        return self.recording.layout.drive if self.recording else self.summary["drive"]["name"]
+        return self.recording.layout.drive if self.recording else self.facts.drive.name
 
     @property
     def configuration(self) -> Path | None:
@@ -88,23 +94,24 @@ class DriveResult:
         """
         if self.recording is not None:
             return self.path if self.pictured else None
-        written = self.summary.get("run", {}).get("output", {}).get("save")
+        written = self.facts.run.get("output", {}).get("save")
         path = Path(written or Path("recordings", f"{self.name}.rrd"))
         # A summary from elsewhere may name a share of somebody's server, which Windows would ask.
         if str(path).startswith(("//", "\\\\")) or not path.is_file():
             return None
         try:
-            other = DriveResult(path).summary.get("log", {}).get("sha256")
+            other = DriveResult(path).facts.sha256
         except RoadevalError:
             return None
-        return path if other == self.summary["log"]["sha256"] else None
+        return path if other == self.facts.sha256 else None
 
     @cached_property
-    def summary(self) -> dict[str, Any]:
-        """As ``summary.json``; of an incomplete run, what its tables give."""
+    def facts(self) -> Facts:
+        """The facts; of an incomplete run, what its tables give."""
         if not self.complete:
-            return self._summary_of_part()
-        return self._tables.summary
+            return self._facts_of_part()
+        assert self._tables.facts is not None
+        return self._tables.facts
 
     @cached_property
     def rows(self) -> Rows:
@@ -119,12 +126,12 @@ class DriveResult:
     @cached_property
     def frames(self) -> pd.DataFrame:
         """The rows of ``frames.csv``."""
-        return self._whole(self._tables.frames)
+        return self._whole(self._tables.table("frames"))
 
     @cached_property
     def regions(self) -> pd.DataFrame:
         """The rows of ``regions.csv``."""
-        return self._whole(self._tables.regions)
+        return self._whole(self._tables.table("regions"))
 
     @cached_property
     def pictured(self) -> tuple[int, ...]:
@@ -194,29 +201,23 @@ class DriveResult:
         both: list[int] = np.intersect1d(frames, regions).tolist()
         return both
 
-    def _summary_of_part(self) -> dict[str, Any]:
-        """Make the summary that a killed run did not get to write, of what it had scored."""
+    def _facts_of_part(self) -> Facts:
+        """Make the facts that a killed run did not get to write, of what it had scored."""
         assert self.recording is not None
         layout, settings = self.recording.layout, EvaluationSettings()
         effects = drive_effects(list(score.mask_counts(self.rows)), settings)
-        return {
-            "drive": {"name": layout.drive, "width": layout.width, "height": layout.height},
-            "frames": {
-                "with_pictures": len(self.pictured),
-                "trained_on": layout.properties.get("training_frames", 0),
-                "evaluated": len(self.rows.distinct("frame")),
-            },
-            "warnings": [],
-            "losses": [],
-            "run": {},
-            "settings": {},
-            "versions": {},
-            "seconds": {},
-            "training": {"source": layout.properties.get("trained_on")},
-            "totals": (totals := score.totals(self.rows)),
-            "verdict": verdict(totals, effects, settings),
+        totals = score.totals(self.rows)
+        return Facts(
+            verdict(totals, effects, settings),
+            DriveFacts(layout.drive, width=layout.width, height=layout.height),
+            FrameAccount(
+                trained_on=int(layout.properties.get("training_frames", 0)),
+                evaluated=len(self.rows.distinct("frame")),
+            ),
+            totals,
+            training=TrainingFacts(str(layout.properties.get("trained_on"))),
             **as_parts(effects),
-        }
+        )
 
 
 # --- Any number of drives -------------------------------------------------------------------------
@@ -249,7 +250,10 @@ class Result:
     Parameters
     ----------
     paths
-        Recordings, results folders and fleets' folders.
+        Recordings, results folders and fleets' folders, perhaps from elsewhere.
+    trust_sources
+        Whether logs, masks, models and recordings may be read that a fleet's folder names and that
+        lie outside it.
 
     Raises
     ------
@@ -267,10 +271,11 @@ class Result:
     1 blind filtered unfiltered
     """
 
-    def __init__(self, *paths: str | Path) -> None:
+    def __init__(self, *paths: str | Path, trust_sources: bool = False) -> None:
         self.paths: Final = tuple(map(Path, paths))
         self._opened: Final = [
-            Fleet(path) if is_fleet(path) else DriveResult(path) for path in self.paths
+            FleetFolder(path, trust_sources=trust_sources) if is_fleet(path) else DriveResult(path)
+            for path in self.paths
         ]
 
     @property
@@ -279,27 +284,49 @@ class Result:
         return ", ".join(each.name for each in self._opened)
 
     @property
+    def fleet(self) -> FleetFolder | None:
+        """The fleet's folder, where that was opened alone."""
+        (first, *more) = self._opened
+        return first if isinstance(first, FleetFolder) and not more else None
+
+    @property
+    def drive(self) -> DriveResult | None:
+        """The result of the one drive, where a recording or its folder was opened alone."""
+        (first, *more) = self._opened
+        return first if isinstance(first, DriveResult) and not more else None
+
+    @property
+    def facts(self) -> Facts | FleetFacts:
+        """The facts of the first result."""
+        return self._opened[0].facts
+
+    @property
     def summary(self) -> dict[str, Any]:
         """The content of the first result's ``summary.json`` or ``fleet.json``."""
-        return self._opened[0].summary
+        return self.facts.as_dict()
 
     @property
     def complete(self) -> bool:
         """Whether every run reached its end."""
-        return all(isinstance(each, Fleet) or each.complete for each in self._opened)
+        return not self.warnings
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The warnings that a reader should see first."""
+        own = (each.warnings for each in self._opened if isinstance(each, DriveResult))
+        return tuple(chain.from_iterable(own))
 
     @property
     def recording(self) -> Path | None:
         """The recording, where that was opened alone."""
-        (first, *more) = self._opened
-        return None if more or isinstance(first, Fleet) or not first.recording else first.path
+        return self.drive.path if self.drive and self.drive.recording else None
 
     @cached_property
     def variants(self) -> list[str]:
         """The variants that were scored, in order."""
         found = (
-            (row["variant"] for row in each.summary["rates"])
-            if isinstance(each, Fleet)
+            (row["variant"] for row in each.facts.rates)
+            if isinstance(each, FleetFolder)
             else each.rows.distinct("variant")
             for each in self._opened
         )
@@ -311,36 +338,45 @@ class Result:
         return tuple(
             part
             for each in self._opened
-            for part in (_members(each) if isinstance(each, Fleet) else [_alone(each)])
+            for part in (_members(each) if isinstance(each, FleetFolder) else [_alone(each)])
         )
 
     @cached_property
     def drives(self) -> pd.DataFrame:
         """A row per drive and camera, scored or not."""
-        return self._of_drives("drives")
+        return self._table("drives")
 
     @cached_property
     def scores(self) -> pd.DataFrame:
         """A row per drive, camera, variant, stage and region."""
-        return self._of_drives("scores")
+        return self._table("scores")
 
     @cached_property
     def effects(self) -> pd.DataFrame:
         """A row per drive, camera, difference between two masks, and rate."""
-        return self._of_drives("effects")
+        return self._table("effects")
+
+    @cached_property
+    def worst(self) -> pd.DataFrame:
+        """A row per frame among the worst of a fleet; empty for single drives."""
+        return self._table("worst")
 
     @cached_property
     def frames(self) -> pd.DataFrame:
         """A row per evaluated frame, variant and stage of every drive."""
         return _together(
-            each.frames if isinstance(each, DriveResult) else each.frames(member["drive"])
+            table
             for each in self._opened
-            for member in (each.summary["drives"] if isinstance(each, Fleet) else [{}])
+            for table in (
+                [each.frames]
+                if isinstance(each, DriveResult)
+                else (each.frames(name).to_pandas() for name in each.scored())
+            )
         )
 
-    def _of_drives(self, name: str) -> pd.DataFrame:
+    def _table(self, name: str) -> pd.DataFrame:
         return _together(
-            getattr(each, name) if isinstance(each, Fleet) else _own(each, name)
+            each.table(name).to_pandas() if isinstance(each, FleetFolder) else _own(each, name)
             for each in self._opened
         )
 
@@ -352,64 +388,63 @@ def _together(tables: Iterable[pd.DataFrame]) -> pd.DataFrame:
 
 
 def _own(result: DriveResult, name: str) -> pd.DataFrame:
-    """Return a table of drives of a single drive, by what makes a fleet's."""
+    """Return a table of drives for a single drive, by the function that makes a fleet's."""
     import pandas as pd
 
-    facts = result.summary
-    key = Key(result.name, facts["drive"].get("camera", ""))
+    facts, rows = result.facts, []
     if name == "drives":
         rows = [drive_row(facts, result.name, str(result.path))]
     elif name == "scores":
         rows = [*score_rows(facts, score.region_totals(result.table("regions")))]
-    else:
+    elif name == "effects":
         rows = [*effect_rows(facts)]
+    key = Key(result.name, facts.drive.camera)
     return pd.DataFrame(cells(name, key, rows), columns=TABLES[name].names)
 
 
 def _alone(result: DriveResult) -> Part:
-    digest = result.summary.get("log", {}).get("sha256")
     return Part(
-        *(result.name, result.name, str(digest) if digest else None),
-        *(len(result.rows) > 0, asked(result.summary), cache(result.table)),
+        *(result.name, result.name, result.facts.sha256),
+        *(len(result.rows) > 0, asked(result.facts.run), cache(result.table)),
     )
 
 
-def _members(fleet: Fleet) -> Iterator[Part]:
+def _members(fleet: FleetFolder) -> Iterator[Part]:
     columns = ["drive", "sha256", "evaluated"]
     about = {row["drive"]: row for row in fleet.table("drives", columns).to_pylist()}
-    members = fleet.summary["drives"]
-    counted = Counter(member["name"] for member in members)
-    settings = asked(fleet.summary)
+    members = fleet.facts.drives
+    counted = Counter(member.name for member in members)
+    settings = asked(fleet.facts.run)
     for member in members:
-        drive, row = member["drive"], about[member["drive"]]
+        row = about[member.drive]
         yield Part(
-            drive=drive,
+            drive=member.drive,
             # Two drives of a fleet may have one name.
-            name=member["name" if counted[member["name"]] == 1 else "drive"],
+            name=member.name if counted[member.name] == 1 else member.drive,
             digest=row["sha256"] or None,
             scored=bool(row["evaluated"]),
             asked=settings,
-            rows=partial(_rows_of_member, fleet, drive),
-            group=member["group"],
-            tags=member["tags"],
+            rows=partial(_rows_of_member, fleet, member.drive),
+            group=member.group,
+            tags=member.tags,
         )
 
 
-def _rows_of_member(fleet: Fleet, drive: str, table: str) -> Rows:
+def _rows_of_member(fleet: FleetFolder, drive: str, table: str) -> Rows:
     """Return the rows of a fleet's drive; of its frames alone, for they are in one small file."""
     if table != "frames":
         return as_arrays(table, ())
     try:
-        return parquet_rows(read_frames(fleet.path, drive), table)
+        return parquet_rows(fleet.frames(drive), table)
     except FileNotFoundError:
         path = frames_path(fleet.path, drive)
         raise ResultsError(f"{path}: is not there; {AGAIN}") from None
 
 
-def asked(summary: Mapping[str, Any]) -> dict[str, Any]:
+def asked(run: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of a run that may change its numbers, by names as ``frames.scale``."""
     found: dict[str, Any] = {}
-    for table, own in summary.get("run", {}).items():
+    for table, own in run.items():
         if table in NO_NUMBER:
             continue
         nested = own.items() if isinstance(own, dict) else [("", own)]

@@ -2,30 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from functools import cached_property, partial
 from http import HTTPStatus
 from pathlib import Path
+from threading import Lock
 from typing import Final
 
 from roadeval.errors import RoadevalError
-from roadeval.jobs.replayed import Replayer
-from roadeval.jobs.result import DriveResult
-from roadeval.jobs.served import Served, ServedDrive, moved, policy
-from roadeval.jobs.served_fleet import ServedFleet
+from roadeval.jobs.inspect import WorstFrame, worst_frames
+from roadeval.jobs.page_frames import StripMaker, browsed
+from roadeval.jobs.progress import OnProgress
+from roadeval.jobs.replayed import CancelledReplayError, Replayer, recording_of
+from roadeval.jobs.report import PICTURED, findings_of
+from roadeval.jobs.result import DriveResult, Result
 from roadeval.recording.screen.viewer import WindowViewer
-from roadeval.report.blocks import Document, Heading, LinkList
+from roadeval.report.blocks import Document, Heading, LinkList, Strip
+from roadeval.report.document import page_document
 from roadeval.report.findings import Commands
-from roadeval.report.page.render import SCRIPT, STYLE, Place, code, page
-from roadeval.results.fleet.kind import is_fleet
-from roadeval.runtime.files import Paths, listed
+from roadeval.report.page.render import SCRIPT, STYLE, Place, code, page, part
+from roadeval.report.sections.browse import LARGE
+from roadeval.results.fleet import FleetFolder
+from roadeval.runtime.files import Paths, listed, own_names
 from roadeval.runtime.local_server import NOT_FOUND, PAGE, LocalServer, Request, Response, told
 
-MakeCommands = Callable[[DriveResult | Path], Commands]
-"""Returns the commands that a page names, of a drive's result or of a fleet's folder."""
+MakeCommands = Callable[[Result], Commands]
+"""Returns the commands that the page of a result names."""
+STRIPS: Final = 40
+"""Frames whose pictures are kept in memory."""
 _CODE: Final = {STYLE: "text/css; charset=utf-8", SCRIPT: "text/javascript; charset=utf-8"}
-_PLACE: Final = Place("", "", "{}")
+_MEDIA: Final = {"jpg": "image/jpeg", "png": "image/png", "svg": "image/svg+xml"}
+_HOME: Final = Place("", "", "{}")
 
 
 def serve(
@@ -63,40 +73,22 @@ def serve(
 def serving(
     results: Paths, *, trust_sources: bool = False, commands: MakeCommands | None = None
 ) -> Iterator[LocalServer]:
-    """Have a server of results, as `serve`; when the block ends, all that it started ends with it.
-
-    Yields
-    ------
-    LocalServer
-        Its ``serve_forever`` answers.
-    """
+    """Yield a server of results, as of `serve`; what it started ends with the block."""
     with ExitStack() as stack:
-        replayer = Replayer()
-        opened = [
-            _opened(Path(path), commands, replayer, trust_sources=trust_sources)
-            for path in listed(results)
-        ]
-        viewer = WindowViewer()
+        replayer, viewer = Replayer(), WindowViewer()
+        opened = [Result(path, trust_sources=trust_sources) for path in listed(results)]
+        site = _Site([_served(each, commands, replayer) for each in opened], viewer)
         stack.callback(viewer.close)
         stack.callback(replayer.cancel)
-        server = LocalServer(_Site(opened, viewer).answer)
+        server = LocalServer(site.answer)
         stack.callback(server.server_close)
         yield server
-
-
-def _opened(
-    path: Path, commands: MakeCommands | None, replayer: Replayer, *, trust_sources: bool
-) -> Served:
-    if is_fleet(path):
-        inspect = commands(path).inspect if commands else None
-        return ServedFleet(path, inspect, commands, replayer, trust_sources=trust_sources)
-    return ServedDrive(path, commands)
 
 
 class _Site:
     """Finds what answers a request: the list of results, or one of them."""
 
-    def __init__(self, served: Sequence[Served], viewer: WindowViewer) -> None:
+    def __init__(self, served: list[_Served], viewer: WindowViewer) -> None:
         self._served = served
         self._viewer = viewer
 
@@ -115,17 +107,247 @@ class _Site:
                 return Response(code()[name], _CODE[name])
             case (place, *rest) if place.isdecimal() and int(place) < len(self._served):
                 if not rest and not request.folder:
-                    return moved(f"{place}/")
+                    return _moved(f"{place}/")
                 below = replace(request, parts=tuple(rest))
                 return self._served[int(place)].answer(below, self._viewer)
         return NOT_FOUND
 
     def _home(self) -> Response:
         if len(self._served) == 1:
-            return moved("0/")
+            return _moved("0/")
         links = [
             (f"{each.title} ({each.path})", f"{place}/") for place, each in enumerate(self._served)
         ]
         blocks = [Heading("Results"), LinkList(links)]
         made = Document("roadeval", "Results", f"{len(links)} results", "", blocks)
-        return Response(page(made, _PLACE), PAGE, headers=policy(_PLACE))
+        return _page(page(made, _HOME), _HOME)
+
+
+def _served(result: Result, commands: MakeCommands | None, replayer: Replayer) -> _Served:
+    if result.fleet:
+        return _ServedFleet(result, commands, result.fleet, replayer)
+    assert result.drive is not None
+    return _ServedDrive(result, commands, result.drive)
+
+
+class _Served:
+    """The page of a result, with its pictures.
+
+    Parameters
+    ----------
+    result
+        The result.
+    make_commands
+        Makes the commands that its page names.
+    place
+        Where its page lies.
+    """
+
+    def __init__(self, result: Result, make_commands: MakeCommands | None, place: Place) -> None:
+        (self.path,) = result.paths
+        self.title: Final = result.name
+        self._result: Final = result
+        self._make_commands: Final = make_commands
+        self._commands: Final = make_commands(result) if make_commands else None
+        self._lock: Final = Lock()
+        self._place: Final = place
+
+    def answer(self, request: Request, viewer: WindowViewer) -> Response:
+        """Return what is asked for below its address."""
+        match request.parts:
+            case () if not request.acts:
+                return _page(self._page, self._place)
+            case ("pictures", name) if not request.acts:
+                content = self._picture(name)
+                media = _MEDIA.get(name.rpartition(".")[2], "")
+                return Response(content, media, kept=True) if content else NOT_FOUND
+        return self._more(request, viewer)
+
+    @cached_property
+    def _document(self) -> Document:
+        inspect = self._commands.inspect if self._commands else None
+        drive = self._result.drive
+        with self._lock:
+            findings = findings_of(self._result, self._commands, PICTURED)
+            return page_document(findings, browsed(drive, inspect) if drive else None)
+
+    @cached_property
+    def _page(self) -> bytes:
+        return page(self._document, self._place)
+
+    @cached_property
+    def _pictures(self) -> Mapping[str, bytes]:
+        return self._document.files()
+
+    def _picture(self, name: str) -> bytes | None:
+        return self._pictures.get(name)
+
+    def _more(self, request: Request, viewer: WindowViewer) -> Response:
+        """Answer below the page."""
+        raise NotImplementedError
+
+
+class _ServedDrive(_Served):
+    """A drive, and every frame that has pictures.
+
+    ``site`` is the address of the whole site as its page names it, ``above`` the address and the
+    title of the page above.
+    """
+
+    def __init__(
+        self,
+        result: Result,
+        make_commands: MakeCommands | None,
+        drive: DriveResult,
+        site: str = "../",
+        above: tuple[str, str] = ("../", "All results"),
+    ) -> None:
+        super().__init__(result, make_commands, Place("pictures/", site, "frame/{}", *above))
+        self._drive: Final = drive
+        self._strips: Final[OrderedDict[int, Strip]] = OrderedDict()
+        self._frames: Final = frozenset(drive.pictured)
+        self._frame_place: Final = Place(
+            *("../pictures/", f"../{site}", "../frame/{}", "../", self.title), forms=True
+        )
+
+    def _more(self, request: Request, viewer: WindowViewer) -> Response:
+        match request.parts:
+            case ("frame", number, *rest) if number.isdecimal() and int(number) in self._frames:
+                return self._frame(int(number), tuple(rest), viewer, acts=request.acts)
+        return NOT_FOUND
+
+    @cached_property
+    def _maker(self) -> StripMaker:
+        inspect = self._commands.inspect if self._commands else None
+        return StripMaker(self._drive, inspect, LARGE)
+
+    def _picture(self, name: str) -> bytes | None:
+        with self._lock:
+            strips = [*self._strips.values()]
+        found = next((i for each in strips for i in each.images() if i.name == name), None)
+        return found.content if found else super()._picture(name)
+
+    def _strip(self, frame: int) -> Strip:
+        with self._lock:
+            if frame not in self._strips:
+                self._strips[frame] = self._maker.strip(frame)
+                while len(self._strips) > STRIPS:
+                    self._strips.popitem(last=False)
+            self._strips.move_to_end(frame)
+            return self._strips[frame]
+
+    def _frame(
+        self, frame: int, rest: tuple[str, ...], viewer: WindowViewer, *, acts: bool
+    ) -> Response:
+        match rest, acts:
+            case ("part",), False:
+                return Response(part(self._strip(frame), self._place), PAGE)
+            case (), False:
+                blocks = [Heading(f"Frame {frame}"), self._strip(frame)]
+                made = Document("frame", self.title, f"frame {frame}", "", blocks)
+                return _page(page(made, self._frame_place), self._frame_place)
+            case ("view",), True:
+                return _viewed(viewer, self.path, frame)
+            case ("show",), True:
+                shown = _viewed(viewer, self.path, frame)
+                return _moved("../..") if shown.succeeded else shown
+        return NOT_FOUND
+
+
+class _ServedFleet(_Served):
+    """A fleet, the pages of its drives, and its worst frames in the viewer."""
+
+    def __init__(
+        self,
+        result: Result,
+        make_commands: MakeCommands | None,
+        fleet: FleetFolder,
+        replayer: Replayer,
+    ) -> None:
+        super().__init__(result, make_commands, Place("pictures/", "../", "frame/{}", "../"))
+        self._fleet: Final = fleet
+        self._replayer: Final = replayer
+        self._drives: Final[dict[Path, _ServedDrive]] = {}
+
+    def _more(self, request: Request, viewer: WindowViewer) -> Response:
+        match request.parts:
+            case ("worst", rank, "view" | "cancel" as what) if request.acts and rank.isdecimal():
+                frame = self._worst.get(int(rank))
+                if frame is None:
+                    return NOT_FOUND
+                return self._view(frame, viewer) if what == "view" else self._cancel(frame)
+            case ("drive", place, *rest) if place.isdecimal() and int(place) < len(self._names):
+                if not rest and not request.folder:
+                    return NOT_FOUND
+                below = replace(request, parts=tuple(rest))
+                return self._served(self._names[int(place)]).answer(below, viewer)
+        return NOT_FOUND
+
+    @cached_property
+    def _names(self) -> list[str]:
+        names: list[str] = self._fleet.table("drives", ["drive"])["drive"].to_pylist()
+        return names
+
+    @cached_property
+    def _worst(self) -> Mapping[int, WorstFrame]:
+        if not self._fleet.table("worst", ["rank"]).num_rows:
+            return {}
+        return {each.rank: each for each in worst_frames(self._result, PICTURED)}
+
+    def _served(self, drive: str) -> _ServedDrive:
+        """Return a drive as it lies in the folder now: its recording, or else its tables."""
+        recording = self._fleet.recording(drive)
+        path = recording if recording.exists() else self._fleet.results(drive)
+        with self._lock:
+            if path not in self._drives:
+                opened, above = Result(path), ("../../", self.title)
+                assert opened.drive is not None
+                self._drives[path] = _ServedDrive(
+                    opened, self._make_commands, opened.drive, "../../../", above
+                )
+            return self._drives[path]
+
+    def _view(self, frame: WorstFrame, viewer: WindowViewer) -> Response:
+        """Show one of the worst frames; its drive is replayed where no recording was kept."""
+        drive = frame.drive
+        try:
+            recording = self._fleet.recording(drive)
+            state = self._replayer.want(recording, drive, partial(self._replay, drive))
+            if state:
+                return told(HTTPStatus.ACCEPTED, state)
+        except RoadevalError as error:
+            return told(HTTPStatus.CONFLICT, str(error))
+        return _viewed(viewer, recording, frame.frame)
+
+    def _replay(self, drive: str, on_progress: OnProgress) -> None:
+        """Make a drive's recording; nothing is left of one that is cancelled."""
+        try:
+            recording_of(self._fleet, drive, on_progress)
+        except CancelledReplayError:
+            for left in own_names(self._fleet.recording(drive), hidden=False):
+                left.unlink(missing_ok=True)
+            raise
+
+    def _cancel(self, frame: WorstFrame) -> Response:
+        self._replayer.cancel(self._fleet.recording(frame.drive))
+        return Response(b"")
+
+
+def _viewed(viewer: WindowViewer, recording: Path, frame: int) -> Response:
+    """Show a frame in the viewer; the answer is empty, or says why it cannot be shown."""
+    try:
+        viewer.show(recording, frame)
+    except RoadevalError as error:
+        return told(HTTPStatus.CONFLICT, str(error))
+    return Response(b"")
+
+
+def _page(content: bytes, place: Place) -> Response:
+    """Return a page, with the policy on what it may ask for."""
+    policy = f"{place.policy}; frame-ancestors 'none'"
+    return Response(content, PAGE, headers={"Content-Security-Policy": policy})
+
+
+def _moved(to: str) -> Response:
+    """Return where the browser is to look instead."""
+    return Response(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": to})

@@ -1,4 +1,4 @@
-"""The content of ``summary.json``: what a run found, on which frames, by which settings."""
+"""The facts of a run: what it found, on which frames, by which settings."""
 
 from __future__ import annotations
 
@@ -10,10 +10,18 @@ from typing import Any, Final
 
 from roadeval.config import RunConfig
 from roadeval.data import BASELINE, Role
-from roadeval.evaluation.score import as_parts
 from roadeval.jobs.identity import computing
 from roadeval.jobs.run import Run
+from roadeval.results.facts import (
+    DriveFacts,
+    Facts,
+    FrameAccount,
+    LogFacts,
+    TrainingFacts,
+    as_parts,
+)
 from roadeval.results.sentences import verdict
+from roadeval.results.tables import TableFacts
 from roadeval.version import VERSION
 
 JOURNEY: Final = 3
@@ -21,27 +29,29 @@ JOURNEY: Final = 3
 FLATTERED: Final = "look alike, which flatters the result: use a model of other drives"
 
 
-def of(run: Run) -> dict[str, Any]:
-    """Return the content of ``summary.json``, but for its format, of a run at its end."""
+def of(run: Run, examples: list[int], tables: dict[str, TableFacts]) -> Facts:
+    """Return the facts of a run at its end, with the frames of figure 2 and the tables' sums."""
     found, effects = run.board.summary(), run.board.effects()
     repeats = run.board.repeats()
-    seeds = {"seeds": [run.config.training.seed, *run.repeats], **repeats} if repeats else None
-    return found | {
-        "verdict": verdict(found["totals"], effects, run.config.evaluation),
+    return Facts(
+        **found,
         **as_parts(effects),
-        **({"seeds": seeds} if seeds else {}),
-        "drive": _drive(run),
-        "frames": _accounting(run),
-        "training": _training(run),
-        "warnings": list(warnings(run)),
-        "losses": list(losses(run)),
-        "run": run.config.as_dict(),
-        "settings": {each.name: each.pipeline.as_dict() for each in run.variants},
-        **({"methods": run.methods} if run.methods else {}),
-        "versions": versions(),
-        "log": {"path": str(run.log.path), "sha256": run.log.sha256},
-        **({"masks": masks} if (masks := _masks(run)) else {}),
-    }
+        verdict=verdict(found["totals"], effects, run.config.evaluation),
+        drive=_drive(run),
+        frames=_accounting(run),
+        seeds={"seeds": [run.config.training.seed, *run.repeats], **repeats} if repeats else {},
+        examples=examples,
+        training=_training(run),
+        warnings=list(warnings(run)),
+        losses=list(losses(run)),
+        run=run.config.as_dict(),
+        settings={each.name: each.pipeline.as_dict() for each in run.variants},
+        methods=run.methods,
+        versions=versions(),
+        log=LogFacts(str(run.log.path), run.log.sha256),
+        masks=_masks(run),
+        tables=tables,
+    )
 
 
 def versions() -> dict[str, str]:
@@ -166,19 +176,17 @@ def _constant(run: Run) -> Iterator[str]:
                 yield f"{variant}: its final mask is road {where}, on every frame"
 
 
-def _drive(run: Run) -> dict[str, Any]:
-    width, height = run.selection.size or (0, 0)
-    return {
-        "name": run.log.name,
-        "camera": run.key.camera,
-        "width": width,
-        "height": height,
-        "rate_hz": run.selection.image.rate_hz,
-        "topics": list(run.selection.reasons),
-    }
+def _drive(run: Run) -> DriveFacts:
+    return DriveFacts(
+        run.log.name,
+        run.key.camera,
+        *(run.selection.size or (0, 0)),
+        rate_hz=run.selection.image.rate_hz,
+        topics=list(run.selection.reasons),
+    )
 
 
-def _accounting(run: Run) -> dict[str, Any]:
+def _accounting(run: Run) -> FrameAccount:
     """Account for every frame of the image topic: evaluated, or skipped and why."""
     seen, roles = run.frames.accounting, Counter(run.board.roles())
     skipped = {
@@ -191,28 +199,29 @@ def _accounting(run: Run) -> dict[str, Any]:
         _gap(run.config): roles[Role.GAP],
         "unlabelled": roles[Role.UNLABELLED],
     }
-    return {
-        "in_log": seen.in_log,
-        "read": seen.read,
-        "decoded": seen.read - len(seen.undecodable),
-        "labelled": seen.labelled,
-        "trained_on": roles[Role.TRAINING],
-        "evaluated": roles[Role.EVALUATED],
-        "skipped": {reason: number for reason, number in skipped.items() if number},
-    }
+    return FrameAccount(
+        in_log=seen.in_log,
+        read=seen.read,
+        decoded=seen.read - len(seen.undecodable),
+        labelled=seen.labelled,
+        trained_on=roles[Role.TRAINING],
+        evaluated=roles[Role.EVALUATED],
+        skipped={reason: number for reason, number in skipped.items() if number},
+    )
 
 
 def _gap(config: RunConfig) -> str:
     return f"gap {'after' if config.training.placement == 'first' else 'beside'} training"
 
 
-def _training(run: Run) -> dict[str, Any]:
-    given = run.config.training.model is not None and not run.config.training.adapt
-    return {
-        "source": run.model.source,
-        "frames": len(run.model.digests),
-        "pixels": run.model.pixels,
-        "model": run.config.training.model,
-        "placement": None if given else run.config.training.placement,
-        **({"adapted": True} if run.config.training.adapt else {}),
-    }
+def _training(run: Run) -> TrainingFacts:
+    settings = run.config.training
+    given = settings.model is not None and not settings.adapt
+    return TrainingFacts(
+        run.model.source,
+        len(run.model.digests),
+        run.model.pixels,
+        settings.model,
+        None if given else settings.placement,
+        settings.adapt,
+    )

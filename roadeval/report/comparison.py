@@ -35,7 +35,7 @@ from roadeval.report.blocks import markdown as written
 from roadeval.report.chart import Chart
 from roadeval.report.charts import differences
 from roadeval.report.charts.differences import MEAN, ForestRow
-from roadeval.report.fleet.common import MarkedRow, q_value, strata_table
+from roadeval.report.sections.strata import Part, strata_table
 from roadeval.results import comparison as told
 from roadeval.results.sentences import correction, marked_interval
 
@@ -276,9 +276,15 @@ def changed_drives(comparison: Comparison) -> Iterator[Block]:
                 "drive": lambda row: row.drive,
                 "frames": lambda row: number(row.frames),
                 **_change(lambda row: interval(row.difference.low, row.difference.high)),
-                "q": lambda row: DASH if row.q is None else q_value(row.q),
+                "q": lambda row: (
+                    DASH if row.q is None else "<0.001" if row.q < 0.001 else f"{row.q:.3f}"
+                ),
             }
             yield _table(rows[:NAMED], columns)
+
+
+def _q_value(q: float | None) -> str:
+    return DASH if q is None else "<0.001" if q < 0.001 else f"{q:.3f}"
 
 
 def _change(ends: Callable[[Any], str]) -> Columns:
@@ -303,11 +309,11 @@ def _own(comparison: Comparison, result: str, variant: str) -> list[DriveChange]
 def _by_tag(comparison: Comparison) -> Iterator[Block]:
     for mask in _masks(comparison):
         parts = [
-            MarkedRow.of_stratum(each.stratum)
+            Part(each.stratum.by, str(each.stratum.value), each.stratum.difference)
             for each in comparison.strata
             if (each.result, each.variant) == mask
         ]
-        if any(part.mean for part in parts):
+        if any(part.difference.mean for part in parts):
             yield Heading(f"Change of {TESTED} of {mask[1]} by tag", 2)
             yield from strata_table(parts)
 

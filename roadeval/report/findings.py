@@ -1,4 +1,4 @@
-"""The content of a report on one drive: tables, frames and facts that a job has collected."""
+"""The content of a report on one drive or on many, as a job collects it."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import Rows
+from roadeval.data import BASELINE, Rows
+from roadeval.data.words import defined
+from roadeval.evaluation.stats import Difference
+from roadeval.report.blocks import ImageFile
 from roadeval.report.images import ExampleFrame, LayerImage
+from roadeval.results.facts import Facts, FleetFacts, Totals
+from roadeval.results.schema import FAILED
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Totals = Mapping[str, Mapping[str, Mapping[str, Any]]]
-"""Counts and rates by variant and stage, as ``totals`` in ``summary.json``."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,8 +28,8 @@ class PairedComparison:
     treated: str
     control: str
     """Variants; differences are the first minus the second."""
-    differences: Mapping[str, Mapping[str, Any]]
-    """By rate, as in ``summary.json``."""
+    differences: Mapping[str, Difference]
+    """By rate."""
     frames: pd.DataFrame
     """Indexed by ``frame``: ``stamp_ns``, the differences by rate, ``wrong`` (net pixels)."""
     pixels: tuple[int, int, int] | None = None
@@ -92,12 +94,10 @@ class Findings:
     """Whether ``commands`` open frames in the viewer: the recording is there."""
     pictured: int
     """Number of frames with pictures, of those evaluated, or without truth of all."""
-    summary: Mapping[str, Any]
-    """As ``summary.json``; of an incomplete run, what its tables allow to compute."""
+    facts: Facts
+    """Of an incomplete run, what its tables allow to compute."""
     properties: Mapping[str, Any]
     """The recording's own, about its origin."""
-    finals: Mapping[str, str]
-    """Each scored variant's final stage."""
     windows: Rows
     """As ``windows.csv``, or longer windows for a long drive."""
     window_size: int
@@ -118,8 +118,6 @@ class Findings:
     """One a variant."""
     oracles: pd.DataFrame
     """See `roadeval.evaluation.score.perfect_stages`; empty if the run counted none."""
-    beyond: Mapping[str, Mapping[str, Any]]
-    """Boundary F and flicker of each final mask, as in ``summary.json``."""
     levels: Rows
     """As ``probabilities.csv``; empty where no stage says how probable road is."""
     sampled: int
@@ -138,14 +136,76 @@ class Findings:
     @property
     def drive(self) -> str:
         """The drive's name."""
-        return str(self.summary["drive"]["name"])
+        return self.facts.drive.name
 
     @property
     def totals(self) -> Totals:
         """Counts and rates by variant and stage."""
-        totals: Totals = self.summary["totals"]
-        return totals
+        return self.facts.totals
+
+    @property
+    def finals(self) -> Mapping[str, str]:
+        """Each scored variant's final stage."""
+        return self.facts.finals
 
     def total(self, variant: str) -> Mapping[str, Any]:
         """Return the counts and rates of a variant's final mask."""
         return self.totals[variant][self.finals[variant]]
+
+
+# --- Many drives ----------------------------------------------------------------------------------
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class WorstPicture:
+    """One of the worst frames over all drives; without a picture where none is left."""
+
+    rank: int
+    drive: str
+    frame: int
+    rates: Mapping[str, float]
+    picture: ImageFile | None
+
+
+@dataclass(frozen=True, slots=True)
+class FleetFindings:
+    """Everything that a report of many drives shows."""
+
+    name: str
+    folder: str
+    """Of the fleet."""
+    facts: FleetFacts
+    drives: Mapping[str, Row]
+    """Rows of ``drives`` by the drives' identity."""
+    names: Mapping[str, str]
+    """The drives' names for people, by their identity; no two are equal."""
+    effects: Mapping[tuple[str, str], Sequence[Row]]
+    """Rows of ``effects`` of the final masks' ERR, by base and variant."""
+    scores: Sequence[Row]
+    """Rows of ``scores`` of the first variant's final mask, over all labelled pixels."""
+    worst: Sequence[WorstPicture] = ()
+    """The worst frames over all drives."""
+    inspect: Callable[[int], str] | None = None
+    """Returns the command that opens one of them, by its rank; None where the report is not made at
+    a terminal."""
+
+    def pages(self) -> dict[str, str]:
+        """Return where each drive's own page lies below that of a served fleet.
+
+        By the drives' identity; a drive that failed has none.
+        """
+        return {
+            drive: f"drive/{place}/"
+            for place, (drive, row) in enumerate(self.drives.items())
+            if row["status"] != FAILED
+        }
+
+
+def worse_than_baseline(errors: Mapping[str, float | None]) -> list[str]:
+    """Return the variants with a higher ERR than the baseline, where that is known."""
+    blind = errors.get(BASELINE)
+    if not defined(blind):
+        return []
+    return [name for name, error in errors.items() if defined(error) and error > blind]

@@ -8,14 +8,15 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import IO, TYPE_CHECKING, Any, Final, Self
+from typing import IO, TYPE_CHECKING, Final, Self
 
 from roadeval.data import Rows
+from roadeval.results.facts import SUMMARY, Facts
 from roadeval.results.schema import OF_A_DRIVE, TABLES, TableSchema
-from roadeval.results.summary import SUMMARY, read_summary, summary_text
-from roadeval.results.tables import ResultsError, read_rows, read_table
+from roadeval.results.tables import ResultsError, TableFacts, read_rows, read_table
 from roadeval.runtime.documents import read_bounded, read_json
 from roadeval.runtime.files import Content, NewFolder
 
@@ -106,32 +107,24 @@ class ResultsWriter:
                 self._open[name].append(text)
 
     @property
-    def tables(self) -> dict[str, dict[str, Any]]:
-        """Rows and SHA-256 of each table that has rows so far, as the summary states them."""
+    def tables(self) -> dict[str, TableFacts]:
+        """The tables that have rows so far."""
         return {name: table.stated for name, table in self._open.items() if table.rows}
 
-    def finish(self, summary: Mapping[str, Any], run_toml: str) -> dict[str, Any]:
-        """Write the last files, and return the content of the summary.
+    def finish(self, facts: Facts, run_toml: str) -> Facts:
+        """Write ``summary.json`` and ``run.toml``; return the facts with the tables and files.
 
         A table without rows is left out.
-
-        Parameters
-        ----------
-        summary
-            See `roadeval.results.summary.summary_text`.
-        run_toml
-            The configuration of the run, as the text of a TOML file.
         """
         with self.explained():
-            stated = self.tables
             for table in self._open.values():
                 table.complete()
             (self.folder / RUN).write_bytes(run_toml.encode())
             names = sorted({SUMMARY, *(path.name for path in self.folder.iterdir())})
-            content = {"tables": stated} | dict(summary) | {"files": names}
-            (self.folder / SUMMARY).write_bytes(summary_text(content).encode())
+            facts = replace(facts, tables=self.tables, files=names)
+            (self.folder / SUMMARY).write_bytes(facts.text().encode())
         self._finished = True
-        return content
+        return facts
 
     @contextmanager
     def explained(self) -> Iterator[None]:
@@ -156,9 +149,9 @@ class _Growing:
         self._write(table.header)
 
     @property
-    def stated(self) -> dict[str, Any]:
-        """As `roadeval.results.tables.fingerprint` of the whole file."""
-        return {"rows": self.rows, "sha256": self._digest.hexdigest()}
+    def stated(self) -> TableFacts:
+        """The rows so far, and the SHA-256 of the text."""
+        return TableFacts(self.rows, self._digest.hexdigest())
 
     def append(self, lines: str) -> None:
         self.rows += lines.count("\n")
@@ -195,22 +188,7 @@ class ResultsFolder:
 
     def __init__(self, folder: Path) -> None:
         self._folder: Final = folder
-        self.summary: Final[dict[str, Any]] = read_summary(folder / SUMMARY)
-
-    @property
-    def frames(self) -> pd.DataFrame:
-        """``frames.csv``: a row per evaluated frame, variant and stage."""
-        return self.table("frames")
-
-    @property
-    def windows(self) -> pd.DataFrame:
-        """``windows.csv``: a row per window, variant and stage."""
-        return self.table("windows")
-
-    @property
-    def regions(self) -> pd.DataFrame:
-        """``regions.csv``: a row per evaluated frame, variant, stage and region."""
-        return self.table("regions")
+        self.facts: Final = Facts.read(folder / SUMMARY)
 
     def table(self, name: str) -> pd.DataFrame:
         """Read a table by its name in `roadeval.results.schema.TABLES`.
@@ -222,8 +200,8 @@ class ResultsFolder:
         ResultsError
             If it is damaged, or not the one of which the summary tells.
         """
-        return read_table(name, self._folder / f"{name}.csv", self.summary.get("tables"))
+        return read_table(name, self._folder / f"{name}.csv", self.facts.tables)
 
     def rows(self, name: str) -> Rows:
         """Read a table as `table` does, without pandas."""
-        return read_rows(name, self._folder / f"{name}.csv", self.summary.get("tables"))
+        return read_rows(name, self._folder / f"{name}.csv", self.facts.tables)

@@ -12,23 +12,20 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from roadeval.data import (
-    BASELINE,
-    FILTERED,
-    UNFILTERED,
     Change,
     Counts,
     FrameResult,
     Rows,
     Transition,
 )
-from roadeval.evaluation.score import at_levels, final_stages
-from roadeval.results.fleet.record import DAMAGED, SCORED, UNSCORED
-from roadeval.results.schema import ALL, KEY, TABLES, Kind
+from roadeval.evaluation.score import at_levels
+from roadeval.results.schema import ALL, DAMAGED, KEY, SCORED, TABLES, UNSCORED, Kind
 from roadeval.runtime.text import visible
 
 if TYPE_CHECKING:
     from roadeval.data.arrays import Sums
     from roadeval.evaluation.score import DriveSums, HeatMap, Name, Window
+    from roadeval.results.facts import Facts
 
 Row = tuple[str | int | float, ...]
 """A row's cells in the order of its table's columns, without the key."""
@@ -43,7 +40,7 @@ ARRAYS: Final = {
 
 LOST: Final = 3
 """Exit code of a replay that has lost a part of its log."""
-_ACCOUNT: Final = ("in_log", "read", "decoded", "labelled", "trained_on", "evaluated")
+ACCOUNT: Final = ("in_log", "read", "decoded", "labelled", "trained_on", "evaluated")
 
 
 class Key(NamedTuple):
@@ -193,51 +190,40 @@ def as_arrays(name: str, rows: Iterable[Row]) -> Rows:
 # --- Rows of the tables of drives -----------------------------------------------------------------
 
 
-def drive_row(facts: Mapping[str, Any], name: str, source: str) -> dict[str, Any]:
-    """Return the row of ``drives`` of a drive that was replayed.
-
-    Parameters
-    ----------
-    facts
-        Of the drive, as in ``summary.json``.
-    name, source
-        See the columns.
-    """
-    # Not the outcome's: those tell of other runs' files, too.
-    losses, warnings, is_scored = facts["losses"], facts["warnings"], bool(facts["totals"])
-    status = (DAMAGED if losses else SCORED) if is_scored else UNSCORED
+def drive_row(facts: Facts, name: str, source: str) -> dict[str, Any]:
+    """Return the row of ``drives`` of a drive that was replayed, under a name, from a source."""
+    status = (DAMAGED if facts.losses else SCORED) if facts.totals else UNSCORED
     return {
         "name": name,
         "source": source,
         "status": status,
-        "exit_code": LOST if losses else 0,
-        "reason": None if is_scored else next(iter(warnings), None),
-        "sha256": facts.get("log", {}).get("sha256"),
-        **{column: facts["drive"].get(column) for column in ("rate_hz", "width", "height")},
-        **{column: facts["frames"].get(column) for column in _ACCOUNT},
-        "losses": "\n".join(losses) or None,
-        "warnings": "\n".join(warnings) or None,
-        "verdict": facts["verdict"],
+        "exit_code": LOST if facts.losses else 0,
+        "reason": None if facts.totals else next(iter(facts.warnings), None),
+        "sha256": facts.sha256,
+        **{column: getattr(facts.drive, column) for column in ("rate_hz", "width", "height")},
+        **{column: getattr(facts.frames, column) for column in ACCOUNT},
+        "losses": "\n".join(facts.losses) or None,
+        "warnings": "\n".join(facts.warnings) or None,
+        "verdict": facts.verdict,
     }
 
 
 def score_rows(
-    facts: Mapping[str, Any], regions: Mapping[tuple[str, str, str], Mapping[str, Any]]
+    facts: Facts, regions: Mapping[tuple[str, str, str], Mapping[str, Any]]
 ) -> Iterator[dict[str, Any]]:
     """Yield the rows of ``scores``: each mask on every labelled pixel, then region by region.
 
     Parameters
     ----------
     facts
-        Of the drive, as in ``summary.json``.
+        Of the drive.
     regions
         Frames, counts and rates by variant, stage and region.
     """
-    stages = _final_stages(facts)
-    for variant, own in facts["totals"].items():
-        beyond = facts["beyond"].get(variant, {})
+    for variant, own in facts.totals.items():
+        beyond = facts.beyond.get(variant, {})
         for stage, total in own.items():
-            final = stages[variant] == stage
+            final = facts.finals[variant] == stage
             mask = {"variant": variant, "stage": stage, "final": final}
             further = {
                 "boundary_f": beyond.get("boundary_F"),
@@ -250,49 +236,30 @@ def score_rows(
                     yield {**mask, "region": region, **sums}
 
 
-def effect_rows(facts: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+def effect_rows(facts: Facts) -> Iterator[dict[str, Any]]:
     """Yield the rows of ``effects``: each variant minus ``unfiltered``, and minus ``blind``."""
-    stages = _final_stages(facts)
-    for stage, rates in facts["difference"].items():
-        final = stages[FILTERED] == stage
-        pair = (FILTERED, stage), (UNFILTERED, stages[UNFILTERED] if final else stage)
-        yield from _effects(facts, *pair, rates, final=final)
-    for base in (UNFILTERED, BASELINE):
-        for variant, rates in facts[f"against_{base}"].items():
-            pair = (variant, stages[variant]), (base, stages[base])
-            yield from _effects(facts, *pair, rates, final=True)
-
-
-def _effects(
-    facts: Mapping[str, Any],
-    mask: tuple[str, str],
-    base: tuple[str, str],
-    rates: Mapping[str, Mapping[str, Any]],
-    *,
-    final: bool,
-) -> Iterator[dict[str, Any]]:
-    mine, theirs = (facts["totals"][variant][stage] for variant, stage in (mask, base))
-    copied = ("mean", "standard_error", "low", "high", "p")
-    for metric, found in rates.items():
-        yield {
-            "base": base[0],
-            "variant": mask[0],
-            "stage": mask[1],
-            "final": final,
-            "metric": metric,
-            **{name: found[name] for name in copied},
-            "frames": found["units"],
-            "effective_frames": found["effective"],
-            "base_wrong": theirs["FP"] + theirs["FN"],
-            "base_N": theirs["N"],
-            "wrong": mine["FP"] + mine["FN"],
-            "N": mine["N"],
-        }
-
-
-def _final_stages(facts: Mapping[str, Any]) -> dict[str, str]:
-    masks = ((variant, stage) for variant, own in facts["totals"].items() for stage in own)
-    return final_stages(masks)
+    for each in facts.effects:
+        mine = facts.totals[each.variant][each.stage]
+        theirs = facts.totals[each.base][each.base_stage]
+        for metric, found in each.rates.items():
+            yield {
+                "base": each.base,
+                "variant": each.variant,
+                "stage": each.stage,
+                "final": each.final,
+                "metric": metric,
+                "mean": found.mean,
+                "standard_error": found.standard_error,
+                "low": found.low,
+                "high": found.high,
+                "p": found.p,
+                "frames": found.units,
+                "effective_frames": found.effective,
+                "base_wrong": theirs["FP"] + theirs["FN"],
+                "base_N": theirs["N"],
+                "wrong": mine["FP"] + mine["FN"],
+                "N": mine["N"],
+            }
 
 
 def cells(table: str, key: Key, rows: Iterable[Mapping[str, Any]]) -> list[list[Any]]:

@@ -88,6 +88,11 @@ class TableSchema:
         return pa.schema([(c.name, ARROW[c.kind]) for c in (*self.columns, *self.of_a_fleet)])
 
 
+SCORED: Final = "scored"
+DAMAGED: Final = "damaged"
+UNSCORED: Final = "unscored"
+FAILED: Final = "failed"
+"""The values of ``status`` in ``drives``."""
 TAG: Final = "tag_"
 """Begins the name of a column of ``drives`` that holds a tag."""
 ALL: Final = "all"

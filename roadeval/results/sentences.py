@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
 from enum import Enum, auto
 from typing import Any, Final
 
@@ -136,32 +135,15 @@ def stands(p_holm: float | None, confidence: float) -> bool:
     return p_holm is not None and p_holm < 1 - confidence
 
 
-def marked_interval(found: Difference | Mapping[str, Any]) -> str:
-    """Return the interval of a difference, with a mark where it excludes 0 after correction.
-
-    Parameters
-    ----------
-    found
-        A difference, or one as in ``summary.json``.
-    """
-    own = asdict(found) if isinstance(found, Difference) else found
-    mark = f" {MARK}" if stands(own["p_holm"], own["confidence"]) else ""
-    return interval(own["low"], own["high"]) + mark
+def marked_interval(found: Difference) -> str:
+    """Return the interval of a difference, with a mark where it excludes 0 after correction."""
+    mark = f" {MARK}" if stands(found.p_holm, found.confidence) else ""
+    return interval(found.low, found.high) + mark
 
 
-def correction(differences: Iterable[Difference | Mapping[str, Any]]) -> str:
-    """Return what a mark on differences of ERR means; empty where none was corrected.
-
-    Parameters
-    ----------
-    differences
-        As such, or as in ``summary.json``.
-    """
-    given = (
-        each.comparisons if isinstance(each, Difference) else each.get("comparisons")
-        for each in differences
-    )
-    counts = sorted({count for count in given if count})
+def correction(differences: Iterable[Difference]) -> str:
+    """Return what a mark on differences of ERR means; empty where none was corrected."""
+    counts = sorted({each.comparisons for each in differences if each.comparisons})
     if not counts:
         return ""
     if counts == [1]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -44,11 +45,19 @@ class ResultsError(RoadevalError):
     """Results that cannot be written or read."""
 
 
+@dataclass(frozen=True, slots=True)
+class TableFacts:
+    """The rows of a table, and the SHA-256 of its text."""
+
+    rows: int
+    sha256: str
+
+
 # --- CSV ------------------------------------------------------------------------------------------
 
 
 def read_table(
-    name: str, source: Path | str, stated: Mapping[str, Any] | None = None
+    name: str, source: Path | str, stated: Mapping[str, TableFacts] | None = None
 ) -> pd.DataFrame:
     """Read a table of a drive bit-exactly, and check that it is whole.
 
@@ -83,7 +92,9 @@ def read_table(
     return _pandas(table.cast(pa.schema(fields)))
 
 
-def read_rows(name: str, source: Path | str, stated: Mapping[str, Any] | None = None) -> Rows:
+def read_rows(
+    name: str, source: Path | str, stated: Mapping[str, TableFacts] | None = None
+) -> Rows:
     """Read a table as `read_table` does, as arrays without the key, and without pandas.
 
     pandas takes a third of a second to import.
@@ -92,13 +103,7 @@ def read_rows(name: str, source: Path | str, stated: Mapping[str, Any] | None = 
     return _arrays(table, TABLES[name].columns[len(KEY) :])
 
 
-def fingerprint(content: bytes) -> dict[str, Any]:
-    """Return what a summary states of a table: ``rows`` and ``sha256`` of its text."""
-    rows = max(content.count(b"\n") - 1, 0)
-    return {"rows": rows, "sha256": hashlib.sha256(content).hexdigest()}
-
-
-def _read(name: str, source: Path | str, stated: Mapping[str, Any] | None) -> pa.Table:
+def _read(name: str, source: Path | str, stated: Mapping[str, TableFacts] | None) -> pa.Table:
     import pyarrow as pa
 
     table = TABLES[name]
@@ -128,14 +133,13 @@ def _content(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def _check(where: Path | str, content: bytes, stated: Mapping[str, Any] | None) -> None:
-    found = fingerprint(content)
-    if found == stated or (stated is None and not found["rows"]):
+def _check(where: Path | str, content: bytes, stated: TableFacts | None) -> None:
+    rows = max(content.count(b"\n") - 1, 0)
+    found = TableFacts(rows, hashlib.sha256(content).hexdigest())
+    if found == stated or (stated is None and not rows):
         return
-    wanted = stated["rows"] if stated else 0
-    difference = (
-        "its content differs" if found["rows"] == wanted else f"{found['rows']} of {wanted} rows"
-    )
+    wanted = stated.rows if stated else 0
+    difference = "its content differs" if rows == wanted else f"{rows} of {wanted} rows"
     raise ResultsError(f"{where}: does not agree with its summary ({difference}); {_ANEW}")
 
 

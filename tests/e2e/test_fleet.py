@@ -17,10 +17,10 @@ from roadeval import logs
 from roadeval.cli.app import main
 from roadeval.cli.screens.fleet import problems
 from roadeval.errors import RoadevalError
-from roadeval.jobs.fleet_inspect import recording_of, worst_frames
 from roadeval.jobs.fleet_work import train_fold
+from roadeval.jobs.replayed import recording_of
 from roadeval.logs import LogWriter
-from roadeval.results.fleet.record import record_path, recording_path
+from roadeval.results.fleet import record_path, recording_path
 from tests.e2e.commands import here
 from tests.fixtures.make import make
 from tests.training.making import frame
@@ -117,7 +117,7 @@ def test_dasks_workers_replay_every_drive_and_the_broken_one_is_named(drives, ra
 
 
 def test_the_numbers_are_those_of_single_replays(drives, ran, tmp_path):
-    scores = roadeval.Fleet(ran.folder).scores
+    scores = roadeval.Result(ran.folder).scores
     for name in ("a", "c"):
         alone = roadeval.replay(
             drives / f"{name}.mcap",
@@ -178,7 +178,7 @@ def test_more_failures_than_allowed_are_an_error_and_nothing_is_lost(
 
 
 def test_the_recording_of_the_worst_drive_alone_is_kept(ran):
-    scores = roadeval.Fleet(ran.folder).scores
+    scores = roadeval.Result(ran.folder).scores
     final = scores[(scores.variant == "filtered") & scores.final & (scores.region == "all")]
     (kept,) = (ran.folder / "recordings").glob("*.rrd")
     assert kept.stem == final.loc[final.ERR.idxmax()].drive
@@ -271,9 +271,9 @@ def test_a_folder_with_folds_that_has_moved_is_looked_at_with_its_own_models(tmp
         write(tmp_path / "logs" / f"{name}.mcap", 100 * number)
     run(tmp_path / "logs", tmp_path / "before", executor=ThreadTasks(), folds=2)
     (tmp_path / "before").rename(tmp_path / "after")
-    moved = roadeval.Fleet(tmp_path / "after", trust_sources=True)
-    recording, warnings = recording_of(moved, worst_frames(moved)[0].drive)
-    assert recording.is_relative_to(moved.path)
+    moved = roadeval.Result(tmp_path / "after", trust_sources=True)
+    recording, warnings = recording_of(moved.fleet, moved.worst.drive[0])
+    assert recording.is_relative_to(tmp_path / "after")
     assert recording.exists()
     assert not warnings
 

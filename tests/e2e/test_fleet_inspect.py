@@ -42,7 +42,7 @@ def drawn(monkeypatch, tmp_path):
 
 
 def worst(fleet):
-    return roadeval.Fleet(fleet).worst.iloc[0]
+    return roadeval.Result(fleet).worst.iloc[0]
 
 
 def test_the_list_is_of_all_drives_the_worst_first(made, fleet):

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from roadeval.results.summary import digest_of
+from roadeval.results.facts import digest_of
 from tests.e2e.commands import here
 from tests.results.fleet.making import fleet_of
 

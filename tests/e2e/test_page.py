@@ -10,7 +10,7 @@ import pytest
 from roadeval.report.blocks import Figure
 from roadeval.report.chart import Chart, ChartKind, Look, Series
 from roadeval.report.page.render import write_page
-from roadeval.results.fleet.folder import Fleet
+from roadeval.results.fleet import FleetFolder
 from tests.e2e.commands import here
 from tests.fixtures.browser import missing, violations, wait_until
 from tests.report.making import a_document
@@ -374,7 +374,7 @@ def test_of_many_drives_each_is_a_point_with_its_interval(many, watched):
     area.focus()
     seen.tab.keyboard.press("ArrowRight")
     name, *told = filter(None, seen.tab.locator(".tip:visible").inner_text().split("\n"))
-    effects = Fleet(many.parent / "year").table("effects").to_pylist()
+    effects = FleetFolder(many.parent / "year").table("effects").to_pylist()
     changes = {
         row["drive"]: row
         for row in effects

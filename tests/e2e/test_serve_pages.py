@@ -97,7 +97,7 @@ def test_a_frame_of_a_fleet_is_replayed_before_it_opens(fleet, watched, monkeypa
         assert statuses[0] == 202
         assert statuses[-1] == 409
         (recording,) = recordings.glob("*.rrd")
-        worst = roadeval.Fleet(fleet).worst.iloc[0]
+        worst = roadeval.Result(fleet).worst.iloc[0]
         assert recording.stem == worst.drive
         assert worst.frame in roadeval.Recording(recording).frame_numbers
         assert tab.locator(".cancel").count() == 0
@@ -115,7 +115,7 @@ def test_a_fleet_leads_to_its_drives_and_they_lead_back(fleet, watched):
             assert "Made without pictures" in tab.content()
             tab.get_by_role("link", name="week").click()
             tab.wait_for_url(f"{address}0/")
-        worst = roadeval.Fleet(fleet).worst.iloc[0]
+        worst = roadeval.Result(fleet).worst.iloc[0]
         tab.locator("#the-worst-frames-over-all-drives tbody a").nth(1).click()
         tab.wait_for_url(f"**/#frame-{worst.frame}")
         assert tab.locator(".frames tr[aria-current]").get_attribute("data-frame") == str(

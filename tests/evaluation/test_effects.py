@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from roadeval.evaluation.score import FrameCounts, as_parts, drive_effects, final_stages
+from roadeval.evaluation.score import FrameCounts, drive_effects, final_stages
 from roadeval.evaluation.settings import EvaluationSettings
 
 SETTINGS = EvaluationSettings()
@@ -67,17 +67,6 @@ def test_final_masks_against_one_base_are_corrected_together():
         *[("blind", True, 3)] * 3,
     ]
     assert {each.rates["FPR"].comparisons for each in effects} == {None}
-
-
-def test_the_summary_has_them_by_base():
-    names = ("filtered", "unfiltered", "net", "blind")
-    parts = as_parts(drive_effects([a_mask(name, "post", [3] * 12) for name in names], SETTINGS))
-    assert {name: [*part] for name, part in parts.items()} == {
-        "difference": ["post"],
-        "against_unfiltered": ["net"],
-        "against_blind": ["filtered", "unfiltered", "net"],
-    }
-    assert parts["difference"]["post"]["ERR"]["mean"] == 0
 
 
 def test_the_final_stage_is_post_or_the_last_one():

@@ -8,8 +8,8 @@ from pathlib import Path
 from roadeval.jobs.outputs import Outputs
 from roadeval.logs import LogWriter
 from roadeval.results.folder import CONTENT, ResultsWriter
-from roadeval.results.summary import OPTIONAL, PARTS
 from roadeval.runtime.files import NewFile
+from tests.results.making import facts_of
 
 __all__ = ["CONTENT"]
 PLACES = ("out.rrd", "out.mcap", "reports")
@@ -40,8 +40,7 @@ def run(place: Path, name: str) -> None:
             # Of each run a figure that the next one does not have, and one that all have.
             for figure in (name, "same"):
                 (results.folder / f"fig_{figure}.png").write_text(name)
-            parts = {part: {} for part in set(PARTS) - OPTIONAL - {"format", "digest"}}
-            results.finish(parts, f"# {name}")
+            results.finish(facts_of(), f"# {name}")
         if left is not None:
             left.unlink()
 

@@ -9,8 +9,7 @@ from roadeval import compare
 from roadeval.errors import RoadevalError
 from roadeval.jobs.compare import as_json
 from roadeval.jobs.result import asked
-from roadeval.results.fleet.folder import Fleet
-from roadeval.results.fleet.record import frames_path
+from roadeval.results.fleet import FleetFolder, frames_path
 from tests.results.fleet.making import RUN, fleet_of
 
 
@@ -48,11 +47,11 @@ def test_the_variants_of_one_fleet_are_compared_over_its_drives(fleets):
     found = compare(fleets[0], fail_if=["post.filtered.ERR > +50pp"]).comparison
     (final,) = (change for change in found.changes if change.final)
     assert (final.variant, final.drives, final.difference["ERR"].unit) == ("filtered", 8, "drives")
-    effects = Fleet(fleets[0]).summary["effects"]
-    told = next(e for e in effects if (e["base"], e["metric"]) == ("unfiltered", "ERR"))
+    effects = FleetFolder(fleets[0]).facts.effects
+    told = next(e for e in effects if (e.base, e.metric) == ("unfiltered", "ERR"))
     own = final.difference["ERR"]
     assert (own.mean, own.low, own.high, own.p) == pytest.approx(
-        (told["mean"], told["low"], told["high"], told["p"])
+        (told.mean, told.low, told.high, told.p)
     )
 
 
@@ -100,7 +99,7 @@ def test_settings_that_differ_are_told(fleets, tmp_path):
 
 def test_settings_that_change_no_number_are_left_aside():
     run = {"preset": "paper", "svm": {"c": 1}, "output": {"save": "a"}, "fleet": {"folds": 2}}
-    assert asked({"run": run}) == {"preset": "paper", "svm.c": 1}
+    assert asked(run) == {"preset": "paper", "svm.c": 1}
     assert asked({}) == {}
 
 
@@ -128,7 +127,7 @@ def test_equal_fleets_give_equal_json_without_nan(fleets):
 
 def test_a_drive_whose_frames_have_gone_is_named(fleets, tmp_path):
     cut = shutil.copytree(fleets[1], tmp_path / "cut")
-    drive = Fleet(cut).summary["drives"][0]["drive"]
+    drive = FleetFolder(cut).facts.drives[0].drive
     path = frames_path(cut, drive)
     path.write_bytes(path.read_bytes()[:100])
     with pytest.raises(RoadevalError, match=r"frames\.parquet: damaged"):

@@ -7,8 +7,8 @@ import pytest
 import roadeval
 from roadeval.jobs import compare, page_comparison, page_frames
 from roadeval.jobs.page_frames import FEWEST, bytes_of, strips_of
-from roadeval.jobs.report import drive_page
-from roadeval.jobs.result import DriveResult
+from roadeval.jobs.report import page_of
+from roadeval.jobs.result import DriveResult, Result
 from roadeval.report.blocks import FrameBrowser
 from tests.jobs.making import settings, write_log
 
@@ -37,7 +37,7 @@ def layered(strip):
 
 
 def test_every_variants_errors_and_layers_are_shown(recording):
-    shown = browser(drive_page(DriveResult(recording)))
+    shown = browser(page_of(Result(recording)))
     for strip in shown.strips:
         assert layered(strip) == ["filtered", "unfiltered", "third", "fourth"]
         names = [picture.name for picture in strip.rows[0].pictures]
@@ -57,7 +57,7 @@ def test_where_layers_have_no_room_some_variants_have_none_and_the_page_says_so(
     assert sum(map(bytes_of, strips)) <= page_frames.BYTES
     monkeypatch.setattr(page_frames, "BYTES", page_frames.BYTES + 10**9)
     monkeypatch.setattr(page_frames, "FEWEST", 10**6)
-    note = browser(drive_page(result)).note
+    note = browser(page_of(Result(recording))).note
     assert "the layers of third and fourth are left out" in note
 
 

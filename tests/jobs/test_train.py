@@ -136,7 +136,7 @@ def test_a_replay_takes_what_is_asked_of_its_drive(drives, tmp_path):
     config = settings(drives=asked, record="none", max_frames=13)
     done = roadeval.replay(drives[1], config, reports=tmp_path / "out")
     assert done.summary["frames"]["evaluated"] == 3
-    assert done.summary["run"]["labels"]["road"] == (3,)
+    assert done.summary["run"]["labels"]["road"] == [3]
     assert "drives" not in done.summary["run"]
 
 

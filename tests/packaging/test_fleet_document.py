@@ -51,7 +51,7 @@ def test_the_columns_are_the_schemas():
 
 
 def test_which_drives_got_worse_at_dusk(asked, fleets):
-    new, old = (roadeval.Fleet(fleets / name) for name in ("monday", "last_week"))
+    new, old = (roadeval.Result(fleets / name) for name in ("monday", "last_week"))
     change = final(new).set_index("drive").ERR - final(old).set_index("drive").ERR
     dark = new.drives[new.drives.luminance < 0.35].drive
     wanted = change[change.index.isin(dark) & (change > 0)].sort_values(ascending=False)
@@ -62,7 +62,7 @@ def test_which_drives_got_worse_at_dusk(asked, fleets):
 
 
 def test_err_by_weather_in_duckdb_and_in_pandas(asked, fleets):
-    fleet = roadeval.Fleet(fleets / "monday")
+    fleet = roadeval.Result(fleets / "monday")
     rows = final(fleet).merge(fleet.drives, on="drive")
     found = asked(WEATHER).set_index("weather")
     assert {*found.index} == {"sun", "rain", "fog"}
@@ -77,11 +77,9 @@ def test_err_by_weather_in_duckdb_and_in_pandas(asked, fleets):
 
 
 def test_the_worst_frames_in_the_sun(asked, fleets):
-    fleet = roadeval.Fleet(fleets / "monday")
-    rows = []
-    for drive in fleet.drives.drive:
-        own = fleet.frames(drive).query("variant == 'filtered' and final and sun > 0.1")
-        rows += [(-(r.FP + r.FN) / r.N, drive, r.frame) for r in own.itertuples()]
+    fleet = roadeval.Result(fleets / "monday")
+    own = fleet.frames.query("variant == 'filtered' and final and sun > 0.1")
+    rows = [(-(r.FP + r.FN) / r.N, r.drive, r.frame) for r in own.itertuples()]
     found = asked(SUN)
     assert len(found) == 20
     assert [*zip(found.drive, found.frame, strict=True)] == [row[1:] for row in sorted(rows)[:20]]

@@ -32,8 +32,7 @@ from roadeval.evaluation.metrics import METRICS
 from roadeval.recording import Layout, Recorder, Recording
 from roadeval.recording.read.rrd_file import RrdFile
 from roadeval.results.schema import TABLES
-from roadeval.results.summary import FORMAT, digest_of
-from tests.results.making import lines
+from tests.results.making import facts_of, lines
 
 HEIGHT, WIDTH = 6, 8
 
@@ -50,10 +49,7 @@ RINGS = LayerSpec(
 )
 POST = mask_spec("post", "Road")
 VARIANT = VariantLayout("filtered", "with the filter", ("post",), (NDI, RINGS, POST))
-SUMMARY = {"format": FORMAT, "totals": {}, "digest": digest_of({}, ())} | {
-    "seconds": {"filtered": {"post": 0.5}}
-}
-"""Of which the viewer and the reader use a few parts only."""
+SUMMARY = json.loads(facts_of(seconds={"filtered": {"post": 0.5}}).text())
 WINDOW = {
     "drive": "street",
     "camera": "/camera/image",

@@ -1,8 +1,9 @@
 """Findings made by hand, and reading back what was typeset."""
 
 import io
+import math
 import re
-from dataclasses import asdict
+from dataclasses import fields
 
 import pandas as pd
 from pypdf import PdfReader
@@ -10,6 +11,7 @@ from pypdf import PdfReader
 from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import Cell, Document
 from roadeval.report.findings import Commands, Findings, PairedComparison
+from roadeval.results.facts import DriveFacts, Facts, FrameAccount
 from roadeval.results.rows import as_arrays
 
 
@@ -48,13 +50,12 @@ def a_total(err, fpr=0.25, fnr=0.5):
 
 
 def a_difference(mean, low=None, high=None):
-    """A paired difference, as ``summary.json`` has it."""
+    """A paired difference."""
     p = None if low is None else 0.003
     known = {"effective": 40.0, "p_holm": p and 0.01, "comparisons": p and 3}
     needed = 2000 if low is None else None
-    units = 0 if mean is None else 1200
-    difference = Difference(mean, low, high, p, 0.95, "frames", units, needed=needed, **known)
-    return asdict(difference)
+    units, mean = (0, math.nan) if mean is None else (1200, mean)
+    return Difference(mean, low, high, p, 0.95, "frames", units, needed=needed, **known)
 
 
 def a_pair(changes, wrong, pixels=(30, 10, 1000), control="unfiltered"):
@@ -64,31 +65,33 @@ def a_pair(changes, wrong, pixels=(30, 10, 1000), control="unfiltered"):
     return PairedComparison("filtered", control, differences, frames, pixels)
 
 
+FACTS = {each.name for each in fields(Facts)} - {each.name for each in fields(Findings)}
+
+
 def some_findings(**changes):
-    """Findings of a drive whose numbers all differ: of two variants and the baseline."""
+    """Findings of a drive whose numbers all differ: of two variants and the baseline.
+
+    Changes are of the findings or of their facts, by name.
+    """
     totals = {
         "filtered": {"svm": a_total(0.20, 0.21, 0.22), "post": a_total(0.10, 0.11, 0.12)},
         "unfiltered": {"svm": a_total(0.30, 0.31, 0.32), "post": a_total(0.15, 0.16, 0.17)},
         "blind": {"post": a_total(0.12, 0.13, 0.14)},
     }
-    frames = {"in_log": 1210, "evaluated": 1200, "skipped": {"trained on": 10}}
+    facts = {
+        "verdict": "It helps.",
+        "drive": DriveFacts("street", width=40, height=20),
+        "frames": FrameAccount(1210, evaluated=1200, skipped={"trained on": 10}),
+        "totals": totals,
+    }
     plain = {
         "source": "drive.rrd",
         "complete": True,
         "commands": Commands("repeat {}".format, "open frame {}".format),
         "viewable": True,
         "pictured": 1200,
-        "summary": {
-            "drive": {"name": "street", "width": 40, "height": 20},
-            "verdict": "It helps.",
-            "frames": frames,
-            "totals": totals,
-            "settings": {},
-            "run": {},
-            "versions": {},
-        },
+        "facts": Facts(**facts | {n: value for n, value in changes.items() if n in FACTS}),
         "properties": {},
-        "finals": dict.fromkeys(VARIANTS, "post"),
         "windows": NO_WINDOWS,
         "window_size": 10,
         "paired": [],
@@ -101,7 +104,6 @@ def some_findings(**changes):
         "error_parts": {},
         "heatmaps": [],
         "oracles": pd.DataFrame(),
-        "beyond": {},
         "levels": NO_LEVELS,
         "sampled": 1200,
         "examples": [],
@@ -111,7 +113,7 @@ def some_findings(**changes):
         "harmed": [],
         "coverage": pd.DataFrame(),
     }
-    return Findings(**plain | changes)
+    return Findings(**plain | {n: value for n, value in changes.items() if n not in FACTS})
 
 
 def the(kind, blocks):

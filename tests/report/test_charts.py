@@ -132,7 +132,7 @@ def test_a_figure_over_the_drive_is_one_file_in_the_folder(tmp_path, monkeypatch
 
 
 def test_a_frame_that_got_worse_has_the_colour_of_the_other_variant():
-    mean = {"mean": -0.05, "low": None, "high": None}
+    mean = replace(CHANGE, mean=-0.05, low=None, high=None)
     frames, changes = np.array([7, 9]), np.array([0.1, -0.2])
     chart = differences.difference(frames, changes, "filtered", "unfiltered", mean)
     worse, better = chart.series

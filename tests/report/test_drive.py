@@ -5,8 +5,9 @@ from dataclasses import replace
 import pandas as pd
 
 from roadeval.report.blocks import Heading
-from roadeval.report.drive import document, page_document
+from roadeval.report.document import document, page_document
 from roadeval.report.sections.browse import BrowsedFrames
+from roadeval.results.facts import DriveFacts, FrameAccount
 from tests.report.making import VARIANTS, a_pair, some_findings
 from tests.report.sections.test_thresholds import findings as thresholded
 
@@ -22,9 +23,7 @@ def headings(made):
 
 
 def test_without_truth_there_are_masks_in_place_of_rates():
-    findings = some_findings(finals={}, overlap={})
-    findings.summary["totals"] = {}
-    assert sections(findings) == [
+    assert sections(some_findings(totals={}, overlap={})) == [
         *("Summary", "Masks", "Settings, versions, and how to reproduce this")
     ]
 
@@ -65,19 +64,15 @@ def test_a_page_has_the_sections_of_the_report():
 
 
 def test_of_a_run_that_was_cut_the_evaluated_frames_are_counted():
-    findings = some_findings(finals={}, overlap={})
-    findings.summary["totals"] = {}
-    findings.summary["frames"] = {"evaluated": 17, "trained_on": 10, "with_pictures": 20}
+    account = FrameAccount(evaluated=17, trained_on=10)
+    findings = some_findings(totals={}, overlap={}, frames=account)
     assert document(findings).subtitle.startswith("17 frames")
 
 
 def test_the_drives_facts_stand_below_its_name():
-    findings = some_findings(finals={}, overlap={})
-    findings.summary["totals"] = {}
-    findings.summary["drive"]["rate_hz"] = 14.9999
-    findings.summary["versions"]["roadeval"] = "1.2"
-    findings.summary["run"]["preset"] = "paper"
-    page = document(findings)
+    drive = DriveFacts("street", width=40, height=20, rate_hz=14.9999)
+    about = {"versions": {"roadeval": "1.2"}, "run": {"preset": "paper"}}
+    page = document(some_findings(totals={}, overlap={}, drive=drive, **about))
     assert page.title == "street"
     assert page.subtitle == "1210 frames, 40 × 20, 15 Hz, preset paper, roadeval 1.2"  # noqa: RUF001
     assert page.footer == "street, drive.rrd"

@@ -1,5 +1,6 @@
-"""Lines of tables, as a replay writes them."""
+"""Lines of tables, and facts, as a replay writes them."""
 
+from roadeval.results.facts import DriveFacts, Facts, FrameAccount
 from roadeval.results.rows import Key, csv_lines, frame_rows, sum_rows
 
 KEY = Key("street", "/camera/image")
@@ -11,3 +12,11 @@ def lines(result):
 
 def sum_lines(sums):
     return csv_lines(KEY, sum_rows(sums))
+
+
+def facts_of(**parts):
+    """Facts of a drive with these parts."""
+    return Facts(
+        **{"verdict": "", "drive": DriveFacts("street"), "frames": FrameAccount(), "totals": {}}
+        | parts
+    )

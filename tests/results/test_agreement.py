@@ -5,11 +5,10 @@ import pytest
 
 from roadeval.evaluation import score
 from roadeval.evaluation.comparison import Side, compare, variants_as_sides
-from roadeval.evaluation.score import as_parts, drive_effects
+from roadeval.evaluation.score import drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.fleet.record import Record
-from roadeval.results.fleet.tables import Member
-from roadeval.results.fleet.writing import FleetWriter
+from roadeval.results.facts import DriveFacts, Facts, FrameAccount, Member, as_parts
+from roadeval.results.fleet import FleetWriter, Record
 from roadeval.results.rows import Key, cells, effect_rows, score_rows
 from roadeval.results.sentences import degree, sentence, verdict
 from tests.evaluation.making import APart, a_table, autoregression, rows_of
@@ -46,9 +45,10 @@ def replayed(rows):
 
 
 def a_fleet_of(rows, folder):
-    """The content of ``fleet.json`` of a fleet of this drive."""
+    """The facts of a fleet of this drive."""
     effects, _ = replayed(rows)
-    facts = {"totals": score.totals(rows), "beyond": {}, **as_parts(effects)}
+    about = "", DriveFacts("street"), FrameAccount(), score.totals(rows)
+    facts = Facts(*about, **as_parts(effects))
     about = {"status": "scored", "evaluated": len(rows.distinct("frame")), "sha256": "d1"}
     tables = {
         "drives": [about],
@@ -87,11 +87,11 @@ def test_all_three_judge_the_same_difference_alike(variants, tmp_path):
         sum(not each.is_zero for each in of_replay.values()),
     }
     fleet = a_fleet_of(rows, tmp_path / "fleet")
-    assert fleet["verdict"] == told
+    assert fleet.verdict == told
     of_fleet = {
-        e["variant"]: (e["mean"], e["low"], e["high"], e["p"], e["p_holm"], e["comparisons"])
-        for e in fleet["effects"]
-        if (e["base"], e["metric"]) == ("unfiltered", "ERR")
+        e.variant: (e.mean, e.low, e.high, e.p, e.p_holm, e.comparisons)
+        for e in fleet.effects
+        if (e.base, e.metric) == ("unfiltered", "ERR")
     }
     assert of_fleet == {
         name: (each.mean, each.low, each.high, each.p, each.p_holm, each.comparisons)

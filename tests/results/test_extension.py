@@ -31,10 +31,10 @@ from roadeval.evaluation.region import Region
 
 def left(labelled):
     height, width = labelled.truth.shape
-    return {"left": pack(np.arange(width)[None].repeat(height, 0) < 2)}
+    return pack(np.arange(width)[None].repeat(height, 0) < 2)
 
 
-REGIONS = (Region({"left": "on the left"}, order=25, find=left),)
+REGIONS = (Region("left", "on the left", order=25, find=left),)
 '''
 PROGRAM = """
 import importlib.util
@@ -55,34 +55,32 @@ for kind in ("metrics", "regions"):
     spec.loader.exec_module(module)
 
 from roadeval.data import Role
-from roadeval.evaluation import regions, score
+from roadeval.evaluation import regions, scored
 from roadeval.evaluation.score import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.folder import ResultsFolder, ResultsWriter
 from roadeval.results.schema import TABLES, documentation
-from roadeval.results.summary import OPTIONAL, PARTS
-from tests.results.making import lines, sum_lines
+from tests.results.making import facts_of, lines, sum_lines
 from tests.evaluation.making import a_frame, a_variant, pixels
 
 board = Scoreboard(EvaluationSettings(bands=1), ["net"], None)
 variant = a_variant("net", {"post": pixels("#.#.", "##..")})
 result = board.score(a_frame(pixels("##..", "##.?")), Role.EVALUATED, (variant,))
 board.add(result)
-summary = board.summary()
 with ResultsWriter(folder / "out") as writer:
     writer.append(lines(result))
     writer.append(sum_lines(board.sums()))
-    unknown = set(PARTS) - summary.keys() - {"format", "digest"} - OPTIONAL
-    writer.finish(summary | {part: {} for part in unknown}, "")
+    writer.finish(facts_of(**board.summary()), "")
 read = ResultsFolder(folder / "out")
-assert read.frames["FDR"].tolist() == [0.25]
-assert read.windows["FDR"].tolist() == read.windows["pooled_FDR"].tolist() == [0.25]
-assert read.summary["totals"]["net"]["post"]["pooled_FDR"] == 0.25
+assert read.table("frames")["FDR"].tolist() == [0.25]
+windows = read.table("windows")
+assert windows["FDR"].tolist() == windows["pooled_FDR"].tolist() == [0.25]
+assert read.facts.totals["net"]["post"]["pooled_FDR"] == 0.25
 assert score.totals(read.rows("frames"))["net"]["post"]["FDR"] == 0.25
 assert "FP / (TP + FP)" in documentation(TABLES, "csv")
-left = read.regions.set_index("region").loc["left"]
+left = read.table("regions").set_index("region").loc["left"]
 assert left[["TP", "TN", "FP", "FN"]].tolist() == [3, 0, 0, 1]
-assert regions.titles([*read.regions["region"]])["left"] == "on the left"
+assert regions.titles([*read.table("regions")["region"]])["left"] == "on the left"
 """
 
 

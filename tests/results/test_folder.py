@@ -15,12 +15,12 @@ import pytest
 from roadeval.data import FrameResult, Packed, Role
 from roadeval.evaluation.score import BlindPrior, Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.results.facts import FORMAT, Facts, FrameAccount, digest_of
 from roadeval.results.folder import ResultsFolder, ResultsWriter, belonging
 from roadeval.results.schema import OF_A_DRIVE
-from roadeval.results.summary import FORMAT, OPTIONAL, PARTS, digest_of, summary_text
 from roadeval.results.tables import ResultsError
 from tests.evaluation.making import a_frame, a_variant, pixels
-from tests.results.making import lines, sum_lines
+from tests.results.making import facts_of, lines, sum_lines
 
 TRUTHS = [pixels("##..", "##.?"), pixels("....", "...."), pixels("###.", "....")]
 MASK = pixels("#.#.", "##..")
@@ -44,11 +44,10 @@ def scored(board: Scoreboard, role: Role = Role.EVALUATED) -> Iterator[FrameResu
         yield result
 
 
-def the_rest(board: Scoreboard) -> dict[str, Any]:
-    """A summary: the board's parts, and empty ones for those that it does not know."""
-    known = board.summary() | {"frames": {"evaluated": board.roles().get(Role.EVALUATED, 0)}}
-    unknown = set(PARTS) - known.keys() - {"format", "digest"} - OPTIONAL
-    return known | {name: {} for name in unknown}
+def the_rest(board: Scoreboard) -> Facts:
+    """Facts with the board's parts, and empty ones for those that it does not know."""
+    account = FrameAccount(evaluated=board.roles().get(Role.EVALUATED, 0))
+    return facts_of(frames=account, **board.summary())
 
 
 def write(folder: Path, role: Role = Role.EVALUATED) -> list[Path]:
@@ -57,7 +56,7 @@ def write(folder: Path, role: Role = Role.EVALUATED) -> list[Path]:
         for result in scored(board, role):
             writer.append(lines(result))
         writer.append(sum_lines(board.sums()))
-        files = writer.finish(the_rest(board), RUN_TOML)["files"]
+        files = writer.finish(the_rest(board), RUN_TOML).files
     return [folder / name for name in files]
 
 
@@ -103,17 +102,17 @@ def test_an_undefined_rate_is_an_empty_cell_and_reads_back_as_undefined(tmp_path
     write(tmp_path)
     line = (tmp_path / "frames.csv").read_text().splitlines()[3]
     assert line == f"{OF}6,600000000,600000007,filtered,post,0,4,4,0,8,0.5,0.5,,,0.5,0.5"
-    assert math.isnan(ResultsFolder(tmp_path).frames.loc[2, "TPR"])
+    assert math.isnan(ResultsFolder(tmp_path).table("frames").loc[2, "TPR"])
 
 
 def test_numbers_read_back_bit_by_bit(tmp_path: Path) -> None:
     board = a_board()
     tallies = [tally for result in scored(board) for tally in result.tallies]
     write(tmp_path)
-    frames = ResultsFolder(tmp_path).frames
+    frames = ResultsFolder(tmp_path).table("frames")
     assert frames["ERR"].tolist() == [tally.rates["ERR"] for tally in tallies]
     assert frames["TP"].tolist() == [tally.counts.tp for tally in tallies]
-    windows = ResultsFolder(tmp_path).windows
+    windows = ResultsFolder(tmp_path).table("windows")
     assert windows["pooled_ACC"].tolist() == [row.pooled["ACC"] for row in board.windows()]
 
 
@@ -125,7 +124,7 @@ def test_a_variant_named_like_a_number_keeps_its_name(tmp_path: Path) -> None:
         board.add(result)
         writer.append(lines(result))
         writer.finish(the_rest(board), RUN_TOML)
-    assert ResultsFolder(tmp_path).frames["variant"].tolist() == ["007"]
+    assert ResultsFolder(tmp_path).table("frames")["variant"].tolist() == ["007"]
 
 
 def test_the_sums_over_the_drive_read_back(tmp_path: Path) -> None:
@@ -133,7 +132,7 @@ def test_the_sums_over_the_drive_read_back(tmp_path: Path) -> None:
     results = ResultsFolder(tmp_path)
     between = results.table("changes").set_index(["from_variant", "to_variant"])
     assert between["N"].to_dict() == {("filtered", "blind"): 23, ("blind", "filtered"): 23}
-    heat, frames = results.table("heat"), results.frames
+    heat, frames = results.table("heat"), results.table("frames")
     own = frames[frames["variant"] == "filtered"]
     assert heat[["labelled", "FP", "FN"]].sum().tolist() == own[["N", "FP", "FN"]].sum().tolist()
 
@@ -169,10 +168,10 @@ def test_a_table_that_nothing_was_counted_for_is_not_written_and_an_earlier_one_
 
 def test_regions_have_a_row_per_frame_variant_stage_and_region(tmp_path: Path) -> None:
     write(tmp_path)
-    regions = ResultsFolder(tmp_path).regions
+    regions = ResultsFolder(tmp_path).table("regions")
     assert len(regions) == 3 * 2 * 5
     assert set(regions["region"]) == {"shadow", "boundary", "interior", "band_0", "band_1"}
-    whole = ResultsFolder(tmp_path).frames
+    whole = ResultsFolder(tmp_path).table("frames")
     bands = regions[regions["region"].str.startswith("band_")]
     summed = bands.groupby(["frame", "variant"])["FP"].sum().to_dict()
     assert summed == whole.groupby(["frame", "variant"])["FP"].sum().to_dict()
@@ -228,7 +227,7 @@ def test_the_next_run_s_files_are_all_that_is_left_of_results_and_others_stay(
     assert {"fig9_weather.png", "frames.csv", "notes.txt"} < names(tmp_path)
     written = {path.name for path in write(tmp_path)}
     assert names(tmp_path) == {*written, "notes.txt"}
-    assert ResultsFolder(tmp_path).summary["files"] == sorted(written)
+    assert ResultsFolder(tmp_path).facts.files == sorted(written)
 
 
 @pytest.mark.parametrize(
@@ -307,12 +306,12 @@ def test_a_table_of_which_the_summary_knows_nothing_is_refused(tmp_path: Path) -
 
 def test_the_summary_states_what_sha256sum_says(tmp_path: Path) -> None:
     write(tmp_path)
-    stated = ResultsFolder(tmp_path).summary["tables"]
+    stated = ResultsFolder(tmp_path).facts.tables
     assert list(stated) == list(OF_A_DRIVE)
     for name, told in stated.items():
         content = (tmp_path / f"{name}.csv").read_bytes()
-        assert told["sha256"] == hashlib.sha256(content).hexdigest()
-        assert told["rows"] == len(ResultsFolder(tmp_path).table(name))
+        assert told.sha256 == hashlib.sha256(content).hexdigest()
+        assert told.rows == len(ResultsFolder(tmp_path).table(name))
 
 
 def test_masks_that_are_missing_on_some_frames_agree_with_the_summary(tmp_path: Path) -> None:
@@ -340,8 +339,8 @@ def test_a_run_that_scored_nothing_writes_no_tables_and_leaves_no_older_ones(
     write(tmp_path)
     assert [path.name for path in write(tmp_path, Role.TRAINING)] == ["run.toml", "summary.json"]
     assert names(tmp_path) == {"run.toml", "summary.json"}
-    assert ResultsFolder(tmp_path).frames.empty
-    assert "ERR" in ResultsFolder(tmp_path).frames
+    assert ResultsFolder(tmp_path).table("frames").empty
+    assert "ERR" in ResultsFolder(tmp_path).table("frames")
 
 
 def test_a_folder_that_cannot_be_written_is_one_line_with_a_remedy(tmp_path: Path) -> None:
@@ -370,19 +369,3 @@ def test_a_file_that_is_no_summary_is_refused(tmp_path: Path, text: str) -> None
     (tmp_path / "summary.json").write_text(text)
     with pytest.raises(ResultsError, match="not a summary"):
         ResultsFolder(tmp_path)
-
-
-def test_the_summary_writes_undefined_as_null_and_keeps_its_order() -> None:
-    document = json.loads(summary_text(the_rest(a_board()) | {"totals": {"ERR": math.nan}}))
-    assert tuple(document) == tuple(part for part in PARTS if part not in OPTIONAL)
-    assert document["totals"] == {"ERR": None}
-    assert document["format"] == {"name": "roadeval-summary", "version": 4}
-
-
-def test_a_summary_with_a_part_too_few_or_too_many_is_refused() -> None:
-    parts = the_rest(a_board())
-    with pytest.raises(ValueError, match="weather"):
-        summary_text(parts | {"weather": "fine"})
-    parts.pop("drive")
-    with pytest.raises(ValueError, match="drive"):
-        summary_text(parts)

@@ -1,5 +1,6 @@
 """Tables read back: what each column is, whatever stands in it."""
 
+import hashlib
 import math
 import subprocess
 import sys
@@ -9,7 +10,7 @@ import pytest
 
 from roadeval.results.rows import Key, as_arrays, csv_lines
 from roadeval.results.schema import TABLES
-from roadeval.results.tables import ResultsError, fingerprint, read_rows, read_table
+from roadeval.results.tables import ResultsError, TableFacts, read_rows, read_table
 
 HEADER = TABLES["oracles"].header
 KINDS = {"frame": "int64", "TP": "int64", "ERR": "float64", "FPR": "float64"}
@@ -127,7 +128,7 @@ def test_a_damaged_file_is_named_in_one_line(text, why, tmp_path):
 
 def test_text_that_is_not_the_summarys_is_refused_and_named():
     text = HEADER + line(1) + line(2)
-    summary = {"oracles": fingerprint(text.encode())}
+    summary = {"oracles": TableFacts(2, hashlib.sha256(text.encode()).hexdigest())}
     assert len(read_table("oracles", text, summary)) == 2
     with pytest.raises(ResultsError, match=r"^the recording's table oracles: .* \(1 of 2 rows\)"):
         read_table("oracles", HEADER + line(1), summary)

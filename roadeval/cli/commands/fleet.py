@@ -57,7 +57,6 @@ def fleet(
     config = arguments.configuration(given)
     from roadeval.cli.screens import fleet as screen
     from roadeval.jobs.fleet import replay_fleet as run
-    from roadeval.results.summary import json_text, plain
 
     with progress.watched(quiet) as watch:
         found = run(
@@ -69,7 +68,7 @@ def fleet(
             on_progress=watch,
         )
     if json:
-        console.emit(json_text(plain(found.summary)).rstrip())
+        console.emit(found.facts.text().rstrip())
     elif not quiet:
         screen.show(found, console.results())
     messages.loops_missing()

@@ -21,7 +21,7 @@ def info(drive: arguments.Drive, *, given: Given, json: arguments.Json = False) 
 
     found = describe(drive, config)
     if json:
-        from roadeval.results.summary import json_text
+        from roadeval.results.facts import json_text
 
         console.emit(json_text(found.as_dict()).rstrip())
     else:

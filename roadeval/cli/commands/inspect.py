@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from roadeval.cli import arguments, console, fleet_inspect, messages
+from roadeval.cli import arguments, console, messages, progress
 from roadeval.cli.exit_codes import ExitCode
-from roadeval.cli.fleet_inspect import Asked
 
 if TYPE_CHECKING:
-    from roadeval.jobs.result import DriveResult
+    from roadeval.jobs.result import Result
 
 Listed = Annotated[bool, typer.Option("--list", help="Print the worst frames with reasons.")]
 Frame = Annotated[int | None, typer.Option("--frame", metavar="N", min=0, help="Open at frame N.")]
@@ -71,76 +70,86 @@ def inspect(
         raise typer.BadParameter("give --frame or --worst, not both")
     if listed and (frame is not None or screenshot is not None):
         raise typer.BadParameter("--list opens nothing; give it without --frame and --screenshot")
-    from roadeval.results.fleet.kind import is_fleet
+    from roadeval.jobs.result import Result
 
-    if is_fleet(recording):
-        from roadeval.results.fleet.folder import Fleet
-
+    opened = Result(recording, trust_sources=trust_sources)
+    if opened.fleet:
         if variant is not None:
             raise typer.BadParameter(
                 "--variant does not go with a fleet: its worst are the first's"
             )
-        asked = Asked(listed, drive, frame, worst, screenshot, json)
-        return fleet_inspect.inspect(Fleet(recording, trust_sources=trust_sources), asked)
-    if drive is not None:
-        raise typer.BadParameter("--drive goes with a fleet's folder alone")
-    if trust_sources:
-        raise typer.BadParameter("--trust-sources goes with a fleet's folder alone")
-    from roadeval.jobs.result import DriveResult
-
-    opened = DriveResult(recording)
+        if frame is not None and drive is None:
+            raise typer.BadParameter("--frame of a fleet needs its drive: --drive ID")
+        if drive is not None and worst is not None:
+            raise typer.BadParameter("--worst counts over all drives; give it without --drive")
+    elif drive is not None or trust_sources:
+        option = "--drive" if drive is not None else "--trust-sources"
+        raise typer.BadParameter(f"{option} goes with a fleet's folder alone")
     if listed:
         _list(opened, worst, variant, as_json=json)
-    elif screenshot is not None:
-        _draw(opened, _asked_for(opened, frame, worst, variant), variant, screenshot)
     else:
-        _open(opened, _asked_for(opened, frame, worst, variant))
+        _show(opened, _Asked(drive, frame, worst, variant, screenshot))
     for warning in opened.warnings:
         messages.warning(warning)
     return ExitCode.DONE
 
 
-def _list(opened: DriveResult, count: int | None, variant: str | None, *, as_json: bool) -> None:
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What is to be opened, and the file to draw it into."""
+
+    drive: str | None
+    frame: int | None
+    worst: int | None
+    variant: str | None
+    file: Path | None
+
+
+def _list(opened: Result, count: int | None, variant: str | None, *, as_json: bool) -> None:
     """Print the worst frames, for people or as JSON."""
     from roadeval.cli.screens import inspect as screen
-    from roadeval.jobs import inspect as inspecting
-    from roadeval.results.summary import json_text, plain
+    from roadeval.jobs import inspect as job
+    from roadeval.results.facts import json_text, plain
 
-    found = inspecting.worst_frames(opened, count or inspecting.LISTED, variant)
+    found = job.worst_frames(opened, count or job.LISTED, variant)
     if as_json:
         console.emit(json_text(plain([asdict(each) for each in found])).rstrip())
     else:
         screen.show(opened.name, found, console.results())
 
 
-def _asked_for(
-    opened: DriveResult, frame: int | None, worst: int | None, variant: str | None
-) -> int | None:
-    """Return the number of the frame that was asked for, by itself or by its rank."""
-    from roadeval.jobs.inspect import worst_frames
+def _show(opened: Result, asked: _Asked) -> None:
+    """Open the viewer at a frame, or draw the frame into a file."""
+    from roadeval.jobs import inspect as job
+    from roadeval.jobs.result import DriveResult
 
-    return frame if worst is None else worst_frames(opened, worst, variant)[-1].frame
+    frame, drive, of, why = asked.frame, opened.drive, "", ""
+    warnings: tuple[str, ...] = ()
+    if opened.fleet:
+        from roadeval.jobs.replayed import recording_of
 
-
-def _draw(opened: DriveResult, frame: int | None, variant: str | None, file: Path) -> None:
-    """Draw a frame into a file, the worst that has pictures if none was asked for."""
-    from roadeval.jobs import inspect as inspecting
-
-    why = ""
-    if frame is None and (bad := inspecting.worst(opened, variant)):
-        (first,) = inspecting.worst_frames(opened, 1, variant)
-        which = "the worst" if bad.frame == first.frame else "the worst that has pictures"
+        name = asked.drive
+        if name is None:
+            worst = job.of_rank(opened, asked.worst or 1)
+            name, frame = worst.drive, worst.frame
+        with progress.watched() as watch:
+            path, warnings = recording_of(opened.fleet, name, watch, messages.note)
+        drive, of = DriveResult(path), f"{name}, "
+        warnings = (*drive.warnings, *warnings)
+    elif asked.worst is not None:
+        frame = job.of_rank(opened, asked.worst, asked.variant).frame
+    assert drive is not None
+    if asked.file and frame is None and not of and (bad := job.worst(drive, asked.variant)):
+        is_worst = bad.frame == job.of_rank(opened, 1, asked.variant).frame
+        which = "the worst" if is_worst else "the worst that has pictures"
         frame, why = bad.frame, f", {which} (--frame N or --worst K takes another)"
-    console.emit(f"{file}: frame {_open(opened, frame, file)}{why}")
-
-
-def _open(opened: DriveResult, frame: int | None, file: Path | None = None) -> int | None:
-    """Open the viewer at a frame, or draw it into a file; return the frame that it shows."""
-    from roadeval.jobs import inspect as inspecting
-
-    if frame is not None and (said := inspecting.without_pictures(opened, frame)):
-        messages.warning(said)
-    return inspecting.view(opened, frame, file)
+    if frame is not None and (sentence := job.without_pictures(drive, frame)):
+        messages.warning(sentence)
+    shown = job.view(drive, frame, asked.file)
+    if asked.file:
+        console.emit(f"{asked.file}: {of}frame {shown}{why}")
+    for warning in warnings:
+        messages.warning(warning)
 
 
 COMMAND: Final = inspect

@@ -30,13 +30,12 @@ def replay(
     config = arguments.configuration(given)
     from roadeval.cli.screens import replay as screen
     from roadeval.jobs.replay import replay as run
-    from roadeval.results.summary import summary_text
 
     _spare_pandas(config)
     with progress.watched(quiet) as watch:
         found = run(drive, config, on_progress=watch)
     if json:
-        console.emit(summary_text(found.summary).rstrip())
+        console.emit(found.facts.text().rstrip())
     elif not quiet:
         screen.show(found, console.results())
     for text in found.tracebacks:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -13,7 +12,7 @@ from roadeval.cli import arguments, console, messages
 from roadeval.cli.exit_codes import ExitCode
 
 if TYPE_CHECKING:
-    from roadeval.jobs.result import DriveResult
+    from roadeval.jobs.result import Result
     from roadeval.report.findings import Commands
 
 
@@ -63,58 +62,40 @@ def report(
     that needs no network and no server; of a fleet its pictures lie in a folder beside it.
     """
     from roadeval.jobs.report import PageSettings, is_page, write_report
-    from roadeval.jobs.result import DriveResult
-    from roadeval.results.fleet.kind import is_fleet
+    from roadeval.jobs.result import Result
 
     size = arguments.paper_of(paper)
     if (pictures is not None or assets) and not (output and is_page(output)):
         raise typer.BadParameter("--pictures and --assets go with a page alone: -o FILE.html")
-    page = PageSettings(pictures, assets)
-    warnings: Sequence[str] = ()
-    if is_fleet(result):
-        told = commands_of(result)
-        path = write_report(result, output, paper=size, commands=told, as_page=page)
-    else:
-        read = DriveResult(result)
-        path = write_report(read, output, paper=size, commands=commands_of(read), as_page=page)
-        warnings = read.warnings
+    page, opened = PageSettings(pictures, assets), Result(result)
+    path = write_report(opened, output, paper=size, commands=commands_of(opened), as_page=page)
     if not quiet:
         console.emit(str(path))
-    for warning in warnings:
+    for warning in opened.warnings:
         messages.warning(warning)
     return ExitCode.DONE
 
 
-def commands_of(result: DriveResult | Path) -> Commands:
-    """Return what to type for more about a drive's result, or about a fleet's folder."""
-    return _of_fleet(result) if isinstance(result, Path) else _of_drive(result)
+def commands_of(result: Result) -> Commands:
+    """Return what to type for more about a result: of a fleet, by the rank of a worst frame."""
+    from roadeval.report.findings import Commands
+
+    (path,) = result.paths
+    if result.drive is None:
+        worst = ["roadeval", "inspect", str(path), "--worst"]
+        return Commands(again=None, inspect=lambda rank: shlex.join([*worst, str(rank)]))
+    config, shown = result.drive.configuration, result.drive.viewable or path
+    return Commands(
+        again=None
+        if config is None
+        else lambda log: shlex.join(["roadeval", "replay", log, "--config", str(config)]),
+        inspect=lambda frame: inspect_command(shown, frame),
+    )
 
 
 def inspect_command(path: Path, frame: int) -> str:
     """Return the command that opens a frame of a recording in the viewer."""
     return shlex.join(["roadeval", "inspect", str(path), "--frame", str(frame)])
-
-
-def _of_drive(result: DriveResult) -> Commands:
-    from roadeval.report.findings import Commands
-
-    config = result.configuration
-    return Commands(
-        again=None
-        if config is None
-        else lambda log: shlex.join(["roadeval", "replay", log, "--config", str(config)]),
-        inspect=lambda frame: inspect_command(result.viewable or result.path, frame),
-    )
-
-
-def _of_fleet(path: Path) -> Commands:
-    """Return the command that opens one of a fleet's worst frames, by its rank."""
-    from roadeval.report.findings import Commands
-
-    def inspect(rank: int) -> str:
-        return shlex.join(["roadeval", "inspect", str(path), "--worst", str(rank)])
-
-    return Commands(again=None, inspect=inspect)
 
 
 COMMAND: Final = report

@@ -11,7 +11,8 @@ from roadeval.cli.screens import tables
 from roadeval.data.words import interval, percent, points
 from roadeval.evaluation.metrics import FULL
 from roadeval.report.blocks import Table
-from roadeval.results.fleet.record import DAMAGED, FAILED, SCORED, UNSCORED
+from roadeval.results.facts import OverDrives
+from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,22 +33,22 @@ NAMED: Final = 5
 
 def show(outcome: FleetOutcome, out: Console) -> None:
     """Print how many drives there are, the verdict, the rates, and the effects over drives."""
-    summary = outcome.summary
+    facts = outcome.facts
     counted = (
         f"{outcome.counts[s]} {text}" for s, text in STATUSES.items() if outcome.counts.get(s)
     )
     total = sum(outcome.counts.values())
-    out.print(f"{total} drives: {', '.join(counted)}; {summary['frames']} frames evaluated")
+    out.print(f"{total} drives: {', '.join(counted)}; {facts.frames} frames evaluated")
     if outcome.replayed < total:
         out.print(f"{total - outcome.replayed} of them were done before.")
     out.print()
-    out.print(summary["verdict"])
+    out.print(facts.verdict)
     out.print()
-    if summary["rates"]:
-        show_rates(summary["rates"], out)
+    if facts.rates:
+        show_rates(facts.rates, out)
         out.print()
-    if summary["effects"]:
-        show_effects(summary["effects"], out)
+    if facts.effects:
+        show_effects(facts.effects, out)
         out.print()
     out.print(f"results    {outcome.folder}{os.sep}", soft_wrap=True)
 
@@ -62,17 +63,17 @@ def show_rates(rates: Sequence[Mapping[str, Any]], out: Console) -> None:
     tables.show_table(Table(["variant", "drives", *RATES.values()], rows, caption=caption), out)
 
 
-def show_effects(effects: Sequence[Mapping[str, Any]], out: Console) -> None:
+def show_effects(effects: Sequence[OverDrives], out: Console) -> None:
     """Print the differences of ERR over drives."""
-    tested = [each for each in effects if each["metric"] == TESTED]
-    (confidence,) = {each["confidence"] for each in tested}
+    tested = [each for each in effects if each.metric == TESTED]
+    (confidence,) = {each.confidence for each in tested}
     rows = [
         [
-            f"{each['variant']} - {each['base']}",
-            points(each["mean"]),
-            interval(each["low"], each["high"]),
-            *("-" if each[name] is None else str(each[name]) for name in ("worse", "better")),
-            points(each["pooled"]),
+            f"{each.variant} - {each.base}",
+            points(each.mean),
+            interval(each.low, each.high),
+            *("-" if count is None else str(count) for count in (each.worse, each.better)),
+            points(each.pooled),
         ]
         for each in tested
     ]
@@ -85,11 +86,11 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
     """Yield what to know first, and why drives failed, with the first drives of each reason."""
     for path in outcome.unused:
         yield f"the settings for {path} hold for none of these drives"
-    yield from outcome.summary["warnings"]
-    for condition in outcome.summary["conditions"]:
-        if condition["judged"] and (missing := [*condition["not_judged"].values()]):
+    yield from outcome.facts.warnings
+    for condition in outcome.facts.conditions:
+        if condition.judged and (missing := [*condition.not_judged.values()]):
             more = f" (and {len(missing) - 1} more drives)" if missing[1:] else ""
-            yield f"{condition['condition']}: {missing[0]}{more}"
+            yield f"{condition.condition}: {missing[0]}{more}"
     reasons = Counter(_reason(drive, text, outcome) for drive, text in outcome.problems.items())
     for reason, count in reasons.items():
         drives = [d for d, text in outcome.problems.items() if _reason(d, text, outcome) == reason]
@@ -99,7 +100,7 @@ def problems(outcome: FleetOutcome) -> Iterator[str]:
 
 def _reason(drive: str, text: str, outcome: FleetOutcome) -> str:
     """Return a reason without the name of the drive's file, which begins most of them."""
-    sources = {each["drive"]: each["source"] for each in outcome.summary["drives"]}
+    sources = {each.drive: each.source for each in outcome.facts.drives}
     source = sources.get(drive, "")
     for name in (source, source.rpartition("/")[2]):
         text = text.removeprefix(f"{name}: ") if name else text

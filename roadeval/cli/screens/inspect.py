@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from roadeval.cli.screens.tables import ascii_of, show_table
 from roadeval.data.words import percent, points
-from roadeval.evaluation.metrics import SHORT
 from roadeval.report.blocks import Table
 
 if TYPE_CHECKING:
@@ -16,18 +15,43 @@ if TYPE_CHECKING:
     from roadeval.jobs.inspect import WorstFrame
 
 
-def show(drive: str, found: Sequence[WorstFrame], out: Console) -> None:
-    """Print a drive's worst frames: their rates, where ERR comes from, and the notes on them."""
+def show(name: str, found: Sequence[WorstFrame], out: Console) -> None:
+    """Print the worst frames with their rates.
+
+    Of a drive with the parts of ERR and the notes; of a fleet with the light, and whether the
+    drive's recording was kept.
+    """
     mask = f"{found[0].variant} by ERR of {found[0].stage}"
-    out.print(f"{drive}: worst frames of {mask} (of neighbours only the worst)")
+    of_fleet = bool(found[0].light)
+    out.print(f"{name}: worst frames of {mask} (of neighbours only the worst)")
     out.print()
-    titles = ["", "frame", *(f"{rate} %" for rate in SHORT), "why"]
-    rows = [
-        [str(each.rank), str(each.frame), *(percent(each.rates[r]) for r in SHORT), _why(each)]
-        for each in found
-    ]
-    why = [len(titles) - 1]
-    show_table(Table(titles, rows, text_columns=why, breaks=range(1, len(rows))), out)
+    rates = [*found[0].rates]
+    titles = ["frame", *(f"{rate} %" for rate in rates)]
+    cells = [[str(each.frame), *(percent(each.rates[r]) for r in rates)] for each in found]
+    if of_fleet:
+        rows = [
+            [str(each.rank), each.drive, *own, *_light(each)]
+            for each, own in zip(found, cells, strict=True)
+        ]
+        titles = ["", "drive", *titles, "bright %", "shade %", "sun", "kept"]
+        show_table(Table(titles, rows, text_columns=(0, 1)), out)
+    else:
+        rows = [[str(e.rank), *own, _why(e)] for e, own in zip(found, cells, strict=True)]
+        titles = ["", *titles, "why"]
+        why = [len(titles) - 1]
+        show_table(Table(titles, rows, text_columns=why, breaks=range(1, len(rows))), out)
+    if of_fleet and not all(each.recording for each in found):
+        out.print()
+        out.print("Where no recording was kept, --worst K --trust-sources replays the drive first.")
+
+
+def _light(frame: WorstFrame) -> tuple[str, ...]:
+    sun = frame.light["sun"]
+    return (
+        *(percent(frame.light[name], 0) for name in ("luminance", "shadow")),
+        "-" if sun is None else f"{sun:+.2f}",
+        "yes" if frame.recording else "-",
+    )
 
 
 def _why(frame: WorstFrame) -> str:

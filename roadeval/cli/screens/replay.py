@@ -5,15 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from roadeval.cli import console
 from roadeval.cli.screens import seeds, tables, thresholds
 from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.data.words import defined, percent, points
 from roadeval.evaluation.metrics import FULL, SHORT
-from roadeval.evaluation.score import final_stages
+from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import Cell, Table
+from roadeval.results.facts import Facts, FrameAccount, Totals
 from roadeval.results.sentences import correction, marked_interval
 
 if TYPE_CHECKING:
@@ -26,44 +27,39 @@ RATES: Final = {"ERR": "ERR %", "pooled_ERR": "pooled ERR %"} | {n: f"{n} %" for
 OTHERS: Final = tuple(rate for rate in SHORT if rate != "ERR")
 """The rates whose differences stand beside that of ERR."""
 
-Totals = Mapping[str, Mapping[str, Mapping[str, Any]]]
-"""Counts and rates by variant and stage, as ``totals`` in ``summary.json``."""
-ByRate = Mapping[str, Mapping[str, Any]]
-"""Differences of two masks, as in ``summary.json``."""
-
 
 def show(outcome: Outcome, out: Console) -> None:
     """Print what a replay read, how well each variant did, and where everything was written."""
-    summary = outcome.summary
-    out.print(f"{summary['drive']['name']}: {accounting(summary)}")
+    facts = outcome.facts
+    out.print(f"{facts.drive.name}: {accounting(facts)}")
     out.print()
-    if summary["totals"]:
-        out.print(summary["verdict"])
+    if facts.totals:
+        out.print(facts.verdict)
         out.print()
-        _show_scores(summary, out)
+        _show_scores(facts, out)
     else:
-        out.print(f"Nothing to score: {_why_nothing(summary['frames'])}.")
+        out.print(f"Nothing to score: {_why_nothing(facts.frames)}.")
     out.print()
     _show_files(outcome, out)
 
 
-def accounting(summary: Mapping[str, Any]) -> str:
+def accounting(facts: Facts) -> str:
     """Return the account of the frames in a line."""
-    frames = summary["frames"]
-    counted = f"{frames['evaluated'] or 'none'} evaluated"
-    if summary["windows"]:
-        counted += f" in {summary['windows']} windows"
-    skipped = (f"{number} {why}" for why, number in frames["skipped"].items())
-    of = f" of {frames['in_log']}" if frames["read"] < frames["in_log"] else ""
-    return ", ".join([f"{frames['read']}{of} frames read", *skipped, counted])
+    frames = facts.frames
+    counted = f"{frames.evaluated or 'none'} evaluated"
+    if facts.windows:
+        counted += f" in {facts.windows} windows"
+    skipped = (f"{number} {why}" for why, number in frames.skipped.items())
+    of = "" if frames.read == frames.in_log else f" of {frames.in_log}"
+    return ", ".join([f"{frames.read}{of} frames read", *skipped, counted])
 
 
-def _show_scores(summary: Mapping[str, Any], out: Console) -> None:
-    tables.show_table(scores(summary["totals"]), out)
+def _show_scores(facts: Facts, out: Console) -> None:
+    tables.show_table(scores(facts.totals), out)
     out.print()
-    out.print(best(summary["totals"]))
-    repeats = summary.get("seeds", {})
-    if pairs := dict(_pairs(summary)):
+    out.print(best(facts.totals))
+    repeats = facts.seeds
+    if pairs := dict(_pairs(facts)):
         out.print()
         tables.show_table(differences(pairs), out)
         out.print(correction(by_rate["ERR"] for by_rate in pairs.values()))
@@ -72,13 +68,13 @@ def _show_scores(summary: Mapping[str, Any], out: Console) -> None:
     if repeats:
         out.print()
         seeds.show(repeats, RATES, out)
-    if curves := summary.get("curves"):
+    if curves := facts.curves:
         out.print()
         thresholds.show(curves, out)
 
 
-def _why_nothing(frames: Mapping[str, Any]) -> str:
-    if frames["labelled"]:
+def _why_nothing(frames: FrameAccount) -> str:
+    if frames.labelled:
         return "every frame with road truth was trained on or left out"
     return "no frame that was read has road truth"
 
@@ -108,26 +104,24 @@ def best(totals: Totals) -> str:
     return f"Lowest ERR: {winner}{aside}, {percent(totals[winner][FINAL_STAGE]['ERR'])} %"
 
 
-def _pairs(summary: Mapping[str, Any]) -> Iterator[tuple[str, ByRate]]:
+def _pairs(facts: Facts) -> Iterator[tuple[str, Mapping[str, Difference]]]:
     """Yield what is subtracted from what, of final masks, and the differences."""
-    stages = final_stages((name, stage) for name, own in summary["totals"].items() for stage in own)
-    if changed := summary["difference"].get(stages.get(FILTERED)):
-        yield f"{FILTERED} - {UNFILTERED}", changed
-    for variant, difference in summary["against_blind"].items():
-        yield f"{variant} - {BASELINE}", difference
+    for each in facts.effects:
+        if each.final and (each.base == BASELINE or each.variant == FILTERED):
+            yield f"{each.variant} - {each.base}", each.rates
 
 
-def differences(pairs: Mapping[str, ByRate]) -> Table:
+def differences(pairs: Mapping[str, Mapping[str, Difference]]) -> Table:
     """Tabulate for each pair the difference of ERR with its interval, and those of others."""
-    confidence = percent(next(iter(pairs.values()))["ERR"]["confidence"], 0)
+    confidence = percent(next(iter(pairs.values()))["ERR"].confidence, 0)
     return Table(
         ["final masks", "ERR, pp", f"{confidence} % interval", *(f"{rate}, pp" for rate in OTHERS)],
         [
             [
                 name,
-                points(by_rate["ERR"]["mean"]),
+                points(by_rate["ERR"].mean),
                 marked_interval(by_rate["ERR"]),
-                *(points(by_rate[rate]["mean"]) for rate in OTHERS),
+                *(points(by_rate[rate].mean) for rate in OTHERS),
             ]
             for name, by_rate in pairs.items()
         ],

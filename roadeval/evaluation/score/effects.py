@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any, Final
+from dataclasses import dataclass, replace
+from typing import Final
 
 from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED
 from roadeval.evaluation.metrics import COMPARED, METRICS
@@ -71,24 +71,6 @@ def corrected(effects: Sequence[Effect]) -> list[Effect]:
         replace(each, rates={**each.rates, TESTED: next(family)}) if each.final else each
         for each in effects
     ]
-
-
-def as_parts(effects: Iterable[Effect]) -> dict[str, Any]:
-    """Return them as parts of ``summary.json``.
-
-    ``difference`` is that of the filter, by stage; ``against_unfiltered`` that of the other
-    variants' final masks, and ``against_blind`` that of all, by variant.
-    """
-    parts: dict[str, Any] = {"difference": {}, "against_unfiltered": {}, "against_blind": {}}
-    for each in effects:
-        rates = {rate: asdict(difference) for rate, difference in each.rates.items()}
-        if each.base == BASELINE:
-            parts["against_blind"][each.variant] = rates
-        elif each.variant == FILTERED:
-            parts["difference"][each.stage] = rates
-        else:
-            parts["against_unfiltered"][each.variant] = rates
-    return parts
 
 
 def final_stages(masks: Iterable[Name]) -> dict[str, str]:

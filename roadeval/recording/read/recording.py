@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -17,8 +18,8 @@ from roadeval.data import ERRORS, Rows, VariantLayout
 from roadeval.recording import layout as at
 from roadeval.recording.layout import Layout, RecordingError
 from roadeval.recording.read.rrd_file import RrdFile, flat, whole
-from roadeval.results.summary import another_format, parse_summary
-from roadeval.results.tables import read_rows, read_table
+from roadeval.results.facts import Facts, another_format
+from roadeval.results.tables import TableFacts, read_rows, read_table
 from roadeval.runtime.documents import check_texts, read_json
 
 if TYPE_CHECKING:
@@ -111,13 +112,18 @@ class Recording:
         return self._file.document(at.result_path(name))
 
     @cached_property
-    def summary(self) -> dict[str, Any]:
-        """The content of ``summary.json``."""
+    def facts(self) -> Facts | None:
+        """The facts of the result; None if the run did not get there."""
         text = self.result(at.SUMMARY)
-        summary = {} if text is None else parse_summary(text, self.path)
+        facts = None if text is None else Facts.parse(text, self.path)
         with whole(self.path, at.SECONDS):
             seconds = read_json(self._file.document(at.SECONDS) or "{}")
-        return summary | ({"seconds": seconds} if seconds else {})
+        return replace(facts, seconds=seconds) if facts else None
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The content of ``summary.json``; empty if the run did not get there."""
+        return self.facts.as_dict() if self.facts else {}
 
     @cached_property
     def frames(self) -> pd.DataFrame:
@@ -136,11 +142,16 @@ class Recording:
 
     def table(self, name: str) -> pd.DataFrame:
         """Return the rows of a table by its name, as ``oracles``; empty if the run has none."""
-        return read_table(name, self._text(name), self.summary.get("tables"))
+        return read_table(name, self._text(name), self._stated)
 
     def rows(self, name: str) -> Rows:
         """Return the rows of a table as `table` does, without pandas."""
-        return read_rows(name, self._text(name), self.summary.get("tables"))
+        return read_rows(name, self._text(name), self._stated)
+
+    @property
+    def _stated(self) -> Mapping[str, TableFacts] | None:
+        """Rows and checksums of the tables; None where there are no facts to state them."""
+        return self.facts.tables or None if self.facts else None
 
     def _text(self, name: str) -> str:
         """Return the text of a table; empty if the run counted none."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from roadeval.data.rows import Cells
 from roadeval.data.words import in_percent, points
 from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.stats import Difference
 from roadeval.report.chart import (
     BETTER,
     FAINT,
@@ -44,12 +45,9 @@ _Interval = tuple[float | None, float | None, float | None]
 
 
 def difference(
-    frames: Cells, changes: Cells, treated: str, control: str, mean: Mapping[str, Any]
+    frames: Cells, changes: Cells, treated: str, control: str, mean: Difference
 ) -> Chart:
-    """Return the paired difference of ERR, frame by frame, and its mean with the interval.
-
-    ``mean`` is as in ``summary.json``.
-    """
+    """Return the paired difference of ERR, frame by frame, and its mean with the interval."""
     drawn, change = looks([treated, control]), 100 * changes
     return Chart(
         f"ERR of {treated} minus {control}",
@@ -63,8 +61,8 @@ def difference(
         ],
         unit="pp",
         level=Level(
-            "mean" if mean["low"] is None else "mean and its interval",
-            *(in_percent(mean[name]) for name in ("mean", "low", "high")),
+            "mean" if mean.low is None else "mean and its interval",
+            *map(in_percent, (mean.mean, mean.low, mean.high)),
         ),
     )
 

@@ -18,7 +18,8 @@ from roadeval.report.chart import Chart, ChartKind, HeatMap, Look, Series, looks
 from roadeval.runtime.discovery import found_in
 
 if TYPE_CHECKING:
-    from roadeval.report.findings import ErrorHeatmap, Totals
+    from roadeval.report.findings import ErrorHeatmap
+    from roadeval.results.facts import Totals
 
 LEAST_SHARE: Final = 1.0
 """Percent of the frames to which a heat map's shades reach at least."""

@@ -30,7 +30,7 @@ def rate_cells(rates: Mapping[str, float], *, bold: bool) -> list[Cell]:
 
 def sampled_frames(findings: Findings) -> str:
     """Describe the frames whose masks were compared pixel by pixel."""
-    evaluated = findings.summary["frames"]["evaluated"]
+    evaluated = findings.facts.frames.evaluated
     if findings.sampled == evaluated:
         return f"all {evaluated} evaluated frames"
     if findings.pictured == evaluated:

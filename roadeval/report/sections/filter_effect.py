@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 from roadeval.data import BASELINE
 from roadeval.data.words import DASH, defined, listing, number, percent, points
@@ -39,7 +38,7 @@ def section(findings: Findings) -> Iterator[Block]:
 def _paired(findings: Findings, pair: PairedComparison) -> Iterator[Block]:
     yield _differences(findings, pair)
     change = pair.differences["ERR"]
-    if not defined(change["mean"]):
+    if not defined(change.mean):
         yield Text("ERR is undefined on every frame, so nothing tells what the filter does to it.")
         return
     yield Text(_method(change), "note")
@@ -61,10 +60,10 @@ def _differences(findings: Findings, pair: PairedComparison) -> Table:
             [
                 rate,
                 *(percent(findings.total(name)[rate]) for name in names),
-                Cell(points(change["mean"]), bold=True),
+                Cell(points(change.mean), bold=True),
                 marked_interval(change),
-                number(change["units"]),
-                DASH if (worth := change["effective"]) is None else f"{worth:.0f}",
+                number(change.units),
+                DASH if change.effective is None else f"{change.effective:.0f}",
             ]
             for rate, change in pair.differences.items()
         ],
@@ -75,11 +74,11 @@ def _differences(findings: Findings, pair: PairedComparison) -> Table:
     )
 
 
-def _method(change: Mapping[str, Any]) -> str:
-    if change["low"] is None:
-        return f"No interval for ERR: {Difference(**change).none_because}."
+def _method(change: Difference) -> str:
+    if change.low is None:
+        return f"No interval for ERR: {change.none_because}."
     return (
-        f"{percent(change['confidence'], 0)} % intervals. Neighbouring frames resemble each other, "
+        f"{percent(change.confidence, 0)} % intervals. Neighbouring frames resemble each other, "
         "and the intervals are the wider for it; effective says how many independent frames would "
         "tell as much. All of this concerns this drive only."
     )
@@ -114,7 +113,7 @@ def pixels_changed(findings: Findings, pair: PairedComparison) -> str:
 
 def _flicker(findings: Findings) -> Iterator[Block]:
     """Tabulate how much of each final mask changes from frame to frame, beside the truth's own."""
-    known = {name: each for name, each in findings.beyond.items() if defined(each["flicker"])}
+    known = {name: each for name, each in findings.facts.beyond.items() if defined(each["flicker"])}
     if not known:
         return
     yield Heading("From one frame to the next", 2)
@@ -146,7 +145,7 @@ def _against_baseline(findings: Findings, blind: Sequence[PairedComparison]) -> 
             [
                 variant_cell(pair.treated, [*findings.finals]),
                 percent(findings.total(pair.treated)["ERR"]),
-                Cell(points((change := pair.differences["ERR"])["mean"]), bold=True),
+                Cell(points((change := pair.differences["ERR"]).mean), bold=True),
                 marked_interval(change),
                 number(int((pair.frames["ERR"] < 0).sum())),
                 number(int((pair.frames["ERR"] > 0).sum())),

@@ -8,7 +8,6 @@ from typing import Final
 from roadeval.data.words import DASH, percent
 from roadeval.evaluation import score
 from roadeval.evaluation.metrics import FULL
-from roadeval.evaluation.settings import settings_of
 from roadeval.report.blocks import (
     Block,
     Cell,
@@ -48,11 +47,11 @@ def section(findings: Findings) -> Iterator[Block]:
 
 def _claims(findings: Findings) -> Iterator[Block]:
     """Tabulate in how many windows the paper's claims are borne out."""
-    found = findings.summary.get("claims", {})
+    found = findings.facts.claims
     rows = list(claim_rows(found))
     if not rows:
         return
-    size = settings_of(findings.summary).window
+    size = findings.facts.evaluation.window
     short = any(each["short"] for each in found.values())
     table = Table(
         ["claim", "borne out by", *(["shorter, at the end"] if short else [])],

@@ -2,69 +2,107 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
+from roadeval.data.words import number
 from roadeval.report.blocks import Block, Command, Heading, KeepTogether, Table, Text, TwoColumns
-from roadeval.report.findings import Commands, Findings
+from roadeval.report.findings import Findings, FleetFindings
+from roadeval.results.facts import Facts
 
 TABLES: Final = ("topics", "labels", "frames", "training", "evaluation")
 """Of the run's configuration, beside its stages: what can change a number."""
 
 
+OF_A_FLEET: Final = ("output", "run")
+"""Tables of a fleet's configuration that change no number."""
+
+
 def section(findings: Findings) -> Iterator[Block]:
     """Yield what was run on what, and how to run it again."""
-    summary = findings.summary
+    facts = findings.facts
     yield Heading("Settings, versions, and how to reproduce this")
-    if summary.get("log"):
-        yield from _log(summary["log"], findings.commands)
-    for topic in summary["drive"].get("topics", ()):
-        yield Text(str(topic), "note")
-    if findings.properties:
-        # The digest of the input says less than the log's checksum and the settings around it.
-        told = ((name, value) for name, value in findings.properties.items() if name != "input")
-        known = {name: value for name, value in told if value != ""}
+    if facts.log:
+        yield Text(f"Log: {facts.log.path}")
+        yield Text(f"SHA-256: {facts.log.sha256}")
+        if findings.commands and findings.commands.again:
+            yield Command(findings.commands.again(facts.log.path))
+            yield Text("The same log, configuration and versions give the same numbers.", "note")
+    for topic in facts.drive.topics:
+        yield Text(topic, "note")
+    # The digest of the input says less than the log's checksum and the settings around it.
+    known = {n: value for n, value in findings.properties.items() if n != "input" and value != ""}
+    if known:
         yield Text("; ".join(f"{name}: {value}" for name, value in known.items()), "note")
-    yield from _methods(summary)
-    yield from _versions_and_seconds(summary)
-    if summary.get("settings"):
-        yield _settings(summary["settings"], summary["run"])
+    yield from _methods(facts)
+    yield from _versions_and_seconds(facts)
+    if facts.settings:
+        first = {"preset": facts.run["preset"]} if "preset" in facts.run else {}
+        shared = {name: facts.run[name] for name in TABLES if name in facts.run}
+        own = {name: {**first, **each, **shared} for name, each in facts.settings.items()}
+        yield _settings(settings_rows(own))
 
 
-def _log(log: Mapping[str, Any], commands: Commands | None) -> Iterator[Block]:
-    yield Text(f"Log: {log['path']}")
-    yield Text(f"SHA-256: {log['sha256']}")
-    if commands and commands.again:
-        yield Command(commands.again(log["path"]))
-        yield Text("The same log, configuration and versions give the same numbers.", "note")
+def of_drives(findings: FleetFindings) -> Iterator[Block]:
+    """Yield the settings, version, models and folds behind the results of many drives."""
+    facts = findings.facts
+    yield Heading("What was run")
+    yield Text(f"roadeval {facts.version}; {_models(findings)}; {_seeds(facts.run)}.")
+    folds = Counter(row["fold"] for row in findings.drives.values() if row["fold"] is not None)
+    if folds:
+        dealt = ", ".join(f"fold {fold}: {number(n)}" for fold, n in sorted(folds.items()))
+        yield Text(f"Drives by the fold whose model scored them, which never saw them: {dealt}.")
+    yield Text(
+        f"run.toml in {findings.folder} has the whole configuration, drives.parquet each log's "
+        "SHA-256. The same logs, configuration and version give the same numbers.",
+        "note",
+    )
+    own = {name: value for name, value in facts.run.items() if name not in OF_A_FLEET}
+    yield _settings([[name, value] for name, value in flattened(own)])
 
 
-def _methods(summary: Mapping[str, Any]) -> Iterator[Block]:
-    """Yield what stages tell of themselves, as networks do, with the time that each takes."""
-    for variant, stages in summary.get("methods", {}).items():
-        for stage, told in stages.items():
-            seconds = summary.get("seconds", {}).get(variant, {}).get(stage)
+def _models(findings: FleetFindings) -> str:
+    models = {row["model"] for row in findings.drives.values() if row["model"]}
+    if not models:
+        return "each drive trained its own model"
+    if len(models) == 1:
+        return f"one model for all drives (SHA-256 {min(models)[:12]})"
+    return f"{number(len(models))} models"
+
+
+def _seeds(run: Mapping[str, Any]) -> str:
+    training = run.get("training", {})
+    seeds = training.get("seeds", 1)
+    first = f"training seed {training.get('seed', 0)}"
+    return first if seeds == 1 else f"{first} and {seeds - 1} more"
+
+
+def _methods(facts: Facts) -> Iterator[Block]:
+    """Yield what stages say of themselves, as networks do, with the time that each takes."""
+    for variant, stages in facts.methods.items():
+        for stage, about in stages.items():
+            seconds = facts.seconds.get(variant, {}).get(stage)
             time = {} if seconds is None else {"ms a frame": f"{1e3 * seconds:.2f}"}
-            facts = {name: value for name, value in flattened(told) if value != "none"} | time
-            rows = [[name, value] for name, value in facts.items()]
+            known = {name: value for name, value in flattened(about) if value != "none"} | time
+            rows = [[name, value] for name, value in known.items()]
             yield KeepTogether([Heading(f"{variant}: {stage}", 2), _words(["what", "value"], rows)])
 
 
-def _settings(variants: Mapping[str, Mapping[str, Any]], run: Mapping[str, Any]) -> Block:
-    """Return the variants' settings, and the run's that can change a number, in two columns."""
-    first = {"preset": run["preset"]} if "preset" in run else {}
-    shared = {name: run[name] for name in TABLES if name in run}
-    rows = settings_rows({name: {**first, **own, **shared} for name, own in variants.items()})
+def _settings(rows: list[list[str]]) -> Block:
+    """Return settings in two columns."""
     half = -(-len(rows) // 2)
-    left, right = (_words(["setting", "value"], part) for part in (rows[:half], rows[half:]))
-    return KeepTogether([Heading("Settings", 2), TwoColumns([left], [right])])
+    left, *right = [
+        _words(["setting", "value"], part) for part in (rows[:half], rows[half:]) if part
+    ]
+    return KeepTogether([Heading("Settings", 2), TwoColumns([left], right)])
 
 
-def _versions_and_seconds(summary: Mapping[str, Any]) -> Iterator[Block]:
-    versions = [[name, str(value)] for name, value in summary.get("versions", {}).items()]
+def _versions_and_seconds(facts: Facts) -> Iterator[Block]:
+    versions = [[name, value] for name, value in facts.versions.items()]
     seconds = [
         [variant, stage, f"{1e3 * value:.2f}"]
-        for variant, stages in summary.get("seconds", {}).items()
+        for variant, stages in facts.seconds.items()
         for stage, value in stages.items()
     ]
     if versions or seconds:

@@ -20,7 +20,7 @@ SHARES: Final = {"ERR": "ERR within, %", "errors": "share of its wrong pixels, %
 def section(findings: Findings) -> Iterator[Block]:
     """Yield in which parts of the image the errors are."""
     yield Heading("Where the errors are")
-    height = findings.summary["drive"].get("height") or 0
+    height = findings.facts.drive.height
     names = titles(findings.regions["region"].unique().tolist(), height)
     table = Rows({str(name): findings.regions[name].to_numpy() for name in findings.regions})
     yield Figure(
@@ -79,7 +79,7 @@ def regions_table(
 
 
 def _note(findings: Findings) -> str:
-    width = findings.summary["run"].get("evaluation", {}).get("boundary_width")
+    width = findings.facts.run.get("evaluation", {}).get("boundary_width")
     near = f"within {width} pixels of" if width else "near"
     shadow = (
         "Shadow is what the filter took for shadow, right or wrong; where it is not true shadow, "

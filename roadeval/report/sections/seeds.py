@@ -14,7 +14,7 @@ from roadeval.results.seeds import in_words, seeds_in_words, sentence, spreads
 
 def blocks(findings: Findings) -> Iterator[Block]:
     """Yield the spread of the final masks' rates, and what it says; nothing with one seed."""
-    seeds = findings.summary.get("seeds")
+    seeds = findings.facts.seeds
     if not seeds:
         return
     yield Table(
@@ -30,7 +30,7 @@ def blocks(findings: Findings) -> Iterator[Block]:
 
 def rows(findings: Findings) -> list[list[Cell | str]]:
     """Return a row for each variant that learns; none with one seed."""
-    totals, names = findings.summary.get("seeds", {}).get("totals", {}), [*findings.finals]
+    totals, names = findings.facts.seeds.get("totals", {}), [*findings.finals]
     finals = {name: spreads(stages[FINAL_STAGE]) for name, stages in totals.items()}
     return [
         [variant_cell(name, names), *(in_words(own.get(rate)) for rate in FULL)]

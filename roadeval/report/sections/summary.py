@@ -1,14 +1,14 @@
-"""The first page: the verdict, the table of rates, a few frames, and the warnings."""
+"""The first page: the verdict, the table of rates, a few frames or differences, and warnings."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from roadeval.data import BASELINE
-from roadeval.data.words import defined, listing, number, percent
-from roadeval.evaluation.metrics import FULL, METRICS, OVERLAP
+from roadeval.data.words import DASH, defined, interval, listing, number, percent, points
+from roadeval.evaluation.metrics import FULL, METRICS, OVERLAP, SHORT
+from roadeval.evaluation.stats import STUDENT_FROM
 from roadeval.report.blocks import (
     Block,
     BulletList,
@@ -21,10 +21,13 @@ from roadeval.report.blocks import (
     Text,
     TwoColumns,
 )
-from roadeval.report.findings import Findings
+from roadeval.report.findings import Findings, FleetFindings, worse_than_baseline
 from roadeval.report.images import jpeg
 from roadeval.report.sections import seeds
 from roadeval.report.sections.common import variant_cell
+from roadeval.results.facts import FleetFacts, FrameAccount, OverDrives
+from roadeval.results.rows import ACCOUNT
+from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
 
 CROWDED: Final = 7
 """Rows of the tables and warnings together that leave room for all thumbnails."""
@@ -35,12 +38,29 @@ PARTIAL: Final = (
 )
 
 
-def section(findings: Findings) -> Iterator[Block]:
+STATUSES: Final = {
+    SCORED: "scored",
+    DAMAGED: "scored, but for what is lost of the log",
+    UNSCORED: "without truth",
+    FAILED: "failed",
+}
+ROWS: Final = 24
+"""Variants that the tables of many drives have, at most."""
+
+
+def section(findings: Findings | FleetFindings) -> Iterator[Block]:
     """Yield the first page."""
     yield Heading("Summary")
+    if isinstance(findings, FleetFindings):
+        yield from _of_drives(findings)
+    else:
+        yield from _of_a_drive(findings)
+
+
+def _of_a_drive(findings: Findings) -> Iterator[Block]:
     if not findings.complete:
         yield BulletList("Partial recording", [PARTIAL], "warning")
-    yield Text(str(findings.summary["verdict"]), "verdict")
+    yield Text(findings.facts.verdict, "verdict")
     if note := _how_sure(findings):
         yield Text(note, "note")
     if findings.totals:
@@ -53,73 +73,140 @@ def section(findings: Findings) -> Iterator[Block]:
         shown = findings.thumbnails[: 4 if rows > CROWDED else None]
         yield ImageGrid([(image.title, jpeg(image)) for image in shown], 4)
         yield Text(_legend(findings), "note")
-    yield TwoColumns(
-        [_accounting(findings.summary["frames"])],
-        [
-            BulletList("Beware", beware, "warning")
-            if beware
-            else BulletList("Beware", ["Nothing known."])
-        ],
-    )
+    yield TwoColumns([_accounting(findings.facts.frames)], [_beware(beware)])
     yield TableOfContents()
     yield PageBreak()
 
 
-@dataclass(frozen=True, slots=True)
-class _Column:
-    """Numbers of the final masks, one a variant."""
+def _of_drives(findings: FleetFindings) -> Iterator[Block]:
+    facts = findings.facts
+    yield Text(facts.verdict, "verdict")
+    if note := _how_sure_over_drives(facts):
+        yield Text(note, "note")
+    if facts.rates:
+        yield fleet_rates_table(facts)
+    if facts.effects:
+        yield effects_table(facts)
+        yield Text(
+            "Percentage points. Every drive counts the same, long or short; drives of one group "
+            "count as one. Pooled: of all pixels together.",
+            "note",
+        )
+    yield TwoColumns([_statuses(facts)], [_beware(list(fleet_warnings(findings)))])
+    yield TableOfContents()
 
-    title: str
-    values: Sequence[float | None]
-    higher_is_better: bool
 
-    def cells(self) -> Iterator[Cell]:
-        """Yield the cells; that of the best value is bold."""
-        known = [value for value in self.values if defined(value)]
-        best = (max if self.higher_is_better else min)(known, default=None)
-        place = None if best is None else self.values.index(best)
-        yield from (Cell(percent(v), bold=i == place) for i, v in enumerate(self.values))
+def _beware(warned: list[str]) -> BulletList:
+    return BulletList("Beware", warned or ["Nothing known."], "warning" if warned else "plain")
+
+
+# --- Rates ----------------------------------------------------------------------------------------
+
+
+def best_bold(values: Sequence[float | None], *, higher: bool) -> Iterator[Cell]:
+    """Yield a cell in percent for each value; that of the best is bold."""
+    known = [value for value in values if defined(value)]
+    best = (max if higher else min)(known, default=None)
+    place = None if best is None else values.index(best)
+    yield from (Cell(percent(value), bold=i == place) for i, value in enumerate(values))
 
 
 def rates_table(findings: Findings) -> Table:
     """Tabulate every final mask's rates; the best of each column is bold."""
     names = [*findings.finals]
-    columns = list(_columns(findings))
-    numbers = zip(*(column.cells() for column in columns), strict=True)
+    columns = {title: [*cells] for title, cells in _columns(findings)}
+    widths = {each["width"] for each in findings.facts.beyond.values()}
+    edge = f" Boundary F: the road's edge within {widths.pop()} pixels." if widths else ""
     return Table(
-        ["final mask", "frames", *(column.title for column in columns)],
+        ["final mask", "frames", *columns],
         [
             [variant_cell(name, names), number(findings.total(name)["frames"]), *row]
-            for name, row in zip(names, numbers, strict=True)
+            for name, row in zip(names, zip(*columns.values(), strict=True), strict=True)
         ],
         caption=(
             "Percent. The paper's rates are means over the evaluated frames; pooled ERR, IoU, F1 "
-            f"and precision are of all pixels together.{_boundary_width(findings)} Bold: the best."
+            f"and precision are of all pixels together.{edge} Bold: the best."
         ),
     )
 
 
-def _columns(findings: Findings) -> Iterator[_Column]:
+def _columns(findings: Findings) -> Iterator[tuple[str, Iterator[Cell]]]:
+    """Yield the title of each column of numbers, and its cells, one a variant."""
     finals = {name: findings.total(name) for name in findings.finals}
     for rate, metric in FULL.items():
         values = [total.get(rate) for total in finals.values()]
-        yield _Column(rate, values, metric.higher_is_better)
+        yield rate, best_bold(values, higher=metric.higher_is_better)
     pooled = [total["pooled_ERR"] for total in finals.values()]
-    yield _Column("pooled ERR", pooled, METRICS["ERR"].higher_is_better)
+    yield "pooled ERR", best_bold(pooled, higher=METRICS["ERR"].higher_is_better)
     overlap = [findings.overlap[name][stage] for name, stage in findings.finals.items()]
     for rate, metric in OVERLAP.items():
-        yield _Column(rate, [each[rate] for each in overlap], metric.higher_is_better)
-    if findings.beyond:
-        boundary = [findings.beyond.get(name, {}).get("boundary_F") for name in finals]
-        yield _Column("boundary F", boundary, higher_is_better=True)
+        yield rate, best_bold([each[rate] for each in overlap], higher=metric.higher_is_better)
+    if beyond := findings.facts.beyond:
+        boundary = [beyond.get(name, {}).get("boundary_F") for name in finals]
+        yield "boundary F", best_bold(boundary, higher=True)
 
 
-def _boundary_width(findings: Findings) -> str:
-    widths = {each["width"] for each in findings.beyond.values()}
-    return f" Boundary F: the road's edge within {widths.pop()} pixels." if widths else ""
+def fleet_rates_table(facts: FleetFacts) -> Table:
+    """Tabulate the final masks' rates over drives; the best of each column is bold."""
+    rows = facts.rates[:ROWS]
+    names = [row["variant"] for row in rows]
+    higher = {name: metric.higher_is_better for name, metric in FULL.items()} | {
+        "pooled_ERR": False
+    }
+    cells = [[*best_bold([row[n] for row in rows], higher=higher[n])] for n in higher]
+    return Table(
+        ["final mask", "drives", "frames", *(name.replace("_", " ") for name in higher)],
+        [
+            [
+                variant_cell(row["variant"], names),
+                number(row["drives"]),
+                number(row["frames"]),
+                *own,
+            ]
+            for row, own in zip(rows, zip(*cells, strict=True), strict=True)
+        ],
+        caption=(
+            "Percent: the mean over drives of each drive's mean rate; pooled ERR is of all pixels "
+            "of all drives together, so that long drives count for more. Bold: the best."
+        ),
+    )
 
 
-def _trained_here(placement: str) -> str:
+def effects_table(facts: FleetFacts) -> Table:
+    """Tabulate the differences over drives: the filter's, and each variant's against blind."""
+    shown = [each for each in facts.effects if each.metric in SHORT]
+    rows: list[list[Cell | str]] = []
+    breaks = []
+    for base, variant in list(dict.fromkeys((e.base, e.variant) for e in shown))[:ROWS]:
+        breaks.append(len(rows))
+        own = {e.metric: e for e in shown if (e.base, e.variant) == (base, variant)}
+        there = [name for name in SHORT if name in own]
+        rows += [_effect_cells(own[name], first=name == there[0]) for name in there]
+    return Table(
+        ["difference", "rate", "mean", "interval", "worse", "better", "pooled"],
+        rows,
+        text_columns=(0, 1),
+        breaks=breaks[1:],
+        groups=[("", 2), ("over drives", 2), ("drives", 2), ("", 1)],
+        small=True,
+    )
+
+
+def _effect_cells(each: OverDrives, *, first: bool) -> list[Cell | str]:
+    return [
+        f"{each.variant} \N{MINUS SIGN} {each.base}" if first else "",
+        each.metric,
+        Cell(points(each.mean), bold=first),
+        interval(each.low, each.high),
+        *(DASH if count is None else number(count) for count in (each.worse, each.better)),
+        points(each.pooled),
+    ]
+
+
+# --- Warnings and notes ---------------------------------------------------------------------------
+
+
+def _trained_here(placement: str | None) -> str:
     if placement == "spread":
         return (
             "Trained on frames spread along this drive (neither they nor those beside them are "
@@ -132,34 +219,29 @@ def _trained_here(placement: str) -> str:
 
 
 def warnings(findings: Findings) -> Iterator[str]:
-    """Yield what a reader must know before believing the numbers."""
-    yield from map(str, findings.summary.get("warnings", ()))
-    training = findings.summary.get("training", {})
-    own = training.get("model") is None or training.get("adapted", False)
-    if training.get("source") == "truth" and own and findings.totals:
-        yield _trained_here(training.get("placement", "first"))
-    yield from _worse_than_baseline(findings)
+    """Yield what a reader must know before believing the numbers of a drive."""
+    facts = findings.facts
+    yield from facts.warnings
+    own = facts.training.model is None or facts.training.adapted
+    if facts.training.source == "truth" and own and findings.totals:
+        yield _trained_here(facts.training.placement)
+    errors = {name: findings.total(name)["ERR"] for name in findings.finals}
+    if worse := _worse_than_baseline(errors):
+        yield f"{worse}, which never looks at the image: nothing was gained from its pixels here."
     yield from _undefined(findings)
-    losses = list(findings.summary.get("losses", ()))
-    yield from (f"Lost: {loss}" for loss in losses[:LOSSES])
-    if len(losses) > LOSSES:
-        yield f"{len(losses) - LOSSES} more frames were lost; summary.json names them."
+    yield from (f"Lost: {loss}" for loss in facts.losses[:LOSSES])
+    if len(facts.losses) > LOSSES:
+        yield f"{len(facts.losses) - LOSSES} more frames were lost; summary.json names them."
     if not findings.pictured:
         yield "Made without pictures (a results folder holds none): no gallery, no maps."
 
 
-def _worse_than_baseline(findings: Findings) -> Iterator[str]:
-    """Yield a warning that names the variants with a higher ERR than the baseline."""
-    blind = findings.total(BASELINE)["ERR"] if BASELINE in findings.finals else None
-    if not defined(blind):
-        return
-    errors = {name: findings.total(name)["ERR"] for name in findings.finals}
-    if worse := [name for name, error in errors.items() if defined(error) and error > blind]:
-        yield (
-            f"{listing(worse)} {'is' if len(worse) == 1 else 'are'} worse than {BASELINE} (ERR "
-            f"{percent(blind)} %), which never looks at the image: nothing was gained from its "
-            "pixels here."
-        )
+def _worse_than_baseline(errors: Mapping[str, float | None]) -> str:
+    """Name the variants with a higher ERR than the baseline; empty without any."""
+    worse = worse_than_baseline(errors)
+    verb = "is" if len(worse) == 1 else "are"
+    blind = percent(errors.get(BASELINE))
+    return f"{listing(worse)} {verb} worse than {BASELINE} (ERR {blind} %)" if worse else ""
 
 
 def _undefined(findings: Findings) -> Iterator[str]:
@@ -172,14 +254,59 @@ def _undefined(findings: Findings) -> Iterator[str]:
             yield f"{variant}: undefined on some of {frames} frames, and left out: {listing(many)}."
 
 
+def fleet_warnings(findings: FleetFindings) -> Iterator[str]:
+    """Yield what a reader must know before believing the numbers of many drives."""
+    facts = findings.facts
+    if failed := facts.counts.get(FAILED):
+        of = number(len(facts.drives))
+        yield f"{number(failed)} of {of} drives failed: no number counts them."
+    if damaged := facts.counts.get(DAMAGED):
+        yield f"{_drives(damaged)} scored without what is lost of the log."
+    scored = [row for row in findings.drives.values() if row["evaluated"]]
+    if own := sum(1 for row in scored if row["trained_on"] and not row["model"]):
+        yield (
+            f"{_drives(own)} scored by a model trained on the drive's own frames (none of "
+            "these is evaluated): the rates say how well it does on a road that it has seen."
+        )
+    if worse := _worse_than_baseline({row["variant"]: row["ERR"] for row in facts.rates}):
+        yield f"{worse}, which never looks at the image."
+    yield from (f"{sentence}." for sentence in facts.warnings)
+
+
+def _drives(count: int) -> str:
+    return f"{number(count)} drive{' was' if count == 1 else 's were'}"
+
+
 def _how_sure(findings: Findings) -> str:
     changes = [pair.differences["ERR"] for pair in findings.paired]
-    if not any(defined(change["low"]) for change in changes):
+    if not any(defined(change.low) for change in changes):
         return "The verdict concerns this drive only." if findings.totals else ""
     return (
-        f"In brackets: {percent(changes[0]['confidence'], 0)} % intervals, which allow for "
+        f"In brackets: {percent(changes[0].confidence, 0)} % intervals, which allow for "
         "neighbouring frames that resemble each other. Probably: by chance alone, one drive in ten "
         "would show as much in that direction. The verdict concerns this drive only."
+    )
+
+
+def _how_sure_over_drives(facts: FleetFacts) -> str:
+    first = next((each for each in facts.effects if each.metric == "ERR" and each.units), None)
+    if first is None:
+        return ""
+    if first.unit == "frames":
+        return "One drive: intervals are those of its frames."
+    count = first.groups or 0
+    groups = (
+        f" The {first.units} drives count as {count}: those of a group are one, "
+        "and so are copies of a log."
+        if count < first.units
+        else ""
+    )
+    if first.low is None:
+        return f"No interval: it takes {first.needed} drives or groups.{groups}"
+    method = "the exact sign-flip test" if count < STUDENT_FROM else "Student's t over drives"
+    return (
+        f"Intervals of {percent(first.confidence, 0)} %, by {method}; the drive is the "
+        f"unit.{groups}"
     )
 
 
@@ -193,8 +320,17 @@ def _legend(findings: Findings) -> str:
     )
 
 
-def _accounting(frames: Mapping[str, Any]) -> Table:
-    counts = {name: count for name, count in frames.items() if isinstance(count, int)}
-    rows = [(name.replace("_", " "), count) for name, count in counts.items()]
-    rows += [(f"skipped: {why}", count) for why, count in frames.get("skipped", {}).items()]
-    return Table(["frames", "count"], [[name, number(count)] for name, count in rows], small=True)
+# --- Accounts -------------------------------------------------------------------------------------
+
+
+def _accounting(frames: FrameAccount) -> Table:
+    rows = [(name.replace("_", " "), getattr(frames, name)) for name in ACCOUNT]
+    rows += [(f"skipped: {why}", count) for why, count in frames.skipped.items()]
+    known = [[name, number(count)] for name, count in rows if count is not None]
+    return Table(["frames", "count"], known, small=True)
+
+
+def _statuses(facts: FleetFacts) -> Table:
+    rows = [[text, number(facts.counts.get(name, 0))] for name, text in STATUSES.items()]
+    rows.append(["all", number(len(facts.drives))])
+    return Table(["drives", "count"], rows, breaks=[len(STATUSES)], small=True)

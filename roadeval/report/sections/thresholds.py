@@ -15,7 +15,7 @@ from roadeval.report.sections.common import variant_cell
 
 def section(findings: Findings) -> Iterator[Block]:
     """Yield the curves and what is quoted of them; nothing without a probability."""
-    quoted = findings.summary.get("curves", {})
+    quoted = findings.facts.curves
     charts = curves(findings.levels, quoted, findings.totals)
     if not quoted or not charts:
         return

@@ -9,6 +9,7 @@ from roadeval.jobs.inspect import WorstFrame
 
 FRAME = WorstFrame(
     rank=1,
+    drive="street",
     frame=39,
     stamp_ns=0,
     variant="net",

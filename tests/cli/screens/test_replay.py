@@ -8,7 +8,9 @@ import pytest
 from rich.console import Console
 
 from roadeval.cli.screens import replay as outcome
+from roadeval.evaluation.stats import Difference
 from roadeval.jobs.replay import Outcome
+from roadeval.results.facts import DriveFacts, Facts, FrameAccount
 
 RATES = ("ACC", "ERR", "TPR", "FNR", "TNR", "FPR")
 
@@ -28,8 +30,8 @@ TOTALS = {
 
 
 def difference(mean, low=None, high=None, p_holm=None):
-    told = {"mean": mean, "low": low, "high": high, "confidence": 0.95}
-    return told | {"p_holm": p_holm, "comparisons": 2 if p_holm else None}
+    corrected = {"p_holm": p_holm, "comparisons": 2 if p_holm else None}
+    return Difference(mean, low, high, None, 0.95, "frames", 91, **corrected)
 
 
 def by_rate(err):
@@ -37,15 +39,15 @@ def by_rate(err):
 
 
 def summary(**changed):
-    return {
-        "drive": {"name": "drive"},
-        "frames": {"in_log": 101, "read": 101, "evaluated": 91, "skipped": {"trained on": 10}},
+    parts = {
+        "drive": DriveFacts("drive"),
+        "frames": FrameAccount(101, 101, evaluated=91, skipped={"trained on": 10}),
         "windows": 10,
         "totals": TOTALS,
         "difference": {"post": by_rate(difference(0.0065, 0.001, 0.012, 0.02))},
-        "against_blind": {},
         "verdict": "On this drive the filter harms.",
-    } | changed
+    }
+    return Facts(**parts | changed)
 
 
 def screen(results, folder=Path("reports/drive")):
@@ -120,7 +122,7 @@ def test_the_frames_are_accounted_for():
 
 def test_frames_that_were_not_read_are_accounted_for_too():
     skipped = {"outside the range": 61, "trained on": 10}
-    frames = {"in_log": 101, "read": 40, "evaluated": 30, "skipped": skipped}
+    frames = FrameAccount(101, 40, evaluated=30, skipped=skipped)
     assert outcome.accounting(summary(frames=frames, windows=3)) == (
         "40 of 101 frames read, 61 outside the range, 10 trained on, 30 evaluated in 3 windows"
     )
@@ -130,13 +132,7 @@ def test_frames_that_were_not_read_are_accounted_for_too():
     ("labelled", "why"), [(0, "has road truth"), (10, "was trained on or left out")]
 )
 def test_where_nothing_is_scored_it_says_why(labelled, why):
-    frames = {
-        "in_log": 39,
-        "read": 39,
-        "evaluated": 0,
-        "labelled": labelled,
-        "skipped": {"unlabelled": 39},
-    }
+    frames = FrameAccount(39, 39, labelled=labelled, skipped={"unlabelled": 39})
     shown = screen(summary(frames=frames, totals={}, difference={}, windows=0))
     assert shown.startswith("drive: 39 frames read, 39 unlabelled, none evaluated\n")
     assert "Nothing to score: " in shown

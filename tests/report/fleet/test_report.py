@@ -1,18 +1,17 @@
 """The report of a fleet: what it says, and how it grows."""
 
-import json
 import shutil
 from dataclasses import replace
 
 import pytest
 
 from roadeval.jobs.report import write_report
-from roadeval.jobs.report_fleet import collect_fleet
+from roadeval.jobs.report_findings import collect_fleet
 from roadeval.report.blocks import BulletList, Figure, Heading, ImageGrid, Table, Text
-from roadeval.report.fleet import drives, frames, losses, provenance, strata, summary
-from roadeval.report.fleet.document import document
+from roadeval.report.document import document
 from roadeval.report.pdf.typeset import pdf
-from roadeval.results.fleet.folder import Fleet
+from roadeval.report.sections import drives, provenance, strata, summary, worst
+from roadeval.results.fleet import FleetFolder
 from tests.report.making import column, links_within, plain_rows, reader, text, the
 from tests.results.fleet import making
 from tests.results.fleet.making import RUN, fleet_of
@@ -26,49 +25,49 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def findings(folder):
-    return collect_fleet(Fleet(folder))
+    return collect_fleet(FleetFolder(folder))
 
 
-def blocks(part, findings):
-    return list(part.section(findings))
+def blocks(section, findings):
+    return list(section(findings))
 
 
-def tables(part, findings):
-    return [block for block in blocks(part, findings) if isinstance(block, Table)]
+def tables(section, findings):
+    return [block for block in blocks(section, findings) if isinstance(block, Table)]
 
 
 def test_the_first_page_has_the_verdict_the_rates_and_the_differences(findings):
-    told = blocks(summary, findings)
-    assert findings.summary["verdict"] in [b.text for b in told if isinstance(b, Text)]
-    rates, effects = tables(summary, findings)
+    told = blocks(summary.section, findings)
+    assert findings.facts.verdict in [b.text for b in told if isinstance(b, Text)]
+    rates, effects = tables(summary.section, findings)
     assert [row[0] for row in plain_rows(rates)] == ["filtered", "unfiltered", "blind"]
-    first = findings.summary["rates"][0]
+    first = findings.facts.rates[0]
     assert plain_rows(rates)[0][1:4] == ["10", "200", f"{100 * first['ERR']:.2f}"]
     bold = [cell.text for row in rates.rows for cell in row[3:4] if cell.bold]
-    assert bold == [f"{100 * min(r['ERR'] for r in findings.summary['rates']):.2f}"]
+    assert bold == [f"{100 * min(r['ERR'] for r in findings.facts.rates):.2f}"]
     assert plain_rows(effects)[0][:2] == ["filtered \N{MINUS SIGN} unfiltered", "ERR"]
     assert len(effects.rows) == 9
 
 
 def test_what_failed_was_lost_and_trained_on_itself_is_warned_of(findings):
-    said = " ".join(summary.warnings(findings))
+    said = " ".join(summary.fleet_warnings(findings))
     assert "1 of 12 drives failed" in said
     assert "1 drive was scored without what is lost" in said
     assert "10 drives were scored by a model trained on the drive's own frames" in said
 
 
 def test_two_plots_and_the_worst_drives(findings):
-    told = blocks(drives, findings)
+    told = blocks(drives.plots, findings)
     assert len([block for block in told if isinstance(block, Figure)]) == 2
     table = the(Table, told)
     errors = [float(cell.text) for cell in column(table, "ERR")]
     assert errors == sorted(errors, reverse=True)
-    worst = max(findings.scores, key=lambda row: row["ERR"])
-    assert table.rows[0][0] == findings.names[worst["drive"]]
+    highest = max(findings.scores, key=lambda row: row["ERR"])
+    assert table.rows[0][0] == findings.names[highest["drive"]]
     (effect,) = (
         row["mean"]
         for row in findings.effects["unfiltered", "filtered"]
-        if row["drive"] == worst["drive"]
+        if row["drive"] == highest["drive"]
     )
     assert float(table.rows[0][5].replace("\N{MINUS SIGN}", "-")) == pytest.approx(
         100 * effect, abs=0.005
@@ -77,29 +76,29 @@ def test_two_plots_and_the_worst_drives(findings):
 
 
 def test_parts_by_tag_and_by_light(findings):
-    filters, blind = tables(strata, findings)
+    filters, blind = tables(strata.section, findings)
     assert [row[0] for row in plain_rows(filters) if row[0]] == [
         *("place", "weather", "luminance", "contrast", "shadow", "sun")
     ]
     assert len(filters.rows) == len(blind.rows) == 17
-    notes = [b.text for b in blocks(strata, findings) if isinstance(b, Text)]
+    notes = [b.text for b in blocks(strata.section, findings) if isinstance(b, Text)]
     assert "No part has enough drives" in notes[0]
 
 
 def test_a_part_that_stands_is_marked_with_the_number_of_comparisons(tmp_path):
     fleet = fleet_of(tmp_path / "f", 60, frames=0, broken=False, grouped=False)
-    told = blocks(strata, collect_fleet(Fleet(fleet)))
+    told = blocks(strata.section, collect_fleet(FleetFolder(fleet)))
     _, blind = (block for block in told if isinstance(block, Table))
     assert all(cell.endswith(" *") for cell in column(blind, "interval"))
     assert "for the 17 parts" in next(b.text for b in told if isinstance(b, Text))
 
 
 def test_what_is_missing_has_its_reasons(findings):
-    failed, unscored, lost = (plain_rows(table) for table in tables(losses, findings))
+    failed, unscored, lost = (plain_rows(table) for table in tables(drives.missing, findings))
     assert failed == [["1", "drive_0007", "no image topic; the log has: no topics at all"]]
     assert unscored == [["1", "drive_0009", "no truth"]]
     assert lost == [["drive_0008", "frame 8 cannot be decoded (and 1 more)"]]
-    headings = [b for b in blocks(losses, findings) if isinstance(b, Heading)]
+    headings = [b for b in blocks(drives.missing, findings) if isinstance(b, Heading)]
     assert [(heading.text, heading.level) for heading in headings] == [
         ("What is missing", 1),
         ("Drives that failed: 1", 2),
@@ -109,36 +108,36 @@ def test_what_is_missing_has_its_reasons(findings):
 
 
 def test_reasons_of_many_drives_are_counted(tmp_path):
-    found = collect_fleet(Fleet(fleet_of(tmp_path / "f", 130, frames=0)))
-    failed, *_ = (plain_rows(table) for table in tables(losses, found))
+    found = collect_fleet(FleetFolder(fleet_of(tmp_path / "f", 130, frames=0)))
+    failed, *_ = (plain_rows(table) for table in tables(drives.missing, found))
     assert [row[0] for row in failed] == ["7", "6"]
     assert failed[0][1] == "drive_0007, drive_0027, drive_0047, drive_0067 and 3 more"
 
 
 def test_the_worst_frames_have_pictures_and_missing_ones_are_named(folder, findings, tmp_path):
-    grid = the(ImageGrid, [b for b in blocks(frames, findings) if isinstance(b, ImageGrid)])
+    grid = the(ImageGrid, [b for b in blocks(worst.section, findings) if isinstance(b, ImageGrid)])
     assert len(grid.pictures) == 12
     first = findings.worst[0]
     assert grid.pictures[0][0].startswith(f"1. {findings.names[first.drive]}, frame {first.frame}")
     copy = shutil.copytree(folder, tmp_path / "copy")
     picture = copy / "pictures" / first.drive / f"{first.frame}.jpg"
     picture.write_bytes(picture.read_bytes()[:50])
-    told = blocks(frames, collect_fleet(Fleet(copy)))
+    told = blocks(worst.section, collect_fleet(FleetFolder(copy)))
     assert len(told[1].pictures) == 11
     name = f"{findings.names[first.drive]} frame {first.frame}"
     assert f"Pictures of 1 are not in the folder: {name}." in told[-1].text
 
 
 def test_what_was_run_is_told_with_its_seed_and_folds(findings):
-    told = " ".join(b.text for b in blocks(provenance, findings) if isinstance(b, Text))
+    told = " ".join(b.text for b in blocks(provenance.of_drives, findings) if isinstance(b, Text))
     assert "each drive trained its own model; training seed 0" in told
     assert "fold" not in told
 
 
 def test_several_seeds_are_told(tmp_path):
     run = RUN | {"training": {"seed": 4, "seeds": 3}}
-    found = collect_fleet(Fleet(fleet_of(tmp_path / "f", 1, frames=0, run=run)))
-    told = " ".join(b.text for b in blocks(provenance, found) if isinstance(b, Text))
+    found = collect_fleet(FleetFolder(fleet_of(tmp_path / "f", 1, frames=0, run=run)))
+    told = " ".join(b.text for b in blocks(provenance.of_drives, found) if isinstance(b, Text))
     assert "training seed 4 and 2 more" in told
 
 
@@ -173,25 +172,25 @@ def test_a_fleet_in_which_every_drive_failed_has_a_report(tmp_path, monkeypatch)
 
 def test_two_drives_of_one_name_are_told_apart(folder, tmp_path):
     copy = shutil.copytree(folder, tmp_path / "copy")
-    found = Fleet(copy)
-    rows = {d["drive"]: {**d, "name": "same"} for d in found.summary["drives"]}
-    assert len(rows) == 12
-    (copy / "fleet.json").write_text(json.dumps(found.summary | {"drives": [*rows.values()]}))
-    names = collect_fleet(Fleet(copy)).names
+    found = FleetFolder(copy)
+    drives_ = [replace(each, name="same") for each in found.facts.drives]
+    assert len({each.drive for each in drives_}) == 12
+    (copy / "fleet.json").write_text(replace(found.facts, drives=drives_).text())
+    names = collect_fleet(FleetFolder(copy)).names
     assert len(set(names.values())) == 12
 
 
 def test_a_plain_list_says_that_nothing_is_known(tmp_path):
     fleet = fleet_of(tmp_path / "f", 2, frames=0, broken=False)
-    found = collect_fleet(Fleet(fleet))
+    found = collect_fleet(FleetFolder(fleet))
     drives_ = {d: dict(row) | {"trained_on": 0} for d, row in found.drives.items()}
-    two = blocks(summary, replace(found, drives=drives_))[-2]
+    two = blocks(summary.section, replace(found, drives=drives_))[-2]
     (listed,) = (block for block in two.right if isinstance(block, BulletList))
     assert (list(listed.items), listed.tone) == (["Nothing known."], "plain")
 
 
 def test_its_contents_lead_to_its_sections(tmp_path):
-    found = collect_fleet(Fleet(fleet_of(tmp_path / "f", 12, pictures=2)))
+    found = collect_fleet(FleetFolder(fleet_of(tmp_path / "f", 12, pictures=2)))
     made = document(found)
     parts = [each for each in made.blocks if isinstance(each, Heading) and each.level == 1]
     assert links_within(pdf(made)) == len(parts) > 4

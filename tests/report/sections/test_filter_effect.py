@@ -1,6 +1,7 @@
 """Filtered against unfiltered: the sentences, and the tables' columns."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -48,7 +49,7 @@ def test_the_table_has_both_rates_their_difference_and_how_sure_it_is():
 
 def test_where_there_is_no_interval_the_reason_is_given():
     pair = a_pair([-0.1], [-1])
-    pair.differences["ERR"].update(a_difference(-0.02))
+    pair.differences["ERR"] = a_difference(-0.02)
     assert any(
         text.startswith("No interval for ERR: 1200 frames are too few")
         for text in texts(some_findings(paired=[pair]))
@@ -57,7 +58,7 @@ def test_where_there_is_no_interval_the_reason_is_given():
 
 def test_where_err_is_undefined_nothing_is_said_about_frames():
     pair = a_pair([math.nan], [0])
-    pair.differences["ERR"].update(a_difference(None))
+    pair.differences["ERR"] = a_difference(None)
     text, *_ = texts(some_findings(paired=[pair]))
     assert text.startswith("ERR is undefined on every frame")
 
@@ -80,7 +81,7 @@ def test_flicker_stands_beside_the_truths_own():
 
 def test_an_unknown_number_of_effective_frames_is_a_dash():
     pair = a_pair([-0.1], [-1])
-    pair.differences["ERR"]["effective"] = None
+    pair.differences["ERR"] = replace(pair.differences["ERR"], effective=None)
     table, *_ = (b for b in section(some_findings(paired=[pair])) if isinstance(b, Table))
     assert plain_rows(table)[0][-1] == DASH
 

@@ -60,8 +60,7 @@ def test_a_row_of_example_pictures_is_the_camera_the_truth_and_a_mask_each():
 
 def test_many_variants_have_a_table_a_rate():
     totals = {name: {"post": rates(0.1)} for name in "abcd"}
-    findings = some_findings(windows=windows(), finals=dict.fromkeys(totals, "post"))
-    findings.summary["totals"] = totals
+    findings = some_findings(windows=windows(), totals=totals)
     tables = [block for block in section(findings) if isinstance(block, Table)]
     assert [len(table.columns) for table in tables] == [5, 5, 5, 5]
 
@@ -89,12 +88,11 @@ def test_a_variant_that_lacks_frames_makes_no_short_row():
 
 
 def test_the_paper_s_claims_stand_with_the_windows_that_bear_them_out():
-    findings = some_findings()
-    findings.summary["claims"] = {
+    claims = {
         "filter_ERR": {"held": 2, "windows": 9, "short_held": 1, "short": 1},
         "post_ERR": {"held": 9, "windows": 9, "short_held": 0, "short": 1},
     }
-    blocks = the(KeepTogether, section(findings)).blocks
+    blocks = the(KeepTogether, section(some_findings(claims=claims))).blocks
     table = the(Table, blocks)
     assert table.columns == ["claim", "borne out by", "shorter, at the end"]
     assert [row[1:] for row in plain_rows(table)] == [["2 of 9", "1 of 1"], ["9 of 9", "0 of 1"]]
@@ -103,10 +101,8 @@ def test_the_paper_s_claims_stand_with_the_windows_that_bear_them_out():
 
 
 def test_no_column_for_shorter_windows_where_there_are_none():
-    findings = some_findings()
-    findings.summary["claims"] = {
-        "filter_ERR": {"held": 2, "windows": 9, "short_held": 0, "short": 0}
-    }
+    claims = {"filter_ERR": {"held": 2, "windows": 9, "short_held": 0, "short": 0}}
+    findings = some_findings(claims=claims)
     table = the(Table, the(KeepTogether, section(findings)).blocks)
     assert table.columns == ["claim", "borne out by"]
 

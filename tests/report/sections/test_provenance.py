@@ -2,6 +2,7 @@
 
 from roadeval.report.blocks import Command, Table, Text, TwoColumns
 from roadeval.report.sections.provenance import section, settings_rows
+from roadeval.results.facts import LogFacts
 from tests.report.making import plain_rows, some_findings, the
 
 
@@ -24,18 +25,14 @@ def test_settings_are_told_once_where_variants_agree_and_apart_where_they_differ
 
 
 def test_the_log_and_the_command_that_makes_the_results_again_are_given():
-    findings = some_findings()
-    findings.summary["log"] = {"path": "street.mcap", "sha256": "abc"}
-    blocks = list(section(findings))
+    blocks = list(section(some_findings(log=LogFacts("street.mcap", "abc"))))
     texts = [block.text for block in blocks if isinstance(block, Text)]
     assert texts[:2] == ["Log: street.mcap", "SHA-256: abc"]
     assert the(Command, blocks).text == "repeat street.mcap"
 
 
 def test_seconds_are_told_in_milliseconds_beside_the_versions():
-    findings = some_findings()
-    findings.summary["versions"]["numpy"] = "2.0"
-    findings.summary["seconds"] = {"filtered": {"svm": 0.0123}}
-    both = the(TwoColumns, section(findings))
+    seconds = {"filtered": {"svm": 0.0123}}
+    both = the(TwoColumns, section(some_findings(versions={"numpy": "2.0"}, seconds=seconds)))
     assert plain_rows(the(Table, both.left)) == [["numpy", "2.0"]]
     assert plain_rows(the(Table, both.right)) == [["filtered", "svm", "12.30"]]

@@ -63,7 +63,7 @@ def test_many_variants_have_a_table_a_number():
     variants = ("a", "b", "c", "d")
     findings = some_findings(
         regions=table_of("boundary", "interior", variants=variants),
-        finals=dict.fromkeys(variants, "post"),
+        totals={name: {"post": {}} for name in variants},
     )
     assert [table.groups[2][0] for table in tables(findings)] == [
         *("ERR within, %", "share of its wrong pixels, %")
@@ -71,8 +71,8 @@ def test_many_variants_have_a_table_a_number():
 
 
 def test_the_width_of_the_edge_is_told_where_it_is_known():
-    findings = some_findings(regions=table_of("boundary", "interior"))
-    findings.summary["run"]["evaluation"] = {"boundary_width": 7}
+    run = {"evaluation": {"boundary_width": 7}}
+    findings = some_findings(regions=table_of("boundary", "interior"), run=run)
     (note,) = (block.text for block in section(findings) if isinstance(block, Text))
     assert "within 7 pixels of the border" in note
 

@@ -6,7 +6,8 @@ import pytest
 
 from roadeval.report.blocks import BulletList, Table, Text
 from roadeval.report.sections.summary import rates_table, section, warnings
-from tests.report.making import a_pair, column, plain_rows, some_findings
+from roadeval.results.facts import TrainingFacts
+from tests.report.making import a_pair, a_total, column, plain_rows, some_findings
 
 
 def bold(table, title):
@@ -39,10 +40,11 @@ def test_boundary_f_is_best_where_it_is_highest_and_may_be_unknown():
 
 def test_an_undefined_rate_is_never_the_best():
     findings = some_findings()
-    findings.summary["totals"]["filtered"]["post"]["ERR"] = math.nan
+    findings.totals["filtered"]["post"]["ERR"] = math.nan
     assert bold(rates_table(findings), "ERR") == ["12.00"]
 
 
+ALONE = {"filtered": {"post": a_total(0.1)}}
 SEEDS = {
     "seeds": [0, 1, 2],
     "totals": {
@@ -56,8 +58,7 @@ SEEDS = {
 def test_the_spread_over_seeds_stands_below_the_rates_and_in_a_sentence():
     findings = some_findings()
     assert len([block for block in section(findings) if isinstance(block, Table)]) == 1
-    findings.summary["seeds"] = SEEDS
-    blocks = list(section(findings))
+    blocks = list(section(some_findings(seeds=SEEDS)))
     _, table = (block for block in blocks if isinstance(block, Table))
     assert plain_rows(table) == [
         ["filtered", *["15.00 (10.00 to 30.00)"] * 4],
@@ -83,17 +84,16 @@ def test_who_is_worse_than_the_baseline_is_named():
 
 
 def test_undefined_rates_are_told_and_how_often():
-    findings = some_findings(finals={"filtered": "post"})
-    findings.summary["totals"]["filtered"]["post"]["undefined"] = {"FNR": 1200, "FPR": 3, "ERR": 0}
-    assert list(warnings(findings)) == [
+    undefined = {"FNR": 1200, "FPR": 3, "ERR": 0}
+    totals = {"filtered": {"post": a_total(0.1) | {"undefined": undefined}}}
+    assert list(warnings(some_findings(totals=totals))) == [
         "filtered: undefined on every frame: FNR.",
         "filtered: undefined on some of 1200 frames, and left out: FPR on 3.",
     ]
 
 
 def test_three_losses_are_named_and_the_others_counted():
-    findings = some_findings(finals={"filtered": "post"})
-    findings.summary["losses"] = ["a", "b", "c", "d", "e"]
+    findings = some_findings(totals=ALONE, losses=["a", "b", "c", "d", "e"])
     assert list(warnings(findings)) == [
         *("Lost: a", "Lost: b", "Lost: c"),
         "2 more frames were lost; summary.json names them.",
@@ -101,13 +101,12 @@ def test_three_losses_are_named_and_the_others_counted():
 
 
 def test_a_drive_that_trained_itself_says_so():
-    findings = some_findings(finals={"filtered": "post"})
-    findings.summary["training"] = {"source": "truth", "model": None}
-    assert [text.partition(" (")[0] for text in warnings(findings)] == [
+    own = some_findings(totals=ALONE, training=TrainingFacts("truth"))
+    assert [text.partition(" (")[0] for text in warnings(own)] == [
         "Trained on this drive's own first frames"
     ]
-    findings.summary["training"]["model"] = "city.model"
-    assert not list(warnings(findings))
+    given = TrainingFacts("truth", model="city.model")
+    assert not list(warnings(some_findings(totals=ALONE, training=given)))
 
 
 def test_the_page_has_the_verdict_how_sure_it_is_and_every_count():
@@ -120,6 +119,7 @@ def test_the_page_has_the_verdict_how_sure_it_is_and_every_count():
     assert isinstance(counts, Table)
     assert plain_rows(counts) == [
         ["in log", "1,210"],
+        ["trained on", "0"],
         ["evaluated", "1,200"],
         ["skipped: trained on", "10"],
     ]

@@ -33,12 +33,12 @@ def findings(**quoted):
     made = some_findings(
         levels=rows_of(pd.DataFrame(LEVELS, columns=COLUMNS)),
         overlap={"filtered": {"post": {"F1": 0.81, "precision": 0.82, "IoU": 0.7}}},
+        curves={"filtered": {"post": QUOTED | quoted}},
     )
     counts = {"TP": 6, "TN": 6, "FP": 2, "FN": 1, "pooled_TPR": 0.83, "pooled_FPR": 0.25}
-    for stages in made.summary["totals"].values():
+    for stages in made.totals.values():
         for total in stages.values():
             total.update(counts)
-    made.summary["curves"] = {"filtered": {"post": QUOTED | quoted}}
     return made
 
 

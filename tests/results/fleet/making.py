@@ -12,9 +12,8 @@ from roadeval.data import Counts
 from roadeval.evaluation import metrics
 from roadeval.evaluation.metrics import COMPARED, METRICS
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.fleet.record import Record, frames_path
-from roadeval.results.fleet.tables import Member
-from roadeval.results.fleet.writing import FleetWriter
+from roadeval.results.facts import Member
+from roadeval.results.fleet import FleetWriter, Record, frames_path
 from roadeval.results.rows import Key, cells
 from roadeval.results.schema import LIGHT, TABLES
 from roadeval.runtime.files import put

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from roadeval.results.fleet.record import Record, read_record, record_path
+from roadeval.results.fleet import Record, read_record, record_path
 from roadeval.results.rows import Key, cells
 from roadeval.results.schema import OF_DRIVES
 

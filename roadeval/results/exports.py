@@ -2,40 +2,37 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 from xml.etree import ElementTree
 
 from roadeval.data import FILTERED, UNFILTERED
+from roadeval.data.words import defined
 from roadeval.evaluation.metrics import METRICS
-from roadeval.results.fleet.conditions import DriveJudgement
-from roadeval.results.fleet.record import DAMAGED, FAILED, UNSCORED
+from roadeval.results.facts import FleetFacts
+from roadeval.results.over_drives import POOLED, DriveJudgement
+from roadeval.results.schema import DAMAGED, FAILED, UNSCORED
 from roadeval.runtime.text import visible
 
 
-def flat_metrics(summary: Mapping[str, Any]) -> dict[str, float]:
+def flat_metrics(facts: FleetFacts) -> dict[str, float]:
     """Return a fleet's numbers under flat names, as ``filtered.post.ERR``.
 
     Rates are means over drives; ``effect.filter.post.ERR.mean`` and its likes are the differences.
     What is undefined is left out.
-
-    Parameters
-    ----------
-    summary
-        The content of ``fleet.json``.
     """
-    flat: dict[str, float] = {"drives": len(summary["drives"]), "frames": summary["frames"]}
-    flat |= {f"drives_{status}": count for status, count in sorted(summary["counts"].items())}
-    for row in summary["rates"]:
-        for name in (*METRICS, *(f"pooled_{name}" for name in METRICS)):
+    flat: dict[str, float | None] = {"drives": len(facts.drives), "frames": facts.frames}
+    flat |= {f"drives_{status}": count for status, count in sorted(facts.counts.items())}
+    for row in facts.rates:
+        for name in (*METRICS, *POOLED):
             flat[f"{row['variant']}.{row['stage']}.{name}"] = row[name]
-    for each in summary["effects"]:
-        of_filter = (each["base"], each["variant"]) == (UNFILTERED, FILTERED)
-        whose = f"filter.{each['stage']}" if of_filter else f"{each['base']}.{each['variant']}"
-        begin = f"effect.{whose}.{each['metric']}"
-        flat |= {f"{begin}.{name}": each[name] for name in ("mean", "low", "high", "p", "pooled")}
-    return {name: value for name, value in flat.items() if value is not None and _finite(value)}
+    for each in facts.effects:
+        of_filter = (each.base, each.variant) == (UNFILTERED, FILTERED)
+        whose = f"filter.{each.stage}" if of_filter else f"{each.base}.{each.variant}"
+        begin = f"effect.{whose}.{each.metric}"
+        for name in ("mean", "low", "high", "p", "pooled"):
+            flat[f"{begin}.{name}"] = getattr(each, name)
+    return {name: value for name, value in flat.items() if defined(value)}
 
 
 def junit_xml(
@@ -95,7 +92,3 @@ def _part(case: ElementTree.Element, kind: str, text: str | None) -> None:
         ElementTree.SubElement(case, kind).text = said
     else:
         ElementTree.SubElement(case, kind, message=said)
-
-
-def _finite(value: float) -> bool:
-    return math.isfinite(value)

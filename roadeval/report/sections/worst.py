@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from roadeval.data.words import percent
 from roadeval.report.blocks import Block, Cell, Heading, ImageGrid, Table, Text
-from roadeval.report.fleet.findings import FleetFindings, WorstFrame
+from roadeval.report.findings import FleetFindings, WorstPicture
 from roadeval.runtime.text import elided
 
 ACROSS = 4
@@ -28,7 +28,7 @@ def section(findings: FleetFindings) -> Iterator[Block]:
     ]
     if pictures:
         yield ImageGrid(pictures, ACROSS)
-    yield Text(_note(findings, len(pictures)), "note")
+    yield Text(_legend(findings, len(pictures)), "note")
     if findings.inspect is not None:
         yield commands_table(findings, findings.inspect)
 
@@ -56,14 +56,14 @@ def commands_table(findings: FleetFindings, inspect: Callable[[int], str]) -> Ta
     )
 
 
-def _caption(findings: FleetFindings, frame: WorstFrame) -> str:
+def _caption(findings: FleetFindings, frame: WorstPicture) -> str:
     name = elided(findings.names[frame.drive], LONGEST)
     return f"{frame.rank}. {name}, frame {frame.frame}: ERR {percent(frame.rates['ERR'], 1)} %"
 
 
-def _note(findings: FleetFindings, shown: int) -> str:
+def _legend(findings: FleetFindings, shown: int) -> str:
     missing = len(findings.worst) - shown
-    told = (
+    legend = (
         "By ERR of the first variant's final mask; of a drive at most three, a second apart. "
         "Green: road found; orange: non-road called road (FP); purple: road missed (FN); "
         "grey: ignored."
@@ -72,5 +72,5 @@ def _note(findings: FleetFindings, shown: int) -> str:
         lacking = [frame for frame in findings.worst if frame.picture is None]
         named = [f"{findings.names[each.drive]} frame {each.frame}" for each in lacking[:LACKING]]
         more = f" and {missing - LACKING} more" if missing > LACKING else ""
-        told += f" Pictures of {missing} are not in the folder: {', '.join(named)}{more}."
-    return told
+        legend += f" Pictures of {missing} are not in the folder: {', '.join(named)}{more}."
+    return legend

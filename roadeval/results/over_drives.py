@@ -1,4 +1,4 @@
-"""The summary of a fleet: what all its drives together tell."""
+"""The facts of many drives, made of their tables: differences, strata, rates, and conditions."""
 
 from __future__ import annotations
 
@@ -6,62 +6,71 @@ import math
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from roadeval.data import OUTCOMES, Counts
 from roadeval.evaluation import metrics
+from roadeval.evaluation.comparison import Change, Condition, ConditionError
 from roadeval.evaluation.metrics import METRICS
 from roadeval.evaluation.score import TESTED, Effect, corrected
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.evaluation.stats import Difference, DriveMean, Stratum, over_drives, strata
-from roadeval.results.fleet.record import FAILED
-from roadeval.results.fleet.tables import Member
-from roadeval.results.schema import ALL, LIGHT, TAG
+from roadeval.evaluation.stats import Difference, DriveMean, over_drives, strata
+from roadeval.results.comparison import judged
+from roadeval.results.facts import ConditionFacts, FleetFacts, Member, OverDrives, StratumFacts
+from roadeval.results.schema import ALL, FAILED, LIGHT, TAG
 from roadeval.results.sentences import verdict
 from roadeval.results.tables import read_parquet
 from roadeval.version import VERSION
 
 WARNINGS: Final = 5
-"""Kinds of warnings of single drives that the summary has."""
+"""Kinds of warnings of single drives that are listed."""
+POOLED: Final = tuple(f"pooled_{name}" for name in METRICS)
 Rows = list[dict[str, Any]]
 
 
 def summarise(
-    folder: Path, members: Sequence[Member], settings: EvaluationSettings
-) -> dict[str, Any]:
-    """Return the content of ``fleet.json``, but for its format and settings, from the tables."""
+    folder: Path,
+    members: Sequence[Member],
+    settings: EvaluationSettings,
+    run: dict[str, Any],
+    conditions: list[ConditionFacts],
+) -> FleetFacts:
+    """Make the facts of a fleet of the tables in its folder."""
     columns = ["drive", "status", "reason", "evaluated", "sha256", "warnings"]
     columns += [column.name for column in LIGHT]
     drives: Rows = read_parquet(folder / "drives.parquet", "drives", columns).to_pylist()
-    known = {member.drive: member for member in members}
     rows = _final_effects(folder)
     copies = _copies(drives)
-    groups = {drive: member.group or copies.get(drive, drive) for drive, member in known.items()}
+    groups = {each.drive: each.group or copies.get(each.drive, each.drive) for each in members}
     effects = _effects(rows, groups, settings)
     rates = _rates(folder)
     totals: dict[str, dict[str, Any]] = {}
     for each in rates:
         totals.setdefault(each["variant"], {})[each["stage"]] = each
-    summary: dict[str, Any] = {
-        "version": VERSION,
-        "drives": [_member(member) for member in members],
-        "counts": dict(Counter(drive["status"] for drive in drives)),
-        "frames": sum(drive["evaluated"] or 0 for drive in drives),
-        "failed": {d["drive"]: d["reason"] for d in drives if d["status"] == FAILED},
-        "rates": rates,
-        "effects": [
-            _named(each.base, each.variant, each.stage, rate)
-            | asdict(difference)
-            | _pooled(rows[each.base, each.variant, rate])
+    return FleetFacts(
+        verdict=verdict(totals, effects, settings),
+        version=VERSION,
+        drives=[*members],
+        counts=dict(Counter(drive["status"] for drive in drives)),
+        frames=sum(drive["evaluated"] or 0 for drive in drives),
+        failed={d["drive"]: d["reason"] for d in drives if d["status"] == FAILED},
+        rates=rates,
+        effects=[
+            OverDrives(
+                **asdict(difference),
+                **_named(each.base, each.variant, each.stage, rate),
+                pooled=_pooled(rows[each.base, each.variant, rate]),
+            )
             for each in effects
             for rate, difference in each.rates.items()
         ],
-        "strata": _strata(rows, drives, known, groups, settings.confidence),
-        "warnings": [*_of_copies(copies), *_of_drives(drives)],
-    }
-    return {"verdict": verdict(totals, effects, settings)} | summary
+        strata=[*_strata(rows, drives, members, groups, settings.confidence)],
+        warnings=[*_of_copies(copies), *_of_drives(drives)],
+        conditions=conditions,
+        run=run,
+    )
 
 
 def _copies(drives: Rows) -> dict[str, str]:
@@ -151,12 +160,12 @@ def _mean(row: Mapping[str, Any], groups: Mapping[str, str]) -> DriveMean:
     return DriveMean(row["drive"], groups[row["drive"]], mean)
 
 
-def _pooled(rows: Rows) -> dict[str, float | None]:
-    """Return the difference of the rates of all pixels together."""
+def _pooled(rows: Rows) -> float | None:
+    """Return the difference of the rates of all pixels together, where it is known."""
     names = ("wrong", "N", "base_wrong", "base_N")
     wrong, n, base_wrong, base_n = (sum(row[name] or 0 for row in rows) for name in names)
     known = rows[0]["metric"] == TESTED and n and base_n
-    return {"pooled": wrong / n - base_wrong / base_n if known else None}
+    return wrong / n - base_wrong / base_n if known else None
 
 
 def _named(base: str, variant: str, stage: str, metric: str) -> dict[str, Any]:
@@ -166,34 +175,29 @@ def _named(base: str, variant: str, stage: str, metric: str) -> dict[str, Any]:
 def _strata(
     effects: Mapping[Key, Rows],
     drives: Rows,
-    known: Mapping[str, Member],
+    members: Sequence[Member],
     groups: Mapping[str, str],
     confidence: float,
-) -> Rows:
+) -> Iterator[StratumFacts]:
     """Divide the drives by each tag and by the measured light, for each difference of ERR."""
     light = {drive["drive"]: drive for drive in drives}
-    keys = sorted({key for member in known.values() for key in member.tags})
-    found = []
+    tags_of = {member.drive: member.tags for member in members}
+    keys = sorted({key for tags in tags_of.values() for key in tags})
     for (base, variant, metric), rows in effects.items():
         if metric != TESTED:
             continue
         own = [_mean(row, groups) for row in rows]
-        tags = {key: [known[e.drive].tags.get(key) for e in own] for key in keys}
+        tags = {key: [tags_of[e.drive].get(key) for e in own] for key in keys}
         conditions = {c.name: [light[e.drive][c.name] for e in own] for c in LIGHT}
-        named = _named(base, variant, rows[0]["stage"], metric)
-        divided = strata(own, tags, conditions, confidence)
-        found += [named | _stratum(each, is_tag=each.by in tags) for each in divided]
-    return found
-
-
-def _stratum(each: Stratum, *, is_tag: bool) -> dict[str, Any]:
-    return {
-        "by": f"{TAG}{each.by}" if is_tag else each.by,
-        "value": str(each.value),
-        "least": each.least,
-        "most": each.most,
-        **asdict(each.difference),
-    }
+        for each in strata(own, tags, conditions, confidence):
+            yield StratumFacts(
+                **asdict(each.difference),
+                **_named(base, variant, rows[0]["stage"], metric),
+                by=f"{TAG}{each.by}" if each.by in tags else each.by,
+                value=str(each.value),
+                least=each.least,
+                most=each.most,
+            )
 
 
 def _rates(folder: Path) -> Rows:
@@ -242,15 +246,97 @@ class _Rates:
             name: math.fsum(self._sums[name]) / len(self._sums[name]) if self._sums[name] else None
             for name in METRICS
         }
-        pooled = {f"pooled_{name}": value for name, value in metrics.of(counts).items()}
+        pooled = dict(zip(POOLED, metrics.of(counts).values(), strict=True))
         return {"drives": self._drives, "frames": self._frames, **means, **pooled}
 
 
-def _member(member: Member) -> dict[str, Any]:
-    return {
-        "drive": member.drive,
-        "name": member.name,
-        "source": member.source,
-        "group": member.group,
-        "tags": dict(member.tags),
-    }
+# --- Conditions on each drive ---------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class DriveJudgement:
+    """A condition judged on a drive."""
+
+    drive: str
+    condition: str
+    """Which."""
+    holds: bool | None
+    """Whether it holds; None where it was not judged."""
+    sentence: str
+    """What was found, or why it was not judged."""
+
+
+def check_conditions(conditions: Sequence[Condition]) -> None:
+    """Raise a `ConditionError` for a condition on a change: a fleet alone has no base."""
+    for condition in conditions:
+        if condition.is_change:
+            raise ConditionError(
+                f"{condition.text}: a fleet alone has no base to have changed from; limit the rate "
+                "of its drives in %, or compare two fleets with roadeval compare"
+            )
+
+
+def judge_drives(
+    folder: Path, conditions: Sequence[Condition], least: int
+) -> Iterator[DriveJudgement]:
+    """Judge conditions on each scored drive: on the rates of its own frames.
+
+    Parameters
+    ----------
+    folder
+        Of the fleet, its tables written.
+    conditions
+        On levels alone, see `check_conditions`.
+    least
+        Evaluated frames that it takes; a drive of fewer is not judged.
+
+    Raises
+    ------
+    ConditionError
+        If no drive has the mask that a condition names.
+    """
+    if not conditions:
+        return
+    columns = ["drive", "variant", "stage", "final", "region", "frames", *OUTCOMES, *METRICS]
+    columns += POOLED
+    rows = [
+        row
+        for row in read_parquet(folder / "scores.parquet", "scores", columns).to_pylist()
+        if row["region"] == ALL
+    ]
+    for condition in conditions:
+        own = [
+            r for r in rows if (r["stage"], r["variant"]) == (condition.stage, condition.variant)
+        ]
+        if not own:
+            there = ", ".join(sorted({f"{row['stage']}.{row['variant']}" for row in rows}))
+            raise ConditionError(
+                f"{condition.text}: no drive has a mask {condition.stage}.{condition.variant}; "
+                f"there are {there or 'none'}"
+            )
+        yield from (_judged(condition, row, least) for row in own)
+
+
+def _judged(condition: Condition, row: Mapping[str, Any], least: int) -> DriveJudgement:
+    drive = row["drive"]
+    if row["frames"] < least:
+        few = f"{row['frames']} evaluated frames, and {least} are needed"
+        return DriveJudgement(drive, condition.text, None, f"not judged: {drive} has {few}")
+    rates = {name: math.nan if row[name] is None else row[name] for name in (*METRICS, *POOLED)}
+    rates |= metrics.overlap(Counts(*(row[name] for name in OUTCOMES)))
+    mask = Change(
+        result=drive,
+        variant=row["variant"],
+        stage=row["stage"],
+        final=row["final"],
+        drives=1,
+        frames=row["frames"],
+        base={},
+        new=rates,
+        difference={},
+    )
+    try:
+        judgement = condition.judge(mask)
+    except ConditionError as error:
+        return DriveJudgement(drive, condition.text, None, str(error))
+    return DriveJudgement(drive, condition.text, judgement.holds, judged(judgement))

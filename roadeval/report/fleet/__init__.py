@@ -1,1 +1,0 @@
-"""Reports of fleets: many drives judged together, and two fleets compared."""

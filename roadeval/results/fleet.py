@@ -1,0 +1,412 @@
+"""A fleet's folder: the tables and facts of many drives, and the record of each.
+
+A record is written last. A drive is done where its record stands, was made of the same log,
+settings, model and version, and its other files are there.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from roadeval.data import is_plain
+from roadeval.evaluation.comparison import Condition
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.results.exports import flat_metrics, junit_xml
+from roadeval.results.facts import (
+    FLEET,
+    SUMMARY,
+    ConditionFacts,
+    FleetFacts,
+    Member,
+    check_fleet_format,
+    digest_of,
+    is_as_written,
+    is_fleet,
+    json_text,
+    plain,
+)
+from roadeval.results.over_drives import DriveJudgement, judge_drives, summarise
+from roadeval.results.schema import FAILED, OF_DRIVES, TABLES
+from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, TableFile, read_parquet
+from roadeval.runtime.documents import read_bounded, read_json
+from roadeval.runtime.files import alone, check_output, leads_outside, put
+from roadeval.runtime.text import is_utf8
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+RUN: Final = "run.toml"
+METRICS: Final = "metrics.json"
+JUNIT: Final = "junit.xml"
+FILES: Final = (FLEET, RUN, METRICS, JUNIT, *(f"{table}.parquet" for table in OF_DRIVES))
+"""The files of a fleet's folder; beside them lie folders with files of each drive."""
+RECORDS: Final = "records"
+RESULTS: Final = "results"
+FRAMES: Final = "frames"
+PICTURES: Final = "pictures"
+RECORDINGS: Final = "recordings"
+WORST: Final = 50
+"""Frames that the table of the worst names."""
+_KEPT: Final = ("drive", "asked", "stamp", "rows")
+"""Parts of a record's file that ``digest`` covers."""
+
+Cells = Sequence[Any]
+"""A row's values in the order of its table's columns; None where there is none."""
+
+
+def record_path(folder: Path, drive: str) -> Path:
+    """Return the file of a drive's record."""
+    return folder / RECORDS / f"{drive}.json"
+
+
+def frames_path(folder: Path, drive: str) -> Path:
+    """Return the table of a drive's frames."""
+    return folder / FRAMES / f"drive={drive}" / "frames.parquet"
+
+
+def results_path(folder: Path, drive: str) -> Path:
+    """Return the results folder of a drive."""
+    return folder / RESULTS / drive
+
+
+def recording_path(folder: Path, drive: str) -> Path:
+    """Return the recording of a drive, which may not have been kept."""
+    return folder / RECORDINGS / f"{drive}.rrd"
+
+
+# --- Reading --------------------------------------------------------------------------------------
+
+
+class FleetFolder:
+    """Reads a fleet's folder, perhaps made on another machine, by anybody.
+
+    Parameters
+    ----------
+    folder
+        As ``roadeval fleet`` left it.
+    trust_sources
+        Whether logs, masks, models and recordings may be read that lie elsewhere, where the folder
+        names them.
+
+    Raises
+    ------
+    ResultsError
+        If it is no fleet's folder, or one of another version.
+    """
+
+    def __init__(self, folder: Path, *, trust_sources: bool = False) -> None:
+        self.path: Final = folder
+        self.trust_sources: Final = trust_sources
+        self.facts: Final = FleetFacts.read(folder)
+        if not all(is_plain(member.drive) for member in self.facts.drives):
+            raise ResultsError(
+                f"{folder / FLEET}: damaged (a drive's name is not made of letters, digits, '-' "
+                f"and '_' alone); {AGAIN}"
+            )
+
+    @property
+    def name(self) -> str:
+        """The folder's name."""
+        return self.path.resolve().name
+
+    def recording(self, drive: str, *, new: bool = False) -> Path:
+        """Return where the recording of a drive lies, or where a ``new`` one is to be written.
+
+        A `ResultsError` if a link there leads out of the folder: nothing is written through it, and
+        it is read only with `trust_sources`.
+        """
+        return self._inside(recording_path(self.path, drive), new=new)
+
+    def results(self, drive: str) -> Path:
+        """Return where the results folder of a drive lies, as of `recording`."""
+        return self._inside(results_path(self.path, drive))
+
+    def _inside(self, path: Path, *, new: bool = False) -> Path:
+        if not leads_outside(path, self.path) or (self.trust_sources and not new):
+            return path
+        what = "nothing is written there; remove it" if new else "`trust_sources` reads it there"
+        raise ResultsError(f"{path}: a link leads out of the fleet's folder; {what}")
+
+    def table(self, name: str, columns: list[str] | None = None) -> pa.Table:
+        """Read a table, or some columns of it."""
+        path = self.path / f"{name}.parquet"
+        try:
+            return read_parquet(path, name, columns)
+        except FileNotFoundError:
+            raise ResultsError(f"{path}: is not there; {AGAIN}") from None
+
+    def scored(self) -> list[str]:
+        """Return the drives that have evaluated frames, in the tables' order."""
+        rows = self.table("drives", ["drive", "evaluated"]).to_pylist()
+        return [row["drive"] for row in rows if row["evaluated"]]
+
+    def frames(self, drive: str) -> pa.Table:
+        """Read the rows of a drive's frames; a FileNotFoundError if none was scored."""
+        remedy = f"remove {record_path(self.path, drive)} and {AGAIN}"
+        return read_parquet(frames_path(self.path, drive), "frames", remedy=remedy)
+
+
+# --- Records --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """The record of a drive: its rows in the fleet's tables, and what they were made of."""
+
+    drive: str
+    """Its name in the fleet."""
+    asked: str
+    """Digest of what was asked: settings, model and version."""
+    stamp: Mapping[str, Any] | None
+    """Sizes and times of the log's files, which show cheaply whether it has changed; None where
+    they could not be read."""
+    rows: Mapping[str, Sequence[Cells]] = field(default_factory=dict)
+    """Its rows of each table in `roadeval.results.schema.OF_DRIVES`."""
+
+    def value(self, column: str) -> Any:
+        """Return a value of the drive's own row in ``drives``."""
+        ((*cells,),) = self.rows["drives"]
+        return cells[TABLES["drives"].names.index(column)]
+
+    @property
+    def failed(self) -> bool:
+        """Whether the drive could not be used at all."""
+        return bool(self.value("status") == FAILED)
+
+    def is_whole(self, folder: Path) -> bool:
+        """Return whether the drive's other files are there, too."""
+        if self.failed:
+            return True
+        needed = [results_path(folder, self.drive) / SUMMARY]
+        if self.value("evaluated"):
+            needed.append(frames_path(folder, self.drive))
+        return all(path.exists() for path in needed)
+
+    def write(self, folder: Path) -> None:
+        """Write it into a fleet's folder, whole or not at all; an OSError if that fails."""
+        content = {
+            "format": FLEET_FORMAT,
+            "drive": self.drive,
+            "asked": self.asked,
+            "stamp": self.stamp,
+            "rows": {
+                name: [[_finite(cell) for cell in row] for row in rows]
+                for name, rows in self.rows.items()
+            },
+        }
+        content["digest"] = digest_of(content, _KEPT)
+        # All in ASCII: the name of a file may hold bytes that are no text.
+        put(record_path(folder, self.drive), json.dumps(content, allow_nan=False).encode())
+
+
+def _finite(cell: Any) -> Any:
+    return None if isinstance(cell, float) and not math.isfinite(cell) else cell
+
+
+def read_record(folder: Path, drive: str) -> Record | None:
+    """Read the record of a drive; None where there is none that is whole and of this version."""
+    try:
+        content = read_json(read_bounded(record_path(folder, drive)))
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        raise ResultsError(f"{record_path(folder, drive)}: {error.strerror}") from error
+    except ValueError:
+        return None  # not ours, or not whole: it is made again
+    match content:
+        case {
+            "format": dict(form),
+            "drive": str(name),
+            "asked": str(asked),
+            "stamp": dict() | None as stamp,
+            "rows": dict(rows),
+            "digest": {"parts": list(parts)},
+        } if (
+            form == FLEET_FORMAT
+            and name == drive
+            and parts == [*_KEPT]
+            and is_as_written(content)
+            and _fits(rows)
+        ):
+            return Record(name, asked, stamp, rows)
+    return None
+
+
+def _fits(rows: Mapping[str, Any]) -> bool:
+    """Return whether the rows have their tables' columns, and the drive its row."""
+    widths = all(
+        isinstance(rows.get(name), list)
+        and all(isinstance(row, list) and len(row) == len(TABLES[name].names) for row in rows[name])
+        for name in OF_DRIVES
+    )
+    return widths and len(rows["drives"]) == 1
+
+
+class _Records:
+    """The records of a folder, read as they are needed: all together would fill the memory."""
+
+    def __init__(self, folder: Path, asked: Mapping[str, str]) -> None:
+        self._folder: Final = folder
+        self._asked: Final = asked
+
+    def __getitem__(self, drive: str) -> Record:
+        record = read_record(self._folder, drive)
+        if record is None:
+            raise ResultsError(
+                f"{self._folder}: the record of {drive} has gone; run the same command again"
+            )
+        if self._asked.get(drive, record.asked) != record.asked:
+            raise ResultsError(
+                f"{self._folder}: another command has replayed {drive} with other settings "
+                "meanwhile; run the same command again, or give each a folder of its own"
+            )
+        return record
+
+
+# --- Writing --------------------------------------------------------------------------------------
+
+
+class FleetWriter:
+    """Writes the folder of a fleet."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder: Final = Path(folder).absolute()
+
+    def begin(self) -> None:
+        """Make the folder, or see that it is a fleet's of this version.
+
+        Raises
+        ------
+        ResultsError
+            If it is something else, or cannot be written to.
+        """
+        if not is_utf8(str(self.folder)):
+            raise ResultsError(
+                f"{self.folder}: its bytes are not UTF-8, and Parquet files cannot be written "
+                "there: choose another name"
+            )
+        with self._explained():
+            check_output(self.folder, folder=True)
+            if is_fleet(self.folder):
+                with suppress(ValueError):  # damage: it is written anew
+                    path = self.folder / FLEET
+                    check_fleet_format(path, read_json(read_bounded(path)))
+            elif (
+                not (self.folder / RECORDS).is_dir()
+                and self.folder.is_dir()
+                and any(self.folder.iterdir())
+            ):
+                raise ResultsError(
+                    f"{self.folder}: holds other files and is no fleet's folder; name a new one"
+                )
+            (self.folder / RECORDS).mkdir(parents=True, exist_ok=True)
+            for each in self.folder.iterdir():  # the folder may come from anybody
+                if leads_outside(each, self.folder):
+                    raise ResultsError(f"{each}: a link leads out of the fleet's folder; remove it")
+
+    def finish(
+        self,
+        members: Sequence[Member],
+        settings: EvaluationSettings,
+        run: Mapping[str, Any],
+        run_toml: str,
+        *,
+        conditions: Sequence[Condition] = (),
+        asked: Mapping[str, str] | None = None,
+    ) -> FleetFacts:
+        """Write the tables of all drives and the facts that follow from them.
+
+        Parameters
+        ----------
+        members
+            The drives in the tables' order; each has its record.
+        settings
+            The confidence of intervals, and what is negligible.
+        run, run_toml
+            The configuration of the fleet, as plain data and as the text of a TOML file.
+        conditions
+            Judged on each drive, see `roadeval.results.over_drives.judge_drives`.
+        asked
+            Digests of what each drive's record must have been made for; anything by default.
+        """
+        # Two commands may replay drives of one folder together.
+        with self._explained(), alone(*(self.folder / name for name in FILES)):
+            write_tables(self.folder, members, _Records(self.folder, asked or {}))
+            judged = [*judge_drives(self.folder, conditions, settings.least_frames)]
+            facts = summarise(
+                self.folder,
+                members,
+                settings,
+                run=dict(run),
+                conditions=[_condition(each, judged) for each in conditions],
+            )
+            put(self.folder / RUN, run_toml.encode())
+            put(self.folder / METRICS, json_text(plain(flat_metrics(facts))).encode())
+            columns = ["drive", "name", "status", "reason", "losses", "seconds", "verdict"]
+            drives = read_parquet(self.folder / "drives.parquet", "drives", columns).to_pylist()
+            put(self.folder / JUNIT, junit_xml(self.folder.name, drives, judged))
+            put(self.folder / FLEET, facts.text().encode())
+        return facts
+
+    @contextmanager
+    def _explained(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise ResultsError(
+                f"{self.folder}: cannot be written: {error.strerror or error}"
+            ) from error
+
+
+def _condition(condition: Condition, judged: Sequence[DriveJudgement]) -> ConditionFacts:
+    """Return on which drives a condition holds."""
+    own = [each for each in judged if each.condition == condition.text]
+    return ConditionFacts(
+        condition.text,
+        judged=sum(each.holds is not None for each in own),
+        not_judged={each.drive: each.sentence for each in own if each.holds is None},
+        holds={each.drive: each.sentence for each in own if each.holds},
+    )
+
+
+def write_tables(
+    folder: Path, members: Sequence[Member], records: Mapping[str, Record] | _Records
+) -> None:
+    """Write every table but that of frames; all are whole before one takes its name.
+
+    Records are looked up one at a time. An OSError if a table cannot be written.
+    """
+    tags = sorted({key for member in members for key in member.tags})
+    with ExitStack() as stack:
+        files = {
+            name: stack.enter_context(
+                TableFile(folder / f"{name}.parquet", name, tags if name == "drives" else ())
+            )
+            for name in OF_DRIVES
+        }
+        worst: list[list[Any]] = []
+        for member in members:
+            record = records[member.drive]
+            own = dict(zip(TABLES["drives"].names, record.rows["drives"][0], strict=True))
+            own |= {"name": member.name, "source": member.source, "group": member.group}
+            files["drives"].add([[*own.values(), *(member.tags.get(tag) for tag in tags)]])
+            for name in ("scores", "effects"):
+                files[name].add(record.rows[name])
+            worst = _worst([*worst, *map(list, record.rows["worst"])])
+        files["worst"].add(worst)
+        for file in files.values():
+            file.finish()
+
+
+def _worst(rows: list[list[Any]]) -> list[list[Any]]:
+    """Keep the worst of some rows, and rank them."""
+    names = TABLES["worst"].names
+    err, drive, frame = (names.index(name) for name in ("ERR", "drive", "frame"))
+    ranked = sorted(rows, key=lambda row: (-row[err], row[drive], row[frame]))[:WORST]
+    return [[rank, *row[1:]] for rank, row in enumerate(ranked, 1)]

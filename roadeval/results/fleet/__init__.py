@@ -1,1 +1,0 @@
-"""The results of a fleet: a record a drive, and the tables that are made of all records."""

@@ -1,0 +1,188 @@
+"""Facts written and read back."""
+
+import json
+import math
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import pytest
+
+from roadeval.evaluation.score import drive_effects
+from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.results.facts import FORMAT, Facts, LogFacts, as_parts, digest_of, json_text, plain
+from roadeval.results.tables import ResultsError
+from tests.evaluation.test_effects import a_mask
+from tests.results.making import facts_of
+
+NAMES = ("filtered", "unfiltered", "net", "blind")
+TOTALS = {name: {"post": {"ERR": 0.1, "frames": 100}} for name in NAMES}
+EFFECTS = drive_effects([a_mask(n, "post", [3] * 12) for n in NAMES], EvaluationSettings())
+WRITTEN = facts_of(
+    totals=TOTALS,
+    claims={"filter_ERR": {"held": 2}},
+    run={"output": {"save": "out.rrd"}, "evaluation": {"window": 7, "from_the_future": 1}},
+    log=LogFacts("street.mcap", "abc"),
+    **as_parts(EFFECTS),
+)
+
+
+def changed(**parts):
+    """The text of a summary with other parts, under the digest of the first ones."""
+    return json.dumps(json.loads(WRITTEN.text()) | parts)
+
+
+def sealed(content):
+    digest = digest_of(content, content["digest"]["parts"])
+    return json.dumps(content | {"digest": digest})
+
+
+def test_what_is_read_is_what_was_written():
+    assert Facts.parse(WRITTEN.text(), "here") == WRITTEN
+    assert Facts.parse(WRITTEN.text(), "here").effects == EFFECTS
+
+
+def test_differences_are_written_by_their_base():
+    parts = as_parts(EFFECTS)
+    assert {name: [*part] for name, part in parts.items()} == {
+        "difference": ["post"],
+        "against_unfiltered": ["net"],
+        "against_blind": ["filtered", "unfiltered", "net"],
+    }
+
+
+def test_undefined_numbers_are_null_and_read_as_undefined():
+    (effect,) = (e for e in EFFECTS if (e.base, e.variant) == ("unfiltered", "filtered"))
+    nothing = replace(effect.rates["ERR"], mean=math.nan, units=0)
+    facts = replace(WRITTEN, difference={"post": {"ERR": nothing}})
+    assert json.loads(facts.text())["difference"]["post"]["ERR"]["mean"] is None
+    read = Facts.parse(facts.text(), "here").difference["post"]["ERR"]
+    assert math.isnan(read.mean)
+    assert asdict(read) | {"mean": 0} == asdict(nothing) | {"mean": 0}
+
+
+def test_what_a_run_does_not_have_is_left_out():
+    content = json.loads(WRITTEN.text())
+    assert [*content][:3] == ["format", "verdict", "drive"]
+    assert not content.keys() & {"curves", "seeds", "methods", "masks", "files"}
+    with_seeds = replace(WRITTEN, seeds={"seeds": [0, 1]})
+    assert json.loads(with_seeds.text())["seeds"] == {"seeds": [0, 1]}
+
+
+def test_settings_of_another_version_are_read_as_far_as_they_are_known():
+    assert WRITTEN.evaluation == EvaluationSettings(window=7)
+    assert facts_of().evaluation == EvaluationSettings()
+
+
+@pytest.mark.parametrize("given", [{"confidence": 2}, {"window": None}, 5, None])
+def test_damaged_settings_are_one_line(given):
+    with pytest.raises(ResultsError, match=r"`run.evaluation` is not what it must be"):
+        _ = facts_of(run={"evaluation": given}).evaluation
+
+
+@pytest.mark.parametrize(
+    ("summary", "told"),
+    [
+        (
+            {"format": {**FORMAT, "version": 1}},
+            "made by an earlier version of roadeval, whose format",
+        ),
+        (
+            {"format": {**FORMAT, "version": 2}, "versions": {"roadeval": "0.2.0"}},
+            "made by roadeval 0.2.0, whose format",
+        ),
+        (
+            {"format": FORMAT, "versions": {"roadeval": "0.2.0"}},
+            "made by roadeval 0.2.0, whose format",
+        ),
+        (
+            {"format": FORMAT, "versions": ["0.2.0"]},
+            "made by an earlier version of roadeval, whose",
+        ),
+        ({"format": {**FORMAT, "version": 5}}, "made by a later version: update roadeval"),
+        (
+            {"format": {**FORMAT, "version": 9}, "versions": {"roadeval": "9.\n"}},
+            r"made by roadeval 9.\n, a later version: update",
+        ),
+        ({"format": {**FORMAT, "version": "x"}}, "not a summary of roadeval; make it anew"),
+        ({"format": {"name": "other", "version": 3}}, "not a summary of roadeval; make it anew"),
+        ([3], "not a summary of roadeval; make it anew"),
+    ],
+)
+def test_a_summary_of_another_format_is_refused_with_who_wrote_it(summary, told):
+    with pytest.raises(ResultsError) as caught:
+        Facts.parse(json.dumps(summary), "old.rrd")
+    assert str(caught.value).startswith(f"old.rrd: {told}")
+
+
+@pytest.mark.parametrize(
+    ("part", "value"),
+    [
+        ("totals", {"blind": 5}),
+        ("totals", {"filtered": {"post": None}}),
+        ("seconds", {"filtered": 1.5}),
+        ("settings", -1),
+        ("tables", {"frames": 1.5}),
+        ("run", []),
+        ("drive", {}),
+        ("frames", {"evaluated": "many"}),
+        ("difference", {"post": {"ERR": {"mean": 0.1}}}),
+    ],
+)
+def test_a_part_of_another_shape_is_damage(part, value):
+    with pytest.raises(ResultsError, match=f"here: damaged .`{part}` is not what it must be"):
+        Facts.parse(changed(**{part: value}), "here")
+
+
+@pytest.mark.parametrize("part", ["verdict", "drive", "frames", "totals"])
+def test_a_document_without_its_first_parts_is_no_summary(part):
+    content = json.loads(WRITTEN.text())
+    del content[part]
+    with pytest.raises(ResultsError, match=f"here: not a summary .it has no {part}"):
+        Facts.parse(json.dumps(content), "here")
+
+
+def test_a_number_that_was_changed_is_damage():
+    other = {**TOTALS, "filtered": {"post": {"ERR": 0.3, "frames": 100}}}
+    with pytest.raises(ResultsError, match=r"here: damaged \(its content is not what was"):
+        Facts.parse(changed(totals=other), "here")
+    content = json.loads(WRITTEN.text())
+    del content["claims"]
+    with pytest.raises(ResultsError, match="here: damaged"):
+        Facts.parse(json.dumps(content), "here")
+
+
+def test_where_files_lie_may_change():
+    moved = Facts.parse(changed(run={"output": {"save": "elsewhere.rrd"}}), "here")
+    assert moved.run["output"]["save"] == "elsewhere.rrd"
+
+
+def test_a_digest_is_that_of_what_json_gives_back():
+    written = {"totals": {"a": (1, math.nan, Path("b"), 1 / 3, "\u00e9\udce9")}, "run": 5}
+    read = json.loads(json_text(plain(written)))
+    assert digest_of(written, ("totals",)) == digest_of(read, ("totals", "other"))
+
+
+@pytest.mark.parametrize("digest", ["x", {}, {"parts": 5, "sha256": ""}, {"parts": [[]]}])
+def test_a_damaged_digest_is_damage(digest):
+    with pytest.raises(ResultsError, match="here: damaged"):
+        Facts.parse(changed(digest=digest), "here")
+
+
+def test_parts_that_a_later_version_covers_are_checked_by_this_one():
+    content = json.loads(WRITTEN.text()) | {"new": [1, 2]}
+    content["digest"]["parts"].append("new")
+    assert Facts.parse(sealed(content), "here") == WRITTEN
+    with pytest.raises(ResultsError, match="damaged"):
+        Facts.parse(json.dumps(json.loads(sealed(content)) | {"new": [1, 3]}), "here")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 100_000,
+        changed(run={"deep": 0}).replace('"deep": 0', '"deep": ' + 800 * "[" + 800 * "]"),
+    ],
+)
+def test_a_text_that_nests_without_end_is_no_summary(text):
+    with pytest.raises(ResultsError, match="here: not a summary"):
+        Facts.parse(text, "here")
