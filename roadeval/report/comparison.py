@@ -276,9 +276,7 @@ def changed_drives(comparison: Comparison) -> Iterator[Block]:
                 "drive": lambda row: row.drive,
                 "frames": lambda row: number(row.frames),
                 **_change(lambda row: interval(row.difference.low, row.difference.high)),
-                "q": lambda row: (
-                    DASH if row.q is None else "<0.001" if row.q < 0.001 else f"{row.q:.3f}"
-                ),
+                "q": lambda row: _q_value(row.q),
             }
             yield _table(rows[:NAMED], columns)
 

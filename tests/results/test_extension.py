@@ -31,10 +31,10 @@ from roadeval.evaluation.region import Region
 
 def left(labelled):
     height, width = labelled.truth.shape
-    return pack(np.arange(width)[None].repeat(height, 0) < 2)
+    return {"left": pack(np.arange(width)[None].repeat(height, 0) < 2)}
 
 
-REGIONS = (Region("left", "on the left", order=25, find=left),)
+REGIONS = (Region({"left": "on the left"}, order=25, find=left),)
 '''
 PROGRAM = """
 import importlib.util
