@@ -55,7 +55,7 @@ for kind in ("metrics", "regions"):
     spec.loader.exec_module(module)
 
 from roadeval.data import Role
-from roadeval.evaluation import regions, scored
+from roadeval.evaluation import regions, score
 from roadeval.evaluation.score import Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.results.folder import ResultsFolder, ResultsWriter
