@@ -7,12 +7,12 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from roadeval.data import IGNORE, Frame, Mask, Rgb
+from roadeval.data import ROAD, Frame, Rgb
 from roadeval.images import Limits, format_of
 from roadeval.logs.errors import BadMessage, DamagedMessage, FrameError
 from roadeval.logs.messages.encoding import TopicKind
@@ -122,16 +122,19 @@ class LoggedFrame:
             self.accounting.sizes[self.number] = size
         labels = {name: self._label(label, image) for name, label in self.labels.items()}
         truth, shadow = (labels.pop(name, None) for name in (TRUTH, SHADOW))
+        is_file = isinstance(picture, CompressedPicture)
+        format_ = format_of(picture.data) if is_file else None
         return Frame(
             self.number,
             self.stamp_ns,
             self.log_time_ns,
             image,
             picture.data,
-            _media_type(picture) if is_whole else None,
+            format_.media_type if is_whole and format_ else None,
             None if truth is None else truth.truth,
             None if shadow is None else shadow.truth,
-            {name: _as_mask(label.truth) for name, label in labels.items()},
+            # A mask has no third value.
+            {name: (label.truth == ROAD).astype(np.uint8) for name, label in labels.items()},
             {
                 name: label.probability
                 for name, label in labels.items()
@@ -269,14 +272,3 @@ def _nearest(labels: Pixels, size: tuple[int, int]) -> Pixels:
 
     how = cv2.INTER_NEAREST_EXACT
     return np.asarray(cv2.resize(labels, size, interpolation=how), labels.dtype)
-
-
-def _media_type(picture: Picture) -> str | None:
-    """Return the media type of a file that every viewer knows."""
-    format_ = format_of(picture.data) if isinstance(picture, CompressedPicture) else None
-    return format_.media_type if format_ else None
-
-
-def _as_mask(truth: npt.NDArray[Any]) -> Mask:
-    """Make ignored pixels non-road, because a mask has no third value."""
-    return np.where(truth == IGNORE, 0, truth).astype(np.uint8)

@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-from mcap.records import Channel, Schema
 
 from roadeval.images import Limits
 from roadeval.logs.container.file import Damage, containers_in, damage_of
@@ -75,7 +73,10 @@ class Log:
             container
             for file in files
             for container in containers_in(
-                file, _is_image, message_stamp, keep_corrupt=config.frames.keep_corrupt
+                file,
+                lambda *channel: kind_of(*channel) is not TopicKind.OTHER,
+                message_stamp,
+                keep_corrupt=config.frames.keep_corrupt,
             )
         ]
         self._readers = topic_readers(self._containers, self._limits, lacks_files=bool(damage))
@@ -103,9 +104,9 @@ class Log:
         """
         for container in self._containers:
             container.verify_data()
-        lost = [damage for damage in self.damage if damage.lossy]
-        kept = [self._kept(topic) for topic in self.topics if topic.is_image]
-        return (*map(str, lost), *kept) if lost else ()
+        lost = [str(damage) for damage in self.damage if damage.lossy]
+        images = [topic for topic in self.topics if topic.is_image] if lost else []
+        return (*lost, *map(self._kept, images))
 
     @property
     def size(self) -> int:
@@ -198,25 +199,19 @@ class Log:
             If there is none in the range.
         """
         asked, times = self.config.frames, selection.camera.images.log_times
-        first, last = (
-            default
-            if text is None
-            else int(np.searchsorted(times, parse_time(text, self.start_ns)))
-            for text, default in ((asked.start, 0), (asked.end, len(times)))
-        )
+        first, last = 0, len(times)
+        if asked.start is not None:
+            first = int(np.searchsorted(times, parse_time(asked.start, self.start_ns)))
+        if asked.end is not None:
+            last = int(np.searchsorted(times, parse_time(asked.end, self.start_ns)))
         if first >= last:
-            raise LogError(self._empty(times))
+            begin, end = ((int(time) - self.start_ns) / NS for time in (times[0], times[-1]))
+            raise LogError(
+                f"{self.path.name}: no frame in this range; the images lie from {begin:.3f} to "
+                f"{end:.3f} seconds after the log's start ({times[0]} to {times[-1]} ns)"
+            )
         numbers = range(first, last, asked.every)
         return FrameStream(selection, last - first, numbers[: asked.max_frames])
-
-    def _empty(self, times: npt.NDArray[np.int64]) -> str:
-        if not len(times):
-            return f"{self.path.name}: the image topic holds no message"
-        begin, end = ((int(time) - self.start_ns) / NS for time in (times[0], times[-1]))
-        return (
-            f"{self.path.name}: no frame in this range; the images lie from {begin:.3f} to "
-            f"{end:.3f} seconds after the log's start ({times[0]} to {times[-1]} ns)"
-        )
 
     def close(self) -> None:
         """Close the log's files, and those of logs beside it."""
@@ -234,7 +229,7 @@ class Log:
 
 @dataclass(frozen=True, slots=True)
 class LogDescription:
-    """What a log holds, what is wrong with it, and what a replay would pick."""
+    """The content of a log, its damage, and what a replay would pick."""
 
     path: str
     bytes: int
@@ -248,10 +243,10 @@ class LogDescription:
     problem: str
     """Why a replay could not pick, or empty."""
     oddities: tuple[str, ...]
-    """Of the images that a replay would pick: several sizes, repeated ones; a sentence each."""
+    """Several sizes and repetitions of the images that a replay would pick, a sentence each."""
     damage: tuple[str, ...]
     losses: tuple[str, ...]
-    """What is wrong with the files, and what is lost by it, a sentence each."""
+    """The damage of the files, and the losses by it, a sentence each."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON has it: text, numbers, lists, objects."""
@@ -290,7 +285,3 @@ def describe(path: str | Path, config: LogConfig | None = None) -> LogDescriptio
             damage=tuple(map(str, log.damage)),
             losses=log.losses,
         )
-
-
-def _is_image(channel: Channel, schema: Schema | None) -> bool:
-    return kind_of(channel, schema) is not TopicKind.OTHER

@@ -104,7 +104,8 @@ def settle(
     """
     asked = config.topics
     image, why = choose_image(topics, asked.image)
-    _check_readable(readers[image.name], image)
+    if image.problem:
+        _check_readable(readers[image.name], image)
     truth = choose_truth(topics, image, asked.truth, config.labels)
     choices = {TRUTH: truth, SHADOW: choose_shadow(topics, image, asked.shadow, config.labels)}
     for name, topic in asked.masks.items():
@@ -130,8 +131,6 @@ def settle(
 
 def _check_readable(reader: TopicReader, topic: TopicInfo) -> None:
     """Refuse, as a `LogError`, a topic of whose sampled messages none can be decoded."""
-    if not topic.problem:
-        return
     for picture in samples(reader):
         with suppress(BadMessage):
             to_rgb(picture, reader.limits)

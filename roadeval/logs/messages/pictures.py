@@ -85,8 +85,7 @@ def codec_of(picture: Picture) -> str | None:
     """Return the video codec of a packet, None for a picture that stands alone."""
     if not isinstance(picture, CompressedPicture):
         return None
-    words = re.split(r"[^a-z0-9]+", picture.format.lower())
-    for word in words:
+    for word in re.split(r"[^a-z0-9]+", picture.format.lower()):
         if word in _CODECS:
             return _CODECS[word]
     return "h264" if bytes(picture.data[:4]).startswith(_START_CODES) else None
@@ -98,10 +97,16 @@ def picture_in(message: Any) -> LoggedPicture:
     Raises
     ------
     BadMessage
-        If it has not the fields of an image.
+        If it lacks the fields of an image.
     """
     try:
-        stamp_ns, frame_id = _stamp_ns(message), _frame_id(message)
+        stamp_ns, header = 0, getattr(message, "header", message)
+        if header is not message:
+            stamp_ns = nanoseconds(header.stamp)
+        elif hasattr(message, "timestamp"):
+            stamp_ns = nanoseconds(message.timestamp)
+        frame_id = getattr(header, "frame_id", "")
+        frame_id = frame_id if isinstance(frame_id, str) else ""
         if not hasattr(message, "height") or hasattr(message, "pts"):
             name = message.format if hasattr(message, "format") else message.encoding
             data = _as(BUFFERS, message.data)
@@ -117,35 +122,18 @@ def picture_in(message: Any) -> LoggedPicture:
             frame_id,
         )
     except (AttributeError, StopIteration, TypeError, ValueError, LogError) as error:
-        raise BadMessage("it has not the fields of an image") from error
+        raise BadMessage("it lacks the fields of an image") from error
 
 
 def _as(kind: type | tuple[type, ...], value: Any) -> Any:
-    """Return a value of a kind: a damaged schema may give a field another; a TypeError if so."""
+    """Return a value, whose kind a damaged schema may have changed: a TypeError if so."""
     if not isinstance(value, kind):
         raise TypeError(value)
     return value
 
 
-def _stamp_ns(message: Any) -> int:
-    """Integer nanoseconds of the header stamp; 0 without one."""
-    if hasattr(message, "header"):
-        stamp = message.header.stamp
-    elif hasattr(message, "timestamp"):
-        stamp = message.timestamp
-    else:
-        return 0
-    return nanoseconds(stamp)
-
-
-def _frame_id(message: Any) -> str:
-    """Return the name of the camera's coordinate frame; empty without one."""
-    name = getattr(getattr(message, "header", message), "frame_id", "")
-    return name if isinstance(name, str) else ""
-
-
 def nanoseconds(stamp: Any) -> int:
-    """Integer nanoseconds of a stamp in any of its forms; a float would round them."""
+    """Return the nanoseconds of a stamp in any of its forms, exactly."""
     if isinstance(stamp, str):
         return parse_time(stamp)
     seconds = next(getattr(stamp, name) for name in _SECONDS if hasattr(stamp, name))

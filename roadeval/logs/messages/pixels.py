@@ -34,18 +34,17 @@ Array = npt.NDArray[Any]
 
 @dataclass(frozen=True, slots=True)
 class PixelFormat:
-    """How an encoding lays out its pixels.
-
-    ``dtype`` and ``channels`` give a row's items; ``rows`` the rows stored per image row (3/2
-    for planar 4:2:0); ``code`` names OpenCV's conversion to RGB, None for RGB itself. Width and
-    height are whole multiples of ``block``: pixels of one block share their colours.
-    """
+    """How an encoding lays out its pixels."""
 
     dtype: str
     channels: int
+    """Items of that type for each pixel of a row."""
     code: str | None
+    """OpenCV's conversion to RGB; None for RGB itself."""
     rows: float = 1.0
+    """Rows stored for each image row, 3/2 for planar 4:2:0."""
     block: tuple[int, int] = (1, 1)
+    """Pixels of one block share their colours; width and height are whole multiples of it."""
 
     @property
     def is_grey(self) -> bool:
@@ -129,14 +128,12 @@ def rows_of(picture: RawPicture, format_: PixelFormat, limits: Limits) -> Array:
 
 def check_size(picture: RawPicture, format_: PixelFormat, limits: Limits) -> None:
     """Refuse a size that the limits forbid, or that the format cannot have."""
-    width, height = picture.width, picture.height
-    limits.check(width, height)
+    limits.check(picture.width, picture.height)
     wide, high = format_.block
-    if width % wide or height % high:
+    if picture.width % wide or picture.height % high:
         even = "width and height" if high > 1 else "width"
-        raise BadMessage(
-            f"an image of {width}x{height} in {picture.encoding}, which needs an even {even}"
-        )
+        size = f"{picture.width}x{picture.height}"
+        raise BadMessage(f"an image of {size} in {picture.encoding}, which needs an even {even}")
 
 
 def raw_to_rgb(picture: RawPicture, limits: Limits) -> Rgb:
@@ -175,9 +172,11 @@ def to_rgb(picture: Picture, limits: Limits) -> Rgb:
     with _bad_message():
         if isinstance(picture, RawPicture):
             return raw_to_rgb(picture, limits)
-        if isinstance(picture, DecodedPicture):
-            return _video_frame(picture, limits)
-        return images.to_rgb(_image_file(picture), limits)
+        if isinstance(picture, CompressedPicture):
+            return images.to_rgb(_image_file(picture), limits)
+    if picture.damage and not limits.keep_damaged:
+        raise DamagedMessage(picture.damage)
+    return picture.pixels
 
 
 def to_labels(picture: Picture, limits: Limits) -> Array:
@@ -227,7 +226,7 @@ def size_of(picture: Picture) -> tuple[int, int] | None:
 
 
 def lossy_format(picture: Picture) -> str:
-    """Name the format of a picture whose compression changes values, as JPEG; else empty."""
+    """Return the name of a format whose compression changes values, as JPEG; else empty."""
     if isinstance(picture, RawPicture):
         return ""
     if isinstance(picture, DecodedPicture) or codec_of(picture) is not None:
@@ -237,7 +236,7 @@ def lossy_format(picture: Picture) -> str:
 
 
 def lossy_labels(name: str) -> str:
-    """Return what is wrong with label images in a format that changes values, and the way out."""
+    """Return the sentence about label images in a format that changes values."""
     return (
         f"is {name}, whose compression changes the values at every edge: log labels as PNG, or "
         "give `labels.tolerance` (32, for example), and values farther than that from 0 and from "
@@ -260,9 +259,3 @@ def _image_file(picture: CompressedPicture) -> Buffer:
     if "compresseddepth" in picture.format.lower():
         raise BadMessage(f"it holds depth ({picture.format}), which is no camera image")
     return picture.data
-
-
-def _video_frame(picture: DecodedPicture, limits: Limits) -> Rgb:
-    if picture.damage and not limits.keep_damaged:
-        raise DamagedMessage(picture.damage)
-    return picture.pixels

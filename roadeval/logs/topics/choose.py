@@ -114,7 +114,8 @@ def choose_truth(
             "give an empty name there to continue without truth"
         )
     if roads:
-        return Choice(None, f"no topic is clearly road truth; `topics.truth`: {_names(roads)}")
+        why = "no topic is clearly road truth; name one with `topics.truth`:"
+        return Choice(None, f"{why} {_names(roads)}")
     if not found:
         return Choice(None, "no label topic")
     why = f"{found[0].name} {lossy_labels(found[0].lossy)}"

@@ -110,7 +110,7 @@ class TopicReader:
         return message
 
     def _read(self, position: int) -> Message | None:
-        """Read a message, if it is the one that the index promises."""
+        """Read a message; None if it is not the one that the index lists."""
         source = self.channels[self._numbers[position]]
         chunk, offset = int(self._chunks[position]), int(self._offsets[position])
         try:
@@ -127,13 +127,11 @@ class TopicReader:
         number, chunk = self._numbers[position], self._chunks[position]
         source = self.channels[number]
         here = np.flatnonzero((self._numbers == number) & (self._chunks == chunk))
-        promised = {(int(self.log_times[i]), int(self._offsets[i])): i for i in here}
-        found = source.container.look(int(chunk), source.channel_id).tolist()
-        missed = [entry for entry in found if tuple(entry) not in promised]
-        wrong = sorted(set(promised) - {tuple(entry) for entry in found})
-        for promise, (log_time, offset) in zip(wrong, missed, strict=False):
-            self.log_times[promised[promise]] = log_time
-            self._offsets[promised[promise]] = offset
+        listed = {(int(self.log_times[i]), int(self._offsets[i])): i for i in here}
+        found = [tuple(e) for e in source.container.look(int(chunk), source.channel_id).tolist()]
+        missed = [entry for entry in found if entry not in listed]
+        for wrong, right in zip(sorted(listed.keys() - {*found}), missed, strict=False):
+            self.log_times[listed[wrong]], self._offsets[listed[wrong]] = right
 
     def picture(self, position: int) -> LoggedPicture:
         """Read the picture of a message.
@@ -168,12 +166,12 @@ class TopicReader:
         return self.name
 
     def is_lost(self, position: int) -> bool:
-        """Whether a message lies in a chunk that was found to be unreadable."""
+        """Return whether a message lies in a chunk that was found to be unreadable."""
         source = self.channels[self._numbers[position]]
         return bool(source.container.is_bad(int(self._chunks[position])))
 
     def expected(self) -> int:
-        """How many messages there should be, by the files' own statistics."""
+        """Return how many messages there should be, by the files' own statistics."""
         return sum(s.container.expected.get(s.channel_id, 0) for s in self.channels)
 
     @property
@@ -190,14 +188,12 @@ class TopicReader:
         return int(np.searchsorted(self.log_times, min(ends), side="right"))
 
     def readable(self) -> int:
-        """Messages that are in the log, less those in chunks found to be damaged."""
-        lost = sum(
-            source.container.is_bad(int(chunk)) * int(count)
-            for number, source in enumerate(self.channels)
-            for chunk, count in zip(
-                *np.unique(self._chunks[self._numbers == number], return_counts=True), strict=True
-            )
-        )
+        """Count the messages of the log, without those in chunks found to be damaged."""
+        lost = 0
+        for number, source in enumerate(self.channels):
+            found = np.unique(self._chunks[self._numbers == number], return_counts=True)
+            for chunk, count in zip(*found, strict=True):
+                lost += source.container.is_bad(int(chunk)) * int(count)
         return len(self) - lost
 
     def _decoder(self, position: int) -> Decoder:

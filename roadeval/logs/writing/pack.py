@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Final
 
-from roadeval.images import ImageError, ImageFormat, Limits, format_of, size_of, to_png
+from roadeval.images import ImageError, Limits, format_of, size_of, to_png
 from roadeval.logs.errors import LogError
 from roadeval.logs.files import IMAGES, by_name, listed, ordered
 from roadeval.logs.settings import NS
@@ -98,8 +98,8 @@ def _pack_folder(
         for file, stamp in stamps.items():
             log.image(CAMERA, stamp, *_image(file))
             if file in by_image:
-                data = _label(by_image[file])
-                log.image(TRUTH, stamp, data, "png", log_time_ns=stamp + LABEL_DELAY_NS)
+                label = _image(by_image[file], is_label=True)
+                log.image(TRUTH, stamp, *label, log_time_ns=stamp + LABEL_DELAY_NS)
     used = set(by_image.values())
     warnings = (
         *_unpaired("images without a mask", [f for f in files if labels and f not in by_image]),
@@ -166,44 +166,23 @@ def _frames_of(video: Path) -> Iterator[tuple[int, bytes]]:
         raise LogError(f"{video}: not a readable video ({error.strerror})") from error
 
 
-def _image(file: Path) -> tuple[bytes, str]:
-    """Read an image file as it is, or as a PNG if viewers would not know its format."""
-    data = _read(file)
-    format_ = _format(file, data)
-    if format_.media_type is None:
-        return _as_png(file, data), "png"
-    return data, format_.media_type.removeprefix("image/")
+def _image(file: Path, *, is_label: bool = False) -> tuple[bytes, str]:
+    """Read an image file as it is, or as a PNG if viewers do not know its format.
 
-
-def _label(file: Path) -> bytes:
-    data = _read(file)
-    format_ = _format(file, data)
-    if format_.name == "JPEG":
-        raise LogError(f"{file}: a JPEG blurs its labels; masks must be PNG or another lossless")
-    return data if format_.name == "PNG" else _as_png(file, data)
-
-
-def _format(file: Path, data: bytes) -> ImageFormat:
-    """Return the format of an image file, whatever its ending, after a look at its head."""
-    try:
-        size_of(data)
-    except ImageError as error:
-        raise LogError(f"{file}: {error}") from error
-    format_ = format_of(data)
-    assert format_ is not None
-    return format_
-
-
-def _read(file: Path) -> bytes:
+    Whatever its ending; a label must not be a JPEG.
+    """
     try:
         check_input(file)
-        return file.read_bytes()
+        data = file.read_bytes()
+        size_of(data)
+        format_ = format_of(data)
+        assert format_ is not None
+        if is_label and not format_.exact:
+            raise LogError(f"{file}: {format_.name} changes label values; masks must be lossless")
+        if format_.media_type is None:
+            return to_png(data, Limits(GREATEST)), "png"
+        return data, format_.media_type.removeprefix("image/")
     except OSError as error:
         raise LogError(f"{file}: {error.strerror}") from error
-
-
-def _as_png(file: Path, data: bytes) -> bytes:
-    try:
-        return to_png(data, Limits(GREATEST))
     except ImageError as error:
         raise LogError(f"{file}: {error}") from error

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import math
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -23,31 +22,13 @@ _INTEGER: Final = {"type": "integer"}
 _RATE: Final = {"type": ["number", "null"], "description": "a fraction; null if undefined"}
 
 
-class SidecarWriter:
+class SidecarWriter(LogWriter):
     """Writes masks, error maps and metrics of each frame.
 
     ``/roadeval/<variant>/<stage>`` holds a mask (PNG, road 255), ``/roadeval/<variant>/errors``
     the error map in its colours (PNG), ``/roadeval/metrics/<variant>/<stage>`` counts and rates
     (JSON with a schema).
-
-    Parameters
-    ----------
-    path
-        The file to write; it appears under its name when it is complete.
-
-    Raises
-    ------
-    LogError
-        If it cannot be written.
     """
-
-    def __init__(self, path: str | Path) -> None:
-        self._log = LogWriter(path)
-
-    @property
-    def path(self) -> Path:
-        """The file to write."""
-        return self._log.path
 
     def write(self, result: FrameResult) -> None:
         """Write a frame's results; frames come in the order of their log times.
@@ -57,46 +38,35 @@ class SidecarWriter:
         LogError
             If the disk is full.
         """
-        frame = result.frame
+        stamp, log_time = result.frame.stamp_ns, result.frame.log_time_ns
         for variant in result.variants:
             for stage, mask in variant.masks():
-                self._png(f"{ROOT}/{variant.variant}/{stage}", frame, mask.pixels() * np.uint8(255))
+                topic, levels = f"{ROOT}/{variant.variant}/{stage}", mask.pixels() * np.uint8(255)
+                self.mask(topic, stamp, levels, log_time_ns=log_time)
         for name, errors in result.errors.items():
-            self._png(f"{ROOT}/{name}/{errors.spec.name}", frame, _coloured(errors))
+            topic = f"{ROOT}/{name}/{errors.spec.name}"
+            self.mask(topic, stamp, _coloured(errors), log_time_ns=log_time)
         for tally in result.tallies:
-            self._metrics(frame, tally)
+            topic = f"{ROOT}/metrics/{tally.variant}/{tally.stage}"
+            schema = METRICS, _schema(tuple(tally.rates))
+            self.json(topic, stamp, _message(result.frame, tally), schema, log_time_ns=log_time)
 
-    def _png(self, topic: str, frame: Frame, pixels: npt.NDArray[np.uint8]) -> None:
-        self._log.mask(topic, frame.stamp_ns, pixels, log_time_ns=frame.log_time_ns)
 
-    def _metrics(self, frame: Frame, tally: Tally) -> None:
-        counts = tally.counts
-        message: dict[str, Any] = {
-            "timestamp": {"sec": frame.stamp_ns // 10**9, "nsec": frame.stamp_ns % 10**9},
-            "frame": frame.number,
-            "variant": tally.variant,
-            "stage": tally.stage,
-            "TP": counts.tp,
-            "TN": counts.tn,
-            "FP": counts.fp,
-            "FN": counts.fn,
-            "N": counts.n,
-        }
-        rates = tally.rates.items()
-        message |= {name: None if math.isnan(rate) else rate for name, rate in rates}
-        topic = f"{ROOT}/metrics/{tally.variant}/{tally.stage}"
-        schema = (METRICS, _schema(tuple(tally.rates)))
-        self._log.json(topic, frame.stamp_ns, message, schema, log_time_ns=frame.log_time_ns)
-
-    def finish(self) -> None:
-        """Write the end of the file, which takes its name when the context ends."""
-        self._log.finish()
-
-    def __enter__(self) -> SidecarWriter:
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self._log.__exit__(*error)
+def _message(frame: Frame, tally: Tally) -> dict[str, Any]:
+    counts = tally.counts
+    rates = {name: None if math.isnan(rate) else rate for name, rate in tally.rates.items()}
+    return {
+        "timestamp": {"sec": frame.stamp_ns // 10**9, "nsec": frame.stamp_ns % 10**9},
+        "frame": frame.number,
+        "variant": tally.variant,
+        "stage": tally.stage,
+        "TP": counts.tp,
+        "TN": counts.tn,
+        "FP": counts.fp,
+        "FN": counts.fn,
+        "N": counts.n,
+        **rates,
+    }
 
 
 class NoSidecar:

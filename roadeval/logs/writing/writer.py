@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -46,7 +46,7 @@ class LogWriter:
             self._file = self._new.partial.open("wb")
         self._writer = Writer(self._file)
         self._writer.start(library=f"roadeval {VERSION}")
-        self._schemas: dict[str, int] = {}
+        self._schemas: dict[tuple[str, str], int] = {}
         self._channels: dict[str, int] = {}
         self._counts: dict[int, int] = {}
 
@@ -81,7 +81,17 @@ class LogWriter:
             raise LogError(f"{topic}: format {format!r} is none of {', '.join(FORMATS)}")
         message = CompressedImage(frame_id=FRAME_ID, data=data, format=format)
         message.timestamp.FromNanoseconds(stamp_ns)
-        channel = self._channels.get(topic) or self._protobuf_channel(topic, CompressedImage)
+
+        def text() -> bytes:
+            from mcap_protobuf.schema import build_file_descriptor_set
+
+            described: bytes = build_file_descriptor_set(CompressedImage).SerializeToString(
+                deterministic=True
+            )
+            return described
+
+        schema = CompressedImage.DESCRIPTOR.full_name, "protobuf"
+        channel = self._channel(topic, "protobuf", schema, text)
         data = message.SerializeToString(deterministic=True)
         self._write(channel, stamp_ns, log_time_ns, data)
 
@@ -123,33 +133,27 @@ class LogWriter:
         LogError
             If the disk is full.
         """
-        channel = self._channels.get(topic) or self._json_channel(topic, *schema)
+        name, text = schema
+        channel = self._channel(topic, "json", (name, "jsonschema"), text.encode)
         data = json.dumps(message, allow_nan=False, separators=(",", ":")).encode()
         self._write(channel, stamp_ns, log_time_ns, data)
+
+    def _channel(
+        self, topic: str, encoding: str, schema: tuple[str, str], text: Callable[[], bytes]
+    ) -> int:
+        """Return the channel of a topic, with a schema's name and encoding; made if it is new."""
+        if topic not in self._channels:
+            if schema not in self._schemas:
+                self._schemas[schema] = self._writer.register_schema(*schema, text())
+            number = self._schemas[schema]
+            self._channels[topic] = self._writer.register_channel(topic, encoding, number)
+        return self._channels[topic]
 
     def _write(self, channel: int, stamp_ns: int, log_time_ns: int | None, data: bytes) -> None:
         sequence = self._counts[channel] = self._counts.get(channel, -1) + 1
         log_time = stamp_ns if log_time_ns is None else log_time_ns
         with self._explained():
             self._writer.add_message(channel, log_time, data, stamp_ns, sequence)
-
-    def _protobuf_channel(self, topic: str, message: Any) -> int:
-        from mcap_protobuf.schema import build_file_descriptor_set
-
-        name = message.DESCRIPTOR.full_name
-        if name not in self._schemas:
-            text = build_file_descriptor_set(message).SerializeToString(deterministic=True)
-            self._schemas[name] = self._writer.register_schema(name, "protobuf", text)
-        return self._register(topic, "protobuf", self._schemas[name])
-
-    def _json_channel(self, topic: str, name: str, text: str) -> int:
-        if name not in self._schemas:
-            self._schemas[name] = self._writer.register_schema(name, "jsonschema", text.encode())
-        return self._register(topic, "json", self._schemas[name])
-
-    def _register(self, topic: str, encoding: str, schema: int) -> int:
-        self._channels[topic] = self._writer.register_channel(topic, encoding, schema)
-        return self._channels[topic]
 
     def finish(self) -> None:
         """Write the end of the file; `close` gives it its name.
@@ -180,7 +184,7 @@ class LogWriter:
             self._discard()
             raise
 
-    def __enter__(self) -> LogWriter:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_error: object) -> None:

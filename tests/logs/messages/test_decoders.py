@@ -117,7 +117,7 @@ def test_fields_of_another_type_than_an_image_has_are_refused() -> None:
     """A damaged schema may make a number of the format's name."""
     for name in (None, 1.5, ["jpeg"]):
         message = {"format": name, "data": "ZmlsZQ=="}
-        with pytest.raises(BadMessage, match="not the fields of an image"):
+        with pytest.raises(BadMessage, match="lacks the fields of an image"):
             read("json", None, json.dumps(message).encode())
 
 

@@ -96,7 +96,7 @@ def test_what_cannot_be_packed_is_refused(tmp_path: Path) -> None:
     empty = folder(tmp_path / "empty", {"b.txt": b""})
     out = tmp_path / "a.mcap"
     for arguments, said in (
-        ({"masks": lossy}, "a JPEG blurs its labels"),
+        ({"masks": lossy}, "JPEG changes label values"),
         ({"masks": other}, "no mask has the name of an image"),
         ({"masks": empty}, "no image in it"),
         ({"rate_hz": 0}, "0 images a second"),
