@@ -63,3 +63,8 @@ def test_a_frame_that_is_not_evaluated_counts_with_no_seed():
     training = (with_seeds("filtered", TWO_WRONG, seed_1=TWO_WRONG),)
     board.add(board.score(a_frame(TRUTH, 1), Role.TRAINING, training))
     assert board.repeats()["totals"]["filtered"]["post"]["ERR"] == [0, 0]
+
+
+def test_without_a_filtered_variant_there_is_no_difference():
+    found = a_board((with_seeds("unfiltered", RIGHT, seed_1=ONE_WRONG),)).repeats()
+    assert found["difference"] == {}

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from roadeval.results.fleet import Record, read_record, record_path
+from roadeval.results.fleet import Record, frames_path, read_record, record_path
 from roadeval.results.rows import Key, cells
 from roadeval.results.schema import OF_DRIVES
 
@@ -43,3 +43,14 @@ def test_a_record_without_a_check_sum_is_none(tmp_path):
     del content["digest"]
     path.write_text(json.dumps(content))
     assert read_record(tmp_path, "a") is None
+
+
+def test_a_drive_is_whole_where_its_summary_and_the_frames_that_it_has_are_there(tmp_path):
+    made = write(tmp_path)
+    summary, frames = tmp_path / "results" / "a" / "summary.json", frames_path(tmp_path, "a")
+    summary.parent.mkdir(parents=True)
+    summary.touch()
+    assert not made.is_whole(tmp_path)
+    frames.parent.mkdir(parents=True)
+    frames.touch()
+    assert made.is_whole(tmp_path)
