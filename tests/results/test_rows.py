@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from roadeval.results.fleet.metrics import junit_xml
+from roadeval.results.exports import junit_xml
 from roadeval.results.rows import drive_row, probability_rows
+from tests.results.making import facts_of
 
 
 def test_a_level_with_as_many_pixels_of_road_as_of_the_rest_has_a_row():
@@ -15,8 +16,8 @@ def test_a_level_with_as_many_pixels_of_road_as_of_the_rest_has_a_row():
 
 @pytest.mark.parametrize(("losses", "code"), [([], 0), (["2 frames"], 3)])
 def test_a_drive_that_lost_a_part_of_its_log_has_exit_code_3(losses, code):
-    facts = {"losses": losses, "warnings": [], "totals": {"net": {}}, "drive": {}, "frames": {}}
-    assert drive_row(facts | {"verdict": ""}, "street", "street.mcap")["exit_code"] == code
+    facts = facts_of(losses=losses, totals={"net": {}})
+    assert drive_row(facts, "street", "street.mcap")["exit_code"] == code
 
 
 @pytest.mark.parametrize(("status", "parts"), [("scored", []), ("unscored", ["skipped"])])
