@@ -184,7 +184,7 @@ def _another_format(header: Mapping[str, Any]) -> str:
     made = f"made by roadeval {visible(writer)}" if writer else f"made by {age} version of roadeval"
     if number > VERSION:
         return f"{made}: update roadeval, or train it again"
-    return f"{made}, whose format is read no more: train it again"
+    return f"{made}, whose format is no longer read: train it again"
 
 
 def kept_model(path: Path, stages: tuple[Stage, ...] = ()) -> Model:

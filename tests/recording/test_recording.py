@@ -159,7 +159,7 @@ def test_a_lane_holds_changes_only_and_ends_where_nothing_is_known(tmp_path):
 @pytest.mark.parametrize(
     ("version", "told"),
     [
-        (2, "made by roadeval 0.1.9, whose format is read no more: replay the log again"),
+        (2, "made by roadeval 0.1.9, whose format is no longer read: replay the log again"),
         (4, "made by roadeval 0.1.9, a later version: update roadeval"),
     ],
 )

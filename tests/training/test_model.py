@@ -130,7 +130,7 @@ def test_an_array_that_hides_code_is_not_run(tmp_path):
         load_model(path)
 
 
-READ_NO_MORE = "whose format is read no more: train it again"
+READ_NO_MORE = "whose format is no longer read: train it again"
 LATER = "update roadeval, or train it again"
 
 
