@@ -347,11 +347,11 @@ def features(scene: Scene, groups: Sequence[str]) -> Values:
     return found
 
 
-def at_samples(sample: TrainingSet, see: Callable[[Rgb], Values]) -> Values:
-    """Return the features of the sampled pixels, then of the same in the mirrored images.
+def at_samples(sample: TrainingSet, see: Callable[[Rgb], Values]) -> tuple[Values, Values]:
+    """Return the features of the sampled pixels, and of the same in the mirrored images.
 
     Nothing but habit makes traffic keep to one side: the mirror doubles what there is to learn
-    from. They are ``(2 n, F)`` float32, in the sample's order; ``see`` returns the features of an
+    from. Both are ``(n, F)`` float32, in the sample's order; ``see`` returns the features of an
     image, ``(F, h, w)``.
     """
     order, straight, mirrored = [], [], []
@@ -363,7 +363,7 @@ def at_samples(sample: TrainingSet, see: Callable[[Rgb], Values]) -> Values:
         straight.append(_at(see(image), image, row, column))
         mirrored.append(_at(see(flipped), image, row, image.shape[1] - 1 - column))
     back = np.argsort(np.concatenate(order))
-    return np.concatenate([np.concatenate(straight)[back], np.concatenate(mirrored)[back]])
+    return np.concatenate(straight)[back], np.concatenate(mirrored)[back]
 
 
 def _at(planes: Values, image: Rgb, row: Places, column: Places) -> Values:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,10 +24,18 @@ BINS: Final = 255
 """Ranges of a feature that a tree can tell apart: the most that scikit-learn knows."""
 
 
-RATE: Final = 0.1
-"""Share of what is left to mend that a tree mends."""
-SHARE: Final = 0.33
-"""Of the features, drawn anew for each node, among which it chooses."""
+class Growth(NamedTuple):
+    """How trees are grown."""
+
+    trees: int
+    leaves: int
+    """Of a tree, at most."""
+    rate: float
+    """Share of what is left to mend that a tree mends."""
+    least: int
+    """Training pixels of a leaf, at least."""
+    share: float
+    """Of the features, drawn anew for each node, among which it chooses."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,17 +77,7 @@ class Forest:
         return total + np.float32(self.offset)
 
 
-def grow(
-    values: Values,
-    road: Flags,
-    weights: Floats | None,
-    seed: int,
-    *,
-    trees: int,
-    leaves: int,
-    least: int,
-    share: float = SHARE,
-) -> Forest:
+def grow(values: Values, road: Flags, weights: Floats | None, growth: Growth, seed: int) -> Forest:
     """Grow trees with scikit-learn's gradient boosting on histograms [1]_.
 
     By one thread: sums of many threads end with other last digits from one run to the next.
@@ -92,10 +90,8 @@ def grow(
         ``(n,)`` labels; both occur.
     weights
         ``(n,)`` of the pixels, above 0; None: all weigh the same.
-    seed
-        Of the draw of features.
-    trees, leaves, least, share
-        How many; of a tree, at most; training pixels of a leaf, at least; see `SHARE`.
+    growth, seed
+        How they are grown; of the draw of features.
 
     References
     ----------
@@ -115,20 +111,20 @@ def grow(
     )
     # Only here: the import takes a second, and a model from a file does not need it.
     boosting = whole("sklearn.ensemble").HistGradientBoostingClassifier(
-        learning_rate=RATE,
-        max_iter=trees,
-        max_leaf_nodes=leaves,
-        min_samples_leaf=least,
-        max_features=share,
+        learning_rate=growth.rate,
+        max_iter=growth.trees,
+        max_leaf_nodes=growth.leaves,
+        min_samples_leaf=growth.least,
+        max_features=growth.share,
         early_stopping=False,
         random_state=seed,
     )
     with threadpool_limits(1, "openmp"):
         boosting.fit(bins, road, sample_weight=weights)
     grown = [_arrays(tree.nodes, edges) for (tree,) in boosting._predictors]
-    feature, threshold, kept, given = (np.stack(each) for each in zip(*grown, strict=True))
+    feature, threshold, kept, leaves = (np.stack(each) for each in zip(*grown, strict=True))
     offset = float(boosting._baseline_prediction.item())
-    return Forest(feature, threshold, kept, given, offset, values.shape[1])
+    return Forest(feature, threshold, kept, leaves, offset, values.shape[1])
 
 
 def bin_edges(feature: Values, weights: Floats) -> Values:

@@ -38,7 +38,7 @@ from roadeval.pipeline.beyond.features import (
     names_of,
     reach_inputs,
 )
-from roadeval.pipeline.beyond.forest import Forest, grow
+from roadeval.pipeline.beyond.forest import Forest, Growth, grow
 from roadeval.pipeline.beyond.hidden_layer import HiddenLayer, train
 from roadeval.pipeline.beyond.scene import guided, scene_of, stretched
 from roadeval.pipeline.reference_patch import ReferencePatch
@@ -56,6 +56,10 @@ FULL: Final = 65535
 """The code of probability 1."""
 IN_LIGHT, IN_SHADE = 2 / 3, 1 / 3
 """The network's weight."""
+RATE: Final = 0.1
+"""Share of what is left to mend that a tree mends."""
+SHARE: Final = 0.33
+"""Of the features, drawn anew for each node, among which it chooses."""
 FARTHEST: Final = 3.0
 """Of the distances from the patch as they are shown."""
 
@@ -188,7 +192,8 @@ def fit(sample: TrainingSet, settings: TreesSettings) -> Stack:
     The sample has as many pixels of road as of the rest. Where the frames' share of road is known,
     the classes weigh as much as they have there.
     """
-    return Stack(_grown(at_samples(sample, partial(see, settings)), sample, settings))
+    values = at_samples(sample, partial(see, settings))
+    return Stack(_grown(np.concatenate(values), sample, settings))
 
 
 def adapt(known: Stack, sample: TrainingSet, settings: TreesSettings) -> Stack:
@@ -196,7 +201,7 @@ def adapt(known: Stack, sample: TrainingSet, settings: TreesSettings) -> Stack:
     if known.base is not None:
         raise MisfitError("the model was adapted to a drive already; train it again")
     check_fit(known, settings)
-    values = at_samples(sample, partial(see, settings))
+    values = np.concatenate(at_samples(sample, partial(see, settings)))
     by_feature = np.ascontiguousarray(values.T)
     given = known.log_odds(by_feature, network_weight(by_feature, settings))
     return Stack(_grown(np.column_stack([values, given]), sample, settings), known.top)
@@ -206,7 +211,8 @@ def _grown(values: Values, sample: TrainingSet, settings: TreesSettings) -> Blen
     road = np.concatenate([sample.road, sample.road])
     weights = None if sample.share is None else balanced_back(road, sample.share)
     s, seed = settings, sample.seed
-    forest = grow(values, road, weights, seed, trees=s.trees, leaves=s.leaves, least=s.least)
+    growth = Growth(s.trees, s.leaves, RATE, s.least, SHARE)
+    forest = grow(values, road, weights, growth, seed)
     network = train(values, road, weights, seed, planes=s.hidden, passes=s.passes, noise=s.noise)
     return Blend(forest, network)
 

@@ -8,7 +8,7 @@ import pytest
 from sklearn.neural_network import MLPClassifier
 
 from roadeval.pipeline.beyond.features import GROUPS, SHADE, SUN, names_of
-from roadeval.pipeline.beyond.forest import grow
+from roadeval.pipeline.beyond.forest import Growth, grow
 from roadeval.pipeline.beyond.hidden_layer import CODES, HiddenLayer, codes_of, train
 from roadeval.pipeline.beyond.trees import Blend, TreesSettings, balanced_back, network_weight
 
@@ -76,7 +76,7 @@ def test_rarer_road_is_less_probable():
 
 def test_a_blend_is_the_weighted_mean(network):
     values, road = features_and_road()
-    forest = grow(values, road, None, 0, trees=10, leaves=8, least=5)
+    forest = grow(values, road, None, Growth(10, 8, 0.1, 5, 0.33), 0)
     seen = planes_of(values)
     trees, other = forest.sums(seen), network.sums(seen)
     blend = Blend(forest, network)

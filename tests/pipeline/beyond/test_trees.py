@@ -9,7 +9,7 @@ from sklearn.ensemble import HistGradientBoostingClassifier
 
 from roadeval.pipeline.beyond import trees
 from roadeval.pipeline.beyond.features import at_samples, names_of, reach
-from roadeval.pipeline.beyond.forest import ALL, BINS, NODES, RATE, bin_edges, grow
+from roadeval.pipeline.beyond.forest import ALL, BINS, NODES, Growth, bin_edges, grow
 from roadeval.pipeline.beyond.scene import scene_of, stretched
 from roadeval.pipeline.beyond.trees import Blend, Stack, TreesSettings, balanced_back
 from roadeval.pipeline.stage import MisfitError, TrainingSet, View
@@ -58,10 +58,10 @@ def test_the_arrays_say_what_scikit_learns_trees_say(leaves, weighted):
     values, road = features_and_road(count=1000)
     values = values.round(1)  # so few that scikit-learn's own bins are the same in each version
     weights = balanced_back(road, 0.2) if weighted else None
-    how = {"trees": SMALL.trees, "leaves": leaves, "least": SMALL.least, "share": 1.0}
-    found = grow(values, road, weights, 0, **how).sums(np.ascontiguousarray(values.T))
+    growth = Growth(SMALL.trees, leaves, trees.RATE, SMALL.least, share=1.0)
+    found = grow(values, road, weights, growth, 0).sums(np.ascontiguousarray(values.T))
     boosting = HistGradientBoostingClassifier(
-        learning_rate=RATE,
+        learning_rate=trees.RATE,
         max_iter=SMALL.trees,
         max_leaf_nodes=leaves,
         min_samples_leaf=SMALL.least,
@@ -152,7 +152,7 @@ def test_samples_are_seen_as_they_are_and_mirrored():
     def see(seen):
         return np.moveaxis(seen, 2, 0).astype(np.float32)
 
-    straight, mirrored = np.split(at_samples(sample, see), 2)
+    straight, mirrored = at_samples(sample, see)
     np.testing.assert_array_equal(straight, image[[23, 3], [31, 5]])
     np.testing.assert_array_equal(mirrored, straight)
 
@@ -170,8 +170,8 @@ def test_the_mirrored_image_has_other_features_at_the_same_pixel():
 def test_samples_keep_their_order():
     images = tuple(np.full((24, 32, 3), grey, np.uint8) for grey in (10, 200))
     sample = TrainingSet(images, *np.array([[1, 0, 1], [0, 1, 2], [0, 1, 2]]), np.ones(3, bool))
-    found = at_samples(sample, lambda seen: np.moveaxis(seen, 2, 0).astype(np.float32))
-    assert found[:, 0].tolist() == [200, 10, 200] * 2
+    straight, _ = at_samples(sample, lambda seen: np.moveaxis(seen, 2, 0).astype(np.float32))
+    assert straight[:, 0].tolist() == [200, 10, 200]
 
 
 @pytest.mark.parametrize(
@@ -252,7 +252,7 @@ def test_what_stands_on_top_sees_the_base_as_its_last_feature(sample, learnt):
     adapted = trees.adapt(learnt, sample, SMALL)
     assert adapted.base is learnt.top
     assert adapted.inputs == learnt.inputs
-    values = np.ascontiguousarray(at_samples(sample, partial(trees.see, SMALL)).T)
+    values = np.ascontiguousarray(np.concatenate(at_samples(sample, partial(trees.see, SMALL))).T)
     known = learnt.log_odds(values, 0.5)
     expected = adapted.top.log_odds(np.concatenate([values, known[None]]), 0.5)
     np.testing.assert_array_equal(adapted.log_odds(values, 0.5), expected)
