@@ -34,6 +34,7 @@ UNDECIDED: Final = 2
 FEW: Final = 1 << 16
 """Up to so many undecided colours are decided at once, when the table is made."""
 _NODES: Final = (16, 24, 32, 48, 64, 96, 128, 256)
+_NONE: Final = np.zeros(0, np.uint64)
 
 
 def sums_of_terms(terms: Floats, offset: float) -> Margins:
@@ -101,29 +102,43 @@ class ColourTable:
         The margin of every colour. It decides where it is further from 0 than its error bound.
     decide
         From ``(n, 3)`` uint8 colours to ``(n,)`` bool, for the colours that are left. There are
-        some twenty of them as a rule, which are decided at once. Where a machine has learnt
-        nothing and its margin is 0 everywhere they are all colours, and those of each image are.
+        some twenty of them as a rule. Where a machine has learnt nothing and its margin is 0
+        everywhere they are all colours, and only those that are looked up are decided.
     """
 
     def __init__(self, margins: Margins, decide: Decide) -> None:
-        self._decide: Final = decide
-        road, left = _table(margins)
-        if ones(left) <= FEW:
-            places = np.flatnonzero(np.unpackbits(left.view(np.uint8), bitorder="little"))
-            own = places[decide(_colours(places))] if len(places) else places
-            np.bitwise_or.at(road, own >> 6, np.uint64(1) << (own & 63).astype(np.uint64))
-            left = np.zeros(0, np.uint64)
-        self._words: Final = road, left
+        self._decide = decide
+        self._words = road, left = _table(margins)
+        if not left.any():
+            self._words = road.copy(), _NONE
+        elif ones(left) <= FEW:
+            bits = np.unpackbits(left.view(np.uint8), bitorder="little")
+            road, _ = self._decided(self._words, np.flatnonzero(bits))
+            self._words = road, _NONE
 
     def look_up(self, planes: Planes) -> Mask:
         """Return ``(H, W)`` uint8, 1 where a pixel's margin is positive; from any thread."""
-        mask = KERNELS.look_up_colours(planes, *self._words)
-        seen = mask == UNDECIDED if len(self._words[1]) else np.zeros(0, np.bool_)
-        if seen.any():
-            colours = np.stack([plane[seen] for plane in planes], axis=1)
-            distinct, each = np.unique(colours, axis=0, return_inverse=True)
-            mask[seen] = self._decide(distinct)[each.ravel()]
+        words = self._words
+        mask = KERNELS.look_up_colours(planes, *words)
+        if len(words[1]):
+            seen = mask == UNDECIDED
+            if seen.any():
+                places = np.unique(_places(*(plane[seen] for plane in planes)))
+                # In new words, because other threads look up in the old ones. If two threads come
+                # here together the later one's are kept, and the other's colours decided again.
+                self._words = words = self._decided(words, places)
+                mask = KERNELS.look_up_colours(planes, *words)
         return mask
+
+    def _decided(
+        self, words: tuple[Words, Words], places: npt.NDArray[np.int64]
+    ) -> tuple[Words, Words]:
+        """Return words in which the colours of ``(n,)`` places are decided too."""
+        road, left = (each.copy() for each in words)
+        word, bit = places >> 6, np.uint64(1) << (places & 63).astype(np.uint64)
+        np.bitwise_or.at(road, word, np.where(self._decide(_colours(places)), bit, np.uint64(0)))
+        np.bitwise_and.at(left, word, ~bit)
+        return road, left
 
 
 def _table(margins: Margins) -> tuple[Words, Words]:
@@ -157,11 +172,18 @@ def _table(margins: Margins) -> tuple[Words, Words]:
     return words[0].reshape(-1), words[1].reshape(-1)
 
 
-def _colours(places: npt.NDArray[np.int64]) -> Colours:
-    """Return the ``(n, 3)`` colours of ``(n,)`` places: a word times 64, and the bit in it.
+def _places(*colours: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
+    """Return the places of ``(n,)`` red, green and blue: the word times 64, and the bit in it.
 
     See `roadeval.kernels.plain.look_up_colours`.
     """
+    r, g, b = (channel.astype(np.int64) for channel in colours)
+    coarse = (r >> 2) << 12 | (g >> 2) << 6 | b >> 2
+    return coarse << 6 | (r & 3) << 4 | (g & 3) << 2 | b & 3
+
+
+def _colours(places: npt.NDArray[np.int64]) -> Colours:
+    """Return the ``(n, 3)`` colours of ``(n,)`` places."""
     coarse = places >> 18, places >> 12 & 63, places >> 6 & 63
     fine = places >> 4 & 3, places >> 2 & 3, places & 3
     channels = [c << 2 | f for c, f in zip(coarse, fine, strict=True)]
