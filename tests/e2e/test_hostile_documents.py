@@ -1,5 +1,6 @@
 """Documents from anybody: no small one takes long, fills the memory or ends in a traceback."""
 
+import hashlib
 import json
 import shutil
 import time
@@ -98,9 +99,8 @@ def test_a_table_of_thousands_of_variants_is_refused(folder):
     summary = json.loads((folder / "summary.json").read_text())
     tables = {name: each for name, each in summary["tables"].items() if name != "frames"}
     content = (folder / "frames.csv").read_bytes()
-    from roadeval.results.tables import fingerprint
-
-    changed(folder / "summary.json", tables=tables | {"frames": fingerprint(content)})
+    stated = {"rows": content.count(b"\n") - 1, "sha256": hashlib.sha256(content).hexdigest()}
+    changed(folder / "summary.json", tables=tables | {"frames": stated})
     assert "column variant holds 2,000 different words" in refused("report", folder)
 
 

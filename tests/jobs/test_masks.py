@@ -318,7 +318,7 @@ def test_the_command_takes_them_and_says_what_is_wrong_with_a_file(places, tmp_p
     )
     bad = here(*words, "--masks", f"b={tmp_path}/bad.toml")
     assert bad.returncode == 1
-    assert "bad.toml: [masks.b] threshold: must be at most 1" in bad.stderr
+    assert "bad.toml: masks.b.threshold: must be at most 1" in bad.stderr
     twice = here(*words, "--masks", f"a={places}/number", "--masks", f"a={places}/npy")
     assert twice.returncode == 2
     assert "the name is taken" in twice.stderr
