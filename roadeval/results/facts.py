@@ -41,10 +41,8 @@ def _with_mean(value: Any) -> Any:
     return {**value, "mean": math.nan} if undefined else value
 
 
-Rates = Mapping[str, Any]
-"""Counts and rates by their names; an undefined rate is NaN, or None where it was read."""
 Totals = dict[str, dict[str, dict[str, Any]]]
-"""Counts and rates by variant and stage."""
+"""Counts and rates by variant and stage; an undefined rate is NaN, or None where it was read."""
 Differences = dict[str, dict[str, Annotated[Difference, BeforeValidator(_with_mean)]]]
 """Differences by stage or variant, then by rate."""
 
