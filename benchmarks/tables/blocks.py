@@ -11,7 +11,7 @@ from typing import Any, Final
 from benchmarks.tables import idd, idd_filters, reach_weights, taught
 from benchmarks.tables.drives import DRIVES, Drive
 from benchmarks.tables.measure import REPLAYS, STRANGERS, TEACHER, command
-from roadeval.results.claims import WORDS
+from roadeval.results.sentences import CLAIMED
 
 Numbers = Mapping[str, Any]
 SURE: Final = 0.05
@@ -190,7 +190,7 @@ def _margins(numbers: Numbers, drive: str) -> list[float]:
 def claims(numbers: Numbers) -> str:
     """Return the paper's claims with the windows of all drives that bear them out."""
     rows = []
-    for name, words in WORDS.items():
+    for name, words in CLAIMED.items():
         found = [numbers["drives"][drive]["paper"]["claims"][name] for drive in DRIVES]
         held, windows = (sum(each[key] for each in found) for key in ("held", "windows"))
         every = sum(each["held"] == each["windows"] for each in found)
@@ -345,7 +345,7 @@ def claims_by_drive(numbers: Numbers) -> str:
         head,
         (
             [words, *(_held(numbers["drives"][drive]["paper"]["claims"][name]) for drive in DRIVES)]
-            for name, words in WORDS.items()
+            for name, words in CLAIMED.items()
         ),
     )
 

@@ -17,7 +17,7 @@ from roadeval.jobs.result import DriveResult
 from roadeval.report.blocks import Strip
 from roadeval.report.charts.rates import over_frames
 from roadeval.report.sections.browse import SMALL, BrowsedFrames, FrameFacts, strip
-from roadeval.results.notes import notes
+from roadeval.results.sentences import notes
 
 PICTURED: Final = 24
 """Frames with pictures, where nobody says how many."""
@@ -68,12 +68,8 @@ def facts_of(result: DriveResult) -> Iterator[FrameFacts]:
             stamp,
             rates,
             [*_conditions(others, blind), *(["much shadow"] if frame in dark else [])],
-            [*notes({name: _with_mirrors(each) for name, each in others.items()}, blind)],
+            [*notes(others, blind)],
         )
-
-
-def _with_mirrors(rates: Mapping[str, float]) -> dict[str, float]:
-    return {**rates, "TPR": 1 - rates["FNR"]}
 
 
 def _conditions(

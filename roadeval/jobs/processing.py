@@ -14,8 +14,8 @@ from roadeval.jobs import frame as one_frame
 from roadeval.jobs.progress import OnProgress, Progress
 from roadeval.jobs.run import Run
 from roadeval.pipeline.stage import StageError, View
-from roadeval.results import notes
 from roadeval.results.rows import csv_lines, frame_rows
+from roadeval.results.sentences import notes_of
 from roadeval.runtime.memory import TRIM_EVERY, trim
 from roadeval.runtime.threads import ordered
 
@@ -94,7 +94,7 @@ def _process(
         for name, mask in frame.external.items()
     ]
     result = run.board.score(frame, use.role, tuple(variants))
-    result = replace(result, notes=notes.of_tallies(result.tallies))
+    result = replace(result, notes=notes_of(result.tallies))
     own = csv_lines(run.key, frame_rows(result))
     encoded = encoder.encode(result, position - 1, own)
     # Results wait for their turn, and would wait with some 15 bytes a pixel.

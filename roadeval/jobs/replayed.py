@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from threading import Event, Lock, Thread
-from typing import Any, Final
+from typing import Final
 
 from roadeval.config import OutputSettings, RunConfig, load_config
 from roadeval.errors import RoadevalError
@@ -55,7 +55,11 @@ def recording_of(
     RoadevalError
         If there is no such drive, its log has gone or may not be read, or it cannot be replayed.
     """
-    row = _row(fleet, drive)
+    row = fleet.drives.get(drive)
+    if row is None:
+        alike = [other for other, own in fleet.drives.items() if own["name"] == drive]
+        hint = f"; by that name there is {', '.join(alike)}" if alike else ""
+        raise RoadevalError(f"{fleet.path}: no drive {drive}{hint}; `drives.parquet` names all")
     if (recording := fleet.recording(drive)).exists():
         return recording, ()
     recording = fleet.recording(drive, new=True)
@@ -78,18 +82,6 @@ def recording_of(
         return recording, ()
     warning = f"{source}: has changed since the fleet was run, and its results may have, too"
     return recording, (warning,)
-
-
-def _row(fleet: FleetFolder, drive: str) -> dict[str, Any]:
-    """Return a drive's row of ``drives``."""
-    columns = ["drive", "name", "source", "status", "reason", "sha256", "fold"]
-    rows: list[dict[str, Any]] = fleet.table("drives", columns).to_pylist()
-    for row in rows:
-        if row["drive"] == drive:
-            return row
-    named = [row["drive"] for row in rows if row["name"] == drive]
-    hint = f"; by that name there is {', '.join(named)}" if named else ""
-    raise RoadevalError(f"{fleet.path}: no drive {drive}{hint}; `drives.parquet` names all")
 
 
 def _configuration(fleet: FleetFolder, drive: str, fold: int | None) -> RunConfig:

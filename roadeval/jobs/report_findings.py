@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -222,10 +222,6 @@ def _coverage(result: DriveResult, numbers: Sequence[int]) -> pd.DataFrame:
 
 WORST_OF_FLEET: Final = 12
 """Worst frames that are shown."""
-_DRIVES: Final = [
-    *("drive", "name", "group", "fold", "status", "reason", "sha256", "evaluated", "losses"),
-    *("trained_on", "model", "luminance", "contrast", "shadow", "sun"),
-]
 _EFFECTS: Final = [
     *("drive", "base", "variant", "stage", "final", "metric"),
     *("mean", "low", "high", "p", "frames"),
@@ -251,17 +247,12 @@ def collect_fleet(
     ResultsError
         If a table cannot be read.
     """
-    drives = {row["drive"]: row for row in fleet.table("drives", _DRIVES).to_pylist()}
-    counted = Counter(row["name"] for row in drives.values())
     return FleetFindings(
         name=fleet.name,
         folder=str(fleet.path),
         facts=fleet.facts,
-        drives=drives,
-        names={
-            drive: row["name"] if counted[row["name"]] == 1 else drive
-            for drive, row in drives.items()
-        },
+        drives=fleet.drives,
+        names=fleet.names,
         effects=_effects(fleet),
         scores=_scores(fleet),
         worst=list(_worst(fleet, worst)),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 from dataclasses import dataclass, field
 from functools import cache, cached_property, partial
@@ -367,11 +366,7 @@ class Result:
         return _together(
             table
             for each in self._opened
-            for table in (
-                [each.frames]
-                if isinstance(each, DriveResult)
-                else (each.frames(name).to_pandas() for name in each.scored())
-            )
+            for table in ([each.frames] if isinstance(each, DriveResult) else each.all_frames())
         )
 
     def _table(self, name: str) -> pd.DataFrame:
@@ -410,17 +405,12 @@ def _alone(result: DriveResult) -> Part:
 
 
 def _members(fleet: FleetFolder) -> Iterator[Part]:
-    columns = ["drive", "sha256", "evaluated"]
-    about = {row["drive"]: row for row in fleet.table("drives", columns).to_pylist()}
-    members = fleet.facts.drives
-    counted = Counter(member.name for member in members)
     settings = asked(fleet.facts.run)
-    for member in members:
-        row = about[member.drive]
+    for member in fleet.facts.drives:
+        row = fleet.drives[member.drive]
         yield Part(
             drive=member.drive,
-            # Two drives of a fleet may have one name.
-            name=member.name if counted[member.name] == 1 else member.drive,
+            name=fleet.names[member.drive],
             digest=row["sha256"] or None,
             scored=bool(row["evaluated"]),
             asked=settings,

@@ -276,17 +276,14 @@ class _ServedFleet(_Served):
                 if frame is None:
                     return NOT_FOUND
                 return self._view(frame, viewer) if what == "view" else self._cancel(frame)
-            case ("drive", place, *rest) if place.isdecimal() and int(place) < len(self._names):
+            case ("drive", place, *rest) if place.isdecimal() and int(place) < len(
+                self._fleet.drives
+            ):
                 if not rest and not request.folder:
                     return NOT_FOUND
                 below = replace(request, parts=tuple(rest))
-                return self._served(self._names[int(place)]).answer(below, viewer)
+                return self._served([*self._fleet.drives][int(place)]).answer(below, viewer)
         return NOT_FOUND
-
-    @cached_property
-    def _names(self) -> list[str]:
-        names: list[str] = self._fleet.table("drives", ["drive"])["drive"].to_pylist()
-        return names
 
     @cached_property
     def _worst(self) -> Mapping[int, WorstFrame]:

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Annotated, Any, Final, Self
+from typing import Annotated, Any, ClassVar, Final, Self
 
 from pydantic import BeforeValidator, TypeAdapter, ValidationError
 
@@ -22,17 +22,12 @@ from roadeval.evaluation.score import Effect, final_stages
 from roadeval.evaluation.settings import EvaluationSettings
 from roadeval.evaluation.stats import Difference
 from roadeval.results.tables import AGAIN, FLEET_FORMAT, ResultsError, TableFacts
-from roadeval.runtime.documents import LONGEST, read_bounded, read_json
+from roadeval.runtime.documents import LONGEST, VALUES, read_bounded, read_json
 from roadeval.runtime.text import elided, visible, visible_lines
 
-FORMAT: Final[Mapping[str, Any]] = {"name": "roadeval-summary", "version": 4}
 SUMMARY: Final = "summary.json"
 FLEET: Final = "fleet.json"
 """The file that makes a folder a fleet's; written last."""
-VALUES: Final = 200_000
-"""Values that are read of a summary; a run with two variants writes some two thousand."""
-ALTERED: Final = "its content is not what was written"
-MAKE: Final = "make it anew with roadeval replay"
 
 
 def _with_mean(value: Any) -> Any:
@@ -96,10 +91,67 @@ class LogFacts:
     sha256: str
 
 
-class _Facts:
-    """What the facts of one drive and of many have in common."""
+class _Document:
+    """A JSON document of facts, with its format and a checksum."""
 
+    FORMAT: ClassVar[Mapping[str, Any]]
+    AGAIN: ClassVar[str]
+    """How to make a damaged one again."""
+    RESULTS: ClassVar[tuple[str, ...]]
+    """The parts that are results, which ``digest`` covers. The others may be changed by who moves
+    or renames files."""
+    OPTIONAL: ClassVar[tuple[str, ...]] = ()
+    """Parts that are left out where they are empty."""
+    VALUES: ClassVar[int] = VALUES
+    """Values that are read at most."""
     run: dict[str, Any]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the content of the document; undefined numbers become None."""
+        content = asdict(self)  # type: ignore[call-overload]
+        known = {k: value for k, value in content.items() if value or k not in self.OPTIONAL}
+        document = plain({"format": self.FORMAT, **known})
+        return {**document, "digest": digest_of(document, self.RESULTS)}
+
+    def text(self) -> str:
+        """Return the document."""
+        return json_text(self.as_dict())
+
+    @classmethod
+    def parse(cls, text: str | bytes, where: object) -> Self:
+        """Read a document, whose origin begins the message of an error.
+
+        Raises
+        ------
+        ResultsError
+            If it is damaged or of another format.
+        """
+        try:
+            content = read_json(text, cls.VALUES)
+        except ValueError as error:
+            raise cls._damaged(where, error) from error
+        check_format(content, cls.FORMAT, where)
+        try:
+            facts: Self = _adapter(cls).validate_python(content)  # type: ignore[arg-type]
+        except ValidationError as error:
+            part = error.errors(include_url=False, include_input=False)[0]["loc"][0]
+            raise cls._damaged(where, f"`{part}` is not what it must be") from error
+        if not is_as_written(content):
+            raise cls._damaged(where, "its content is not what was written")
+        return facts
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read a document's file; a `ResultsError` if there is none, or as of `parse`."""
+        try:
+            return cls.parse(read_bounded(path), path)
+        except OSError as error:
+            raise ResultsError(
+                f"{path.parent}: no results here ({path.name}: {error.strerror}); make some with "
+                "roadeval replay, or roadeval fleet"
+            ) from error
+        except ValueError as error:
+            raise cls._damaged(path, error) from error
 
     @property
     def evaluation(self) -> EvaluationSettings:
@@ -115,14 +167,16 @@ class _Facts:
         try:
             return EvaluationSettings(**{name: given[name] for name in known & {*given}})
         except (TypeError, ValueError) as error:
-            raise ResultsError(
-                "a summary is damaged (`run.evaluation` is not what it must be); make the results "
-                "anew"
-            ) from error
+            what = "`run.evaluation` is not what it must be"
+            raise self._damaged("a summary", what) from error
+
+    @classmethod
+    def _damaged(cls, where: object, what: object) -> ResultsError:
+        return ResultsError(f"{where}: damaged ({what}); {cls.AGAIN}")
 
 
 @dataclass(frozen=True)
-class Facts(_Facts):
+class Facts(_Document):
     """The facts of one drive: the content of ``summary.json``."""
 
     verdict: str
@@ -170,15 +224,15 @@ class Facts(_Facts):
     files: list[str] = field(default_factory=list)
     """The files of the results folder; a recording has none."""
 
+    FORMAT = {"name": "roadeval-summary", "version": 4}  # noqa: RUF012
+    AGAIN = "make it again with roadeval replay"
+    VALUES = 200_000  # a run with two variants writes some two thousand
     RESULTS = (
         *("verdict", "frames", "totals", "beyond", "curves", "difference"),
         *("against_unfiltered", "against_blind", "seeds", "oracles", "windows", "claims"),
         *("health", "warnings", "losses", "settings", "methods"),
     )
-    """Parts that are results, which ``digest`` covers. Whoever moves or renames files may mend what
-    the others say of them."""
     OPTIONAL = ("curves", "seeds", "methods", "masks", "files")
-    """Parts that are left out where they are empty."""
 
     @cached_property
     def finals(self) -> dict[str, str]:
@@ -204,52 +258,6 @@ class Facts(_Facts):
     def sha256(self) -> str | None:
         """The SHA-256 of the log, where it is known."""
         return self.log.sha256 if self.log else None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the content of ``summary.json``; undefined numbers become None."""
-        content = asdict(self)
-        known = {k: value for k, value in content.items() if value or k not in self.OPTIONAL}
-        return _document(FORMAT, known, self.RESULTS)
-
-    def text(self) -> str:
-        """Return ``summary.json``."""
-        return json_text(self.as_dict())
-
-    @classmethod
-    def parse(cls, text: str, where: object) -> Self:
-        """Read the text of ``summary.json``.
-
-        Raises
-        ------
-        ResultsError
-            If it is damaged or of another format. ``where`` begins the message.
-        """
-        try:
-            content = read_json(text, VALUES)
-        except ValueError as error:
-            raise ResultsError(f"{where}: not a summary ({error}); make it anew") from error
-        _check_format(content, where)
-        for part in ("verdict", "drive", "frames", "totals"):
-            if part not in content:
-                raise ResultsError(f"{where}: not a summary (it has no {part})")
-        facts: Self = _typed(cls, content, where, MAKE)
-        if not is_as_written(content):
-            raise ResultsError(f"{where}: damaged ({ALTERED}); {MAKE}")
-        return facts
-
-    @classmethod
-    def read(cls, path: Path) -> Self:
-        """Read ``summary.json``; a `ResultsError` if there is none, or as of `parse`."""
-        try:
-            text = read_bounded(path).decode()
-        except OSError as error:
-            raise ResultsError(
-                f"{path.parent}: no results here ({SUMMARY}: {error.strerror}); "
-                "make some with roadeval replay"
-            ) from error
-        except ValueError as error:
-            raise ResultsError(f"{path}: not a summary ({error}); make it anew") from error
-        return cls.parse(text, path)
 
 
 def as_parts(effects: Iterable[Effect]) -> dict[str, Any]:
@@ -323,7 +331,7 @@ class ConditionFacts:
 
 
 @dataclass(frozen=True)
-class FleetFacts(_Facts):
+class FleetFacts(_Document):
     """The facts of many drives: the content of ``fleet.json``."""
 
     verdict: str
@@ -345,63 +353,16 @@ class FleetFacts(_Facts):
     run: dict[str, Any] = field(default_factory=dict)
     """The configuration of the fleet."""
 
+    FORMAT = FLEET_FORMAT
+    AGAIN = AGAIN
     RESULTS = (
-        "verdict",
-        "counts",
-        "frames",
-        "rates",
-        "effects",
-        "strata",
-        "conditions",
-        "warnings",
+        *("verdict", "counts", "frames", "rates", "effects", "strata", "conditions", "warnings"),
     )
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the content of ``fleet.json``; undefined numbers become None."""
-        return _document(FLEET_FORMAT, asdict(self), self.RESULTS)
-
-    def text(self) -> str:
-        """Return ``fleet.json``."""
-        return json_text(self.as_dict())
-
-    @classmethod
-    def read(cls, folder: Path) -> Self:
-        """Read ``fleet.json`` of a folder.
-
-        Raises
-        ------
-        ResultsError
-            If it is not there, damaged or of another format.
-        """
-        path = folder / FLEET
-        try:
-            content = read_json(read_bounded(path))
-        except OSError as error:
-            raise ResultsError(
-                f"{folder}: no fleet here ({FLEET}: {error.strerror}); make one with roadeval fleet"
-            ) from error
-        except ValueError as error:
-            raise ResultsError(f"{path}: damaged ({error}); {AGAIN}") from error
-        check_fleet_format(path, content)
-        facts: Self = _typed(cls, content, path, AGAIN)
-        if not is_as_written(content):
-            raise ResultsError(f"{path}: damaged ({ALTERED}); {AGAIN}")
-        return facts
 
 
 def is_fleet(path: str | Path) -> bool:
     """Return whether a path leads to a fleet's folder."""
     return (Path(path) / FLEET).is_file()
-
-
-def check_fleet_format(path: Path, content: Any) -> None:
-    """Raise a `ResultsError` unless the content of ``fleet.json`` is of this version's format."""
-    form = content.get("format") if isinstance(content, dict) else None
-    if form != FLEET_FORMAT:
-        raise ResultsError(
-            f"{path}: not of format {FLEET_FORMAT['name']} {FLEET_FORMAT['version']}: another "
-            "version of roadeval made it; use that one, or another folder"
-        )
 
 
 # --- JSON -----------------------------------------------------------------------------------------
@@ -412,27 +373,16 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
     return TypeAdapter(kind)
 
 
-def _typed(kind: Any, content: Any, where: object, remedy: str) -> Any:
-    """Read a document into its type; a `ResultsError` names the first part that does not fit."""
-    try:
-        return _adapter(kind).validate_python(content)
-    except ValidationError as error:
-        part = error.errors(include_url=False, include_input=False)[0]["loc"][0]
-        raise ResultsError(
-            f"{where}: damaged (`{part}` is not what it must be); {remedy}"
-        ) from error
-
-
-def _check_format(content: Any, where: object) -> None:
-    form = content.get("format") if isinstance(content, dict) else None
-    number = form.get("version") if isinstance(form, dict) else None
-    if not isinstance(number, int) or form != {**FORMAT, "version": number}:
-        raise ResultsError(f"{where}: not a summary of roadeval; {MAKE}")
-    if number != FORMAT["version"] or "digest" not in content:
-        versions = content.get("versions")
+def check_format(content: Any, form: Mapping[str, Any], where: object) -> None:
+    """Raise a `ResultsError` unless the content of a document is of a format."""
+    found = content.get("format") if isinstance(content, dict) else None
+    number = found.get("version") if isinstance(found, dict) else None
+    if not isinstance(number, int) or found != {**form, "version": number}:
+        raise ResultsError(f"{where}: not of format {form['name']}; make the results again")
+    if number != form["version"] or "digest" not in content:
+        versions = content.get("versions", {"roadeval": content.get("version")})
         made_by = versions.get("roadeval") if isinstance(versions, dict) else None
-        sentence = another_format(made_by, later=number > FORMAT["version"])
-        raise ResultsError(f"{where}: {sentence}")
+        raise ResultsError(f"{where}: {another_format(made_by, later=number > form['version'])}")
 
 
 def another_format(version: object, *, later: bool) -> str:
@@ -443,14 +393,7 @@ def another_format(version: object, *, later: bool) -> str:
         )
         return f"made by {made}: update roadeval"
     made = f"roadeval {visible(str(version))}" if version else "an earlier version of roadeval"
-    return f"made by {made}, whose format is no longer read: replay the log again"
-
-
-def _document(
-    form: Mapping[str, Any], content: Mapping[str, Any], results: Iterable[str]
-) -> dict[str, Any]:
-    document = plain({"format": form, **content})
-    return {**document, "digest": digest_of(document, results)}
+    return f"made by {made}, whose format is no longer read: replay again, to another place"
 
 
 def digest_of(content: Mapping[str, Any], parts: Iterable[str]) -> dict[str, Any]:

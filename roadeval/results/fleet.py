@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -24,7 +26,7 @@ from roadeval.results.facts import (
     ConditionFacts,
     FleetFacts,
     Member,
-    check_fleet_format,
+    check_format,
     digest_of,
     is_as_written,
     is_fleet,
@@ -39,6 +41,7 @@ from roadeval.runtime.files import alone, check_output, leads_outside, put
 from roadeval.runtime.text import is_utf8
 
 if TYPE_CHECKING:
+    import pandas as pd
     import pyarrow as pa
 
 RUN: Final = "run.toml"
@@ -103,7 +106,7 @@ class FleetFolder:
     def __init__(self, folder: Path, *, trust_sources: bool = False) -> None:
         self.path: Final = folder
         self.trust_sources: Final = trust_sources
-        self.facts: Final = FleetFacts.read(folder)
+        self.facts: Final = FleetFacts.read(folder / FLEET)
         if not all(is_plain(member.drive) for member in self.facts.drives):
             raise ResultsError(
                 f"{folder / FLEET}: damaged (a drive's name is not made of letters, digits, '-' "
@@ -141,15 +144,30 @@ class FleetFolder:
         except FileNotFoundError:
             raise ResultsError(f"{path}: is not there; {AGAIN}") from None
 
-    def scored(self) -> list[str]:
-        """Return the drives that have evaluated frames, in the tables' order."""
-        rows = self.table("drives", ["drive", "evaluated"]).to_pylist()
-        return [row["drive"] for row in rows if row["evaluated"]]
+    @cached_property
+    def drives(self) -> dict[str, dict[str, Any]]:
+        """The rows of ``drives`` by the drives' names in the fleet, in the tables' order."""
+        return {row["drive"]: row for row in self.table("drives").to_pylist()}
+
+    @cached_property
+    def names(self) -> dict[str, str]:
+        """The drives' names for people, no two of them equal, by their names in the fleet."""
+        times = Counter(row["name"] for row in self.drives.values())
+        return {
+            drive: row["name"] if times[row["name"]] == 1 else drive
+            for drive, row in self.drives.items()
+        }
 
     def frames(self, drive: str) -> pa.Table:
         """Read the rows of a drive's frames; a FileNotFoundError if none was scored."""
         remedy = f"remove {record_path(self.path, drive)} and {AGAIN}"
         return read_parquet(frames_path(self.path, drive), "frames", remedy=remedy)
+
+    def all_frames(self) -> Iterator[pd.DataFrame]:
+        """Yield the rows of each scored drive's frames."""
+        for drive, row in self.drives.items():
+            if row["evaluated"]:
+                yield self.frames(drive).to_pandas()
 
 
 # --- Records --------------------------------------------------------------------------------------
@@ -296,7 +314,7 @@ class FleetWriter:
             if is_fleet(self.folder):
                 with suppress(ValueError):  # damage: it is written anew
                     path = self.folder / FLEET
-                    check_fleet_format(path, read_json(read_bounded(path)))
+                    check_format(read_json(read_bounded(path)), FLEET_FORMAT, path)
             elif (
                 not (self.folder / RECORDS).is_dir()
                 and self.folder.is_dir()
@@ -339,8 +357,10 @@ class FleetWriter:
         with self._explained(), alone(*(self.folder / name for name in FILES)):
             write_tables(self.folder, members, _Records(self.folder, asked or {}))
             judged = [*judge_drives(self.folder, conditions, settings.least_frames)]
+            drives = read_parquet(self.folder / "drives.parquet", "drives").to_pylist()
             facts = summarise(
                 self.folder,
+                drives,
                 members,
                 settings,
                 run=dict(run),
@@ -348,8 +368,6 @@ class FleetWriter:
             )
             put(self.folder / RUN, run_toml.encode())
             put(self.folder / METRICS, json_text(plain(flat_metrics(facts))).encode())
-            columns = ["drive", "name", "status", "reason", "losses", "seconds", "verdict"]
-            drives = read_parquet(self.folder / "drives.parquet", "drives", columns).to_pylist()
             put(self.folder / JUNIT, junit_xml(self.folder.name, drives, judged))
             put(self.folder / FLEET, facts.text().encode())
         return facts

@@ -32,15 +32,14 @@ Rows = list[dict[str, Any]]
 
 def summarise(
     folder: Path,
+    drives: Rows,
     members: Sequence[Member],
     settings: EvaluationSettings,
+    *,
     run: dict[str, Any],
     conditions: list[ConditionFacts],
 ) -> FleetFacts:
-    """Make the facts of a fleet of the tables in its folder."""
-    columns = ["drive", "status", "reason", "evaluated", "sha256", "warnings"]
-    columns += [column.name for column in LIGHT]
-    drives: Rows = read_parquet(folder / "drives.parquet", "drives", columns).to_pylist()
+    """Make the facts of a fleet of the tables in its folder, and the rows of ``drives``."""
     rows = _final_effects(folder)
     copies = _copies(drives)
     groups = {each.drive: each.group or copies.get(each.drive, each.drive) for each in members}
@@ -75,12 +74,9 @@ def summarise(
 
 def _copies(drives: Rows) -> dict[str, str]:
     """Return drives whose log is another one's, byte for byte, and the first of these."""
-    logs: dict[str, str] = {}
-    for row in drives:
-        if row["sha256"]:
-            logs.setdefault(row["sha256"], row["drive"])
-    firsts = {row["drive"]: str(logs.get(row["sha256"], row["drive"])) for row in drives}
-    return {drive: first for drive, first in firsts.items() if drive != first}
+    firsts = {row["sha256"]: row["drive"] for row in reversed(drives) if row["sha256"]}
+    known = {row["drive"]: firsts[row["sha256"]] for row in drives if row["sha256"]}
+    return {drive: first for drive, first in known.items() if drive != first}
 
 
 def _of_copies(copies: Mapping[str, str]) -> Iterator[str]:
@@ -202,14 +198,25 @@ def _strata(
 
 def _rates(folder: Path) -> Rows:
     """Return the rates of each final mask: the drives' mean, and of all pixels together."""
-    sums: dict[tuple[str, str], _Rates] = {}
+    masks: defaultdict[tuple[str, str], Rows] = defaultdict(list)
     columns = ["variant", "stage", "final", "region", "frames", *OUTCOMES, *METRICS]
     for row in final_rows(folder / "scores.parquet", columns):
-        sums.setdefault((row["variant"], row["stage"]), _Rates()).add(row)
+        masks[row["variant"], row["stage"]].append(row)
     return [
-        {"variant": variant, "stage": stage, **each.row()}
-        for (variant, stage), each in sums.items()
+        {"variant": variant, "stage": stage, **_over_all(own)}
+        for (variant, stage), own in masks.items()
     ]
+
+
+def _over_all(rows: Rows) -> dict[str, Any]:
+    counts = Counts(*(sum(row[name] for row in rows) for name in OUTCOMES))
+    known = {name: [row[name] for row in rows if row[name] is not None] for name in METRICS}
+    return {
+        "drives": len(rows),
+        "frames": sum(row["frames"] for row in rows),
+        **{name: math.fsum(own) / len(own) if own else None for name, own in known.items()},
+        **dict(zip(POOLED, metrics.of(counts).values(), strict=True)),
+    }
 
 
 def final_rows(path: Path, columns: Sequence[str] | None = None) -> Rows:
@@ -222,32 +229,6 @@ def final_rows(path: Path, columns: Sequence[str] | None = None) -> Rows:
         table = table.filter(compute.equal(table["region"], ALL))
     rows: Rows = table.to_pylist()
     return rows
-
-
-class _Rates:
-    """Rates of one mask, summed up over drives."""
-
-    def __init__(self) -> None:
-        self._drives = self._frames = 0
-        self._counts: Counter[str] = Counter()
-        self._sums: defaultdict[str, list[float]] = defaultdict(list)
-
-    def add(self, row: Mapping[str, Any]) -> None:
-        self._drives += 1
-        self._frames += row["frames"]
-        self._counts.update({name: row[name] for name in OUTCOMES})
-        for name in METRICS:
-            if row[name] is not None:
-                self._sums[name].append(row[name])
-
-    def row(self) -> dict[str, Any]:
-        counts = Counts(*(self._counts[name] for name in OUTCOMES))
-        means = {
-            name: math.fsum(self._sums[name]) / len(self._sums[name]) if self._sums[name] else None
-            for name in METRICS
-        }
-        pooled = dict(zip(POOLED, metrics.of(counts).values(), strict=True))
-        return {"drives": self._drives, "frames": self._frames, **means, **pooled}
 
 
 # --- Conditions on each drive ---------------------------------------------------------------------

@@ -1,16 +1,17 @@
-"""What a difference tells, in words: how sure it is, and the sentence that says so."""
+"""A result in words: differences, the verdict, notes on frames, seeds, and the paper's claims."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import Enum, auto
+from statistics import median
 from typing import Any, Final
 
-from roadeval.data import BASELINE, FILTERED, UNFILTERED
-from roadeval.data.words import in_percent, interval, plain_points
+from roadeval.data import BASELINE, FILTERED, FINAL_STAGE, UNFILTERED, Tally
+from roadeval.data.words import defined, in_percent, interval, listing, percent, plain_points
 from roadeval.evaluation.score import TESTED, Effect, final_stages
-from roadeval.evaluation.settings import EvaluationSettings
+from roadeval.evaluation.settings import FAILED_ERR, FAILED_FNR, NOTEWORTHY, EvaluationSettings
 from roadeval.evaluation.stats import Difference
 
 PROBABLY: Final = 0.2
@@ -212,3 +213,109 @@ def _alone(totals: Mapping[str, Mapping[str, Any]]) -> str:
         for variant, stage in stages.items()
     )
     return f"{TESTED} is {rates}; no frame with truth was trained on, so {BASELINE} is unknown."
+
+
+# --- Other seeds of the training -----------------------------------------------------------------
+
+
+def spread(values: Sequence[float | None]) -> tuple[float, float, float] | None:
+    """Return the median, least and greatest of the values that are defined; None without any."""
+    known = [value for value in values if defined(value)]
+    return (median(known), min(known), max(known)) if known else None
+
+
+def spread_in_words(values: Sequence[float | None]) -> str:
+    """Return how far a rate is spread, in percent.
+
+    >>> spread_in_words([0.01, 0.02, 0.04])
+    '2.00 (1.00 to 4.00)'
+    """
+    middle, *ends = map(percent, spread(values) or [None] * 3)
+    return f"{middle} ({' to '.join(ends)})" if spread(values) else middle
+
+
+def seeds_in_words(seeds: Mapping[str, Any]) -> str:
+    """Name the seeds of ``seeds`` in ``summary.json``.
+
+    >>> seeds_in_words({"seeds": [3, 4, 5]})
+    'seeds 3 to 5'
+    """
+    first, *_, last = seeds["seeds"]
+    return f"seeds {first} to {last}"
+
+
+def of_seeds(seeds: Mapping[str, Any]) -> str:
+    """Return what other seeds make of the final masks' ERR and of the filter's effect.
+
+    Parameters
+    ----------
+    seeds
+        As ``seeds`` in ``summary.json``.
+    """
+    parts = [
+        f"{variant} {percent(least)} to {percent(most)} % (middle {percent(middle)})"
+        for variant, stages in seeds["totals"].items()
+        for middle, least, most in filter(None, [spread(stages[FINAL_STAGE][TESTED])])
+    ]
+    if effect := spread(seeds["difference"].get(FINAL_STAGE, {}).get(TESTED, ())):
+        middle, least, most = map(plain_points, effect)
+        parts.append(f"{FILTERED} minus {UNFILTERED} {least} to {most} pp (middle {middle})")
+    begin = f"With {seeds_in_words(seeds)} of the training"
+    if not parts:
+        return f"{begin} {TESTED} of {FINAL_STAGE} is undefined on every frame."
+    return (
+        f"{begin} {TESTED} of {FINAL_STAGE} is: {listing(parts)}. Tables and recording are those "
+        f"of seed {seeds['seeds'][0]}."
+    )
+
+
+# --- A frame --------------------------------------------------------------------------------------
+
+
+def notes_of(tallies: Iterable[Tally]) -> tuple[str, ...]:
+    """Return the notes on a frame from its tallies; none on a frame that is not evaluated."""
+    finals = {tally.variant: tally.rates for tally in tallies}
+    blind = finals.pop(BASELINE, None)
+    return tuple(notes(finals, blind))
+
+
+def notes(
+    finals: Mapping[str, Mapping[str, float]], blind: Mapping[str, float] | None
+) -> Iterator[str]:
+    """Yield what a person should know of a frame, in sentences.
+
+    Parameters
+    ----------
+    finals
+        The rates of each variant's final mask.
+    blind
+        Those of the baseline, or None.
+    """
+    if FILTERED in finals and UNFILTERED in finals:
+        change = finals[FILTERED]["ERR"] - finals[UNFILTERED]["ERR"]
+        if abs(change) >= NOTEWORTHY:
+            verb = "raised" if change > 0 else "lowered"
+            yield f"The filter {verb} ERR by {percent(abs(change), 1)} pp on this frame."
+    for name, rates in finals.items():
+        if rates["FNR"] >= FAILED_FNR:
+            yield f"{name} finds {percent(1 - rates['FNR'], 1)} % of the road."
+        elif rates["ERR"] >= FAILED_ERR:
+            yield f"{name} gets {percent(rates['ERR'], 1)} % of the pixels wrong."
+    for name, rates in finals.items():
+        if blind is not None and (excess := rates["ERR"] - blind["ERR"]) >= NOTEWORTHY:
+            yield (
+                f"{name} is {percent(excess, 1)} pp worse than {BASELINE}, which never looks at "
+                f"the image (ERR {percent(blind['ERR'], 1)} %)."
+            )
+
+
+# --- The paper's claims ---------------------------------------------------------------------------
+
+CLAIMED: Final = {
+    "filter_ERR": "ERR is lower with the filter (section 5, figure 3a)",
+    "filter_FPR": "FPR is lower with the filter (section 5, figure 3b)",
+    "filter_FNR": "FNR is lower with the filter (section 5, figure 3b)",
+    "svm_ERR": "ERR of the SVM is lower than that of the colour distance (section 4.3)",
+    "post_ERR": "ERR after post-processing is lower than after the SVM (section 4.4)",
+}
+"""By the names of `roadeval.evaluation.score.CLAIMS`; the last two are of the filtered variant."""

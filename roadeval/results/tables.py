@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -412,9 +412,3 @@ def parquet_rows(table: pa.Table, name: str) -> Rows:
     schema = TABLES[name]
     there = set(table.column_names)
     return _arrays(table, [c for c in (*schema.columns, *schema.of_a_fleet) if c.name in there])
-
-
-def rows_as_dicts(table: pa.Table) -> Iterator[dict[str, Any]]:
-    """Yield the rows of a table; what is undefined is None."""
-    for batch in table.to_batches(max_chunksize=BATCH):
-        yield from batch.to_pylist()

@@ -181,7 +181,7 @@ def test_a_results_folder_of_another_format_is_one_line(tmp_path):
     (tmp_path / "summary.json").write_text(json.dumps({"format": {"name": "other"}}))
     run = here("report", tmp_path)
     assert run.returncode == 1
-    assert "not a summary of roadeval" in run.stderr
+    assert "not of format roadeval-summary" in run.stderr
 
 
 def test_the_same_result_gives_the_same_file_and_nothing_is_left_beside_nor_fetched(

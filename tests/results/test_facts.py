@@ -9,7 +9,7 @@ import pytest
 
 from roadeval.evaluation.score import drive_effects
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.facts import FORMAT, Facts, LogFacts, as_parts, digest_of, json_text, plain
+from roadeval.results.facts import Facts, LogFacts, as_parts, digest_of, json_text, plain
 from roadeval.results.tables import ResultsError
 from tests.evaluation.test_effects import a_mask
 from tests.results.making import facts_of
@@ -83,29 +83,29 @@ def test_damaged_settings_are_one_line(given):
     ("summary", "told"),
     [
         (
-            {"format": {**FORMAT, "version": 1}},
+            {"format": {**Facts.FORMAT, "version": 1}},
             "made by an earlier version of roadeval, whose format",
         ),
         (
-            {"format": {**FORMAT, "version": 2}, "versions": {"roadeval": "0.2.0"}},
+            {"format": {**Facts.FORMAT, "version": 2}, "versions": {"roadeval": "0.2.0"}},
             "made by roadeval 0.2.0, whose format",
         ),
         (
-            {"format": FORMAT, "versions": {"roadeval": "0.2.0"}},
+            {"format": Facts.FORMAT, "versions": {"roadeval": "0.2.0"}},
             "made by roadeval 0.2.0, whose format",
         ),
         (
-            {"format": FORMAT, "versions": ["0.2.0"]},
+            {"format": Facts.FORMAT, "versions": ["0.2.0"]},
             "made by an earlier version of roadeval, whose",
         ),
-        ({"format": {**FORMAT, "version": 5}}, "made by a later version: update roadeval"),
+        ({"format": {**Facts.FORMAT, "version": 5}}, "made by a later version: update roadeval"),
         (
-            {"format": {**FORMAT, "version": 9}, "versions": {"roadeval": "9.\n"}},
+            {"format": {**Facts.FORMAT, "version": 9}, "versions": {"roadeval": "9.\n"}},
             r"made by roadeval 9.\n, a later version: update",
         ),
-        ({"format": {**FORMAT, "version": "x"}}, "not a summary of roadeval; make it anew"),
-        ({"format": {"name": "other", "version": 3}}, "not a summary of roadeval; make it anew"),
-        ([3], "not a summary of roadeval; make it anew"),
+        ({"format": {**Facts.FORMAT, "version": "x"}}, "not of format roadeval-summary"),
+        ({"format": {"name": "other", "version": 3}}, "not of format roadeval-summary"),
+        ([3], "not of format roadeval-summary"),
     ],
 )
 def test_a_summary_of_another_format_is_refused_with_who_wrote_it(summary, told):
@@ -137,7 +137,7 @@ def test_a_part_of_another_shape_is_damage(part, value):
 def test_a_document_without_its_first_parts_is_no_summary(part):
     content = json.loads(WRITTEN.text())
     del content[part]
-    with pytest.raises(ResultsError, match=f"here: not a summary .it has no {part}"):
+    with pytest.raises(ResultsError, match=f"here: damaged .`{part}` is not what it must be"):
         Facts.parse(json.dumps(content), "here")
 
 
@@ -184,5 +184,5 @@ def test_parts_that_a_later_version_covers_are_checked_by_this_one():
     ],
 )
 def test_a_text_that_nests_without_end_is_no_summary(text):
-    with pytest.raises(ResultsError, match="here: not a summary"):
+    with pytest.raises(ResultsError, match="here: damaged|here: not of format"):
         Facts.parse(text, "here")

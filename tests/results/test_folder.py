@@ -15,7 +15,7 @@ import pytest
 from roadeval.data import FrameResult, Packed, Role
 from roadeval.evaluation.score import BlindPrior, Scoreboard
 from roadeval.evaluation.settings import EvaluationSettings
-from roadeval.results.facts import FORMAT, Facts, FrameAccount, digest_of
+from roadeval.results.facts import Facts, FrameAccount, digest_of
 from roadeval.results.folder import ResultsFolder, ResultsWriter, belonging
 from roadeval.results.schema import OF_A_DRIVE
 from roadeval.results.tables import ResultsError
@@ -361,11 +361,11 @@ def test_a_folder_without_results_says_how_to_make_some(tmp_path: Path) -> None:
 
 
 FORM = '{"format": {"name": "roadeval-summary"'
-SHORT = json.dumps({"format": FORMAT, "digest": digest_of({}, ())})
+SHORT = json.dumps({"format": Facts.FORMAT, "digest": digest_of({}, ())})
 
 
 @pytest.mark.parametrize("text", ["{", "[]", FORM + "}}", SHORT])
 def test_a_file_that_is_no_summary_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "summary.json").write_text(text)
-    with pytest.raises(ResultsError, match="not a summary"):
+    with pytest.raises(ResultsError, match="damaged|not of format"):
         ResultsFolder(tmp_path)

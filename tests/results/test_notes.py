@@ -4,10 +4,10 @@ import pytest
 
 from roadeval.data import Counts, Tally
 from roadeval.evaluation import metrics
-from roadeval.results.notes import Rates, notes, of_tallies
+from roadeval.results.sentences import notes, notes_of
 
 
-def with_error(percent: int, road: int = 50) -> Rates:
+def with_error(percent: int, road: int = 50) -> dict[str, float]:
     """Rates of a frame of 100 pixels, of which ``percent`` are called road wrongly."""
     return metrics.of(Counts(tp=road, tn=100 - road - percent, fp=percent, fn=0))
 
@@ -46,5 +46,5 @@ def test_the_last_stage_of_each_variant_counts_and_blind_is_none_of_them() -> No
     named = [("net", "svm", 40), ("net", "post", 14), ("blind", "post", 7)]
     tallies = [Tally(v, s, Counts(), rates=with_error(percent)) for v, s, percent in named]
     finals = {"net": with_error(14)}
-    assert of_tallies(tallies) == tuple(notes(finals, with_error(7)))
-    assert of_tallies(()) == ()
+    assert notes_of(tallies) == tuple(notes(finals, with_error(7)))
+    assert notes_of(()) == ()

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from roadeval.cli.screens import tables
 from roadeval.data import FINAL_STAGE
-from roadeval.data.words import interval, percent
+from roadeval.data.words import interval
 from roadeval.report.blocks import Table
-from roadeval.results.seeds import Spread, in_words, seeds_in_words, sentence, spreads
+from roadeval.results.sentences import of_seeds, seeds_in_words, spread, spread_in_words
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,25 +32,18 @@ def show(seeds: Mapping[str, Any], titles: Mapping[str, str], out: Console) -> N
         "to the greatest)"
     )
     rows = [
-        [variant, *(_cell(own.get(rate)) for rate in titles)]
+        [variant, *(spread_in_words(stages[FINAL_STAGE].get(rate, ())) for rate in titles)]
         for variant, stages in seeds["totals"].items()
-        for own in (spreads(stages[FINAL_STAGE]),)
     ]
     tables.show_table(Table(["variant", *titles.values()], rows), out)
     out.print()
-    out.print(sentence(seeds))
+    out.print(of_seeds(seeds))
 
 
 def differences(seeds: Mapping[str, Any]) -> dict[str, str]:
     """Return by rate from where to where the filter's effect goes; nothing without seeds."""
-    by_rate = spreads(seeds.get("difference", {}).get(FINAL_STAGE, {}))
     return {
-        rate: f"{seeds_in_words(seeds)}: {tables.ascii_of(told)}"
-        for rate, spread in by_rate.items()
-        if spread
-        for told in [interval(spread.least, spread.greatest)]
+        rate: f"{seeds_in_words(seeds)}: {tables.ascii_of(interval(least, most))}"
+        for rate, values in seeds.get("difference", {}).get(FINAL_STAGE, {}).items()
+        for _, least, most in filter(None, [spread(values)])
     }
-
-
-def _cell(spread: Spread | None) -> str:
-    return in_words(spread) if spread else percent(None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
-from roadeval.data import BASELINE
+from roadeval.data import BASELINE, FINAL_STAGE
 from roadeval.data.words import DASH, defined, interval, listing, number, percent, points
 from roadeval.evaluation.metrics import FULL, METRICS, OVERLAP, SHORT
 from roadeval.evaluation.stats import STUDENT_FROM
@@ -23,11 +23,11 @@ from roadeval.report.blocks import (
 )
 from roadeval.report.findings import Findings, FleetFindings, worse_than_baseline
 from roadeval.report.images import jpeg
-from roadeval.report.sections import seeds
 from roadeval.report.sections.common import variant_cell
 from roadeval.results.facts import FleetFacts, FrameAccount, OverDrives
 from roadeval.results.rows import ACCOUNT
 from roadeval.results.schema import DAMAGED, FAILED, SCORED, UNSCORED
+from roadeval.results.sentences import of_seeds, seeds_in_words, spread_in_words
 
 CROWDED: Final = 7
 """Rows of the tables and warnings together that leave room for all thumbnails."""
@@ -65,11 +65,18 @@ def _of_a_drive(findings: Findings) -> Iterator[Block]:
         yield Text(note, "note")
     if findings.totals:
         yield rates_table(findings)
-        yield from seeds.blocks(findings)
+        if seeds := findings.facts.seeds:
+            yield Table(
+                ["final mask", *FULL],
+                _seeds(findings),
+                caption=f"Percent, with {seeds_in_words(seeds)} of the training: the middle, and "
+                "from the least to the greatest.",
+            )
+            yield Text(of_seeds(seeds), "note")
     beware = list(warnings(findings))
     if findings.thumbnails:
         # A crowded page has room for one row of four only.
-        rows = len(findings.finals) + len(seeds.rows(findings)) + len(beware)
+        rows = len(findings.finals) + len(_seeds(findings)) + len(beware)
         shown = findings.thumbnails[: 4 if rows > CROWDED else None]
         yield ImageGrid([(image.title, jpeg(image)) for image in shown], 4)
         yield Text(_legend(findings), "note")
@@ -200,6 +207,18 @@ def _effect_cells(each: OverDrives, *, first: bool) -> list[Cell | str]:
         interval(each.low, each.high),
         *(DASH if count is None else number(count) for count in (each.worse, each.better)),
         points(each.pooled),
+    ]
+
+
+def _seeds(findings: Findings) -> list[list[Cell | str]]:
+    """Return the spread of rates over seeds, a row for each variant that learns."""
+    names = [*findings.finals]
+    return [
+        [
+            variant_cell(name, names),
+            *(spread_in_words(stages[FINAL_STAGE].get(rate, ())) for rate in FULL),
+        ]
+        for name, stages in findings.facts.seeds.get("totals", {}).items()
     ]
 
 
