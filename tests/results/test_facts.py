@@ -184,5 +184,5 @@ def test_parts_that_a_later_version_covers_are_checked_by_this_one():
     ],
 )
 def test_a_text_that_nests_without_end_is_no_summary(text):
-    with pytest.raises(ResultsError, match="here: damaged|here: not of format"):
+    with pytest.raises(ResultsError, match=r"here: damaged|here: not of format"):
         Facts.parse(text, "here")

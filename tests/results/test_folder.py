@@ -367,5 +367,5 @@ SHORT = json.dumps({"format": Facts.FORMAT, "digest": digest_of({}, ())})
 @pytest.mark.parametrize("text", ["{", "[]", FORM + "}}", SHORT])
 def test_a_file_that_is_no_summary_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "summary.json").write_text(text)
-    with pytest.raises(ResultsError, match="damaged|not of format"):
+    with pytest.raises(ResultsError, match=r"damaged|not of format"):
         ResultsFolder(tmp_path)

@@ -66,7 +66,7 @@ def test_damage_is_mended_by_the_same_command(folder):
 
 def test_another_version_s_folder_is_not_written_to(folder):
     change(folder / "fleet.json", format={"name": "roadeval-fleet", "version": 9})
-    with pytest.raises(ResultsError, match="made by roadeval .*, a later version"):
+    with pytest.raises(ResultsError, match=r"made by roadeval .*, a later version"):
         fleet_of(folder, 5)
 
 
