@@ -16,6 +16,8 @@ MOST: Final = 4
 """Changes of one case."""
 LENGTHS: Final = (1, 2, 4, 8, 9, 31, 64, 300, 512, 2000, 4096)
 NUMBERS: Final = (0, 1, 8, 0x7F, 0xFF, 0xFFFF, 1 << 31, 1 << 32, 1 << 62, (1 << 64) - 1)
+CHUNK_HEAD: Final = (0, 1, 9, 17, 25, 33, 37, 41, 44, 45)
+"""Where the parts of a chunk's head begin, whatever its compression is called."""
 FOOTER_CRC_FROM_END: Final = len(broken.MAGIC) + 4
 
 
@@ -36,7 +38,8 @@ Change = Callable[[bytes, Choices], bytes]
 
 def damaged(intact: Intact, choices: Choices) -> Damaged:
     """Damage a log as the choices say."""
-    return choices.of((_bytes, _bytes, _records, _summary, _inside, _messages))(intact, choices)
+    kinds = (_bytes, _bytes, _heads, _heads, _records, _summary, _inside, _messages)
+    return choices.of(kinds)(intact, choices)
 
 
 def _bytes(intact: Intact, choices: Choices) -> Damaged:
@@ -74,6 +77,14 @@ def _number(data: bytes, at: int, choices: Choices) -> bytes:
     return broken.over(data, at, packed)
 
 
+def _near(data: bytes, at: int, choices: Choices) -> bytes:
+    """Make a number a little larger or smaller, as a length that is almost right."""
+    width = min(choices.of((4, 8)), len(data) - at)
+    by = choices.of((1, -1, 8, -8, 64, 256))
+    number = int.from_bytes(data[at : at + width], "little") + by
+    return broken.over(data, at, (number % (1 << 8 * width)).to_bytes(width, "little"))
+
+
 def _cut(data: bytes, at: int, choices: Choices) -> bytes:
     return data[:at]
 
@@ -100,6 +111,16 @@ def _swap(data: bytes, at: int, choices: Choices) -> bytes:
 
 
 CHANGES: Final = (_flip, _flip, _overwrite, _number, _cut, _remove, _insert, _swap)
+
+
+def _heads(intact: Intact, choices: Choices) -> Damaged:
+    """Change the kinds, lengths, times and checksums in the heads of records."""
+    data = intact.data
+    for _ in range(1 + choices.number(2)):
+        opcode, begin, _ = choices.of(intact.records)
+        at = choices.of(CHUNK_HEAD if opcode == Opcode.CHUNK else (0, 1))
+        data = choices.of((_near, _number, _flip))(data, begin + at, choices)
+    return Damaged(data)
 
 
 def _records(intact: Intact, choices: Choices) -> Damaged:
@@ -129,7 +150,7 @@ def _summary(intact: Intact, choices: Choices) -> Damaged:
     end = len(data) - FOOTER_CRC_FROM_END
     for _ in range(1 + choices.number(MOST)):
         at = begin + choices.number(end - begin)
-        change = choices.of((_flip, _number, _overwrite))
+        change = choices.of((_flip, _number, _near, _overwrite))
         data = change(data[:end], at, choices) + data[end:]
     return Damaged(broken.mended(data))
 
@@ -146,7 +167,7 @@ def _inside(intact: Intact, choices: Choices) -> Damaged:
         begin, end = choices.of(places)
         head = 49 if data[begin] == Opcode.CHUNK else broken.HEAD
         at = begin + min(head + choices.number(end - begin), end - begin - 1)
-        change = choices.of((_flip, _number, _overwrite))
+        change = choices.of((_flip, _number, _near, _overwrite))
         new = data[:begin] + change(data[begin:end], at - begin, choices) + data[end:]
         changed += [i for i in range(begin, end) if new[i] != data[i]]
         data = new

@@ -212,7 +212,9 @@ class Container:
         logs = self._file()
         if self.summary.statistics is not None and not self._is_as_counted(logs):
             logs = self._file(look=True)
-        if logs.keys() - self.channels.keys():  # perhaps they are described in damaged chunks alone
+        if not all(map(self._is_described, logs)):  # perhaps what describes them is damaged
+            late = (each for each in self.scan.late if isinstance(each, Schema) or each.id in logs)
+            self.scan.define(*late)
             for chunk in self.chunks:
                 if chunk.offset in self.reader.bad:
                     self.scan.define(*definitions(self.reader.remains(chunk)))
@@ -240,8 +242,7 @@ class Container:
         if number in self.scan.seen:
             return self.scan.seen[number]
         index = self.scan.indexes[number] or {}
-        for channel, schema in map(self._described, index):
-            look = look or channel is None or (schema is None and channel.schema_id != 0)
+        look = look or not all(map(self._is_described, index))
         with suppress(BadRecord):
             return self.scan.look(number) if look or not index else index
         return index
@@ -249,6 +250,10 @@ class Container:
     def _described(self, channel_id: int) -> tuple[Channel | None, Schema | None]:
         channel = self.channels.get(channel_id)
         return channel, self.schemas.get(channel.schema_id) if channel else None
+
+    def _is_described(self, channel_id: int) -> bool:
+        channel, schema = self._described(channel_id)
+        return channel is not None and (schema is not None or channel.schema_id == 0)
 
     def _redefine(self, logs: Mapping[int, ChannelLog]) -> bool:
         """Where a topic is described twice, choose by its messages; return whether any was changed.

@@ -49,6 +49,8 @@ PRIVATE: Final = 0x80
 """Opcodes from here on belong to applications."""
 PADDING: Final = 4
 """A message may be padded at its end to a multiple of so many bytes, as CDR does."""
+_EXTENSION: Final = 64
+"""Bytes that a later version of the format may add to a record; one with more is damaged."""
 
 BUFFER: Final = 16 << 10
 """Bytes that are read at once while walking from record to record."""
@@ -102,10 +104,15 @@ class FileBytes:
             raise BadRecord(f"unreadable on its disk ({error.strerror})") from error
 
     def read(self, size: int) -> bytes:
-        """Return the next bytes, as a file does; none at the end."""
-        data = self[self._at : self._at + size]
+        """Return the next bytes, as a file does; the last one alone, so that `left` tells of it."""
+        data = self[self._at : self._at + max(min(size, self.left - 1), 1)]
         self._at += len(data)
         return data
+
+    @property
+    def left(self) -> int:
+        """Bytes that were not read."""
+        return self._size - self._at
 
     def close(self) -> None:
         """Close the file."""
@@ -195,10 +202,12 @@ def parse(opcode: int, body: Buffer) -> Any:
     """Read a record that is neither message nor chunk, by the `mcap` library."""
     if opcode not in _READERS:
         raise BadRecord(f"a record of unknown kind {opcode}")
-    try:
-        return _READERS[opcode](_Strict(BytesIO(body)))
-    except (EndOfFile, struct.error, UnicodeDecodeError) as error:
-        raise BadRecord(f"a {Opcode(opcode).name.lower()} record that does not add up") from error
+    stream = BytesIO(body)
+    with suppress(EndOfFile, struct.error, UnicodeDecodeError):
+        record = _READERS[opcode](_Strict(stream))
+        if len(body) - stream.tell() <= _EXTENSION:
+            return record
+    raise BadRecord(f"a {Opcode(opcode).name.lower()} record that does not add up")
 
 
 def parse_chunk(source: Bytes, record: Record) -> Chunk:
@@ -220,7 +229,7 @@ def parse_chunk(source: Bytes, record: Record) -> Chunk:
 def parse_message_index(body: Buffer) -> tuple[int, Entries]:
     """Read a message index: the channel, and its messages."""
     channel_id, length = _INDEX_HEAD.unpack_from(body) if len(body) >= _INDEX_HEAD.size else (0, 1)
-    if length % 16 or _INDEX_HEAD.size + length > len(body):
+    if length % 16 or not 0 <= len(body) - _INDEX_HEAD.size - length <= _EXTENSION:
         raise BadRecord("a message index whose lengths contradict each other")
     entries = bytes(body[_INDEX_HEAD.size : _INDEX_HEAD.size + length])
     return channel_id, np.frombuffer(entries, "<i8").reshape(-1, 2)
@@ -272,7 +281,7 @@ class ChunkReader:
 
     def __init__(self, source: FileBytes, *, keep_corrupt: bool = False) -> None:
         self._source = source
-        self._keep_corrupt = keep_corrupt
+        self.keep_corrupt = keep_corrupt
         self._cache: OrderedDict[int, Bytes] = OrderedDict()
         self._doubts_left = DOUBTED + 4 * len(source)
         self.bad: dict[int, str] = {}
@@ -289,7 +298,7 @@ class ChunkReader:
             try:
                 records = self.remains(chunk) if chunk.cut else self._whole(chunk)
             except BadRecord as error:
-                if not self._keep_corrupt:
+                if not self.keep_corrupt:
                     self.bad[at] = str(error)
                     raise
                 self.kept[at] = f"{error}, used all the same"
@@ -305,22 +314,26 @@ class ChunkReader:
     def is_sound(self, chunk: Chunk) -> bool:
         """Whether the content of a chunk is what its head says.
 
-        Without a checksum it must consist of whole records. Of a file that claims one wrong chunk
-        after the other only so many are looked at.
+        Without a checksum it must consist of whole records. Compressed data must end with the
+        chunk. Of a file that claims one wrong chunk after the other only so many are looked at.
         """
         if self._doubts_left < 0 or chunk.data_end > len(self._source):
             return False
         with suppress(BadRecord):
-            records = self._whole(chunk)
+            records = self._whole(chunk, exact=True)
             if chunk.crc or max((each.end for each in walk(records)), default=0) == chunk.size:
                 self._keep(chunk.offset, records)
                 return True
         self._doubts_left -= chunk.data_size
         return False
 
-    def _whole(self, chunk: Chunk) -> Bytes:
+    def sized(self, chunk: Chunk) -> Chunk:
+        """Return a chunk with the size of what its data is uncompressed to."""
+        return chunk._replace(size=len(self.remains(chunk)))
+
+    def _whole(self, chunk: Chunk, *, exact: bool = False) -> Bytes:
         doubts_left = self._doubts_left
-        records = self._uncompressed(chunk, whole=True)
+        records = self._uncompressed(chunk, whole=True, exact=exact)
         if len(records) != chunk.size:
             raise BadRecord(f"a chunk of {len(records)} bytes that claims to hold {chunk.size}")
         if chunk.crc is None:
@@ -330,13 +343,13 @@ class ChunkReader:
         self._doubts_left = doubts_left
         return records
 
-    def _uncompressed(self, chunk: Chunk, *, whole: bool) -> Bytes:
+    def _uncompressed(self, chunk: Chunk, *, whole: bool, exact: bool = False) -> Bytes:
         if chunk.compression == "" and whole and chunk.data_size > IN_MEMORY:
             return self._source.part(chunk.data_offset, chunk.data_end)
         small = whole and chunk.size <= IN_MEMORY
         file = BytesIO() if small else SpooledTemporaryFile(max_size=IN_MEMORY)  # noqa: SIM115
         try:
-            for block in blocks(self._source, chunk):
+            for block in blocks(self._source, chunk, exact=exact):
                 self._doubts_left -= len(block)
                 file.write(block)
                 if whole and file.tell() > chunk.size:
@@ -361,7 +374,7 @@ def crc_of(records: Bytes) -> int:
     return crc
 
 
-def blocks(source: FileBytes, chunk: Chunk) -> Iterator[bytes]:
+def blocks(source: FileBytes, chunk: Chunk, *, exact: bool = False) -> Iterator[bytes]:
     """Uncompress a chunk into blocks of a bounded size, whatever they were compressed from."""
     import zstandard
 
@@ -382,6 +395,8 @@ def blocks(source: FileBytes, chunk: Chunk) -> Iterator[bytes]:
             if left < 0:
                 raise BadRecord(f"a chunk of more than {LARGEST_CHUNK >> 20} MiB")
             yield block
+        if exact and data.left:
+            raise BadRecord("a chunk that claims more bytes than its data has")
     except (zstandard.ZstdError, RuntimeError) as error:
         raise BadRecord(f"a chunk that {chunk.compression} cannot uncompress") from error
 

@@ -13,6 +13,7 @@ from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
+from itertools import chain
 from math import inf
 from typing import Any, Final, NamedTuple
 
@@ -106,6 +107,8 @@ class Scan:
         self.channels = dict(self.summary.channels)
         self.conflicts: list[tuple[int, Schema | Channel]] = []
         """Other descriptions than these outside chunks, with their offsets."""
+        self.late: list[Schema | Channel] = []
+        """Descriptions behind the data, from a summary that cannot be relied on."""
         self.gaps: list[Gap] = []
         self.data_end: int | None = None
         self.after_data: int | None = None
@@ -119,6 +122,9 @@ class Scan:
         self._source, self._reader, self._stamp_of = source, reader, stamp_of
         self._stop = None if self.summary.problem else self.summary.start
         self._records_left = RECORDS
+        self._unsure: dict[int, array[int]] = {}
+        """Messages as in ``loose``, but behind damage: they may be those of a damaged chunk."""
+        self._is_unsure = False
         self._finder = RecordFinder(source, reader, self.summary, self.channels)
         self._walk()
 
@@ -137,6 +143,10 @@ class Scan:
                 self.next_log = record.offset
                 return
             record = following
+        checked = self.chunks and all(chunk.crc for chunk in self.chunks)
+        for channel_id, values in self._unsure.items():
+            if self._reader.keep_corrupt or not checked:
+                self.loose.setdefault(channel_id, array("Q")).extend(values)
         size = len(self._source)
         if self.data_end is None and not any(gap.lossy and gap.end == size for gap in self.gaps):
             self._gap(size, size, "the file was never finished; what came after is not in it")
@@ -167,7 +177,7 @@ class Scan:
         if proven or not is_chunk:
             following = self._finder.hidden_chunk(record.end)
         if following is None:
-            following = self._finder.next(record.end if proven else record.body, record)
+            following = self._finder.next(record.end if proven else record.offset + 1, record)
         if is_chunk and not proven:
             record = self._remains(record.content, following.offset)
         kept = proven or is_chunk or following.offset > record.end - PADDING
@@ -181,6 +191,7 @@ class Scan:
                 self.indexes[-1] = None
             if self.data_end is None or following.opcode in (CHUNK, MESSAGE):
                 self._gap(begin, following.offset, reason)
+            self._is_unsure = True
         return following
 
     def _is_proven(self, record: Record) -> bool:
@@ -217,22 +228,28 @@ class Scan:
         opcode, content = record.opcode, record.content
         if opcode == MESSAGE:
             channel_id, log_time = content
-            if channel_id not in self.loose:
-                self.loose[channel_id] = array("Q")
-            self.loose[channel_id].extend((log_time, record.offset))
-        elif opcode == CHUNK:
-            self._take_chunk(content)
-        elif opcode == MESSAGE_INDEX and self.indexes:
-            self._take_index(*content)
+            messages = self._unsure if self._is_unsure else self.loose
+            messages.setdefault(channel_id, array("Q")).extend((log_time, record.offset))
         elif opcode in DEFINITIONS:
-            known: dict[int, Any] = self.schemas if opcode == Opcode.SCHEMA else self.channels
-            if known.setdefault(content.id, content) != content and self.data_end is None:
-                self.conflicts.append((record.offset, content))
-        elif opcode == Opcode.STATISTICS and self.summary.statistics is None:
-            self.summary.statistics = content
-        elif opcode == Opcode.DATA_END:
-            self.data_end, self.after_data = record.offset, record.end
-            self.data_crc = content.data_section_crc
+            self._take_definition(record.offset, content)
+        else:
+            self._is_unsure = False
+            if opcode == CHUNK:
+                self._take_chunk(content)
+            elif opcode == MESSAGE_INDEX and self.indexes:
+                self._take_index(*content)
+            elif opcode == Opcode.STATISTICS and self.summary.statistics is None:
+                self.summary.statistics = content
+            elif opcode == Opcode.DATA_END:
+                self.data_end, self.after_data = record.offset, record.end
+                self.data_crc = content.data_section_crc
+
+    def _take_definition(self, offset: int, record: Schema | Channel) -> None:
+        known: dict[int, Any] = self.schemas if isinstance(record, Schema) else self.channels
+        if self.data_end is not None and (record.id not in known or self.chunks):
+            self.late.append(record)
+        elif known.setdefault(record.id, record) != record:
+            self.conflicts.append((offset, record))
 
     def _take_chunk(self, chunk: Chunk) -> None:
         if chunk.repaired:
@@ -336,7 +353,7 @@ class RecordFinder:
         self._source, self._reader, self._summary = source, reader, summary
         self._size = len(source)
         self._channels = channels
-        self._listings = {chunk.listing for chunk in summary.chunks.values() if summary.checked}
+        self._sizes = {chunk.listing[2:] for chunk in summary.chunks.values() if summary.checked}
         self._proven: dict[int, Chunk] = {}
         self._known = summary.chunks if summary.checked else {}
         self._borders = sorted(self._known)
@@ -455,21 +472,23 @@ class RecordFinder:
             if agrees and listed and own.listing == listed.listing:
                 return own._replace(proven=True)
             heads = [own, own._replace(data_size=record.end - own.data_offset)]
+        tried = heads
         if offset in self._known:
             crc = int.from_bytes(self._source[record.body + 24 : record.body + 28], "little")
-            heads.append(self._known[offset]._replace(crc=crc or None))
-        for chunk in heads:
+            tried = [self._known[offset]._replace(crc=crc or None), *heads]
+        sized = (self._reader.sized(chunk) for chunk in heads if chunk.crc)
+        for chunk in chain(tried, sized):
             # Zeros would be an empty chunk.
             if chunk.data_size >= 0 and (chunk.size or agrees) and self._reader.is_sound(chunk):
                 repaired = not agrees or chunk != heads[0]
                 self._proven[offset] = chunk._replace(repaired=repaired, proven=True)
                 return self._proven[offset]
-        ends = [chunk.data_end for chunk in heads[:2]]
+        ends = [chunk.data_end for chunk in heads]
         if agrees and record.end <= min(self._border(offset), self._size):
             return heads[0]
         if ends and min(ends) > self._size >= heads[0].data_offset:
             return heads[0]._replace(data_size=self._size - heads[0].data_offset, cut=True)
-        for chunk in heads if chained else []:
+        for chunk in tried if chained else []:
             with suppress(BadRecord):
                 self.record(chunk.data_end, chained=False)
                 return chunk._replace(repaired=True)
@@ -528,8 +547,8 @@ class RecordFinder:
         opcode, content = record.opcode, record.content
         in_chunk = doubted.opcode == CHUNK and record.offset < doubted.end
         if opcode == CHUNK:
-            ours = content.listing in self._listings
-            if not self._listings:
+            ours = content.listing[2:] in self._sizes
+            if not self._sizes:
                 ours = content.compression in COMPRESSIONS and record.offset >= log_end
             return ours and (content.proven or not in_chunk)
         misplaced = opcode in (END, BORDER, Opcode.HEADER) or record.offset < log_end

@@ -6,6 +6,7 @@ What is promised of a log whose chunks have checksums:
   named as unreadable.
 - A frame that is missing, or there twice, is told: by a sentence on what is lost, or by refusing
   the log.
+- A frame whose chunks are intact is read, unless the whole log is refused.
 - No other frame suffers from damage inside one message.
 
 Without checksums of chunks the whole file may have one; then a wrong frame is possible, and told.
@@ -46,6 +47,9 @@ def compare(intact: Intact, bad: Damaged, reading: Reading) -> None:
             continue
         number = intact.number_of(time)
         if time not in found or found[time] == logged._replace(truth=None):
+            whole = intact.by_chunk and intact.is_whole(time, bad.data)
+            if whole and time not in found and found:
+                raise Lost(f"frame {number}, whose chunks are intact")
             if not (reading.told or (time in found and reading.without_truth)):
                 raise Lost(f"frame {number}" + " loses its truth" * (time in found))
         elif not reading.told or intact.is_whole(time, bad.data):
