@@ -1,1 +1,1 @@
-"""The tables of README.md and benchmarks/PRESETS.md, and what they are made from."""
+"""The tables in README.md, PRESETS.md and the site, and what they are made from."""

@@ -1,7 +1,7 @@
-"""The tables of README.md and benchmarks/PRESETS.md, and whether they say what was measured.
+"""The tables in the documents, and whether they say what was measured.
 
-python -m benchmarks.tables             checks both texts against benchmarks/tables/numbers.json
-python -m benchmarks.tables --write     writes the tables of both anew
+python -m benchmarks.tables             checks all texts against benchmarks/tables/numbers.json
+python -m benchmarks.tables --write     writes the tables of all anew
 python -m benchmarks.tables --measure   replays the drives and writes the numbers
 
 A drive comes from the folder named for it; see PRESETS.md for where to get them. ``--measure NAME``
@@ -121,7 +121,7 @@ def _arguments() -> argparse.Namespace:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--write", action="store_true", help="write the tables of both texts")
+    parser.add_argument("--write", action="store_true", help="write the tables of all texts")
     parser.add_argument(
         "--measure",
         nargs="*",

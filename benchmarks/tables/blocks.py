@@ -98,6 +98,50 @@ def _untouched() -> list[Drive]:
 # --- README.md ------------------------------------------------------------------------------------
 
 
+def findings(numbers: Numbers) -> str:
+    """Return what was found, in five lines."""
+    return "\n".join(map(_item, _findings(numbers)))
+
+
+def _findings(numbers: Numbers) -> Iterator[str]:
+    changes = {name: numbers["drives"][name]["paper"]["filter"]["ERR"]["seeds"] for name in DRIVES}
+    middles = [round(100 * median(each), 1) for each in changes.values()]
+    up, down = ([each for each in middles if sign * each > 0] for sign in (1, -1))
+    yield (
+        f"The filter of the paper raises ERR on {len(up)} of {len(DRIVES)} drives, by up to "
+        f"{max(up):.1f} points. It lowers ERR on {len(down)}, by up to {-min(down):.1f}."
+    )
+    below = sum(median(_err(numbers, d, "paper", "filtered")) < _blind(numbers, d) for d in DRIVES)
+    yield (
+        f"`blind` never looks at the image. The pipeline of the paper beats it on {below} of "
+        f"{len(DRIVES)} drives."
+    )
+    own = [name for name in DRIVES if _has_robust(numbers, name)]
+    errs = [median(_err(numbers, name, "robust", "unfiltered")) for name in own]
+    blind = [_blind(numbers, name) for name in own]
+    yield (
+        f"The preset `robust` gets {_range(errs)} % of the pixels wrong on {len(own)} drives, and "
+        f"`blind` {_range(blind)} %."
+    )
+    lite = numbers["idd"]
+    found = {name: _percent(median(each["ERR"])) for name, each in lite["variants"].items()}
+    yield (
+        f"On {lite['labelled']} drives of IDD Lite: `robust` {found['robust']} %, `blind` "
+        f"{_percent(lite['blind']['ERR'])} %, `gated` {found['gated']} %, no filter "
+        f"{found['unfiltered']} %, `paper` {found['paper']} %."
+    )
+    held = [numbers["drives"][name]["paper"]["claims"]["filter_ERR"] for name in DRIVES]
+    right, windows = (sum(each[key] for each in held) for key in ("held", "windows"))
+    yield f"The paper says that its filter lowers ERR: {right} of {windows} windows bear it out."
+
+
+def _range(errs: Sequence[float]) -> str:
+    return f"{_percent(min(errs))} to {_percent(max(errs))}"
+
+
+# --- docs/explanation -----------------------------------------------------------------------------
+
+
 def drives(numbers: Numbers) -> str:
     """Return ERR of every preset on every drive, and what became of the filters."""
     head = ["ERR, %", "`blind`", "no filter", "`paper`", "`gated`", "`robust`"]
@@ -536,6 +580,7 @@ def flicker(numbers: Numbers) -> str:
 MEASURE: Final = "python -m benchmarks.tables --measure"
 PAPER, GATED, ROBUST, SPREAD, PATCH = map(command, ("paper", "gated", "robust", "spread", "patch"))
 BLOCKS: Final = {
+    "findings": Block(findings, (MEASURE,)),
     "drives": Block(drives, (MEASURE,)),
     "claims": Block(claims, (PAPER,)),
     "order": Block(order, (PAPER,)),

@@ -7,6 +7,7 @@ class ExitCode(IntEnum):
     """Exit codes of every command."""
 
     DONE = 0
+    """Done."""
     FAILED = 1
     """Something found by opening a file or writing one; one line on stderr says what."""
     USAGE = 2

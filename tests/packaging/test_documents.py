@@ -12,7 +12,7 @@ PACKAGE = Path(roadeval.__file__).parent
 DOCUMENTS = [
     "README.md",
     "CONTRIBUTING.md",
-    *(f"docs/{path.name}" for path in ROOT.glob("docs/*.md")),
+    *(str(path.relative_to(ROOT)) for path in ROOT.glob("docs/**/*.md")),
 ]
 LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)[^)]*\)")
 QUOTED = re.compile(r"`((?:[\w.-]+/)+[\w.-]*)`")
@@ -48,7 +48,7 @@ def test_every_path_exists(name):
         for path in sorted(paths)
         if not path.startswith(ELSEWHERE) and not exists(path, document)
     ]
-    assert paths
+    assert paths or name.startswith("docs/")
     assert not missing
 
 

@@ -1,4 +1,4 @@
-"""docs/fleet.md has the tables' columns, and its queries answer what they say."""
+"""The page of fleets: its queries answer what they say, its manifests can be read."""
 
 import re
 import tomllib
@@ -9,12 +9,10 @@ import pytest
 
 import roadeval
 from roadeval.fleet.manifest import read_manifest
-from roadeval.results.schema import OF_DRIVES, documentation
 from tests.results.fleet.making import fleet_of
 
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "fleet.md"
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "fleet.md"
 TEXT = DOCUMENT.read_text()
-BEGIN, END = "<!-- tables -->\n", "<!-- end -->"
 
 
 def blocks(language):
@@ -43,11 +41,6 @@ def asked(fleets, monkeypatch):
     monkeypatch.chdir(fleets)
     with duckdb.connect() as database:
         yield lambda query: database.execute(query).df()
-
-
-def test_the_columns_are_the_schemas():
-    written = TEXT.partition(BEGIN)[2].partition(END)[0]
-    assert written == documentation((*OF_DRIVES, "frames"), "parquet") + "\n"
 
 
 def test_which_drives_got_worse_at_dusk(asked, fleets):
@@ -92,7 +85,7 @@ def test_the_manifests_say_the_same_of_a_drive_and_can_be_read(tmp_path):
     told = [read_manifest(tmp_path / name) for name in ("m.toml", "m.csv")]
     for one, other in zip(*told, strict=True):
         assert (one.path, one.group, one.tags) == (other.path, other.group, other.tags)
-    assert tomllib.loads(toml)["drives"][1]["labels"]["road"] == [7]
+    assert tomllib.loads(toml)["drives"][1]["labels"]["road"] == [3]
 
 
 def test_the_folder_is_what_the_page_says(fleets):

@@ -1,0 +1,161 @@
+"""What the site takes from the code and from other files of the project, as Markdown."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterator
+from inspect import getdoc, getsource
+from pathlib import Path
+from typing import Any, Final
+
+import typer.main
+
+import roadeval
+from roadeval.cli.app import app
+from roadeval.cli.exit_codes import ExitCode
+from roadeval.config import PRESETS
+from roadeval.evaluation.metrics import METRICS
+from roadeval.results import schema
+
+DOCS: Final = Path(__file__).resolve().parent
+ROOT: Final = DOCS.parent
+COPIES: Final = {
+    "contributing": ROOT / "CONTRIBUTING.md",
+    "changelog": ROOT / "CHANGELOG.md",
+    "explanation/measured": ROOT / "benchmarks" / "PRESETS.md",
+    "explanation/intervals": ROOT / "benchmarks" / "INTERVALS.md",
+    "explanation/benchmarks": ROOT / "benchmarks" / "README.md",
+}
+"""Pages that are a file elsewhere in the project, by their names on the site."""
+PAGES: Final = {path: DOCS / f"{name}.md" for name, path in COPIES.items()}
+LINK: Final = re.compile(r"(!?)\[([^\]]+)\]\((?!https?:|#)([^)#\s]+)(#[^)\s]*)?\)")
+MARK: Final = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
+
+
+def page(name: str, text: str) -> str:
+    """Return a page's text as the site shows it."""
+    path = COPIES.get(name, DOCS / f"{name}.md")
+    text = path.read_text(encoding="utf-8") if name in COPIES else text
+    made = MARK.sub(lambda mark: GENERATED[mark[1]](), text)
+    here = (DOCS / name).parent
+    return LINK.sub(lambda link: _linked(link, path.parent, here), made)
+
+
+def _linked(link: re.Match[str], origin: Path, here: Path) -> str:
+    """Lead a link to a page of the site; of one to a source file the words remain.
+
+    ``origin`` is the folder of the file that the link is written in, ``here`` that of its page.
+    """
+    picture, words, target, place = link.groups(default="")
+    path = Path(os.path.normpath(origin / target))
+    path = PAGES.get(path, path)
+    if picture or path.is_relative_to(DOCS):
+        return f"{picture}[{words}]({os.path.relpath(path, here)}{place})"
+    return words
+
+
+# --- The command line -----------------------------------------------------------------------------
+
+
+def commands() -> str:
+    """Return every command with its arguments and options, as ``--help`` prints them."""
+    group: Any = typer.main.get_command(app)
+    return "\n".join(line for name in group.commands for line in _command(group, name))
+
+
+def _command(group: Any, name: str) -> Iterator[str]:
+    command = group.commands[name]
+    context = command.make_context(name, [], resilient_parsing=True)
+    yield from (f"## {name}", "", command.help, "")
+    part = ""
+    for param in command.get_params(context):
+        flags, words = param.get_help_record(context) or ("", "")
+        of = getattr(param, "rich_help_panel", None) or (
+            "Arguments" if param.param_type_name == "argument" else "Options"
+        )
+        if of != part:
+            yield from ("", f"| {of} | |", "| --- | --- |")
+        part = of
+        yield f"| {_code(flags)} | {_cell(words)} |"
+    yield ""
+
+
+def _code(text: str) -> str:
+    return f"`{_cell(text)}`"
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", r"\|")
+
+
+def exit_codes() -> str:
+    """Return the exit codes with their meaning."""
+    described = re.findall(r' = (\d+)\n    """(.*?)"""', getsource(ExitCode), re.DOTALL)
+    assert len(described) == len(ExitCode)
+    return _table(("code", "meaning"), described)
+
+
+# --- Settings -------------------------------------------------------------------------------------
+
+
+def settings() -> str:
+    """Return every setting of every preset, in the form of ``roadeval config``."""
+    tables: dict[str, str] = {}
+    for preset in PRESETS:
+        text = roadeval.config_toml(roadeval.configure({"preset": preset}))
+        for part in re.split(r"\n\n(?=(?:#[^\n]*\n)*\[)", text):
+            head = re.search(r"^\[(.+)\]$", part, re.MULTILINE)
+            tables.setdefault(head[1] if head else "", part.strip())
+    first = tables.pop("")
+    parts = {"At the top": first, **{f"\\[{name}\\]": part for name, part in tables.items()}}
+    return "\n".join(f"## {name}\n\n```toml\n{part}\n```\n" for name, part in parts.items())
+
+
+# --- Results --------------------------------------------------------------------------------------
+
+
+def tables_of_a_drive() -> str:
+    """Return the tables of a drive with their columns."""
+    return schema.documentation(schema.OF_A_DRIVE, "csv")
+
+
+def tables_of_a_fleet() -> str:
+    """Return the tables of a fleet with their columns."""
+    return schema.documentation((*schema.OF_DRIVES, "frames"), "parquet")
+
+
+def rates() -> str:
+    """Return the rates with their formulas."""
+    rows = ((name, each.title, f"`{each.formula}`") for name, each in METRICS.items())
+    return _table(("rate", "meaning", "formula"), rows)
+
+
+# --- Python ---------------------------------------------------------------------------------------
+
+
+def python() -> str:
+    """Return the public names with the first sentence of each, linked to the API pages."""
+    return _table(("name", "what it is"), map(_name, roadeval.__all__))
+
+
+def _name(name: str) -> tuple[str, str]:
+    first = (getdoc(getattr(roadeval, name)) or "").partition("\n\n")[0]
+    return f'<a href="../api/roadeval.html#{name}"><code>{name}</code></a>', first
+
+
+def _table(head: tuple[str, ...], rows: Any) -> str:
+    lines = [head, ("---",) * len(head), *rows]
+    return "\n".join(f"| {' | '.join(map(_cell, line))} |" for line in lines)
+
+
+GENERATED: Final[dict[str, Callable[[], str]]] = {
+    "commands": commands,
+    "exit_codes": exit_codes,
+    "settings": settings,
+    "tables_of_a_drive": tables_of_a_drive,
+    "tables_of_a_fleet": tables_of_a_fleet,
+    "rates": rates,
+    "python": python,
+}
+"""What a mark ``<!-- generated: NAME -->`` stands for."""

@@ -1,0 +1,180 @@
+"""What README.md and the pages of the site say, done as a reader would, with small drives."""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import typer.main
+
+import roadeval
+from roadeval.cli.app import app
+from roadeval.logs import LogWriter
+from tests.e2e.commands import DEMO, ROADEVAL
+from tests.fixtures.drives import FRAMES, labels, scene, stamp
+from tests.fixtures.make import make
+from tests.networks.making import red_network
+from tests.results.fleet.making import fleet_of
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = ["README.md", *sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("docs/**/*.md"))]
+BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
+FILE = re.compile(r"# ([\w./-]+\.(?:csv|py|toml|yml))\n")
+BY_CI = "python3 -m venv .venv"
+"""Begins the two commands of README.md, which `.ci/run` runs."""
+
+
+def write_drive(path: Path, first: int = 0) -> None:
+    """Write a drive whose truth explains itself, from this scene on."""
+    path.parent.mkdir(exist_ok=True)
+    with LogWriter(path) as log:
+        for number in range(FRAMES):
+            image, _ = scene(first + number)
+            at, truth = stamp(first + number), labels(first + number, 255, 0, 128)
+            log.image("/front/image", at, encoded(image[..., ::-1]), "png")
+            log.mask("/front/road_mask", at, truth)
+
+
+def encoded(pixels: np.ndarray) -> bytes:
+    return cv2.imencode(".png", pixels)[1].tobytes()
+
+
+def write_images(folder: Path) -> None:
+    """Write the pictures of a drive, and two methods' masks of them, a file a frame."""
+    for name in ("images", "masks", "confidences"):
+        (folder / name).mkdir()
+    for number in range(FRAMES):
+        image, road = scene(number)
+        moved = np.roll(road, number % 5, axis=1) * np.uint8(255)
+        soft = cv2.blur(moved, (9, 9))
+        for name, pixels in (("images", image[..., ::-1]), ("masks", moved), ("confidences", soft)):
+            (folder / name / f"{number:04}.png").write_bytes(encoded(pixels))
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory) -> Path:
+    """What the pages speak of: drives, pictures, masks, a network, and results."""
+    folder = tmp_path_factory.mktemp("world")
+    for seed, name in enumerate(("last_week", "monday")):
+        fleet_of(folder / name, 30, seed, frames=5)
+    names = ("drive", "monday", "tuesday", "wednesday", "logs/a", "logs/b", "monday/a")
+    for i, name in enumerate(names):
+        write_drive(folder / f"{name}.mcap", first=FRAMES * i)
+    make("drives/street.mcap", folder)
+    (folder / "drives" / "street.mcap").rename(folder / "street.mcap")
+    (folder / "tuesday").mkdir()
+    shutil.copy(folder / "street.mcap", folder / "tuesday")
+    write_images(folder)
+    red_network(folder / "road.onnx")
+    reports = folder / "reports" / "drive"
+    roadeval.replay(folder / "drive.mcap", save=folder / "out.rrd", reports=reports)
+    for name in ("old", "new"):
+        shutil.copy(folder / "out.rrd", folder / f"{name}.rrd")
+    return folder
+
+
+def copy_of_the_demo(folder: Path) -> None:
+    """Put what README.md and the tutorial begin with into a folder."""
+    (folder / "recordings").mkdir()
+    shutil.copy(DEMO, folder / "recordings")
+
+
+def results_of_the_demo(folder: Path) -> None:
+    """Do what the first of README.md's two commands does, and draw the masks of its third."""
+    outputs = {"save": folder / "out.rrd", "reports": folder / "reports" / "demo"}
+    count = roadeval.replay(DEMO, **outputs).summary["frames"]["read"]
+    (folder / "masks").mkdir()
+    truths = roadeval.Recording(folder / "out.rrd")
+    for number in range(count):
+        moved = np.roll(truths.truth(number) == 1, 12, axis=1) * np.uint8(255)
+        (folder / "masks" / f"{number:04}.png").write_bytes(encoded(moved))
+
+
+@pytest.fixture
+def here(page, request, tmp_path) -> Path:
+    """A folder to follow a page in."""
+    if page in ("README.md", "docs/tutorial.md"):
+        copy_of_the_demo(tmp_path)
+        if page == "README.md":
+            results_of_the_demo(tmp_path)
+        return tmp_path
+    world = request.getfixturevalue("world")
+    return Path(shutil.copytree(world, tmp_path / "world", copy_function=os.link))
+
+
+@pytest.mark.timeout(600)  # a page of many commands, on a machine that is busy
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_does_what_it_says(page, here, pytestconfig):
+    text, said, end = (ROOT / page).read_text(), None, 0
+    written = text
+    for block in BLOCK.finditer(text):
+        language, content = block["language"], block["text"]
+        follows = said is not None and not text[end : block.start()].strip()
+        end = block.end()
+        if file := FILE.match(content):
+            (here / file[1]).unlink(missing_ok=True)
+            (here / file[1]).write_text(content)
+        elif language == "sh" and not content.startswith(BY_CI):
+            said = run(here, "bash", "-eu", "-c", content)
+            continue
+        elif language == "python":
+            run(here, "python", "-c", content)
+        elif language == "text" and follows:
+            if pytestconfig.getoption("write_golden"):
+                written = written.replace(f"```text\n{content}```", f"```text\n{said}```", 1)
+            else:
+                assert content == said
+        said = None
+    if written != text:
+        (ROOT / page).write_text(written)
+
+
+def run(folder: Path, *command: str) -> str:
+    """Run a command where everything lies; return what it prints."""
+    plain = {"COLUMNS": "80", "NO_COLOR": "1", "TERM": "dumb", "MPLBACKEND": "agg"}
+    path = f"{ROADEVAL.parent}{os.pathsep}{os.environ['PATH']}"
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        env={**os.environ, **plain, "PATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, f"{command[-1]}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_commands_that_are_not_run_have_these_options(page):
+    group = typer.main.get_command(app)
+    for block in BLOCK.finditer((ROOT / page).read_text()):
+        if block["language"] != "console":
+            continue
+        for line in re.findall(r"^\$ roadeval (.*)$", block["text"], re.MULTILINE):
+            name, *words = shlex.split(line, comments=True)
+            group.commands[name].make_context(name, words)
+
+
+def test_every_page_of_the_site_begins_with_an_example():
+    others = {"docs/index.md", "docs/architecture.md", "docs/explanation/presets.md"}
+    for page in {*PAGES} - {"README.md", *others}:
+        text = (ROOT / page).read_text()
+        if "The site shows [this file]" not in text:
+            before = text.partition("```")[0]
+            assert text.count("```") >= 2, page
+            assert len(before.split()) < 60, page
+
+
+def test_the_readme_is_short():
+    text = (ROOT / "README.md").read_text()
+    assert len(text.encode()) <= 8192
+    first = re.sub(r"`[^`]*`|\]\([^)]*\)|[*\[|]", " ", text.partition("## Two commands")[0])
+    for sentence in re.split(r"(?<=[.:?!])\s|\n\n", first):
+        assert len(sentence.split()) <= 25, sentence
