@@ -5,25 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from roadeval.data import BASELINE, ERRORS, TRUTH, Rows
+from roadeval.data import BASELINE, ERRORS, Rows
 from roadeval.data.rows import joined
 from roadeval.evaluation import score
 from roadeval.evaluation.comparison import Comparison, Side
 from roadeval.evaluation.metrics import SHORT
 from roadeval.evaluation.score import TESTED
 from roadeval.evaluation.settings import NOTEWORTHY
-from roadeval.jobs.page_frames import BYTES, PICTURED, fitting
-from roadeval.jobs.report_frames import rates_by_frame
+from roadeval.jobs.report_frames import BYTES, PICTURED, fitting, outcomes, rates_by_frame
 from roadeval.jobs.result import DriveResult
 from roadeval.report.blocks import Strip
 from roadeval.report.chart import Chart, Look, looks, looks_of_results
 from roadeval.report.charts.rates import over_frames, over_windows
 from roadeval.report.findings import NotableFrame
-from roadeval.report.images import LayerImage, faded
 from roadeval.report.sections.browse import BrowsedFrames, FrameFacts, strip
 from roadeval.results.rows import as_arrays, window_rows
 
@@ -118,7 +116,7 @@ def browsed(
         Returns the command that opens a frame.
     taken
         Returns the bytes of a page with these frames and none of their pictures: of those as many
-        are there as keep it below `roadeval.jobs.page_frames.BYTES`.
+        are there as keep it below `roadeval.jobs.report_frames.BYTES`.
     """
     if (found := compared_masks(sides)) is None:
         return None
@@ -169,22 +167,15 @@ def _strip(
 ) -> Strip:
     """Return a frame with its pictures."""
     *_, last = (mask.name for mask in masks if mask.name in facts.rates)
-    images = [*_images(facts, masks, opened)]
-    found = NotableFrame(facts.frame, facts.stamp_ns, last, facts.rates, images=images)
+    first, frame = opened[masks[0].result].recording, facts.frame
+    assert first is not None
+    errors = (
+        (
+            m.name,
+            opened[m.result].layer(m.own, ERRORS.name, frame) if m.name in facts.rates else None,
+        )
+        for m in masks
+    )
+    images = [*outcomes(first, frame, errors)]
+    found = NotableFrame(frame, facts.stamp_ns, last, facts.rates, images=images)
     return strip(found, [*facts.rates], command(facts.frame) if command else "")
-
-
-def _images(
-    facts: FrameFacts, masks: Sequence[ComparedMask], opened: Mapping[str, DriveResult]
-) -> Iterator[LayerImage]:
-    recordings = {label: own for label, each in opened.items() if (own := each.recording)}
-    first, frame = recordings[masks[0].result], facts.frame
-    image = first.image(frame)
-    yield LayerImage("camera", image)
-    yield LayerImage("truth", image, TRUTH, first.truth(frame))
-    for mask in masks:
-        if mask.name in facts.rates:
-            errors: Any = recordings[mask.result].layer(mask.own, ERRORS.name, frame)
-            yield LayerImage(f"{mask.name}: errors", image, ERRORS, errors)
-        else:
-            yield LayerImage(f"{mask.name}: no mask", faded(image))

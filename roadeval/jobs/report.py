@@ -8,8 +8,8 @@ from typing import Final
 
 from roadeval.errors import RoadevalError
 from roadeval.jobs.outputs import holding
-from roadeval.jobs.page_frames import browsed, strips_of
 from roadeval.jobs.report_findings import WORST_OF_FLEET, collect, collect_fleet
+from roadeval.jobs.report_frames import browsed, strips_of
 from roadeval.jobs.result import Result
 from roadeval.report.blocks import Document
 from roadeval.report.document import document, page_document, with_frames
@@ -109,7 +109,7 @@ def page_of(
 ) -> Document:
     """Return the page of a result as a document, with so many pictured frames.
 
-    Of a drive by default as many as `roadeval.jobs.page_frames.strips_of` says.
+    Of a drive by default as many as `roadeval.jobs.report_frames.strips_of` says.
     """
     findings = findings_of(result, commands, pictures or PICTURED)
     if result.drive is None:

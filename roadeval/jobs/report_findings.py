@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from roadeval.data import BASELINE, FILTERED, UNFILTERED, Packed, Rows, TruthBits
 from roadeval.evaluation import score
 from roadeval.evaluation.score import TESTED
-from roadeval.jobs.report_frames import FramePicker, evenly, variants_but_baseline
+from roadeval.jobs.report_frames import FramePicker, evenly
 from roadeval.jobs.result import DriveResult
 from roadeval.report.blocks import ImageFile
 from roadeval.report.findings import (
@@ -29,9 +29,6 @@ from roadeval.results.fleet import FleetFolder
 from roadeval.results.rows import as_arrays, change_rows, heat_rows, window_rows
 from roadeval.results.schema import ALL
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 SAMPLED: Final = 100
 """Frames whose masks are read for the maps, at most; tables know every frame."""
 WINDOWS: Final = 30
@@ -43,7 +40,7 @@ THUMBNAILS: Final = 8
 
 def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
     """Collect everything that the report of a result shows."""
-    frames, facts = result.frames, result.facts
+    rows, facts = result.rows, result.facts
     pictured = _pictured(result)
     changes, heat, sampled = _mask_sums(result, pictured)
     windows, window_size = _windows(result)
@@ -60,20 +57,16 @@ def collect(result: DriveResult, commands: Commands | None = None) -> Findings:
         windows=windows,
         window_size=window_size,
         paired=paired,
-        regions=score.by_region(result.regions) if len(frames) else result.regions,
+        regions=score.by_region(result.table("regions")) if len(rows) else {},
         overlap={
             variant: {stage: score.overlap(total) for stage, total in stages.items()}
             for variant, stages in facts.totals.items()
         },
         changes=_stage_changes(changes),
-        error_parts={
-            name: score.causes(result.rows, name).means() for name in variants_but_baseline(frames)
-        },
-        heatmaps=[
-            _heatmap(str(name), cells) for name, cells in heat.groupby("variant", sort=False)
-        ],
-        oracles=score.perfect_stages(result.extra("oracles"), frames),
-        levels=result.levels,
+        error_parts=picker.error_parts(),
+        heatmaps=[_heatmap(name, heat.of_variant(name)) for name in heat.distinct("variant")],
+        oracles=[*score.perfect_stages(result.table("oracles"), rows)],
+        levels=result.table("probabilities"),
         sampled=sampled,
         examples=picker.examples(_examples(facts, result.pictured, pictured)),
         thumbnails=picker.thumbnails(evenly(pictured, THUMBNAILS)),
@@ -92,7 +85,7 @@ def _examples(facts: Facts, there: Collection[int], pictured: Sequence[int]) -> 
 
 def _pictured(result: DriveResult) -> list[int]:
     """Return the evaluated frames that have pictures, or without truth all that have."""
-    evaluated = set(result.frames["frame"]) or set(result.pictured)
+    evaluated = set(result.rows["frame"].tolist()) or set(result.pictured)
     return [number for number in result.pictured if number in evaluated]
 
 
@@ -101,75 +94,56 @@ def _pictured(result: DriveResult) -> list[int]:
 
 def _windows(result: DriveResult) -> tuple[Rows, int]:
     """Return the drive's windows and their size; longer ones where the drive is long."""
-    size = result.facts.evaluation.window
-    count = -(-result.frames["frame"].nunique() // size)
-    if not count or (count <= WINDOWS and len(result.windows)):
-        return result.windows, size
+    size, windows = result.facts.evaluation.window, result.table("windows")
+    count = -(-len(result.rows.distinct("frame")) // size)
+    if not count or (count <= WINDOWS and len(windows)):
+        return windows, size
     size *= -(-count // WINDOWS)
     return as_arrays("windows", window_rows(score.windows(result.rows, size))), size
 
 
-def _paired(result: DriveResult, changes: pd.DataFrame) -> Iterator[PairedComparison]:
+def _paired(result: DriveResult, changes: Rows) -> Iterator[PairedComparison]:
     """Compare filtered against unfiltered, then every variant with the baseline."""
     for each in result.facts.effects:
         if each.final and each.base in (BASELINE, UNFILTERED if each.variant == FILTERED else ""):
-            paired = score.pairs(result.frames, each.variant, each.base)
-            pixels = _changed_pixels(changes, each.variant, each.base)
+            between = (changes["from_variant"] == each.base) & (changes["N"] > 0)
+            own = changes.take(between & (changes["to_variant"] == each.variant))
+            columns = (own[name].tolist() for name in ("repaired", "spoiled", "N"))
+            pixels = next(zip(*columns, strict=True), None)
+            paired = score.pairs(result.rows, each.variant, each.base)
             yield PairedComparison(each.variant, each.base, each.rates, paired, pixels)
 
 
-def _changed_pixels(
-    changes: pd.DataFrame, treated: str, control: str
-) -> tuple[int, int, int] | None:
-    """Return newly right, newly wrong and all labelled pixels from a final mask to another."""
-    between = (changes["from_variant"] == control) & (changes["to_variant"] == treated)
-    for row in changes[between & (changes["N"] > 0)].to_dict("records"):
-        return row["repaired"], row["spoiled"], row["N"]
-    return None
-
-
-def _stage_changes(changes: pd.DataFrame) -> pd.DataFrame:
+def _stage_changes(changes: Rows) -> dict[tuple[str, str], tuple[float, float]]:
     """Return what stages changed, as shares of labelled pixels."""
-    import pandas as pd
-
-    own = changes[(changes["from_variant"] == changes["to_variant"]) & (changes["N"] > 0)]
-    return pd.DataFrame(
-        {
-            "variant": own["to_variant"],
-            "before": own["from_stage"],
-            "after": own["to_stage"],
-            "repaired": own["repaired"] / own["N"],
-            "spoiled": own["spoiled"] / own["N"],
-        }
-    )
+    known = (changes["from_variant"] == changes["to_variant"]) & (changes["N"] > 0)
+    own = changes.take(known)
+    masks = zip(own["to_variant"].tolist(), own["to_stage"].tolist(), strict=True)
+    shares = ((own[name] / own["N"]).tolist() for name in ("repaired", "spoiled"))
+    return dict(zip(masks, zip(*shares, strict=True), strict=True))
 
 
 # --- Masks ----------------------------------------------------------------------------------------
 
 
-def _mask_sums(
-    result: DriveResult, numbers: Sequence[int]
-) -> tuple[pd.DataFrame, pd.DataFrame, int]:
+def _mask_sums(result: DriveResult, numbers: Sequence[int]) -> tuple[Rows, Rows, int]:
     """Return the tables ``changes`` and ``heat``, and the number of frames that they sum up.
 
     A run that was killed did not get to write them: they are made of the masks of evenly spread
     frames then.
     """
-    import pandas as pd
-
-    changes, heat = result.extra("changes"), result.extra("heat")
+    changes, heat = result.table("changes"), result.table("heat")
     if len(changes) or len(heat):
-        return changes, heat, result.frames["frame"].nunique()
+        return changes, heat, len(result.rows.distinct("frame"))
     sample = _sample(result, numbers)
-    made = {"changes": change_rows(sample.changes), "heat": heat_rows(sample.heat)}
-    changes, heat = (pd.DataFrame(as_arrays(name, own).columns) for name, own in made.items())
-    return changes, heat, sample.frames
+    changes = as_arrays("changes", change_rows(sample.changes))
+    return changes, as_arrays("heat", heat_rows(sample.heat)), sample.frames
 
 
 def _sample(result: DriveResult, numbers: Sequence[int]) -> score.Maps:
     """Sum up the masks of evenly spread frames."""
     sums, recording = score.Maps(), result.recording
-    if recording is None or not len(result.frames):
+    if recording is None or not len(result.rows):
         return sums
     for number in evenly(numbers, SAMPLED):
         truth = recording.truth(number)
@@ -187,35 +161,27 @@ def _sample(result: DriveResult, numbers: Sequence[int]) -> score.Maps:
     return sums
 
 
-def _heatmap(variant: str, cells: pd.DataFrame) -> ErrorHeatmap:
+def _heatmap(variant: str, cells: Rows) -> ErrorHeatmap:
     """Spread the cells of a variant's heat map; NaN where none was labelled."""
-    side = cells["side"].to_numpy()[0]
-    rows, columns = (cells[edge].to_numpy() // side for edge in ("top", "left"))
+    rows, columns = (cells[edge] // cells["side"][0] for edge in ("top", "left"))
     shares = np.full((2, rows.max() + 1, columns.max() + 1), np.nan)
     for share, outcome in zip(shares, ("FP", "FN"), strict=True):
         share[rows, columns] = cells[outcome] / cells["labelled"]
     return ErrorHeatmap(variant, shares[0], shares[1])
 
 
-def _coverage(result: DriveResult, numbers: Sequence[int]) -> pd.DataFrame:
+def _coverage(result: DriveResult, numbers: Sequence[int]) -> dict[str, dict[int, float]]:
     """Return without truth how much of the image each final mask covers."""
-    import pandas as pd
-
-    recording = result.recording
-    if recording is None or len(result.frames):
-        return pd.DataFrame()
-    chosen = evenly(numbers, SAMPLED)
-    return pd.DataFrame(
-        {
-            variant.name: [
-                np.nan if mask is None else float(np.mean(mask == 1))
-                for number in chosen
-                for mask in [result.layer(variant.name, variant.stages[-1], number)]
-            ]
-            for variant in recording.variants
-        },
-        index=pd.Index(chosen, name="frame"),
-    )
+    if result.recording is None or len(result.rows):
+        return {}
+    return {
+        variant.name: {
+            number: np.nan if mask is None else float(np.mean(mask == 1))
+            for number in evenly(numbers, SAMPLED)
+            for mask in [result.layer(variant.name, variant.stages[-1], number)]
+        }
+        for variant in result.recording.variants
+    }
 
 
 # --- Many drives ----------------------------------------------------------------------------------

@@ -1,32 +1,50 @@
-"""Frames for a report, picked from a result, with their pictures and facts."""
+"""Frames of a result for a report or a page: which, with their pictures and facts."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, Final
 
-from roadeval.data import BASELINE, ERRORS, FILTERED, TRUTH, UNFILTERED, LayerKind, Rows
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.data import (
+    BASELINE,
+    ERRORS,
+    FILTERED,
+    TRUTH,
+    UNFILTERED,
+    Health,
+    LayerKind,
+    Rows,
+    VariantLayout,
+)
 from roadeval.evaluation import score
 from roadeval.evaluation.metrics import SHORT
+from roadeval.evaluation.settings import NOTEWORTHY
 from roadeval.jobs.result import DriveResult
 from roadeval.recording import Recording
+from roadeval.report.blocks import Strip
+from roadeval.report.charts.rates import over_frames
 from roadeval.report.findings import NotableFrame, PairedComparison
 from roadeval.report.images import ExampleFrame, LayerImage, faded
-
-if TYPE_CHECKING:
-    import pandas as pd
+from roadeval.report.sections.browse import SMALL, BrowsedFrames, FrameFacts, strip
+from roadeval.results.sentences import notes
 
 WORST: Final = 6
 MOVED: Final = 3
-"""Frames that are shown: the worst, and those that the filter helped and harmed most."""
+"""Frames that a report shows: the worst, and those that the filter helped and harmed most."""
 OUTCOMES: Final = 6
 LAYERS: Final = 2
 """Variants of which such a frame shows the errors, and all layers, on paper."""
-
-
-def variants_but_baseline(frames: pd.DataFrame) -> list[str]:
-    """Return the variants of a table that look at the image."""
-    return [name for name in frames["variant"].unique().tolist() if name != BASELINE]
+PICTURED: Final = 24
+"""Frames of a page with pictures, where nobody says how many."""
+BYTES: Final = 9_900_000
+"""Of a page, at most, where nobody says how many frames have pictures."""
+FEWEST: Final = 8
+"""Frames that have pictures even if not every variant's layers have room for it."""
+SHADOW: Final = 1 / 3
+"""A frame with much shadow is among this share of the drive's."""
 
 
 def evenly(numbers: Sequence[int], count: int) -> list[int]:
@@ -37,11 +55,6 @@ def evenly(numbers: Sequence[int], count: int) -> list[int]:
     """
     count = min(count, len(numbers))
     return [numbers[len(numbers) * (2 * i + 1) // (2 * count)] for i in range(count)]
-
-
-def str_keys(values: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return a mapping made by pandas with keys that are text to the type checker, too."""
-    return {str(name): value for name, value in values.items()}
 
 
 def rates_by_frame(
@@ -63,6 +76,20 @@ def rates_by_frame(
     yield from ((*key, rates) for key, rates in found.items())
 
 
+def outcomes(
+    recording: Recording, frame: int, masks: Iterable[tuple[str, npt.NDArray[Any] | None]]
+) -> Iterator[LayerImage]:
+    """Yield the camera, the truth, and each mask's errors, given by its name."""
+    image = recording.image(frame)
+    yield LayerImage("camera", image)
+    yield LayerImage("truth", image, TRUTH, recording.truth(frame))
+    for name, errors in masks:
+        if errors is None:
+            yield LayerImage(f"{name}: no mask", faded(image))
+        else:
+            yield LayerImage(f"{name}: errors", image, ERRORS, errors)
+
+
 class FramePicker:
     """Picks frames of a result and collects their pictures and facts.
 
@@ -80,11 +107,15 @@ class FramePicker:
         self._result = result
         self._outcomes, self._layered = slice(outcomes), slice(layered)
         self._recording = result.recording
-        self._frames = result.frames
-        self._finals = score.final_frames(result.frames)
-        self._variants = variants_but_baseline(result.frames)
+        self._finals = score.finals(result.rows)
+        self._all = result.rows.distinct("variant")
+        self._variants = [name for name in self._all if name != BASELINE]
         self._scored = frozenset(result.rows["frame"].tolist())
         self._causes = {name: score.causes(result.rows, name) for name in self._variants}
+
+    def error_parts(self) -> dict[str, dict[str, float]]:
+        """Return the parts of each variant's mean ERR by stage."""
+        return {name: causes.means() for name, causes in self._causes.items()}
 
     def examples(self, numbers: Sequence[int]) -> list[ExampleFrame]:
         """Return frames for figure 2."""
@@ -108,22 +139,26 @@ class FramePicker:
         """Return the frames that the filter harmed most, or helped most."""
         for pair in paired:
             if (pair.treated, pair.control) == (FILTERED, UNFILTERED):
-                frames = pair.frames
-                stamps, changes = frames["stamp_ns"].to_numpy(), frames["ERR"].to_numpy()
-                places = score.most_changed(stamps, changes, MOVED, harmed=harmed)
-                rows = frames.iloc[places].reset_index().to_dict("records")
-                return [self._notable(row["frame"], row["stamp_ns"], row["ERR"]) for row in rows]
+                stamps, changes = pair.frames["stamp_ns"], pair.frames["ERR"]
+                rows = pair.frames.take(score.most_changed(stamps, changes, MOVED, harmed=harmed))
+                columns = (rows[name].tolist() for name in ("frame", "stamp_ns", "ERR"))
+                return [self._notable(*row) for row in zip(*columns, strict=True)]
         return []
 
-    def pictured(self, frame: int, stamp_ns: int) -> NotableFrame:
-        """Return any frame whose pictures are there, with all of them; without truth, too."""
-        if self._variants and frame in self._scored:
-            return self._notable(frame, stamp_ns)
+    def strip(self, frame: int, inspect: Callable[[int], str] | None, layers: int = SMALL) -> Strip:
+        """Return a frame with its pictures, those of layers of at most so many pixels across."""
+        command = inspect(frame) if inspect else ""
+        return strip(self._pictured(frame), self._all, command, layers)
+
+    def _pictured(self, frame: int) -> NotableFrame:
+        """Return a frame whose pictures are there, with all of them; without truth, too."""
         recording = self._recording
         assert recording is not None
+        if self._variants and frame in self._scored:
+            return self._notable(frame, recording.stamps[frame])
         return NotableFrame(
             frame,
-            stamp_ns,
+            recording.stamps[frame],
             variant="",
             rates={},
             notes=recording.notes(frame),
@@ -132,35 +167,27 @@ class FramePicker:
         )
 
     def _notable(self, frame: int, stamp_ns: int, change: float | None = None) -> NotableFrame:
-        own = self._finals[self._finals["frame"] == frame].set_index("variant")
-        rates = str_keys(own[[*SHORT]].to_dict("index"))
+        own = self._finals.take(self._finals["frame"] == frame)
+        ((_, _, rates),) = rates_by_frame(own, [*SHORT])
         first, recording = self._variants[0], self._recording
-        seen = recording is not None and frame in self._result.pictured
+        seen = recording if recording is not None and frame in self._result.pictured else None
         return NotableFrame(
             frame=frame,
             stamp_ns=stamp_ns,
             variant=first,
-            rates={name: str_keys(each) for name, each in rates.items()},
+            rates=rates,
             parts=self._causes[first].of(frame),
             change=change,
             notes=self._result.notes(frame, first),
-            images=list(self._with_outcomes(recording, frame)) if recording and seen else [],
-            layers=list(self._layers(recording, frame))
-            if recording and seen and change is None
-            else [],
+            images=[*outcomes(seen, frame, self._errors(seen, frame))] if seen else [],
+            layers=[*self._layers(seen, frame)] if seen and change is None else [],
         )
 
-    def _with_outcomes(self, recording: Recording, frame: int) -> Iterator[LayerImage]:
-        """Yield the camera, the truth and each variant's errors."""
-        image = recording.image(frame)
-        yield LayerImage("camera", image)
-        yield LayerImage("truth", image, TRUTH, recording.truth(frame))
+    def _errors(
+        self, recording: Recording, frame: int
+    ) -> Iterator[tuple[str, npt.NDArray[Any] | None]]:
         for variant in recording.variants[self._outcomes]:
-            errors = self._result.layer(variant.name, ERRORS.name, frame)
-            if errors is None:
-                yield LayerImage(f"{variant.name}: no mask", faded(image))
-            else:
-                yield LayerImage(f"{variant.name}: errors", image, ERRORS, errors)
+            yield variant.name, self._result.layer(variant.name, ERRORS.name, frame)
 
     def _layers(self, recording: Recording, frame: int) -> Iterator[list[LayerImage]]:
         """Yield each variant's layers: the stages' masks, and all that is not a mask.
@@ -185,7 +212,7 @@ class FramePicker:
 
     def _outcome(self, recording: Recording, frame: int) -> LayerImage:
         variant = recording.variants[0]
-        if len(self._frames):
+        if self._scored:
             spec = ERRORS
         else:
             spec = next(spec for spec in variant.layers if spec.name == variant.stages[-1])
@@ -197,5 +224,148 @@ class FramePicker:
             v.name: self._result.layer(v.name, v.stages[-1], frame) for v in recording.variants
         }
         there = {name: mask for name, mask in masks.items() if mask is not None}
-        truth = recording.truth(frame) if len(self._frames) else None
+        truth = recording.truth(frame) if self._scored else None
         return ExampleFrame(frame, recording.image(frame), truth, there)
+
+
+# --- Frames of a page -----------------------------------------------------------------------------
+
+
+def browsed(result: DriveResult, inspect: Callable[[int], str] | None) -> BrowsedFrames:
+    """Collect the frames of a result for a page, without their pictures."""
+    frames = result.rows
+    variants = frames.distinct("variant")
+    return BrowsedFrames(
+        frames=list(facts_of(result)),
+        variants=variants,
+        pictured=frozenset(result.pictured),
+        strips=[],
+        charts=over_frames(frames, [*SHORT]) if len(frames) else [],
+        inspect=inspect if result.recording is not None else None,
+        masks=[f"{each.name}: {each.stages[-1]}" for each in _variants(result)],
+    )
+
+
+def _variants(result: DriveResult) -> Sequence[VariantLayout]:
+    return result.recording.variants if result.recording else ()
+
+
+def facts_of(result: DriveResult) -> Iterator[FrameFacts]:
+    """Yield every frame of the table: those evaluated, or without truth those with pictures."""
+    frames = result.rows
+    if not len(frames):
+        stamps = result.recording.stamps if result.recording else {}
+        yield from (FrameFacts(number, stamps[number], {}) for number in result.pictured)
+        return
+    dark = _much_shadow(result)
+    for frame, stamp, rates in rates_by_frame(score.finals(frames), [*SHORT]):
+        blind = rates.get(BASELINE)
+        others = {name: each for name, each in rates.items() if name != BASELINE}
+        yield FrameFacts(
+            frame,
+            stamp,
+            rates,
+            [*_conditions(others, blind), *(["much shadow"] if frame in dark else [])],
+            [*notes(others, blind)],
+        )
+
+
+def _conditions(
+    rates: Mapping[str, Mapping[str, float]],
+    blind: Mapping[str, float] | None,
+) -> Iterator[str]:
+    """Yield what is true of a frame, in words: the first variant's health, and the filter."""
+    first = next(iter(rates), None)
+    if first is None:
+        return
+    health = score.judge(rates[first], blind)
+    if health is not Health.OK:
+        yield f"{first} {health}"
+    if FILTERED in rates and UNFILTERED in rates:
+        change = rates[FILTERED]["ERR"] - rates[UNFILTERED]["ERR"]
+        if abs(change) >= NOTEWORTHY:
+            yield "the filter harms" if change > 0 else "the filter helps"
+    if blind is not None and rates[first]["ERR"] > blind["ERR"]:
+        yield f"{first} worse than {BASELINE}"
+
+
+def _much_shadow(result: DriveResult) -> set[int]:
+    """Return the frames with the most pixels in shadow, as the filter saw them."""
+    regions = result.table("regions")
+    shadow = score.finals(regions.take(regions["region"] == "shadow"))
+    if not len(shadow):
+        return set()
+    first = shadow.of_variant(shadow["variant"][0])
+    much = first["N"] > np.quantile(first["N"], 1 - SHADOW)
+    return set(first["frame"][much].tolist()) if np.ptp(first["N"]) else set()
+
+
+def strips_of(
+    result: DriveResult,
+    inspect: Callable[[int], str] | None,
+    count: int | None = None,
+    taken: int = 0,
+) -> tuple[list[Strip], list[str]]:
+    """Return frames with their pictures, and the variants whose layers had no room.
+
+    In the drive's order: the worst, the best, and others.
+
+    Parameters
+    ----------
+    result
+        Of a recording; a folder has no pictures.
+    inspect
+        Returns the command that opens a frame.
+    count
+        How many. By default as many of `PICTURED` as keep the page below `BYTES`; where that would
+        be fewer than `FEWEST`, only the first variants have their layers.
+    taken
+        Bytes of the page without them.
+    """
+    if result.recording is None:
+        return [], []
+    left_out: list[str] = []
+    chosen, room = _chosen(result, PICTURED if count is None else count), BYTES - taken
+    picker = FramePicker(result, None, None)
+    if count is None and chosen and FEWEST * bytes_of(picker.strip(chosen[0], inspect)) > room:
+        picker = FramePicker(result, None, LAYERS)
+        left_out = [variant.name for variant in result.recording.variants[LAYERS:]]
+    made = (picker.strip(frame, inspect) for frame in chosen)
+    shown = made if count is not None else fitting(made, room)
+    return sorted(shown, key=lambda each: each.frame), left_out
+
+
+def fitting(strips: Iterable[Strip], room: int) -> Iterator[Strip]:
+    """Yield the first strips that have room together."""
+    for made in strips:
+        room -= bytes_of(made)
+        if room < 0:
+            return
+        yield made
+
+
+def bytes_of(made: Strip) -> int:
+    """Return how many bytes of a page a strip takes: pictures as text, with words around each."""
+    return sum(len(image.content) * 4 // 3 + 400 for image in made.images())
+
+
+def _chosen(result: DriveResult, count: int) -> list[int]:
+    """Return frames to picture, the most telling first: bad, good and evenly spread in turn."""
+    rows = result.rows
+    scored_frames = set(rows["frame"].tolist())
+    there = [number for number in result.pictured if number in scored_frames]
+    pictured = there or [*result.pictured]
+    variants = [name for name in rows.distinct("variant") if name != BASELINE]
+    count = min(count, len(pictured))
+    spread = evenly(pictured, count)
+    if not variants:
+        return spread
+    own = rows.take(np.isin(rows["frame"], pictured))
+    worst = score.worst(own, variants[0], count)["frame"].tolist()
+    ranked = score.worst(own, variants[0], len(pictured), 0)["frame"].tolist()
+    best = ranked[::-1]
+    turns: list[int] = []
+    for place in range(count):
+        turns += worst[2 * place : 2 * place + 2]
+        turns += [*best[place : place + 1], *spread[place : place + 1]]
+    return list(dict.fromkeys([*turns, *pictured]))[:count]

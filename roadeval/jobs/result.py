@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -61,6 +61,7 @@ class DriveResult:
         self.path = Path(path)
         self.recording = None if self.path.is_dir() else _recording(self.path)
         self._tables: ResultsFolder | Recording = self.recording or ResultsFolder(self.path)
+        self._read: Final[dict[str, Rows]] = {}
 
     @property
     def complete(self) -> bool:
@@ -112,25 +113,28 @@ class DriveResult:
         assert self._tables.facts is not None
         return self._tables.facts
 
-    @cached_property
+    @property
     def rows(self) -> Rows:
-        """The rows of ``frames.csv``, without pandas."""
+        """The rows of ``frames``."""
         return self.table("frames")
 
     def table(self, name: str) -> Rows:
-        """Return the rows of a table that grew frame by frame, without pandas."""
-        rows = self._tables.rows(name)
-        return rows.take(np.isin(rows["frame"], self._both)) if self._may_be_cut(rows) else rows
+        """Return the rows of a table, as ``oracles``; none where the run counted none.
 
-    @cached_property
+        A killed run may have cut one table: frames that are not in both ``frames`` and ``regions``
+        are left out.
+        """
+        if name not in self._read:
+            rows = self._tables.rows(name)
+            cut = not self.complete and len(rows)
+            self._read[name] = rows.take(np.isin(rows["frame"], self._both)) if cut else rows
+        return self._read[name]
+
+    @property
     def frames(self) -> pd.DataFrame:
-        """The rows of ``frames.csv``."""
-        return self._whole(self._tables.table("frames"))
-
-    @cached_property
-    def regions(self) -> pd.DataFrame:
-        """The rows of ``regions.csv``."""
-        return self._whole(self._tables.table("regions"))
+        """The rows of ``frames`` for pandas."""
+        table = self._tables.table("frames")
+        return table if self.complete else table[table["frame"].isin(self._both)]
 
     @cached_property
     def pictured(self) -> tuple[int, ...]:
@@ -159,16 +163,6 @@ class DriveResult:
         except RecordingError:
             return None
 
-    @cached_property
-    def windows(self) -> Rows:
-        """The rows of ``windows.csv``; none of an incomplete run."""
-        return self._tables.rows("windows")
-
-    @cached_property
-    def levels(self) -> Rows:
-        """The rows of ``probabilities.csv``; none where no variant says how probable road is."""
-        return self._tables.rows("probabilities")
-
     @property
     def properties(self) -> Mapping[str, str | int | float]:
         """The recording's own properties, about its origin; none of a folder."""
@@ -181,17 +175,6 @@ class DriveResult:
         others = {each.name for each in self.recording.variants} - {variant}
         notes = self.recording.notes(frame)
         return tuple(note for note in notes if note.partition(" ")[0] not in others)
-
-    def extra(self, name: str) -> pd.DataFrame:
-        """Read a further table that the run counted, as ``oracles``; empty if it did not."""
-        return self._tables.table(name)
-
-    def _whole(self, table: pd.DataFrame) -> pd.DataFrame:
-        """Keep the rows of frames that stand in both tables; a killed run may have cut one."""
-        return table[table["frame"].isin(self._both)] if self._may_be_cut(table) else table
-
-    def _may_be_cut(self, table: Sized) -> bool:
-        return not self.complete and len(table) > 0
 
     @cached_property
     def _both(self) -> list[int]:
@@ -400,7 +383,7 @@ def _own(result: DriveResult, name: str) -> pd.DataFrame:
 def _alone(result: DriveResult) -> Part:
     return Part(
         *(result.name, result.name, result.facts.sha256),
-        *(len(result.rows) > 0, asked(result.facts.run), cache(result.table)),
+        *(len(result.rows) > 0, asked(result.facts.run), result.table),
     )
 
 

@@ -14,10 +14,10 @@ from typing import Final
 
 from roadeval.errors import RoadevalError
 from roadeval.jobs.inspect import WorstFrame, worst_frames
-from roadeval.jobs.page_frames import StripMaker, browsed
 from roadeval.jobs.progress import OnProgress
 from roadeval.jobs.replayed import CancelledReplayError, Replayer, recording_of
 from roadeval.jobs.report import PICTURED, findings_of
+from roadeval.jobs.report_frames import FramePicker, browsed
 from roadeval.jobs.result import DriveResult, Result
 from roadeval.recording.screen.viewer import WindowViewer
 from roadeval.report.blocks import Document, Heading, LinkList, Strip
@@ -217,9 +217,8 @@ class _ServedDrive(_Served):
         return NOT_FOUND
 
     @cached_property
-    def _maker(self) -> StripMaker:
-        inspect = self._commands.inspect if self._commands else None
-        return StripMaker(self._drive, inspect, LARGE)
+    def _picker(self) -> FramePicker:
+        return FramePicker(self._drive, None, None)
 
     def _picture(self, name: str) -> bytes | None:
         with self._lock:
@@ -230,7 +229,8 @@ class _ServedDrive(_Served):
     def _strip(self, frame: int) -> Strip:
         with self._lock:
             if frame not in self._strips:
-                self._strips[frame] = self._maker.strip(frame)
+                inspect = self._commands.inspect if self._commands else None
+                self._strips[frame] = self._picker.strip(frame, inspect, LARGE)
                 while len(self._strips) > STRIPS:
                     self._strips.popitem(last=False)
             self._strips.move_to_end(frame)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,9 +17,6 @@ from roadeval.report.images import ExampleFrame, LayerImage
 from roadeval.results.facts import Facts, FleetFacts, Totals
 from roadeval.results.schema import FAILED
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairedComparison:
@@ -30,8 +27,8 @@ class PairedComparison:
     """Variants; differences are the first minus the second."""
     differences: Mapping[str, Difference]
     """By rate."""
-    frames: pd.DataFrame
-    """Indexed by ``frame``: ``stamp_ns``, the differences by rate, ``wrong`` (net pixels)."""
+    frames: Rows
+    """See `roadeval.evaluation.score.pairs`."""
     pixels: tuple[int, int, int] | None = None
     """Newly right, newly wrong and labelled pixels of the frames sampled; None if not known."""
 
@@ -104,19 +101,17 @@ class Findings:
     """Evaluated frames in a window."""
     paired: Sequence[PairedComparison]
     """Filtered against unfiltered first, if both were run; then against the baseline."""
-    regions: pd.DataFrame
+    regions: Mapping[tuple[str, str], Mapping[str, float]]
     """See `roadeval.evaluation.score.by_region`."""
     overlap: Mapping[str, Mapping[str, Mapping[str, float]]]
     """IoU, F1 and precision by variant and stage, pooled."""
-    changes: pd.DataFrame
-    """``variant``, ``before``, ``after``, and ``repaired`` and ``spoiled`` as shares of labelled
-    pixels.
-    """
+    changes: Mapping[tuple[str, str], tuple[float, float]]
+    """By variant and stage: the shares of labelled pixels that it repaired and spoiled."""
     error_parts: Mapping[str, Mapping[str, float]]
     """The parts of each variant's mean ERR by stage, see `roadeval.evaluation.score.causes`."""
     heatmaps: Sequence[ErrorHeatmap]
     """One a variant."""
-    oracles: pd.DataFrame
+    oracles: Sequence[Mapping[str, Any]]
     """See `roadeval.evaluation.score.perfect_stages`; empty if the run counted none."""
     levels: Rows
     """As ``probabilities.csv``; empty where no stage says how probable road is."""
@@ -130,8 +125,8 @@ class Findings:
     helped: Sequence[NotableFrame]
     harmed: Sequence[NotableFrame]
     """Frames to look at."""
-    coverage: pd.DataFrame
-    """Without truth: indexed by frame, a variant a column: the share of the image called road."""
+    coverage: Mapping[str, Mapping[int, float]]
+    """Without truth: by variant and frame the share of the image called road."""
 
     @property
     def drive(self) -> str:

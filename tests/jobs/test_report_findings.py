@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
+from roadeval.evaluation.score import Effect
 from roadeval.jobs import report_findings
 from tests.evaluation.making import a_table, rows_of
 from tests.report.making import some_findings
@@ -14,7 +15,7 @@ from tests.report.making import some_findings
 def test_a_long_drive_has_longer_windows_instead_of_more(frames, size, rows):
     table = a_table({("filtered", "post"): [10] * frames})
     facts = some_findings().facts
-    result = SimpleNamespace(facts=facts, frames=table, rows=rows_of(table), windows=[])
+    result = SimpleNamespace(facts=facts, rows=rows_of(table), table=lambda _name: [])
     windows, found = report_findings._windows(result)
     assert found == size
     assert len(windows) == rows
@@ -26,19 +27,22 @@ def test_what_a_stage_changed_is_a_share_of_the_labelled_pixels():
     stages = {"from_stage": "svm", "to_stage": "post"}
     other = {"to_variant": "unfiltered"}
     changes = pd.DataFrame(
-        [row | stages | {"N": 1}, row | stages | {"N": 0}, row | stages | {"N": 5} | other]
+        [row | stages | {"N": 4}, row | stages | {"N": 0}, row | stages | {"N": 5} | other]
     )
-    (found,) = report_findings._stage_changes(changes).to_dict("records")
-    assert (found["variant"], found["before"], found["after"]) == ("filtered", "svm", "post")
-    assert (found["repaired"], found["spoiled"]) == (1, 0)
+    found = report_findings._stage_changes(rows_of(changes))
+    assert found == {("filtered", "post"): (0.25, 0)}
 
 
 def test_pixels_that_changed_between_variants_are_known_where_some_are_labelled():
     row = {"from_variant": "unfiltered", "to_variant": "filtered", "repaired": 3, "spoiled": 2}
 
     def pixels(labelled):
-        changes = pd.DataFrame([row | {"N": labelled}])
-        return report_findings._changed_pixels(changes, "filtered", "unfiltered")
+        changes = rows_of(pd.DataFrame([row | {"N": labelled}]))
+        effect = Effect("unfiltered", "post", "filtered", "post", final=True, rates={})
+        rows = rows_of(a_table({("filtered", "post"): [1], ("unfiltered", "post"): [2]}))
+        result = SimpleNamespace(facts=SimpleNamespace(effects=[effect]), rows=rows)
+        (pair,) = report_findings._paired(result, changes)
+        return pair.pixels
 
     assert pixels(9) == (3, 2, 9)
     assert pixels(0) is None

@@ -5,9 +5,10 @@ import math
 import re
 from dataclasses import fields
 
-import pandas as pd
+import numpy as np
 from pypdf import PdfReader
 
+from roadeval.data import Rows
 from roadeval.evaluation.stats import Difference
 from roadeval.report.blocks import Cell, Document
 from roadeval.report.findings import Commands, Findings, PairedComparison
@@ -60,7 +61,9 @@ def a_difference(mean, low=None, high=None):
 
 def a_pair(changes, wrong, pixels=(30, 10, 1000), control="unfiltered"):
     """Filtered against another, by the frames' changes of ERR and of wrong pixels."""
-    frames = pd.DataFrame({"ERR": changes, "wrong": wrong, "stamp_ns": range(len(changes))})
+    places = np.arange(len(changes))
+    columns = {"ERR": np.array(changes, float), "wrong": np.array(wrong)}
+    frames = Rows({"frame": places, "stamp_ns": places, **columns})
     differences = {rate: a_difference(-0.02, -0.03, -0.01) for rate in ("ERR", "FPR", "FNR")}
     return PairedComparison("filtered", control, differences, frames, pixels)
 
@@ -95,15 +98,15 @@ def some_findings(**changes):
         "windows": NO_WINDOWS,
         "window_size": 10,
         "paired": [],
-        "regions": pd.DataFrame(),
+        "regions": {},
         "overlap": {
             name: {stage: {"IoU": 0.5 + place / 10, "F1": 0.6, "precision": 0.7} for stage in own}
             for place, (name, own) in enumerate(totals.items())
         },
-        "changes": pd.DataFrame(),
+        "changes": {},
         "error_parts": {},
         "heatmaps": [],
-        "oracles": pd.DataFrame(),
+        "oracles": [],
         "levels": NO_LEVELS,
         "sampled": 1200,
         "examples": [],
@@ -111,7 +114,7 @@ def some_findings(**changes):
         "worst": [],
         "helped": [],
         "harmed": [],
-        "coverage": pd.DataFrame(),
+        "coverage": {},
     }
     return Findings(**plain | {n: value for n, value in changes.items() if n not in FACTS})
 

@@ -90,8 +90,7 @@ def test_a_rate_that_is_better_higher_need_not_begin_at_zero(monkeypatch):
 
 
 def test_a_region_has_its_error_rate_and_its_share_of_the_errors():
-    row = {"variant": ["filtered"], "region": ["lit"], "pixels": [0.5], "ERR": [0.1]}
-    table = {name: np.array(column) for name, column in (row | {"errors": [0.3]}).items()}
+    table = {("lit", "filtered"): {"pixels": 0.5, "ERR": 0.1, "errors": 0.3}}
     titles = {"lit": "in light", "dark": "not counted"}
     left, right = rates.regions(table, ["filtered"], titles)
     assert left.names == right.names == ["in light", "not counted"]
@@ -109,7 +108,7 @@ def test_equal_shades_are_equal_shares_in_every_map():
 
 
 def test_the_covered_share_is_in_percent():
-    chart = rates.coverage(np.array([3, 8]), {"filtered": np.array([0.25, 0.5])})
+    chart = rates.coverage({"filtered": {3: 0.25, 8: 0.5}})
     assert numbers(chart.series[0]) == [(3, 25), (8, 50)]
 
 

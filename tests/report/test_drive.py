@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 
-import pandas as pd
-
 from roadeval.report.blocks import Heading
 from roadeval.report.document import document, page_document
 from roadeval.report.sections.browse import BrowsedFrames
@@ -31,7 +29,7 @@ def test_without_truth_there_are_masks_in_place_of_rates():
 def test_with_truth_the_sections_go_from_the_verdict_to_the_settings():
     row = {"variant": "filtered", "region": "lit", "pixels": 1.0, "ERR": 0.1, "errors": 1.0}
     findings = some_findings(
-        regions=pd.DataFrame([row | {"variant": name} for name in VARIANTS]),
+        regions={("interior", name): row for name in VARIANTS},
         error_parts={"filtered": {"svm": 0.2, "post": -0.1}},
         paired=[a_pair([-0.1], [-1])],
     )
@@ -51,7 +49,7 @@ def test_a_page_has_the_sections_of_the_report():
     findings = thresholded()
     findings = replace(
         findings,
-        regions=pd.DataFrame([row | {"variant": name} for name in VARIANTS]),
+        regions={("interior", name): row for name in VARIANTS},
         error_parts={"filtered": {"svm": 0.2, "post": -0.1}},
         overlap={
             variant: dict.fromkeys(stages, OVERLAP) for variant, stages in findings.totals.items()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -17,11 +17,16 @@ from roadeval.data import FILTERED, OUTCOMES, UNFILTERED, Counts, Rows
 from roadeval.data.arrays import Floats
 from roadeval.evaluation import metrics
 from roadeval.evaluation.regions import partitions
-from roadeval.evaluation.score.counts import FourCounts, FrameCounts, Total, Window, cut, sum_up
+from roadeval.evaluation.score.counts import (
+    FourCounts,
+    FrameCounts,
+    Total,
+    Window,
+    cut,
+    means,
+    sum_up,
+)
 from roadeval.evaluation.score.effects import final_stages
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 FILTER: Final = "filter"
 """The part of an error rate that the filter caused, beside the stages'."""
@@ -207,73 +212,67 @@ def _apart(stamps: Ints, ranked: Ints, count: int, apart_ns: int | None = None) 
 # --- Tables of a report ---------------------------------------------------------------------------
 
 
-def final_frames(frames: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of each variant's final mask, as `finals` does for rows of arrays."""
-    masks = frames[["variant", "stage"]].drop_duplicates()
-    last = final_stages(masks.itertuples(index=False))
-    return frames[frames["stage"] == frames["variant"].map(last)]
-
-
-def pairs(frames: pd.DataFrame, treated: str, control: str) -> pd.DataFrame:
-    """Subtract the final masks' rates frame by frame, ``treated`` minus ``control``.
+def pairs(rows: Rows, treated: str, control: str) -> Rows:
+    """Subtract the final masks' ERR frame by frame, ``treated`` minus ``control``.
 
     Returns
     -------
-    DataFrame
-        Indexed by ``frame``, in the drive's order; ``stamp_ns``, a column a rate, and the net
-        change of wrong pixels as ``wrong``.
+    Rows
+        ``frame`` (rising), ``stamp_ns``, ``ERR``, and the net change of wrong pixels as ``wrong``.
     """
-    last = final_frames(frames)
-    columns = ["stamp_ns", *OUTCOMES, *metrics.METRICS]
-    mine, theirs = (
-        last[last["variant"] == name].set_index("frame")[columns] for name in (treated, control)
+    last = finals(rows)
+    mine, theirs = (last.of_variant(name) for name in (treated, control))
+    frames, here, there = np.intersect1d(mine["frame"], theirs["frame"], return_indices=True)
+    mine, theirs = mine.take(here), theirs.take(there)
+    wrong, other = (each["FP"] + each["FN"] for each in (mine, theirs))
+    change = mine["ERR"] - theirs["ERR"]
+    return Rows(
+        {"frame": frames, "stamp_ns": mine["stamp_ns"], "ERR": change, "wrong": wrong - other}
     )
-    mine, theirs = mine.align(theirs, join="inner", axis=0)
-    found = mine[[*metrics.METRICS]] - theirs[[*metrics.METRICS]]
-    found["wrong"] = mine[["FP", "FN"]].sum(axis=1) - theirs[["FP", "FN"]].sum(axis=1)
-    found.insert(0, "stamp_ns", mine["stamp_ns"])
+
+
+def by_region(rows: Rows) -> dict[tuple[str, str], dict[str, float]]:
+    """Pool the final masks' counts by region and variant, of frames or of drives.
+
+    Returns
+    -------
+    dict
+        By region and variant: the rates of short tables, and ``pixels`` and ``errors``: the
+        region's share of all labelled pixels, and of all wrong ones.
+    """
+    last = finals(rows)
+    sums: dict[tuple[str, str], Counts] = {}
+    for variant, _, places in last.masks():
+        names, table = last["region"][places], counts_of(last.take(places))
+        for region in dict.fromkeys(names.tolist()):
+            sums[region, variant] = Counts(*table[names == region].sum(axis=0).tolist())
+    halves = next(iter(partitions([*dict.fromkeys(region for region, _ in sums)])), [])
+    found = {}
+    for (region, variant), counts in sums.items():
+        whole = [sums[half, variant] for half in halves if (half, variant) in sums]
+        rates = {name: metric.function(counts) for name, metric in metrics.SHORT.items()}
+        pixels = counts.n, sum(each.n for each in whole)
+        errors = counts.fp + counts.fn, sum(each.fp + each.fn for each in whole)
+        shares = (part / total if total else np.nan for part, total in (pixels, errors))
+        found[region, variant] = rates | dict(zip(("pixels", "errors"), shares, strict=True))
     return found
 
 
-def by_region(regions: pd.DataFrame) -> pd.DataFrame:
-    """Pool the final masks' counts by variant and region.
+def perfect_stages(oracles: Rows, frames: Rows) -> Iterator[dict[str, Any]]:
+    """Yield the mean rates of final masks once a stage was replaced by the truth.
 
-    Returns
-    -------
-    DataFrame
-        ``variant``, ``region``, the counts, the rates of short tables, and ``pixels`` and
-        ``errors``: the region's share of all labelled pixels, and of all wrong ones.
+    Each has ``variant``, ``oracle``, the rates, the ``frames`` that have both masks, and ``as_is``:
+    the ERR on the same frames as it really is.
     """
-    sums = final_frames(regions).groupby(["variant", "region"], sort=False)[[*OUTCOMES]].sum()
-    counts = [Counts(*row) for row in sums.to_numpy().tolist()]
-    for name, metric in metrics.SHORT.items():
-        sums[name] = [metric.function(each) for each in counts]
-    table = sums.reset_index()
-    wrong, labelled = table["FP"] + table["FN"], table[[*OUTCOMES]].sum(axis=1)
-    halves = table["region"].isin(next(iter(partitions(table["region"].unique().tolist())), []))
-    for column, share in (("pixels", labelled), ("errors", wrong)):
-        whole = share[halves].groupby(table["variant"]).sum()
-        table[column] = share / table["variant"].map(whole)
-    return table
-
-
-def perfect_stages(oracles: pd.DataFrame, frames: pd.DataFrame) -> pd.DataFrame:
-    """Average the final masks' rates once a stage was replaced by the truth.
-
-    Returns
-    -------
-    DataFrame
-        ``variant``, ``oracle``, the rates of short tables, the ``frames`` they are known on, and
-        ``as_is``: the ERR on the same frames as it really is. Empty if nothing was counted.
-    """
-    import pandas as pd
-
-    if not len(oracles):
-        return pd.DataFrame()
-    last = oracles.groupby(["variant", "oracle"], sort=False)["stage"].transform("last")
-    own = final_frames(frames)[["frame", "variant", "ERR"]].rename(columns={"ERR": "as_is"})
-    both = oracles[oracles["stage"] == last].merge(own, on=["frame", "variant"])
-    grouped = both.groupby(["variant", "oracle"], sort=False)
-    sums = grouped[[*metrics.SHORT, "as_is"]].mean()
-    sums["frames"] = grouped.size()
-    return sums.reset_index()
+    last = finals(frames)
+    named = zip(oracles["variant"].tolist(), oracles["oracle"].tolist(), strict=True)
+    for variant, oracle in dict.fromkeys(named):
+        own = oracles.of_variant(variant)
+        own = own.take(own["oracle"] == oracle)
+        own, real = own.take(own["stage"] == own["stage"][-1]), last.of_variant(variant)
+        _, here, there = np.intersect1d(own["frame"], real["frame"], return_indices=True)
+        rates, as_is = (
+            means(metrics.table(counts_of(each))) for each in (own.take(here), real.take(there))
+        )
+        about = {"variant": variant, "oracle": oracle, "frames": len(here)}
+        yield {**about, **rates, "as_is": as_is["ERR"]}

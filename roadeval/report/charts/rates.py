@@ -102,13 +102,13 @@ def _along(
     ]
 
 
-def coverage(frames: Cells, shares: Mapping[str, Cells]) -> Chart:
-    """Return the share of the image that each variant calls road, frame by frame."""
+def coverage(shares: Mapping[str, Mapping[int, float]]) -> Chart:
+    """Return the share of the image that each variant calls road, by frame."""
     return Chart(
         "Share of the image called road",
         ChartKind.LINES,
         [
-            thinned(series(name, look, frames, 100 * shares[name]))
+            thinned(series(name, look, shares[name], 100 * np.array([*shares[name].values()])))
             for name, look in looks([*shares]).items()
         ],
     )
@@ -146,37 +146,44 @@ def _of_stages(
     return series(variant, look, [names.index(stage) for stage in own], values)
 
 
-def regions(table: Rows, variants: Sequence[str], titles: Mapping[str, str]) -> list[Chart]:
+_OF_REGIONS: Final = {"ERR": "ERR within the region", "errors": "Share of the wrong pixels"}
+
+
+def regions(
+    found: Mapping[tuple[str, str], Mapping[str, float]],
+    variants: Sequence[str],
+    titles: Mapping[str, str],
+) -> list[Chart]:
     """Return the error rate in each region, and its share of the errors beside that of pixels.
 
     Parameters
     ----------
-    table
-        ``variant``, ``region``, ``ERR``, ``pixels`` and ``errors``.
+    found
+        See `roadeval.evaluation.score.by_region`.
     variants
         Those to draw, in order.
     titles
         The regions to draw, from top to bottom, with their titles.
     """
-    columns = ("region", "variant", "ERR", "pixels", "errors")
-    rows = {row[:2]: row[2:] for row in zip(*(table[name] for name in columns), strict=True)}
-    missing = (np.nan, np.nan, np.nan)
 
-    def column(place: int, variant: str) -> list[float]:
-        return [in_percent(rows.get((region, variant), missing)[place]) for region in titles]
+    def column(name: str, variant: str) -> list[float]:
+        return [in_percent(found.get((region, variant), {}).get(name)) for region in titles]
 
     return [
         Chart(
             title,
             ChartKind.MARKS,
             [
-                series(name, look, range(len(titles)), column(place, name))
-                for name, look in looks(variants).items()
+                series(variant, look, range(len(titles)), column(name, variant))
+                for variant, look in looks(variants).items()
             ],
             names=[*titles.values()],
-            share=column(1, variants[0]) if place == 2 else (),
+            share=column("pixels", variants[0]) if name == "errors" else (),
         )
-        for place, title in ((0, "ERR within the region"), (2, "Share of the wrong pixels"))
+        for name, title in (
+            ("ERR", "ERR within the region"),
+            ("errors", "Share of the wrong pixels"),
+        )
     ]
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from roadeval.data import BASELINE
 from roadeval.data.words import DASH, defined, listing, number, percent, points
 from roadeval.evaluation.stats import Difference
@@ -45,9 +47,9 @@ def _paired(findings: Findings, pair: PairedComparison) -> Iterator[Block]:
     yield Text(frames_changed(pair))
     if pair.pixels is not None:
         yield Text(pixels_changed(findings, pair))
-    frames, changes = pair.frames.index.to_numpy(), pair.frames["ERR"].to_numpy()
+    columns = pair.frames["frame"], pair.frames["ERR"]
     yield Figure(
-        [difference(frames, changes, pair.treated, pair.control, change)],
+        [difference(*columns, pair.treated, pair.control, change)],
         f"ERR of {pair.treated} minus {pair.control}, frame by frame.",
     )
 
@@ -86,16 +88,14 @@ def _method(change: Difference) -> str:
 
 def frames_changed(pair: PairedComparison) -> str:
     """Return on how many frames the filter lowers ERR, raises it and leaves it."""
-    change = pair.frames["ERR"].dropna()
-    better, worse = int((change < 0).sum()), int((change > 0).sum())
-    same = len(change) - better - worse
-    count = max(len(change), 1)
+    better, same, worse = (int((np.sign(pair.frames["ERR"]) == sign).sum()) for sign in (-1, 0, 1))
+    count = max(better + same + worse, 1)
     parts = [
         f"lowers ERR on {better} frames ({percent(better / count, 0)} %)",
         f"raises it on {worse} ({percent(worse / count, 0)} %)",
         *([f"leaves it on {same} ({percent(same / count, 0)} %)"] if same else []),
     ]
-    return f"Of {len(change)} frames the filter {listing(parts)}."
+    return f"Of {better + same + worse} frames the filter {listing(parts)}."
 
 
 def pixels_changed(findings: Findings, pair: PairedComparison) -> str:

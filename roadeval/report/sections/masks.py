@@ -21,10 +21,8 @@ def section(findings: Findings) -> Iterator[Block]:
     if findings.examples:
         pictures = list(example_pictures(findings.examples))
         yield ImageGrid(pictures, len(variants_of(findings.examples)) + 1)
-    if len(findings.coverage):
-        table = findings.coverage
-        shares = {str(name): table[name].to_numpy() for name in table}
+    if findings.coverage:
         yield Figure(
-            [coverage(table.index.to_numpy(), shares)],
+            [coverage(findings.coverage)],
             "The share of the image that the final masks call road. A jump is worth a look.",
         )

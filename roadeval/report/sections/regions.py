@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from roadeval.data import Rows
 from roadeval.data.words import percent
 from roadeval.evaluation.regions import partitions, titles
 from roadeval.report.blocks import Block, Figure, Heading, Table, Text
@@ -21,17 +20,16 @@ def section(findings: Findings) -> Iterator[Block]:
     """Yield in which parts of the image the errors are."""
     yield Heading("Where the errors are")
     height = findings.facts.drive.height
-    names = titles(findings.regions["region"].unique().tolist(), height)
-    table = Rows({str(name): findings.regions[name].to_numpy() for name in findings.regions})
+    names = titles([*dict.fromkeys(region for region, _ in findings.regions)], height)
     yield Figure(
-        rates.regions(table, [*findings.finals], names),
+        rates.regions(findings.regions, [*findings.finals], names),
         "Error rate within each region, and the region's share of all wrong pixels beside its "
         "share of all pixels: a mark to the right of the grey bar is more than its share.",
     )
     together = len(findings.finals) <= SIDE_BY_SIDE
     for columns in [[*SHARES]] if together else [[column] for column in SHARES]:
         yield regions_table(findings, names, {column: SHARES[column] for column in columns})
-    yield Text(_note(findings), "note")
+    yield Text(_note(findings, names), "note")
     if findings.heatmaps:
         yield Figure(
             [*rates.heat(findings.heatmaps)],
@@ -55,8 +53,7 @@ def regions_table(
         Some of `SHARES`.
     """
     variants = [*findings.finals]
-    found = {(row["region"], row["variant"]): row for row in findings.regions.to_dict("records")}
-    order = [*names]
+    found, order = findings.regions, [*names]
     return Table(
         ["region", "of all, %", *(name for _ in columns for name in variants)],
         [
@@ -78,7 +75,7 @@ def regions_table(
     )
 
 
-def _note(findings: Findings) -> str:
+def _note(findings: Findings, names: Mapping[str, str]) -> str:
     width = findings.facts.run.get("evaluation", {}).get("boundary_width")
     near = f"within {width} pixels of" if width else "near"
     shadow = (
@@ -86,7 +83,7 @@ def _note(findings: Findings) -> str:
         "that is a finding of its own. "
     )
     return (
-        f"{shadow if 'shadow' in findings.regions['region'].array else ''}"
+        f"{shadow if 'shadow' in names else ''}"
         f"Near the road's edge means {near} the border between road "
         "and non-road in the truth. Counts of all evaluated frames together; regions overlap."
     )

@@ -23,7 +23,7 @@ def section(findings: Findings) -> Iterator[Block]:
         "scale.",
     )
     yield stages_table(findings)
-    if len(findings.changes):
+    if findings.changes:
         yield Text(
             "Repaired and spoiled: labelled pixels that the stage has right and the mask before it "
             f"wrong, and the reverse, over {sampled_frames(findings)}.",
@@ -37,16 +37,12 @@ def section(findings: Findings) -> Iterator[Block]:
 
 def stages_table(findings: Findings) -> Table:
     """Tabulate the rates of every stage, and the pixels that it repaired and spoiled."""
-    changes = {
-        (row["variant"], row["after"]): (row["repaired"], row["spoiled"])
-        for row in findings.changes.to_dict("records")
-    }
     rows: list[list[Cell | str]] = []
     breaks = []
     for variant, stages in findings.totals.items():
         breaks.append(len(rows))
         for place, (stage, total) in enumerate(stages.items()):
-            repaired, spoiled = changes.get((variant, stage), (None, None))
+            repaired, spoiled = findings.changes.get((variant, stage), (None, None))
             rows.append(
                 [
                     variant_cell(variant, [*findings.totals]) if place == 0 else "",
@@ -107,7 +103,7 @@ def _meaning(part: str) -> str:
 
 def _oracles(findings: Findings) -> Iterator[Block]:
     """Yield what remains when a stage is replaced by the truth, where the run counted that."""
-    if not len(findings.oracles):
+    if not findings.oracles:
         return
     yield Heading("If a stage were perfect", 2)
     yield Table(
@@ -125,7 +121,7 @@ def _oracles(findings: Findings) -> Iterator[Block]:
                 *(percent(row[name]) for name in SHORT if name != "ERR"),
                 number(row["frames"]),
             ]
-            for row in findings.oracles.to_dict("records")
+            for row in findings.oracles
         ],
         text_columns=(0, 1),
         small=True,

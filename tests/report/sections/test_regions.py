@@ -1,7 +1,5 @@
 """Where the errors are: every region that was counted, with its own numbers."""
 
-import pandas as pd
-
 from roadeval.report.blocks import Figure, Table, Text
 from roadeval.report.sections.regions import section
 from tests.report.making import VARIANTS, plain_rows, some_findings
@@ -9,18 +7,15 @@ from tests.report.making import VARIANTS, plain_rows, some_findings
 
 def table_of(*regions, variants=VARIANTS):
     """A table in which every number is another."""
-    rows = [
-        {
-            "variant": variant,
-            "region": region,
+    return {
+        (region, variant): {
             "pixels": (10 + place) / 100,
             "ERR": (20 + 3 * place + own) / 1000,
             "errors": (400 + 3 * place + own) / 1000,
         }
         for own, variant in enumerate(variants)
         for place, region in enumerate(regions)
-    ]
-    return pd.DataFrame(rows)
+    }
 
 
 def tables(findings):

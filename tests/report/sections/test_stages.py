@@ -1,7 +1,5 @@
 """Which stage broke it: the numbers of each stage, and the parts of the error."""
 
-import pandas as pd
-
 from roadeval.data.words import DASH, MINUS
 from roadeval.report.blocks import Table, Text
 from roadeval.report.sections.stages import section, stages_table
@@ -14,10 +12,7 @@ PARTS = {
 
 
 def test_each_stage_has_its_rates_and_what_it_repaired_and_spoiled():
-    changes = pd.DataFrame(
-        [{"variant": "filtered", "after": "post", "repaired": 0.08, "spoiled": 0.02}]
-    )
-    table = stages_table(some_findings(changes=changes))
+    table = stages_table(some_findings(changes={("filtered", "post"): (0.08, 0.02)}))
     assert table.columns[2:] == ["ERR", "FPR", "FNR", "IoU", "repaired", "spoiled"]
     assert plain_rows(table)[:3] == [
         ["filtered", "svm", "20.00", "21.00", "22.00", "50.00", DASH, DASH],
@@ -49,7 +44,7 @@ def test_the_parts_are_explained():
 
 def test_an_oracle_shows_what_would_change():
     row = {"variant": "filtered", "oracle": "svm", "as_is": 0.1, "frames": 1200}
-    oracles = pd.DataFrame([row | {"ERR": 0.04, "FPR": 0.05, "FNR": 0.06}])
+    oracles = [row | {"ERR": 0.04, "FPR": 0.05, "FNR": 0.06}]
     findings = some_findings(error_parts=PARTS, oracles=oracles)
     *_, table = (block for block in section(findings) if isinstance(block, Table))
     assert plain_rows(table) == [

@@ -5,9 +5,9 @@ import re
 import pytest
 
 import roadeval
-from roadeval.jobs import compare, page_comparison, page_frames
-from roadeval.jobs.page_frames import FEWEST, bytes_of, strips_of
+from roadeval.jobs import compare, page_comparison, report_frames
 from roadeval.jobs.report import page_of
+from roadeval.jobs.report_frames import FEWEST, bytes_of, strips_of
 from roadeval.jobs.result import DriveResult, Result
 from roadeval.report.blocks import FrameBrowser
 from tests.jobs.making import settings, write_log
@@ -50,19 +50,19 @@ def test_where_layers_have_no_room_some_variants_have_none_and_the_page_says_so(
 ):
     result = DriveResult(recording)
     (strip,), _ = strips_of(result, None, 1)
-    monkeypatch.setattr(page_frames, "BYTES", FEWEST * bytes_of(strip) - 1)
+    monkeypatch.setattr(report_frames, "BYTES", FEWEST * bytes_of(strip) - 1)
     strips, left_out = strips_of(result, None)
     assert left_out == ["third", "fourth"]
     assert layered(strips[0]) == ["filtered", "unfiltered"]
-    assert sum(map(bytes_of, strips)) <= page_frames.BYTES
-    monkeypatch.setattr(page_frames, "BYTES", page_frames.BYTES + 10**9)
-    monkeypatch.setattr(page_frames, "FEWEST", 10**6)
+    assert sum(map(bytes_of, strips)) <= report_frames.BYTES
+    monkeypatch.setattr(report_frames, "BYTES", report_frames.BYTES + 10**9)
+    monkeypatch.setattr(report_frames, "FEWEST", 10**6)
     note = browser(page_of(Result(recording))).note
     assert "the layers of third and fourth are left out" in note
 
 
 def test_who_asks_for_a_number_gets_it_with_all_layers(recording, monkeypatch):
-    monkeypatch.setattr(page_frames, "BYTES", 0)
+    monkeypatch.setattr(report_frames, "BYTES", 0)
     strips, left_out = strips_of(DriveResult(recording), None, 5)
     assert len(strips) == 5
     assert left_out == []
