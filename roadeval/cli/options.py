@@ -21,7 +21,7 @@ from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_
 import typer
 
 from roadeval.config.settings import ExecutionSettings, FleetSettings, OutputSettings
-from roadeval.logs.settings import FrameSettings, LabelSettings, TopicSettings
+from roadeval.logs.settings import FrameSettings, LabelPlace, LabelSettings, TopicSettings
 from roadeval.runtime.settings import Flag, meanings
 from roadeval.training.settings import TrainingSettings
 
@@ -69,6 +69,7 @@ TABLES: Final[Mapping[str, tuple[type, str]]] = {
     "": (MethodSettings, "Methods"),
     "output": (OutputSettings, "Output"),
     "training": (TrainingSettings, "Training"),
+    "truth": (LabelPlace, "Truth"),
     "topics": (TopicSettings, "Truth"),
     "labels": (LabelSettings, "Truth"),
     "frames": (FrameSettings, "Range"),
@@ -164,7 +165,7 @@ def _kind(hint: Any) -> tuple[Any, Callable[[str], Any] | None]:
         case typing.Literal:
             return str, None
         case builtins.tuple:
-            return (list[int], None) if _bare(get_args(kind)[0]) is int else (list[str], color)
+            return list[str], value_or_name if _bare(get_args(kind)[0]) is int else color
         case _:
             return list[str], named if get_args(kind)[1] is str else _maybe_named
 
@@ -176,6 +177,11 @@ def _bare(hint: Any) -> Any:
     if get_origin(hint) in (Union, types.UnionType):
         return _bare(next(each for each in get_args(hint) if each is not types.NoneType))
     return hint
+
+
+def value_or_name(text: str) -> int | str:
+    """Read a label's value, or the name of its class."""
+    return int(text) if text.isascii() and text.isdecimal() else text
 
 
 def color(text: str) -> tuple[int, ...]:

@@ -37,7 +37,7 @@ from roadeval.config.variants import (
     Variant,
     check_tables,
     check_variant_name,
-    masks_of,
+    in_drive,
     pipeline_of,
     preset_of,
     variants_of,
@@ -53,7 +53,7 @@ from roadeval.runtime.discovery import Code
 from roadeval.runtime.text import public_url
 from roadeval.training.settings import TrainingSettings
 
-OF_A_LOG: Final[tuple[str, ...]] = ("topics", "labels", "frames", "masks")
+OF_A_LOG: Final[tuple[str, ...]] = ("topics", "truth", "labels", "frames", "masks")
 """The tables that may differ from drive to drive."""
 
 
@@ -128,6 +128,7 @@ class RunConfig(LogConfig):
     """How many drives are replayed together."""
 
     def __post_init__(self) -> None:
+        LogConfig.__post_init__(self)
         names = {variant.name for variant in self.variants()}
         for name in (*self.topics.masks, *self.masks):
             check_variant_name(name, names)
@@ -240,7 +241,11 @@ class RunConfig(LogConfig):
         for drive in self.drives:
             if drive.holds_for(path):
                 config = config._with_drive(drive)
-        return replace(config, masks=masks_of(config.masks, path))
+        for own, each in config.masks.items():
+            if not each.path:
+                raise ConfigError(f"[masks.{own}] has no path: a folder, or LOG.mcap:/topic")
+        masks = {own: in_drive(each, path) for own, each in config.masks.items()}
+        return replace(config, masks=masks, truth=in_drive(config.truth, path))
 
     def _with_drive(self, drive: DriveSettings) -> RunConfig:
         labels = LabelSettings() if "labels" in drive.tables else self.labels
@@ -351,6 +356,6 @@ def log_config(tables: Mapping[str, Any]) -> LogConfig:
     asked = LogConfig()
     found = {
         name: override(getattr(asked, name), tables.get(name, {}), name)
-        for name in ("topics", "labels", "frames")
+        for name in ("topics", "truth", "labels", "frames")
     }
     return replace(asked, **found)

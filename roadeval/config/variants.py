@@ -9,7 +9,7 @@ import os
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from roadeval.config.settings import SECTIONS
 from roadeval.config.tables import ConfigError, either, in_file, override, read_tables
@@ -22,7 +22,7 @@ from roadeval.data import (
     VariantLayout,
     is_plain,
 )
-from roadeval.logs.settings import MaskSettings
+from roadeval.logs.settings import LabelPlace, MaskSettings
 from roadeval.pipeline import stages
 from roadeval.pipeline.chain import Pipeline
 
@@ -65,6 +65,7 @@ DRIVE: Final = "{drive}"
 AS_IT_IS: Final[Mapping[str, Any]] = {"operations": (), "region": "all", "fill": False}
 """Settings of phase 4 that leave a mask as it is."""
 
+Place = TypeVar("Place", bound=LabelPlace)
 Masks = Mapping[str, MaskSettings]
 """Settings of masks in files, by the variant's name."""
 
@@ -255,21 +256,9 @@ def with_masks(current: Masks, tables: Any) -> Masks:
     }
 
 
-def masks_of(masks: Masks, drive: str | os.PathLike[str]) -> Masks:
-    """Return settings with the drive's name in their paths: its file's, without the ending.
-
-    A `ConfigError` if some have no path.
-    """
+def in_drive(place: Place, drive: str | os.PathLike[str]) -> Place:
+    """Return where labels lie, with the drive's name in their paths: its file's, without ending."""
     path = Path(drive)
     name = path.name if path.is_dir() else path.stem
-    for own, each in masks.items():
-        if not each.path:
-            raise ConfigError(f"[masks.{own}] has no path: a folder, or LOG.mcap:/topic")
-    return {
-        own: replace(
-            each,
-            path=each.path.replace(DRIVE, name),
-            images=each.images and each.images.replace(DRIVE, name),
-        )
-        for own, each in masks.items()
-    }
+    images = place.images and place.images.replace(DRIVE, name)
+    return replace(place, path=place.path.replace(DRIVE, name), images=images)

@@ -197,7 +197,8 @@ def seen(entry: DriveEntry, config: RunConfig) -> dict[str, Any] | None:
     ``sure``; else only reading all tells. None where it cannot be looked at.
     """
     try:
-        masks = [file for own in config.masks.values() for file in logs.mask_files(own)]
+        beside = [own for own in (config.truth, *config.masks.values()) if own.path]
+        masks = [file for own in beside for file in logs.label_files(own)]
         times: dict[str, Any] = {str(file): _times(file) for file in masks}
         if entry.path is None:
             facts = stamp(entry.source)

@@ -88,9 +88,11 @@ def asked(
     decides what a run finds.
     """
     plain = {name: replace(each, path="", images=None) for name, each in config.masks.items()}
+    truth = replace(config.truth, path="", images=None)
     nowhere = "" if config.training.adapt else None  # wherever the file lies
     training = replace(config.training, model=nowhere)
     settings = replace(deciding(config).without_places(), training=training, masks=plain)
+    settings = replace(settings, truth=truth)
     parts = [settings.as_dict(), software(config), of, model, masks or {}]
     text = json.dumps(parts, sort_keys=True)
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
@@ -100,7 +102,7 @@ def content_of(path: Path, config: RunConfig, model: str) -> str | None:
     """Return the `identity` of a replay of a log, which is read whole; None if it cannot be."""
     try:
         with logs.open_log(path, config) as log:
-            masks = log.select().digests() if config.masks else {}
+            masks = log.select().digests() if config.masks or config.truth.path else {}
             return asked(config, model, of=log.sha256, masks=masks)
     except RoadevalError:
         return None

@@ -106,35 +106,36 @@ def _missing(run: Run) -> Iterator[str]:
     """Yield a warning where masks of other systems are missing, or belong to no frame."""
     seen = run.frames.accounting
     totals = run.board.totals()
-    for name, masks in run.selection.masks.items():
-        if missing := seen.read - seen.masks[name]:
+    for name, masks in run.selection.labels.items():
+        if name in run.selection.masks and (missing := seen.read - seen.masks[name]):
             without = f"{name}: {missing} of the {seen.read} frames read have no mask of it"
             rest = "it is scored on the others alone" if name in totals else "it has no score"
             yield f"{without}: {rest}"
-        pairing, where = masks.pairing, masks.where
-        if pairing.unsure:
+        shown, where = name.removeprefix("/"), masks.where
+        if unsure := masks.pairing.unsure:
             yield (
-                f"{name}: the last {pairing.unsure} frames of the log have no mask of {where}: "
-                "numbers pair them, and an unknown number of images or masks is lost before them"
+                f"{shown}: the last {unsure} frames of the log have no label of {where}: numbers "
+                "pair them, and an unknown number of images or labels is lost before them"
             )
-        if pairing.unused:
-            yield f"{name}: {pairing.unused} files of {where} belong to no frame"
+        if unused := masks.pairing.unused:
+            yield f"{shown}: {unused} labels of {where} belong to no frame"
+        yield from (f"{shown}: {where}: {note}" for note in masks.notes)
 
 
 def _masks(run: Run) -> dict[str, Any]:
-    """State where masks of other systems lie that are not in the log, and of which frames."""
-    digests = run.selection.digests()
-    return {
-        name: {
-            "path": run.config.masks[name].path,
-            "sha256": digests[name],
-            "pairing": each.why,
-            "meaning": each.meaning.words,
-            "frames": run.frames.accounting.masks[name],
+    """State where labels lie that are not in the log, and how many frames have one."""
+    found, seen = {}, run.frames.accounting
+    for name, digest in run.selection.digests().items():
+        source = run.selection.masks.get(name, run.selection.truth)
+        assert source is not None
+        found[name] = {
+            "path": run.config.masks.get(name, run.config.truth).path,
+            "sha256": digest,
+            "pairing": source.why,
+            "meaning": source.meaning.words,
+            "frames": seen.masks[name] if name in run.selection.masks else seen.labelled,
         }
-        for name, each in run.selection.masks.items()
-        if name in digests
-    }
+    return found
 
 
 def _near_training(run: Run) -> Iterator[str]:

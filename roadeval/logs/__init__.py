@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from roadeval.logs.selection import Selection
     from roadeval.logs.settings import (
         FrameSettings,
+        LabelPlace,
         LabelSettings,
         LogConfig,
         MaskSettings,
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
         parse_time,
     )
     from roadeval.logs.topics.description import TopicInfo
-    from roadeval.logs.truth.source import LabelSource, mask_files
+    from roadeval.logs.truth.source import LabelSource, label_files
     from roadeval.logs.writing.pack import PackResult, pack
     from roadeval.logs.writing.sidecar import NoSidecar, SidecarWriter
     from roadeval.logs.writing.writer import LogWriter
@@ -42,6 +43,7 @@ __all__ = [
     "FrameError",
     "FrameSettings",
     "FrameStream",
+    "LabelPlace",
     "LabelSettings",
     "LabelSource",
     "Log",
@@ -61,7 +63,7 @@ __all__ = [
     "describe",
     "files_of",
     "identity_of",
-    "mask_files",
+    "label_files",
     "natural",
     "open_log",
     "pack",

@@ -180,6 +180,8 @@ def _empty_folder(path: Path) -> str:
 def listed(folder: Path, endings: Collection[str]) -> list[Path]:
     """Return the files of a folder that have one of these endings, in natural order.
 
+    Where there is none, the folders in it are searched.
+
     Raises
     ------
     LogError
@@ -187,6 +189,7 @@ def listed(folder: Path, endings: Collection[str]) -> list[Path]:
     """
     try:
         found = [file for file in folder.iterdir() if file.suffix.lower() in endings]
+        found = found or [file for file in folder.rglob("*") if file.suffix.lower() in endings]
     except NotADirectoryError as error:
         raise LogError(f"{folder}: a file, not a folder") from error
     except FileNotFoundError as error:

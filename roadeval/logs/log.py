@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -18,12 +19,12 @@ from roadeval.logs.files import files_of
 from roadeval.logs.frames import FrameStream
 from roadeval.logs.messages.encoding import TopicKind
 from roadeval.logs.messages.pictures import kind_of, message_stamp
-from roadeval.logs.selection import Selection, settle
+from roadeval.logs.selection import TRUTH, Selection, settle
 from roadeval.logs.settings import NS, LogConfig, MaskSettings, parse_time
-from roadeval.logs.topics.choose import named
+from roadeval.logs.topics.choose import choose_truth, named
 from roadeval.logs.topics.description import TopicInfo, describe_topic, survey
 from roadeval.logs.topics.reader import topic_readers
-from roadeval.logs.truth.folder import labels_in
+from roadeval.logs.truth.beside import labels_in
 from roadeval.logs.truth.named import with_keys
 from roadeval.logs.truth.source import LabelSource, beside_log, log_and_topic
 from roadeval.runtime.text import visible
@@ -163,6 +164,10 @@ class Log:
         """
         try:
             found = settle(self.topics, self._readers, self.config, several=several)
+            if (own := self.config.truth).path:
+                settings = MaskSettings(**vars(own), labels=self.config.labels)
+                truth = self._beside_log(settings, found, several=several)
+                found = replace(found, labels={TRUTH: truth, **found.labels})
             beside = {
                 name: self._masks(name, own, found) for name, own in self.config.masks.items()
             }
@@ -172,23 +177,37 @@ class Log:
 
     def _masks(self, name: str, settings: MaskSettings, found: Selection) -> LabelSource:
         """Settle masks that lie beside the log; errors begin with their variant's name."""
-        place = log_and_topic(settings.path)
         try:
-            if place is None:
-                files = labels_in(Path(settings.path))
-                labels = with_keys(files, settings.path, settings, self._limits)
-                return beside_log(labels, settings, found.camera, lambda: labels.digest)
-            other = open_log(place[0], LogConfig(frames=self.config.frames))
-            self._beside.append(other)
-            topic = named(other.topics, place[1], "topic").name
-            same_log = other.path.resolve() == self.path.resolve()
-            if same_log and found.truth is not None and topic == found.truth.where:
-                raise LogError(f"{topic} is the truth that it is scored against")
-            reader = other._readers[topic]
-            return beside_log(reader, settings, found.camera, lambda: other.sha256, other.name)
+            masks = self._beside_log(settings, found)
+            if found.truth is not None and masks.where == found.truth.where:
+                raise LogError(f"{masks.where} is the truth that it is scored against")
         except LogError as error:
-            reason = str(error).replace("`labels.", f"`masks.{name}.labels.")
+            reason = re.sub(r"`(labels|truth)\.", rf"`masks.{name}.\1.", str(error))
+            reason = reason.replace(f"masks.{name}.truth.", f"masks.{name}.")
             raise LogError(f"`masks` {name}: {reason}") from error
+        return masks
+
+    def _beside_log(
+        self, settings: MaskSettings, found: Selection, *, several: bool = False
+    ) -> LabelSource:
+        """Settle labels of a folder, of an annotation tool's file, or of another log."""
+        log, topic = log_and_topic(settings.path)
+        camera = found.camera
+        if log is None:
+            origin = labels_in(Path(settings.path), camera.topic.size)
+            labels = with_keys(origin, settings.path, settings, self._limits)
+            return beside_log(labels, settings, camera, lambda: labels.digest, several=several)
+        other = open_log(log, LogConfig(frames=self.config.frames))
+        self._beside.append(other)
+        if topic is None:
+            choice = choose_truth(other.topics, camera.topic, None, settings.labels)
+            if choice.topic is None:
+                raise LogError(f"{log}: {choice.why}; name its topic, as {log}:/topic")
+            topic = choice.topic.name
+        reader = other._readers[named(other.topics, topic, "topic").name]
+        same = other.path.resolve() == self.path.resolve()
+        name = "" if same else other.name
+        return beside_log(reader, settings, camera, lambda: other.sha256, name, several=several)
 
     def frames(self, selection: Selection) -> FrameStream:
         """Read the frames of a selection that are asked for, by log time; each call begins anew.

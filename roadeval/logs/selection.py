@@ -57,8 +57,12 @@ class Selection:
         return {name: each for name, each in self.labels.items() if name not in (TRUTH, SHADOW)}
 
     def digests(self) -> dict[str, str]:
-        """Return the SHA-256 of the labels that do not lie in the log, by name."""
-        return {name: each.digest() for name, each in self.labels.items() if each.digest}
+        """Return the SHA-256 of labels that are not in the log: of ``truth``, and masks by name."""
+        return {
+            name.removeprefix("/"): each.digest()
+            for name, each in self.labels.items()
+            if each.digest
+        }
 
     @property
     def size(self) -> tuple[int, int] | None:
@@ -106,7 +110,10 @@ def settle(
     image, why = choose_image(topics, asked.image)
     if image.problem:
         _check_readable(readers[image.name], image)
-    truth = choose_truth(topics, image, asked.truth, config.labels)
+    if config.truth.path:
+        truth = Choice(None, "")
+    else:
+        truth = choose_truth(topics, image, asked.truth, config.labels)
     choices = {TRUTH: truth, SHADOW: choose_shadow(topics, image, asked.shadow, config.labels)}
     for name, topic in asked.masks.items():
         choices[name] = Choice(named(topics, topic, f"`topics.masks` {name}"), "asked for")
@@ -125,7 +132,7 @@ def settle(
             own = MaskSettings(labels=config.labels if name == TRUTH else masks_only)
             reader = readers[chosen.name]
             labels[name] = in_log(reader, own, camera, reason, several=several)
-    no_truth = "" if truth.topic else truth.why
+    no_truth = "" if truth.topic or config.truth.path else truth.why
     return Selection(camera, why, labels, config.frames.scale, no_truth)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Annotated, Final, Literal
 
-from annotated_types import Interval
+from annotated_types import Interval, Len
 
 from roadeval.images.formats import MAX_PIXELS
 from roadeval.logs.errors import LogError
@@ -76,6 +76,7 @@ Time = Annotated[str, Checked(_time)]
 """A moment as `roadeval.logs.parse_time` reads it."""
 Count = Interval(ge=1, le=1_000_000_000)
 Value = Annotated[int, Interval(ge=0, le=65535)]
+Name = Annotated[str, Len(1, 200)]
 Level = Annotated[int, Interval(ge=0, le=255)]
 Color = tuple[Level, Level, Level]
 """Red, green and blue, 0..255 each."""
@@ -112,10 +113,11 @@ class LabelSettings:
     0 and 255 (road), with 128 for ignore; or among 0 and 1 (road), with 255 for ignore.
     """
 
-    road: Annotated[tuple[Value, ...], Flag("--road-label", "V")] = ()
-    """Truth values that are road. Of an image with a palette, its indices."""
-    ignore: Annotated[tuple[Value, ...], Flag("--ignore-label", "V")] = ()
-    """Truth values that are counted nowhere."""
+    road: Annotated[tuple[Value | Name, ...], Flag("--road-label", "V|NAME")] = ()
+    """Truth values that are road, or names of classes where the labels have names. Of an image with
+    a palette, its indices."""
+    ignore: Annotated[tuple[Value | Name, ...], Flag("--ignore-label", "V|NAME")] = ()
+    """Truth values, or names of classes, that are counted nowhere."""
     road_colors: Annotated[tuple[Color, ...], Flag("--road-color", "R,G,B")] = ()
     """Truth colours that are road, red, green and blue."""
     ignore_colors: Annotated[tuple[Color, ...], Flag("--ignore-color", "R,G,B")] = ()
@@ -125,6 +127,14 @@ class LabelSettings:
     most so far from one that means road (255 by default), from 0 or from one to ignore means the
     same; the others lie at edges, and their share is reported. Without it such masks are refused.
     """
+
+    @property
+    def values(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """The values that are road, and those that are ignored; without names."""
+        road, ignore = (
+            tuple(each for each in own if isinstance(each, int)) for own in (self.road, self.ignore)
+        )
+        return road, ignore
 
     def __post_init__(self) -> None:
         if (self.road or self.ignore) and (self.road_colors or self.ignore_colors):
@@ -142,22 +152,33 @@ class LabelSettings:
 
 
 @dataclass(frozen=True)
-class MaskSettings:
+class LabelPlace:
+    """Road truth that lies beside the log, and how it belongs to the log's frames."""
+
+    path: Annotated[str, Flag("--truth", "PATH[:TOPIC]")] = ""
+    """A folder of label images or NPY files, one a frame; files of an annotation tool (COCO, CVAT,
+    LabelMe, YOLO, Label Studio, OpenLABEL); or ``LOG.mcap:/topic``, a topic of another log.
+    ``{drive}`` stands for the name of the drive's file, without its ending."""
+    pair: Annotated[Literal["number", "stamp"] | None, Flag("--truth-pair", "number|stamp")] = None
+    """How labels and frames belong together: by ``number``, the last one in the name of a label's
+    file; or by ``stamp``, the time that the name is (seconds, or milli-, micro- or nanoseconds
+    since 1970). Default: stamps of a log, and of files whose names are all times of more than ten
+    digits."""
+    first: Annotated[int, Interval(ge=0, le=1_000_000_000), Flag("--truth-first", "N")] = 0
+    """The number of the first frame's label."""
+    images: Annotated[str | None, Flag("--truth-images", "FOLDER")] = None
+    """The folder of images that the log was made of, in their order: labels belong to the image of
+    the same name, endings such as ``_mask`` aside. ``{drive}`` stands for the same here."""
+
+    def __post_init__(self) -> None:
+        if self.images is not None and (self.pair is not None or self.first):
+            raise ValueError("with images labels are paired by name: leave out pair and first")
+
+
+@dataclass(frozen=True)
+class MaskSettings(LabelPlace):
     """Another method's road masks that do not lie in the log."""
 
-    path: str = ""
-    """A folder of images or NPY files, one a frame; or ``LOG.mcap:/topic``, a topic of another log.
-    ``{drive}`` stands for the name of the drive's file, without its ending."""
-    pair: Literal["number", "stamp"] | None = None
-    """How masks and frames belong together: by ``number``, for a folder the last number in a file's
-    name; or by ``stamp``, for a folder the time that the name is (seconds, or milli-, micro- or
-    nanoseconds since 1970). By default stamps of a log, and of a folder in which every name is a
-    time of more than ten digits."""
-    first: Annotated[int, Interval(ge=0, le=1_000_000_000)] = 0
-    """The number of the first frame's mask."""
-    images: str | None = None
-    """The folder of images that the log was made of, in their order: masks belong to the image of
-    the same name, endings such as ``_mask`` aside. ``{drive}`` stands for the same here."""
     threshold: Annotated[float | None, Interval(gt=0, le=1)] = None
     """For confidence maps: road is what has at least this confidence. A value of 8 or 16 bits is a
     share of the greatest such value; one with a fraction is from 0 to 1."""
@@ -165,8 +186,7 @@ class MaskSettings:
     """For masks of other values than 0 and 255 (road), or 0 and 1 (road): what they mean."""
 
     def __post_init__(self) -> None:
-        if self.images is not None and (self.pair is not None or self.first):
-            raise ValueError("with images masks are paired by name: leave out pair and first")
+        super().__post_init__()
         if self.threshold is not None and self.labels != LabelSettings():
             raise ValueError("threshold is for confidence maps, labels are for masks of classes")
 
@@ -201,5 +221,10 @@ class LogConfig:
     masks: Mapping[str, MaskSettings] = field(default_factory=dict)
     """Masks of other methods that lie beside the log, by the name of their variant."""
     topics: TopicSettings = field(default_factory=TopicSettings)
+    truth: LabelPlace = field(default_factory=LabelPlace)
     labels: LabelSettings = field(default_factory=LabelSettings)
     frames: FrameSettings = field(default_factory=FrameSettings)
+
+    def __post_init__(self) -> None:
+        if self.truth.path and self.topics.truth:
+            raise LogError("`truth.path` and `topics.truth` both say where the truth is: give one")

@@ -219,7 +219,7 @@ class Facts(_Document):
     log: LogFacts | None = None
     """None of a run that ended early."""
     masks: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """Masks of other systems that are not in the log."""
+    """Labels that are not in the log: masks of other systems by their variant, and ``truth``."""
     tables: dict[str, TableFacts] = field(default_factory=dict)
     files: list[str] = field(default_factory=list)
     """The files of the results folder; a recording has none."""

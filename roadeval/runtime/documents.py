@@ -32,18 +32,23 @@ DOTS: Final = 2_000
 """Parts of a name in TOML; the time to read one grows with the square of their number."""
 
 
-def read_bounded(path: Path) -> bytes:
+def read_bounded(path: Path, most: int = BYTES) -> bytes:
     """Return the bytes of a document; an OSError if it is no file, a ValueError if too large."""
     check_input(path)
     with path.open("rb") as file:
-        content = file.read(BYTES + 1)
-    _check_size(len(content), BYTES)
+        content = file.read(most + 1)
+    _check_size(len(content), most)
     return content
 
 
-def read_json(content: str | bytes, values: int = VALUES) -> Any:
-    """Read a JSON document; a ValueError if it is damaged or beyond a limit."""
-    _check_size(len(content), BYTES)
+def read_json(
+    content: str | bytes, values: int = VALUES, *, most: int = BYTES, shown: bool = True
+) -> Any:
+    """Read a JSON document; a ValueError if it is damaged or beyond a limit.
+
+    The lengths of texts have a limit only where these may be ``shown``.
+    """
+    _check_size(len(content), most)
     comma, bracket, brace = (",", "[", "{") if isinstance(content, str) else (b",", b"[", b"{")
     if sum(map(content.count, (comma, bracket, brace))) > 2 * values:  # type: ignore[arg-type]
         raise ValueError(f"it holds more than {values:,} values")
@@ -51,7 +56,7 @@ def read_json(content: str | bytes, values: int = VALUES) -> Any:
         found = json.loads(content)
     except RecursionError as error:
         raise ValueError(_TOO_DEEP) from error
-    _check(found, values)
+    _check(found, values, shown=shown)
     return found
 
 
@@ -90,7 +95,7 @@ def _check_size(size: int, most: int) -> None:
         raise ValueError(f"it has {size:,} bytes, and at most {most:,} are read")
 
 
-def _check(document: Any, most: int) -> None:
+def _check(document: Any, most: int, *, shown: bool = True) -> None:
     """Raise a ValueError for a document that is too deep, too large or too long to be shown."""
     texts: list[str] = []
     level: list[Any] = [document]
@@ -111,7 +116,8 @@ def _check(document: Any, most: int) -> None:
                     inner += each.values()
                 case list():
                     inner += each
-                    if sum(len(text) for text in each if isinstance(text, str)) > LISTED:
+                    if shown and sum(len(e) for e in each if isinstance(e, str)) > LISTED:
                         raise ValueError(f"a list in it has more than {LISTED:,} letters")
         level = inner
-    check_texts(texts)
+    if shown:
+        check_texts(texts)

@@ -41,8 +41,11 @@ class Checked:
 
 
 def meanings(kind: type) -> Mapping[str, str]:
-    """Return the string after each field in the source of a class; none without a source."""
-    return _meanings(kind.__module__).get(kind.__qualname__, {})
+    """Return the string after each field of a class, and of its bases; none without a source."""
+    found: dict[str, str] = {}
+    for each in reversed(kind.__mro__):
+        found |= _meanings(each.__module__).get(each.__qualname__, {})
+    return found
 
 
 @cache

@@ -11,7 +11,7 @@ from roadeval.cli.options import Given, takes
 
 @takes(
     *("preset", "config", "variants", "nets", "masks", "drives"),
-    *("output", "training", "topics", "labels", "frames", "run"),
+    *("output", "training", "truth", "topics", "labels", "frames", "run"),
 )
 def config(*, given: Given) -> int:
     """Print the whole effective configuration as TOML.

@@ -24,7 +24,7 @@ Drives = Annotated[
 
 @takes(
     *("preset", "config", "variants", "nets", "masks", "drives"),
-    *("training", "topics", "labels", "frames"),
+    *("training", "truth", "topics", "labels", "frames"),
     *("output.record", "fleet"),
 )
 def fleet(

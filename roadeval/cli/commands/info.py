@@ -8,7 +8,7 @@ from roadeval.cli import arguments, console, messages
 from roadeval.cli.options import Given, takes
 
 
-@takes("topics", "labels", "frames.keep_corrupt", "frames.max_pixels")
+@takes("truth", "topics", "labels", "frames.keep_corrupt", "frames.max_pixels")
 def info(drive: arguments.Drive, *, given: Given, json: arguments.Json = False) -> int:
     """Show what is in a log and what replay would pick.
 

@@ -13,7 +13,14 @@ from roadeval.cli.options import Given, takes
 
 @takes(
     *("preset", "config", "variants", "drives", "training.frames"),
-    *("topics.image", "topics.truth", "topics.sync_tolerance_ms", "topics.resize_truth", "labels"),
+    *(
+        "truth",
+        "topics.image",
+        "topics.truth",
+        "topics.sync_tolerance_ms",
+        "topics.resize_truth",
+        "labels",
+    ),
     *("frames.scale", "frames.keep_corrupt", "frames.max_pixels"),
     *("frames.start", "frames.end"),
 )

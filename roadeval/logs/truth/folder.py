@@ -1,4 +1,4 @@
-"""Label format: a folder of images or NPY files, a file a frame."""
+"""Labels that are image files or NPY files, one a frame."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from roadeval.images import Limits
 from roadeval.logs.errors import BadMessage, LogError
-from roadeval.logs.files import IMAGES, listed
 from roadeval.logs.messages.pictures import CompressedPicture, RawPicture
 from roadeval.logs.truth.named import NamedLabel
+from roadeval.runtime.documents import read_bounded
 from roadeval.runtime.files import check_input
 
 NPY: Final = ".npy"
@@ -22,14 +22,23 @@ _LONGEST_HEAD: Final = 1 << 16
 """Bytes in which the head of an NPY file of numbers ends."""
 
 
-def labels_in(path: Path) -> list[NamedLabel]:
-    """List the label files of a folder; a `LogError` if there is none."""
-    if path.suffix == ".mcap" and path.is_file():
-        raise LogError(f"{path}: a log; name a topic of it, as {path}:/topic")
-    return [_label(file) for file in listed(path, IMAGES | {NPY})]
+def colour_names(folder: Path) -> dict[str, int]:
+    """Return the packed colours of the classes in CVAT's ``labelmap.txt``, in or above a folder."""
+    places = [each / "labelmap.txt" for each in (folder, folder.parent)]
+    found = next((place for place in places if place.is_file()), None)
+    if found is None:
+        return {}
+    try:
+        lines = read_bounded(found).decode().splitlines()
+        pairs = [line.split(":")[:2] for line in lines if line.strip() and line[0] != "#"]
+        colours = {name: [int(level) for level in rgb.split(",")] for name, rgb in pairs}
+        return {name: r << 16 | g << 8 | b for name, (r, g, b) in colours.items()}
+    except (OSError, ValueError) as error:
+        raise LogError(f"{found}: not a list of names and colours: {error}") from error
 
 
-def _label(file: Path) -> NamedLabel:
+def file_label(file: Path) -> NamedLabel:
+    """Return the label of an image or NPY file."""
     ending = file.suffix.lower()
     if ending == NPY:
         return NamedLabel(file, partial(_content, file), npy_picture)

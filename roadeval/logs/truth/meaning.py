@@ -25,6 +25,8 @@ from roadeval.logs.messages.pixels import (
     to_rgb,
 )
 from roadeval.logs.settings import Color, LabelSettings
+from roadeval.logs.truth.drawn import UNLABELLED
+from roadeval.logs.truth.named import LabelSet
 
 UNKNOWN: Final = 254
 """Marks a value whose meaning is not known."""
@@ -222,19 +224,19 @@ def understand(
     if labels.tolerance is not None:
         return _within(labels, labels.tolerance, values, name)
     # A mask of 0 and 1 could as well be class ids of a log without the given ones.
-    given = {*labels.road, *labels.ignore}
-    if several and {255} <= {*values} <= _MASKS[0].keys() - given:
+    road, ignore = labels.values
+    if several and {255} <= {*values} <= _MASKS[0].keys() - {*road, *ignore}:
         labels = LabelSettings()
     if labels.road or labels.road_colors:
         return _as_given(labels, values, name, several=several)
     for meaning in _MASKS:
         # A 1 in few pictures of a mask of 0 and 255 may be damage: were it road, all the road would
         # be ignored.
-        road = next(value for value, truth in meaning.items() if truth == ROAD)
-        is_plain = road > 1 or 2 * pictures[road] >= pictures[255]
+        white = next(value for value, truth in meaning.items() if truth == ROAD)
+        is_plain = white > 1 or 2 * pictures[white] >= pictures[255]
         if {*values} <= meaning.keys() and is_plain:
             ignored = [str(value) for value in values if meaning[value] == IGNORE]
-            words = f"a mask of {_listed(map(str, values))}: {_words([str(road)], ignored)}"
+            words = f"a mask of {_listed(map(str, values))}: {_words([str(white)], ignored)}"
             return ClassMap(meaning, UNKNOWN, False, words)
     raise LogError(
         f"{name} holds the values {_listed(map(str, values))}: name those that mean road with "
@@ -246,9 +248,10 @@ def _as_given(labels: LabelSettings, seen: list[int], name: str, *, several: boo
     """Return the meaning of the values, or of the colours, that the settings name."""
     by_color = bool(labels.road_colors)
     ending, text = ("_colors", _color_name) if by_color else ("", str)
+    road, ignore = labels.values
     wanted = {
-        "road": [*labels.road, *map(_packed, labels.road_colors)],
-        "ignore": [*labels.ignore, *map(_packed, labels.ignore_colors)],
+        "road": [*road, *map(_packed, labels.road_colors)],
+        "ignore": [*ignore, *map(_packed, labels.ignore_colors)],
     }
     help_ = "; say with `drives` what holds for this drive alone" if several else ""
     for setting, values in wanted.items():
@@ -262,16 +265,87 @@ def _as_given(labels: LabelSettings, seen: list[int], name: str, *, several: boo
     return ClassMap(meaning, NON_ROAD, by_color, _words(*(map(text, v) for v in wanted.values())))
 
 
+def of_classes(labels: LabelSettings, origin: LabelSet, name: str) -> ClassMap:
+    """Return the meaning of drawn labels, whose classes have names.
+
+    Raises
+    ------
+    LogError
+        If no class is named that means road, or one that does not occur.
+    """
+    classes = origin.classes
+    known = ", ".join(
+        f"{each} ({origin.occurring[each]})" for each in classes if each != UNLABELLED
+    )
+    if not labels.road:
+        raise LogError(
+            f"{name} has the classes {known}: name those that mean road with `labels.road`, and "
+            "those to leave out with `labels.ignore`"
+        )
+    _check_names(labels, classes, f"{name}, which has the classes {known}")
+    meaning = {classes[each]: truth for each, truth in _named(labels).items()}
+    ignored = [*map(str, labels.ignore)]
+    if UNLABELLED in classes and UNLABELLED not in _named(labels):
+        meaning[classes[UNLABELLED]] = IGNORE
+        ignored.append(UNLABELLED)
+    words = _words(map(str, labels.road), ignored)
+    if rest := [each for each in classes if classes[each] not in meaning]:
+        words += f"; {_listed(rest)} and the rest are non-road"
+    return ClassMap(meaning, NON_ROAD, False, words)
+
+
+def with_colours(labels: LabelSettings, origin: LabelSet, name: str) -> LabelSettings:
+    """Replace the names of classes by their colours.
+
+    Raises
+    ------
+    LogError
+        If a class has no such name, or the labels have no names.
+    """
+    names = [*_named(labels)]
+    if not origin.classes:
+        if names:
+            raise LogError(
+                f"`labels.road` {names[0]}: {name} has no names of classes; give the value that "
+                "means road"
+            )
+        return labels
+    if not names:
+        return labels
+    if len(names) < len({*labels.road, *labels.ignore}):
+        raise LogError(f"{name}: give the classes as names or as values, not as both")
+    _check_names(labels, origin.classes, f"{name}, which has the classes {_listed(origin.classes)}")
+    road, ignore = (
+        tuple(_unpacked(origin.classes[str(each)]) for each in own)
+        for own in (labels.road, labels.ignore)
+    )
+    return LabelSettings(road_colors=road, ignore_colors=ignore)
+
+
+def _named(labels: LabelSettings) -> dict[str, int]:
+    """Return the truth of each class that is given by its name."""
+    pairs = [(each, ROAD) for each in labels.road] + [(each, IGNORE) for each in labels.ignore]
+    return {each: truth for each, truth in pairs if isinstance(each, str)}
+
+
+def _check_names(labels: LabelSettings, classes: Mapping[str, int], where: str) -> None:
+    for setting, given in (("road", labels.road), ("ignore", labels.ignore)):
+        for each in given:
+            if each not in classes:
+                raise LogError(f"`labels.{setting}` {each} does not occur in {where}")
+
+
 def _within(labels: LabelSettings, tolerance: int, seen: list[int], name: str) -> ClassMap:
     """Return the meaning of a mask whose values are near the known ones: 0 is non-road."""
-    road, ignore = labels.road or (255,), labels.ignore
+    road, ignore = labels.values
+    given, road = (*road, *ignore), road or (255,)
     meaning = {0: NON_ROAD} | dict.fromkeys(road, ROAD) | dict.fromkeys(ignore, IGNORE)
     for low, high in pairwise(sorted(meaning)):
         if meaning[low] != meaning[high] and high - low <= 2 * tolerance:
             raise LogError(
                 f"{name}: `labels.tolerance` {tolerance} does not keep {low} and {high} apart"
             )
-    for value in (*labels.road, *ignore):
+    for value in given:
         if not any(abs(value - each) <= tolerance for each in seen):
             raise LogError(
                 f"{name} holds nothing within {tolerance} of {value}; its frames hold "
@@ -285,6 +359,10 @@ def pack_colors(colors: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint32]:
     """``(H, W)`` numbers for ``(H, W, 3)`` colours: red * 65536 + green * 256 + blue."""
     wide = colors.astype(np.uint32)
     return np.asarray(wide[..., 0] << 16 | wide[..., 1] << 8 | wide[..., 2], np.uint32)
+
+
+def _unpacked(color: int) -> Color:
+    return color >> 16, color >> 8 & 255, color & 255
 
 
 def _packed(color: Color) -> int:

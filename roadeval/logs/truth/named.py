@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -18,7 +18,7 @@ from roadeval.images import ImageError, Limits
 from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.files import IMAGES, bare, listed, ordered, time_in
 from roadeval.logs.messages.pictures import Picture
-from roadeval.logs.settings import MaskSettings
+from roadeval.logs.settings import LabelPlace
 from roadeval.runtime.text import visible
 
 _LAST_NUMBER: Final = re.compile(r"(\d+)\D*$")
@@ -40,6 +40,21 @@ class NamedLabel:
     """Return the picture of that content; a `BadMessage` or `ImageError` if there is none."""
 
 
+@dataclass(frozen=True, slots=True)
+class LabelSet:
+    """The labels of a folder or a file, and the names of their classes."""
+
+    labels: Sequence[NamedLabel]
+    classes: Mapping[str, int] = field(default_factory=dict)
+    """Values of the classes by their names, where the format has names."""
+    by_color: bool = False
+    """Whether these values are packed colours: red * 65536 + green * 256 + blue."""
+    occurring: Mapping[str, int] = field(default_factory=dict)
+    """In how many labels each class occurs, if that is known without decoding them."""
+    notes: tuple[str, ...] = ()
+    """What a user should know of the labels, a sentence each."""
+
+
 @dataclass(frozen=True, eq=False)
 class NamedLabels:
     """Labels in the order of their keys: the number, or the stamp, of each one's frame."""
@@ -47,6 +62,8 @@ class NamedLabels:
     name: str
     """The folder or file, for messages."""
     labels: tuple[NamedLabel, ...]
+    origin: LabelSet
+    """Where they come from, with the names of their classes."""
     log_times: npt.NDArray[np.int64]
     """``(n,)``: the keys, rising."""
     by: str
@@ -80,6 +97,11 @@ class NamedLabels:
         except (BadMessage, ImageError) as error:
             raise FrameError(f"{self.place(position)}: {error}") from error
 
+    def some(self) -> str:
+        """Return the names of the first three, for messages."""
+        names = ", ".join(visible(label.path.name) for label in self.labels[:3])
+        return names + (", ..." if len(self.labels) > 3 else "")
+
     def place(self, position: int) -> str:
         """Return a label's path, for messages to people."""
         return visible(str(self.labels[position].path))
@@ -97,9 +119,7 @@ class NamedLabels:
         return digest.hexdigest()
 
 
-def with_keys(
-    labels: Sequence[NamedLabel], name: str, settings: MaskSettings, limits: Limits
-) -> NamedLabels:
+def with_keys(origin: LabelSet, name: str, settings: LabelPlace, limits: Limits) -> NamedLabels:
     """Find the key of each label by its name, as the settings ask.
 
     Raises
@@ -107,6 +127,7 @@ def with_keys(
     LogError
         If a name has no key, or two labels have the same.
     """
+    labels = origin.labels
     named = None if settings.images is None else _places(Path(settings.images))
     by, keys = _keys([label.path for label in labels], settings, named)
     found = sorted((label for label in labels if label.path in keys), key=lambda x: keys[x.path])
@@ -116,11 +137,11 @@ def with_keys(
             raise LogError(f"{name}: {both} belong to the same frame, by {by}")
     in_order = np.array([keys[label.path] for label in found], np.int64)
     nameless, images = len(labels) - len(found), None if named is None else len(named)
-    return NamedLabels(visible(name), tuple(found), in_order, by, limits, nameless, images)
+    return NamedLabels(visible(name), tuple(found), origin, in_order, by, limits, nameless, images)
 
 
 def _keys(
-    files: Sequence[Path], settings: MaskSettings, named: Mapping[str, int] | None
+    files: Sequence[Path], settings: LabelPlace, named: Mapping[str, int] | None
 ) -> tuple[str, dict[Path, int]]:
     """Return what the keys are, and that of each file that has one."""
     if named is not None:

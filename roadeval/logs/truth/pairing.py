@@ -6,8 +6,8 @@ where they are needed: around the stamp that is looked for.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import islice
 from typing import Final, Protocol
@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roadeval.logs.errors import LogError
-from roadeval.logs.settings import MaskSettings, TopicSettings
+from roadeval.logs.settings import LabelPlace, TopicSettings
 from roadeval.logs.topics.description import TopicInfo, median_period
 from roadeval.logs.topics.reader import UNREADABLE, TopicReader
 from roadeval.logs.truth.named import NamedLabels
@@ -159,6 +159,16 @@ class Partners:
         return label if _closest(images, theirs, image) == image else None
 
 
+def frames_of(pairing: Pairing, near: int = 0) -> Iterator[int]:
+    """Yield the position of each label's image, in the order of the labels."""
+    images, labels = pairing.images, pairing.labels
+    forth, back = Partners(pairing), Partners(replace(pairing, images=labels, labels=images), near)
+    for label in range(len(labels)):
+        image = back.of(label)
+        if image is not None and forth.of(image) == label:
+            yield image
+
+
 def _closest(stamps: Stamps, stamp: int, hint: int) -> int:
     """Return the position of the nearest stamp (the first of equals); search from a hint."""
 
@@ -225,21 +235,26 @@ def by_time(labels: LabelPictures, camera: Camera) -> Pairing:
 
 
 def check_times(pairing: Pairing, name: str, clock: Clock) -> None:
-    """Refuse, as a `LogError`, labels beside the log whose times are all outside of the frames'."""
+    """Refuse, as a `LogError`, labels beside the log of which none has the time of a frame."""
     if not len(pairing.labels):
-        raise LogError(f"{name}: the log has no times to pair masks by; pair by number")
-    (first, last), (theirs, their_last) = (
-        (each.stamp(0), each.stamp(len(each) - 1)) for each in (pairing.images, pairing.labels)
-    )
-    apart = max(first - their_last, theirs - last)
-    if UNREADABLE not in (first, last, theirs, their_last) and apart > pairing.tolerance:
+        raise LogError(f"{name}: the log has no times to pair by; set `truth.pair` to number")
+    if next(frames_of(pairing), None) is None:
+        theirs, ours = (_some_times(each) for each in (pairing.labels, pairing.images))
         raise LogError(
-            f"{name}: no mask belongs to a frame: theirs are from {theirs} to {their_last} ns, the "
-            f"frames from {first} to {last} ns, by {clock}"
+            f"{name}: none of them belongs to a frame by {clock}: theirs are {theirs} ns, the "
+            f"frames' {ours} ns; at most {pairing.tolerance / 1e6:g} ms may lie between "
+            "(`topics.sync_tolerance_ms`), or pair by number (`truth.pair`)"
         )
 
 
-def by_number(labels: LabelPictures, settings: MaskSettings, images: TopicReader) -> Pairing:
+def _some_times(stamps: Stamps) -> str:
+    """Return the first three times, and the last one, for messages."""
+    count = len(stamps)
+    first = ", ".join(str(stamps.stamp(place)) for place in range(min(3, count)))
+    return first if count <= 3 else f"{first}, ... {stamps.stamp(count - 1)}"
+
+
+def by_number(labels: LabelPictures, settings: LabelPlace, images: TopicReader) -> Pairing:
     """Pair by frame numbers.
 
     Frames after the loss of an unknown number of images, or of another log's labels, have no
@@ -261,21 +276,34 @@ def by_number(labels: LabelPictures, settings: MaskSettings, images: TopicReader
     if named is not None and (named < frames or (named > frames and not cut)):
         raise LogError(
             f"{name}: {settings.images} holds {named} images and the log {frames}, so it was not "
-            "made of all of them: leave `images` out, and pair masks by number or stamp"
+            "made of all of them: leave `truth.images` out, and pair by number or stamp"
         )
     inside = int(np.count_nonzero((keys >= 0) & (keys < frames)))
     if not inside:
-        theirs = f"{keys[0] + first} to {keys[-1] + first}" if len(keys) else "none"
-        what = "no image has the name of one" if named is not None else f"theirs are {theirs}"
         raise LogError(
-            f"{name}: no mask belongs to a frame by {labels.by}: {what}, and the frames' numbers "
-            f"are {first} to {first + frames - 1}"
+            f"{name}: none of them belongs to a frame by {labels.by}: "
+            + (
+                f"no image of {settings.images} has the name of one ({labels.some()})"
+                if named is not None
+                else f"theirs are {keys[0] + first} to {keys[-1] + first} ({labels.some()}), the "
+                f"frames' {first} to {first + frames - 1}{_help(labels, first)}"
+            )
         )
     if named is None and (keys[0], keys[-1], len(keys)) == (1, frames, frames):
         raise LogError(
             f"{name}: its numbers are {first + 1} to {first + frames}, and the frames' {first} to "
-            f"{first + frames - 1}: if its masks begin at the first frame, set first = {first + 1} "
-            "in [masks]"
+            f"{first + frames - 1}: if it begins at the first frame, set `truth.first` to "
+            f"{first + 1}"
         )
     unused = len(labels) - inside + labels.nameless if images.sure == frames else 0
     return Pairing(Times(range(frames), images.sure), labels, 0, unused, frames - images.sure)
+
+
+def _help(labels: NamedLabels, first: int) -> str:
+    """Return the setting by which labels without a frame may find theirs."""
+    keys = labels.log_times
+    by_name = "name the folder of the images that the log was made of with `truth.images`"
+    if keys[-1] - keys[0] == len(keys) - 1:
+        number = keys[0] + first
+        return f": if {number} is the first frame's, set `truth.first` to {number}; or {by_name}"
+    return f": {by_name}"

@@ -16,9 +16,19 @@ from roadeval.logs.errors import BadMessage, FrameError, LogError
 from roadeval.logs.messages.pictures import Picture, RawPicture
 from roadeval.logs.messages.pixels import format_of, size_of
 from roadeval.logs.messages.video import PictureSequence
-from roadeval.logs.settings import MaskSettings
+from roadeval.logs.settings import LabelPlace, MaskSettings
 from roadeval.logs.topics.reader import TopicReader
-from roadeval.logs.truth.meaning import TOP, Confidence, Labels, Meaning, seen_in, understand
+from roadeval.logs.truth.meaning import (
+    TOP,
+    Confidence,
+    Labels,
+    Meaning,
+    of_classes,
+    seen_in,
+    understand,
+    with_colours,
+)
+from roadeval.logs.truth.named import LabelSet, NamedLabels
 from roadeval.logs.truth.pairing import (
     LOOKED_AT,
     Camera,
@@ -55,6 +65,8 @@ class LabelSource:
     """Why they were chosen, or how they are paired, in words."""
     digest: Callable[[], str] | None = None
     """Computes the SHA-256 of what lies beside the log, in hexadecimal."""
+    notes: tuple[str, ...] = ()
+    """What a user should know of labels beside the log, a sentence each."""
 
     @property
     def is_confidence(self) -> bool:
@@ -125,8 +137,10 @@ def beside_log(
     camera: Camera,
     digest: Callable[[], str],
     log: str = "",
+    *,
+    several: bool = False,
 ) -> LabelSource:
-    """Settle the labels of a folder, or of a topic of another ``log``.
+    """Settle labels that have names, or those of a topic of another ``log``.
 
     Raises
     ------
@@ -134,41 +148,46 @@ def beside_log(
         If none belongs to a frame, they cannot be understood, or are of another size.
     """
     if not isinstance(labels, TopicReader):
-        by, count, where = labels.by, f"{len(labels)} files", labels.name
+        by, count, where = labels.by, f"{len(labels)} labels", labels.name
     elif settings.images is None:
-        by, where = settings.pair or "stamp", f"{labels.name} of {log}"
+        by, where = settings.pair or "stamp", f"{labels.name} of {log}" if log else labels.name
         count = f"{len(labels)} messages"
     else:
-        raise LogError("images are for a folder of masks: those of a log have no names")
+        raise LogError("`truth.images` is for labels with names: those of a log have none")
     if by == "stamp":
         pairing = by_time(labels, camera)
         check_times(pairing, labels.name, camera.clock)
     else:
         pairing = by_number(labels, settings, camera.images)
-    words = camera.clock if log and settings.pair is None else by
-    meaning = _meaning(labels, settings, camera)
-    return LabelSource(where, labels, meaning, pairing, f"{count}, paired by {words}", digest)
+    from_log = isinstance(labels, TopicReader)
+    words = camera.clock if from_log and settings.pair is None else by
+    meaning = _meaning(labels, settings, camera, several=several)
+    notes = labels.origin.notes if isinstance(labels, NamedLabels) else ()
+    why = f"{count}, paired by {words}"
+    return LabelSource(where, labels, meaning, pairing, why, digest, notes)
 
 
-def log_and_topic(path: str) -> tuple[str, str] | None:
-    """Return the parts of ``LOG.mcap:/topic``; None of a folder's path.
+def log_and_topic(path: str) -> tuple[str | None, str | None]:
+    """Return the log and the topic that a path of labels names; no log for a folder or a file.
 
     >>> log_and_topic("night/masks.mcap:/net/road")
     ('night/masks.mcap', '/net/road')
     """
-    found = _TOPIC_OF_A_LOG.fullmatch(path)
-    return None if found is None else (found[1], found[2])
+    if (found := _TOPIC_OF_A_LOG.fullmatch(path)) is not None:
+        return found[1], found[2]
+    return (path if path.endswith(".mcap") else None), None
 
 
-def mask_files(settings: MaskSettings) -> list[Path]:
-    """Return the files that hold masks, or give them their frames, even if they do not exist.
+def label_files(settings: LabelPlace) -> list[Path]:
+    """Return the files that hold labels, or give them their frames, even if they do not exist.
 
     An OSError if a folder cannot be listed.
     """
-    place = log_and_topic(settings.path)
-    named = (settings.path if place is None else place[0], settings.images)
-    folders = [Path(each) for each in named if each is not None]
-    return [f for each in folders for f in (sorted(each.iterdir()) if each.is_dir() else [each])]
+    named = (log_and_topic(settings.path)[0] or settings.path, settings.images)
+    paths = [Path(each) for each in named if each is not None]
+    # A file of panoptic labels has a folder of its name beside it.
+    paths += [each.with_suffix("") for each in paths if each.with_suffix("").is_dir()]
+    return [f for each in paths for f in (sorted(each.rglob("*")) if each.is_dir() else [each])]
 
 
 def check_size(labels: str, size: tuple[int, int] | None, camera: Camera) -> None:
@@ -202,6 +221,9 @@ def _meaning(
 
     A `LogError` if their values cannot be understood.
     """
+    origin = labels.origin if isinstance(labels, NamedLabels) else LabelSet(())
+    drawn = bool(origin.occurring)
+    wanted = settings.labels if drawn else with_colours(settings.labels, origin, labels.name)
     confidence = None if settings.threshold is None else Confidence(settings.threshold)
     seen: list[int] = []
     problem, fractions = "", False
@@ -210,10 +232,10 @@ def _meaning(
             if camera is not None:
                 check_size(labels.name, size_of(picture), camera)
             if confidence is None:
-                seen += seen_in(picture, settings.labels, labels.name, labels.limits)
+                seen += seen_in(picture, wanted, labels.name, labels.limits)
             else:
                 seen.append(int(confidence.codes(picture, labels.limits).max()))
-                fractions |= isinstance(picture, RawPicture) and format_of(picture).dtype == "f4"
+                fractions |= _is_fraction(picture)
         except BadMessage as error:
             problem = problem or str(error)
     if not seen:
@@ -221,12 +243,13 @@ def _meaning(
     if confidence is not None:
         _check_confidence(max(seen), labels.name, fractions=fractions)
         return confidence
-    try:
-        return understand(settings.labels, seen, labels.name, several=several)
-    except LogError as error:
-        if camera is None or len(set(seen)) <= _CLASSES:
-            raise
-        raise LogError(f"{error}; or, for confidences, their threshold") from error
+    if drawn:
+        return of_classes(wanted, origin, labels.name)
+    return understand(wanted, seen, labels.name, several=several)
+
+
+def _is_fraction(picture: Picture) -> bool:
+    return isinstance(picture, RawPicture) and format_of(picture).dtype == "f4"
 
 
 def _check_confidence(greatest: int, name: str, *, fractions: bool) -> None:

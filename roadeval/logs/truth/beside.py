@@ -1,0 +1,178 @@
+"""Labels beside the log: a folder of images or NPY files, or files of an annotation tool."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Sequence
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, Final
+from xml.etree.ElementTree import ParseError, fromstring
+
+from roadeval.images import Limits
+from roadeval.logs.errors import BadMessage, LogError
+from roadeval.logs.files import IMAGES, listed
+from roadeval.logs.messages.pictures import Picture, RawPicture
+from roadeval.logs.truth import formats
+from roadeval.logs.truth.drawn import Drawing, Drawn, Size
+from roadeval.logs.truth.folder import NPY, colour_names, file_label
+from roadeval.logs.truth.format import LabelFormat
+from roadeval.logs.truth.named import LabelSet, NamedLabel
+from roadeval.runtime.discovery import found_in
+from roadeval.runtime.documents import read_bounded, read_json
+
+GREATEST: Final = 256 << 20
+"""Bytes of a file of labels."""
+VALUES: Final = 20_000_000
+"""Numbers and texts in it."""
+_TRIED: Final = 8
+"""Files of an ending, of a folder, that are tried for a format."""
+_NOT_SO: Final = (KeyError, TypeError, ValueError, IndexError, AttributeError)
+"""What a reader raises for a file that is not as its format asks."""
+
+
+def labels_in(path: Path, size: Size | None) -> LabelSet:
+    """List the labels in a folder or a file.
+
+    In a folder, files of an annotation tool come before images: these may be the ones that were
+    annotated. A folder without any of both is searched with all below it.
+
+    Parameters
+    ----------
+    path
+        The folder or file.
+    size
+        Width and height of the log's images, if known: some formats have shares of it.
+
+    Raises
+    ------
+    LogError
+        If there is no label, or the file of labels cannot be read.
+    """
+    if path.is_file() and path.suffix.lower() not in _readers():
+        known = ", ".join(sorted({each.name for own in _readers().values() for each in own}))
+        raise LogError(f"{path}: no file of labels; known are folders of images, and {known}")
+    files = [path] if path.is_file() else listed(path, IMAGES | {NPY} | _readers().keys())
+    for ending in _readers():
+        own = [file for file in files if file.suffix.lower() == ending]
+        for file in own[:_TRIED]:
+            if (format_ := _format_of(file, alone=path.is_file())) is not None:
+                return _drawn(own, format_, size)
+    images = [file for file in files if file.suffix.lower() in IMAGES | {NPY}]
+    if not images:
+        raise LogError(f"{path}: no label in it that roadeval can read")
+    by_id = [file for file in images if file.stem.endswith("_labelIds")]  # Cityscapes has others
+    return LabelSet(tuple(map(file_label, by_id or images)), colour_names(path), by_color=True)
+
+
+@cache
+def _readers() -> dict[str, list[LabelFormat]]:
+    """Return the formats by the endings of their files."""
+    found: dict[str, list[LabelFormat]] = {}
+    for each in found_in(formats, "FORMAT"):
+        found.setdefault(each.ending, []).append(each)
+    return found
+
+
+def _format_of(file: Path, *, alone: bool) -> LabelFormat | None:
+    """Return the format of a file; a `LogError` if it is ``alone`` and of no known one."""
+    try:
+        content = _parsed(file)
+    except LogError:
+        if alone:
+            raise
+        return None
+    known = _readers()[file.suffix.lower()]
+    try:
+        found = next((each for each in known if each.holds(file, content)), None)
+    except _NOT_SO:
+        found = None
+    if found is None and alone:
+        raise LogError(f"{file}: not labels of {' or '.join(each.name for each in known)}")
+    return found
+
+
+def _parsed(file: Path) -> Any:
+    """Parse a file by its ending; a `LogError` if it is damaged, or beyond a limit."""
+    try:
+        content = read_bounded(file, GREATEST)
+        match file.suffix.lower():
+            case ".json":
+                return read_json(content, VALUES, shown=False, most=GREATEST)
+            case ".xml":
+                if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
+                    raise ValueError("it defines entities, which labels have no use for")
+                return fromstring(content)
+            case _:
+                return content.decode()
+    except OSError as error:
+        raise LogError(f"{file}: {error.strerror}") from error
+    except (ValueError, ParseError) as error:
+        raise LogError(f"{file}: cannot be read as labels: {error}") from error
+
+
+def _drawn(files: Sequence[Path], format_: LabelFormat, size: Size | None) -> LabelSet:
+    """Read all files of a format. One of several that cannot be read is an unreadable label."""
+    drawn: list[Drawn] = []
+    problems: dict[Path, str] = {}
+    others: list[str] = []
+    for file in files:
+        try:
+            content = _parsed(file)
+            if format_.holds(file, content):
+                drawn += format_.read(file, content, size)
+            else:
+                others.append(file.name)
+        except LogError as error:
+            problems[file] = str(error).removeprefix(f"{file}: ")
+        except _NOT_SO as error:
+            problems[file] = f"not as {format_.name} files are: {type(error).__name__} {error}"
+    labelled = [each for each in drawn if not isinstance(each, Drawing) or each.shapes]
+    if not labelled:
+        file, problem = next(iter(problems.items()), (files[0], f"{format_.name} without a shape"))
+        raise LogError(f"{file}: {problem}")
+    found = Counter(sorted(name for each in labelled for name in each.classes))
+    classes = {name: value for value, name in enumerate(found, 1)}
+    broken = [NamedLabel(each, bytes, partial(_raise, why)) for each, why in problems.items()]
+    return LabelSet(
+        [*(_label(each, classes) for each in labelled), *broken],
+        classes,
+        occurring=found,
+        notes=_notes(drawn, labelled, others),
+    )
+
+
+def _raise(problem: str, *_: Any) -> Picture:
+    raise BadMessage(problem)
+
+
+def _label(drawn: Drawn, classes: dict[str, int]) -> NamedLabel:
+    def picture(content: bytes, limits: Limits) -> Picture:
+        pixels = drawn.pixels(content, classes, limits)
+        height, width = pixels.shape
+        data = pixels.astype("<u2").tobytes()
+        return RawPicture(0, width, height, "mono16", 0, big_endian=False, data=data)
+
+    return NamedLabel(Path(drawn.image), drawn.content, picture)
+
+
+def _notes(
+    drawn: Sequence[Drawn], labelled: Collection[Drawn], others: Sequence[str]
+) -> tuple[str, ...]:
+    """Return what a user should know of the labels, a sentence each."""
+    notes = []
+    if others:
+        notes.append(f"{_some(others)}: of another format than the other labels, not read")
+    if bare := len(drawn) - len(labelled):
+        notes.append(f"{bare} of {len(drawn)} images have no shape, and count as not labelled")
+    beyond = [each.image for each in labelled if isinstance(each, Drawing) and each.is_cut()]
+    if beyond:
+        notes.append(
+            f"{len(beyond)} of {len(labelled)} labels reach beyond their image, and are cut at its "
+            f"edge: {_some(beyond)}"
+        )
+    return tuple(notes)
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(Path(name).name for name in names[:3]) + (", ..." if len(names) > 3 else "")

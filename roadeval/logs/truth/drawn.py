@@ -1,0 +1,179 @@
+"""Labels that annotation tools draw: outlines and runs of pixels, each with the name of a class.
+
+One rule turns an outline into pixels, whichever tool wrote it: a pixel belongs to it if the pixel's
+centre lies inside, by the even-odd rule; the corner of the image is at 0,0 and the centre of its
+first pixel at 0.5,0.5. Where shapes overlap, the later one covers the earlier one.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from roadeval.images import Limits, to_rgb
+from roadeval.logs.errors import BadMessage
+from roadeval.runtime.files import check_input
+
+Mask = npt.NDArray[np.bool_]
+Size = tuple[int, int]
+"""Width and height in pixels."""
+UNLABELLED: Final = "unlabelled"
+"""The class of pixels of which a format says that nobody has labelled them; they are ignored."""
+FARTHEST: Final = 1e6
+"""Pixels from the image's corner at which a point may lie."""
+
+
+class Outline(NamedTuple):
+    """An area inside a ring of points."""
+
+    label: str
+    ring: Sequence[float]
+    """``x, y, x, y, ...`` in pixels."""
+
+    def fill(self, size: Size) -> Mask:
+        """Return the ``(H, W)`` pixels that belong to it; a `BadMessage` if it is no outline."""
+        width, height = size
+        crossings = np.zeros((height, width + 1), np.bool_)
+        points = self._points()
+        for (x, y), (next_x, next_y) in zip(points, np.roll(points, -1, axis=0), strict=True):
+            first, end = np.ceil(np.clip(sorted((y, next_y)), 0, height)).astype(int)
+            if first < end:
+                rows = np.arange(first, end)
+                at = x + (rows - y) * (next_x - x) / (next_y - y)
+                crossings[rows, np.ceil(np.clip(at, 0, width)).astype(int)] ^= True
+        filled: Mask = np.logical_xor.accumulate(crossings, axis=1)[:, :width]
+        return filled
+
+    def _points(self) -> npt.NDArray[np.float64]:
+        """Return the ``(n, 2)`` points of the ring, from the centre of the first pixel."""
+        flat = np.asarray(self.ring, np.float64)
+        if flat.ndim != 1 or len(flat) % 2 or not (np.abs(flat) <= FARTHEST).all():
+            raise BadMessage(f"an outline of {self.label} whose points are no pixels")
+        return flat.reshape(-1, 2) - 0.5
+
+
+def rectangle(label: str, left: float, top: float, right: float, bottom: float) -> Outline:
+    """Return the outline of a rectangle, given two opposite corners in pixels."""
+    return Outline(label, (left, top, right, top, right, bottom, left, bottom))
+
+
+class Runs(NamedTuple):
+    """An area of runs of pixels, alternately outside and inside of it, in a box of the image."""
+
+    label: str
+    lengths: Sequence[int]
+    box: tuple[int, int, int, int] | None = None
+    """Left, top, width and height; the whole image by default."""
+    by_columns: bool = False
+    """Whether the runs go down the columns instead of along the rows."""
+
+    def fill(self, size: Size) -> Mask:
+        """Return the ``(H, W)`` pixels that belong to it; a `BadMessage` if the runs do not fit."""
+        left, top, width, height = self.box or (0, 0, *size)
+        lengths = np.asarray(self.lengths, np.int64)
+        fits = min(left, top) >= 0 and left + width <= size[0] and top + height <= size[1]
+        if not fits or (lengths < 0).any() or lengths.sum() != width * height:
+            raise BadMessage(f"a mask of {self.label} that does not fit its image")
+        inside = np.repeat(np.arange(len(lengths)) % 2 == 1, lengths)
+        filled = np.zeros(size[::-1], np.bool_)
+        filled[top : top + height, left : left + width] = (
+            inside.reshape(width, height).T if self.by_columns else inside.reshape(height, width)
+        )
+        return filled
+
+
+Shape = Outline | Runs
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """The shapes on one image."""
+
+    image: str
+    """The name of the image's file, or a text that ends with the number of its frame."""
+    size: Size | None
+    """Of the image; None where the format does not say."""
+    shapes: Sequence[Shape]
+
+    @property
+    def classes(self) -> set[str]:
+        """The classes that occur."""
+        return {shape.label for shape in self.shapes}
+
+    def is_cut(self) -> bool:
+        """Whether an outline reaches more than a pixel beyond the image."""
+        size, rings = self.size, [each.ring for each in self.shapes if isinstance(each, Outline)]
+        return size is not None and any(
+            not -1 <= float(at) <= size[place % 2] + 1
+            for ring in rings
+            for place, at in enumerate(ring)
+        )
+
+    def content(self) -> bytes:
+        """Return all that decides its pixels."""
+        return json.dumps([self.size, self.shapes]).encode()
+
+    def pixels(
+        self, _content: bytes, values: Mapping[str, int], limits: Limits
+    ) -> npt.NDArray[np.uint16]:
+        """Return the ``(H, W)`` values of the classes, 0 where no shape is.
+
+        Raises
+        ------
+        BadMessage
+            If a shape does not fit the image, or the size of that is not known.
+        """
+        if self.size is None:
+            raise BadMessage("neither the label nor the log says how large the image is")
+        limits.check(*self.size)
+        found = np.zeros(self.size[::-1], np.uint16)
+        for shape in self.shapes:
+            found[shape.fill(self.size)] = values[shape.label]
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Segments:
+    """An image file whose colours are the numbers of segments: red + 256 green + 65536 blue."""
+
+    image: str
+    """As of `Drawing`."""
+    size: Size | None
+    file: Path
+    labels: Mapping[int, str]
+    """The class of each segment; pixels of number 0 are unlabelled."""
+
+    @property
+    def classes(self) -> set[str]:
+        """The classes that occur."""
+        return {*self.labels.values(), UNLABELLED}
+
+    def content(self) -> bytes:
+        """Return all that decides its pixels; an OSError if the file cannot be read."""
+        check_input(self.file)
+        return json.dumps(sorted(self.labels.items())).encode() + b"\n" + self.file.read_bytes()
+
+    def pixels(
+        self, content: bytes, values: Mapping[str, int], limits: Limits
+    ) -> npt.NDArray[np.uint16]:
+        """Return the ``(H, W)`` values of the classes; a `BadMessage` or `ImageError`."""
+        colors = to_rgb(content.partition(b"\n")[2], limits).astype(np.uint32)
+        numbers = colors[..., 0] | colors[..., 1] << 8 | colors[..., 2] << 16
+        known, places = np.unique(numbers, return_inverse=True)
+        labels = {0: UNLABELLED} | dict(self.labels)
+        if unknown := [number for number in known.tolist() if number not in labels]:
+            raise BadMessage(f"{self.file.name} holds a segment {unknown[0]} that has no class")
+        meant: npt.NDArray[np.uint16] = np.array(
+            [values[labels[number]] for number in known.tolist()], np.uint16
+        )
+        return np.asarray(meant[places.reshape(numbers.shape)])
+
+
+Drawn = Drawing | Segments
+"""The label of one image, as a format reads it."""

@@ -1,0 +1,1 @@
+"""Label formats: files in which annotation tools keep shapes, a module for each."""
